@@ -1,0 +1,73 @@
+"""What a reader is.
+
+A reader opens a file without changing it, lists its channels without decoding samples where the format allows, and
+decodes only the channels that are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+from aqualog.types import Channel, ChannelInfo, FileFaults
+
+__all__ = ["ReadOptions", "Reader"]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """What the user says about the files beyond their content.
+
+    `time_channel` and `time_unit` apply to tables (CSV, Parquet); `dbc` decodes raw CAN frames.
+    """
+
+    dbc: tuple[Path, ...] = ()
+    time_channel: str | None = None
+    time_unit: str | None = None
+
+
+class Reader(Protocol):
+    """One open log.
+
+    Every reader is constructed as `XReader(path, options)` and is a context manager. It raises `LogError` for
+    anything that the file's content causes, with the foreign exception as cause.
+    """
+
+    format: str
+
+    def channels(self) -> Sequence[ChannelInfo]:
+        """All channels, in file order; `path` unique."""
+        ...
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
+        """Decode these channels (as given by `channels()`), in the order asked for."""
+        ...
+
+    @property
+    def faults(self) -> FileFaults:
+        """What was lost so far; complete after `read`."""
+        ...
+
+    def close(self) -> None:
+        """Release the file."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None: ...
+
+
+@dataclass(slots=True)
+class FaultLog:
+    """Collects what a reader had to leave out while it works."""
+
+    truncated: bool = False
+    lost_samples: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    def freeze(self) -> FileFaults:
+        """The record for the outside."""
+        return FileFaults(self.truncated, self.lost_samples, tuple(dict.fromkeys(self.notes)))

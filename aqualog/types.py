@@ -1,0 +1,161 @@
+"""Frozen records that the layers share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import polars as pl
+
+__all__ = [
+    "BoolArray", "Channel", "ChannelInfo", "Event", "FileFaults", "FloatArray", "Origin", "Quality", "Signals",
+    "TimeArray", "TimeFaults", "Unavailable",
+]  # fmt: skip
+
+FloatArray = NDArray[np.float64]
+TimeArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """A channel as the file lists it, before any sample is decoded.
+
+    `path` is unique within the file: group, bus, message or topic stand before the name (`ESP_19.ESP_v_Signal`,
+    `/imu/data.linear_acceleration.x`). `key` is the reader's own address and means nothing outside it.
+    """
+
+    path: str
+    name: str
+    unit: str
+    count: int
+    file: str
+    key: Any = field(default=None, compare=False, repr=False)
+    comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Samples of one channel as they stand in the file, in the file's own order.
+
+    `t_ns` are nanoseconds: since 1970 UTC if `absolute`, else on the file's own clock. Nothing is sorted, repaired
+    or dropped by a reader; a sample that the file marks as invalid is NaN.
+    """
+
+    info: ChannelInfo
+    t_ns: TimeArray
+    values: FloatArray
+    absolute: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FileFaults:
+    """What a reader had to leave out. `notes` are sentences for the user."""
+
+    truncated: bool = False
+    lost_samples: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TimeFaults:
+    """Faults of one source's time stamps, classified and counted."""
+
+    duplicates: int = 0
+    back_steps: int = 0
+    resets: int = 0
+    wraps: int = 0
+    pauses: int = 0
+
+    def __add__(self, other: TimeFaults) -> TimeFaults:
+        return TimeFaults(*(getattr(self, n) + getattr(other, n) for n in TimeFaults.__slots__))
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a signal on the grid comes from and what was wrong with it."""
+
+    symbol: str
+    channel: str
+    file: str
+    unit: str
+    rate_hz: float
+    samples: int
+    not_finite: int = 0
+    out_of_range: int = 0
+    invalid_code: int = 0
+    missing_fraction: float = 0.0
+    faults: TimeFaults = field(default_factory=TimeFaults)
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """What was lost on the way from the files to the grid."""
+
+    dropped_samples: int = 0
+    time_jumps: int = 0
+    truncated: bool = False
+    faults: TimeFaults = field(default_factory=TimeFaults)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """All signals of one drive on one time base.
+
+    `frame` has `t` [s] from the first sample and one column per canonical symbol in SI; a value that could not be
+    had is null. `origins` has one entry per symbol; `start_ns` is the absolute time of `t = 0` where the log has it.
+    """
+
+    frame: pl.DataFrame
+    dt_ns: int
+    start_ns: int | None
+    origins: Mapping[str, Origin]
+    quality: Quality
+    files: tuple[str, ...]
+
+    @property
+    def dt(self) -> float:
+        """Sample time. [s]"""
+        return self.dt_ns * 1e-9
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of the columns beside `t`."""
+        return tuple(c for c in self.frame.columns if c != "t")
+
+    def array(self, symbol: str) -> FloatArray:
+        """One column as float array, NaN where missing or where the drive has no such signal. Shape (n,)."""
+        if symbol not in self.frame.columns:
+            return np.full(self.frame.height, np.nan)
+        import polars as pl
+
+        return self.frame[symbol].cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64, copy=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One detection. `peak` and `threshold` are in the unit of the detector's statistic."""
+
+    detector: str
+    wheel: str | None
+    side: str | None
+    start_s: float
+    end_s: float
+    severity: str
+    peak: float
+    threshold: float
+    evidence: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Unavailable:
+    """A detector that could not run and what it lacks."""
+
+    detector: str
+    missing: tuple[str, ...]
