@@ -68,7 +68,7 @@ SYMBOLS: dict[str, Symbol] = {s.name: s for s in _ALL}
 
 # Names that a log may bear beside the canonical ones; each becomes canonical on reading.
 ACCEPTED: dict[str, Symbol] = {
-    "steering_wheel_angle": Symbol("steering_wheel_angle", "rad", "divided by the vehicle's steering_ratio", -25.0, 25.0),
+    "steering_wheel_angle": Symbol("steering_wheel_angle", "rad", "divided by the vehicle's steering_ratio", -25, 25),
     "torque_f": Symbol("torque_f", "N*m", "front axle torque, halved to its wheels", -24000.0, 24000.0),
     "torque_r": Symbol("torque_r", "N*m", "rear axle torque, halved to its wheels", -24000.0, 24000.0),
 }

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 __all__ = [
-    "BoolArray", "Channel", "ChannelInfo", "Event", "FileFaults", "FloatArray", "Origin", "Quality", "Signals",
-    "TimeArray", "TimeFaults", "Unavailable",
+    "BoolArray", "Channel", "ChannelInfo", "DriveResult", "Event", "FileFaults", "FloatArray", "Origin", "Quality",
+    "Signals", "TimeArray", "TimeFaults", "Track", "Unavailable",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -159,3 +159,39 @@ class Unavailable:
 
     detector: str
     missing: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A detector's statistic over the whole drive, on the time base of the signals.
+
+    `statistic` (n,) is NaN where the detector was held or its signals were missing; `active` (n,) is the detection bit.
+    """
+
+    detector: str
+    wheel: str | None
+    side: str | None
+    unit: str
+    statistic: FloatArray
+    threshold: float
+    active: BoolArray
+
+
+@dataclass(frozen=True, slots=True)
+class DriveResult:
+    """Everything that `detect` found in one drive.
+
+    `features` has the rows of `signals.frame` and no `t`: velocity estimate `v_x_hat` [m/s], centre-line wheel speeds
+    `v_w_fl` ... [m/s], differences `v_w_delta_fl` [m/s] (thesis 2.4) and `a_w_delta_fl` [m/s^2] (2.3), traction
+    coefficients `mu_fl` [-], `delta_a_x` [m/s^2] (2.9); a column is there only if its signals are.
+    `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
+    """
+
+    signals: Signals
+    features: pl.DataFrame
+    tracks: tuple[Track, ...]
+    events: tuple[Event, ...]
+    unavailable: tuple[Unavailable, ...]
+    limited: tuple[Unavailable, ...]
+    vehicle_name: str
+    notes: tuple[str, ...] = ()

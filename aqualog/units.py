@@ -85,12 +85,6 @@ _add("time", 3600.0, "h hr")
 _add("ratio", 1.0, "- 1 none None unitless bool Bool boolean enum n/a N/A")
 _add("ratio", 0.01, "% percent Percent pct")
 
-# A label needs no unit; `1/s` on a wheel is taken as rad/s, as the dictionary of the signals says.
-_DIMENSION_OF_SI = {
-    "m/s": "speed", "m/s^2": "acceleration", "rad/s": "angular_speed", "rad": "angle", "N*m": "torque", "N": "force",
-    "m": "length", "Pa": "pressure", "K": "temperature", "s": "time", "-": "ratio", "bool": "ratio", "deg": "angle",
-}  # fmt: skip
-
 
 def is_unit(text: str) -> bool:
     """Whether a spelling is in the table."""
@@ -110,7 +104,8 @@ def parse_unit(text: str, *, where: str = "") -> Unit:
         return found[0]
     near = difflib.get_close_matches(text.strip(), list(_TABLE), n=1, cutoff=0.5)
     hint = f'unit = "{near[0]}" in the signal map' if near else "give the unit in the signal map"
-    raise SignalError(f'unknown unit "{text.strip()}"', where=where, expected="a unit such as km/h, rad/s, g, N*m, bar", hint=hint)
+    expected = "a unit such as km/h, rad/s, g, N*m, bar"
+    raise SignalError(f'unknown unit "{text.strip()}"', where=where, expected=expected, hint=hint)
 
 
 def convert(values: NDArray[np.float64], source: str, target: str, *, where: str = "") -> NDArray[np.float64]:
@@ -134,6 +129,10 @@ def convert(values: NDArray[np.float64], source: str, target: str, *, where: str
         return values
     a, b = parse_unit(source, where=where), parse_unit(target, where=where)
     if a.dimension != b.dimension:
-        raise SignalError(f'unit "{source}" is a {a.dimension}', where=where, expected=f'a {b.dimension} such as "{target}"',
-                          hint="correct the unit or the channel in the signal map")  # fmt: skip
+        raise SignalError(
+            f'unit "{source}" is a {a.dimension}',
+            where=where,
+            expected=f'a {b.dimension} such as "{target}"',
+            hint="correct the unit or the channel in the signal map",
+        )
     return (values * (a.factor / b.factor)) + (a.offset - b.offset) / b.factor

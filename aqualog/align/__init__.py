@@ -1,1 +1,1 @@
-
+"""Channels onto one table: names, units, clocks, grid."""

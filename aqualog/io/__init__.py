@@ -1,1 +1,1 @@
-
+"""Files into channels, and signals into files."""

@@ -14,7 +14,7 @@ from typing import Protocol, Self
 
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
-__all__ = ["ReadOptions", "Reader"]
+__all__ = ["FaultLog", "ReadOptions", "Reader"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,9 @@ class Reader(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
 
 
 @dataclass(slots=True)

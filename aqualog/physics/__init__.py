@@ -1,1 +1,1 @@
-
+"""Pure functions of vehicle, tyre and water; no state, no files."""

@@ -1,1 +1,1 @@
-
+"""Results into pages; no physics here."""
