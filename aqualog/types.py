@@ -95,11 +95,16 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What was lost on the way from the files to the grid."""
+    """What was lost on the way from the files to the grid.
+
+    `dropped_samples` are all samples that were not used; `lost_in_files` those among them that a reader could not get
+    out of a damaged file.
+    """
 
     dropped_samples: int = 0
     time_jumps: int = 0
     truncated: bool = False
+    lost_in_files: int = 0
     faults: TimeFaults = field(default_factory=TimeFaults)
     notes: tuple[str, ...] = ()
 

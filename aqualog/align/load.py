@@ -1,0 +1,66 @@
+"""From files to the table of signals, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from aqualog.align.mapping import SignalMap, resolve
+from aqualog.align.table import build_signals
+from aqualog.io.base import ReadOptions
+from aqualog.io.open_log import DriveLog
+from aqualog.types import Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = ["load_signals", "read_options"]
+
+
+def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
+    """What readers need to know of a signal map."""
+    return ReadOptions(dbc=tuple(dbc), time_channel=signal_map.time_channel, time_unit=signal_map.time_unit)
+
+
+def load_signals(
+    paths: Sequence[Path],
+    *,
+    vehicle: Vehicle,
+    signal_map: SignalMap | None = None,
+    dbc: Sequence[Path] = (),
+    rate_hz: float | None = None,
+    wanted: Callable[[str], bool] = lambda _: True,
+    report: Callable[[str], None] = lambda _: None,
+) -> Signals:
+    """Read the files of one drive and bring their signals onto one grid.
+
+    Only channels that the map (or a canonical name) asks for are decoded.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of one drive.
+    vehicle : Vehicle
+        For wheel speeds in km/h and steering wheel angles.
+    signal_map : SignalMap, optional
+    dbc : sequence of Path
+        Databases for raw CAN frames.
+    rate_hz : float, optional
+        Grid rate; default that of the wheel speeds.
+    wanted : callable
+        Which symbols are of interest.
+    report : callable
+        Told what is being done.
+
+    Raises
+    ------
+    LogError, SignalError, ConfigError
+    """
+    signal_map = signal_map or SignalMap()
+    with DriveLog(paths, read_options(signal_map, dbc)) as log:
+        report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
+        found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+        report(f"reading {len(found)} channels")
+        channels = log.read(info for _, info in found.values())
+        faults = log.faults
+    report("aligning")
+    mapped = {s: (entry, channels[info.file, info.path]) for s, (entry, info) in found.items()}
+    return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)

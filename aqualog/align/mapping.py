@@ -1,0 +1,135 @@
+"""Which channel is which signal: data, not code."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+from aqualog.errors import SignalError
+from aqualog.notation import ACCEPTED, SYMBOLS
+from aqualog.types import ChannelInfo
+
+__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "resolve"]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line of a signal map: SI value = scale * to_SI(raw) + offset.
+
+    `channel` may be a list in order of preference. `unit` overrides what the file says. `invalid` are raw values that
+    mean "no value" (error codes).
+    """
+
+    symbol: str
+    channel: tuple[str, ...]
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    invalid: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SourceClock:
+    """Correction of one source's clock: t = t_file - offset_s - drift_ppm * 1e-6 * (time since the source's start).
+
+    A positive offset means that the source is late.
+    """
+
+    offset_s: float = 0.0
+    drift_ppm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SignalMap:
+    """A signal map; the empty one takes canonical names only."""
+
+    entries: Mapping[str, Entry] = field(default_factory=dict)
+    clocks: Mapping[str, SourceClock] = field(default_factory=dict)
+    time_channel: str | None = None
+    time_unit: str | None = None
+    path: str = ""
+
+    def clock_of(self, file: str) -> SourceClock:
+        """The clock correction of a file, by name or glob pattern."""
+        for pattern, clock in self.clocks.items():
+            if fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern:
+                return clock
+        return SourceClock()
+
+
+def channel_id(info: ChannelInfo) -> str:
+    """`file:path`, unique within a drive of several files."""
+    return f"{info.file}:{info.path}"
+
+
+def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:
+    """Find the channel of every mapped symbol, and of every canonical name that needs no map.
+
+    A map entry matches a channel by `file:path`, by path, by the end of a path after a separator, or by name. It must
+    match exactly one channel.
+
+    Raises
+    ------
+    SignalError
+        If a mapped channel is missing or ambiguous; all faults in one message.
+    """
+    found: dict[str, tuple[Entry, ChannelInfo]] = {}
+    faults: list[str] = []
+    for symbol, entry in signal_map.entries.items():
+        matches = next((m for m in (_matching(channels, c) for c in entry.channel) if m), [])
+        if len(matches) == 1:
+            found[symbol] = (entry, matches[0])
+        elif not matches:
+            faults.append(f"{symbol}: no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
+        else:
+            faults.append(f"{symbol}: channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
+    for symbol in (*SYMBOLS, *ACCEPTED):
+        if symbol in signal_map.entries:
+            continue
+        matches = [c for c in channels if c.name == symbol]
+        if len(matches) == 1:
+            found[symbol] = (Entry(symbol, (matches[0].path,)), matches[0])
+        elif len(matches) > 1:
+            faults.append(f"{symbol}: several channels bear this name: {_listed(matches)}")
+    if faults:
+        raise SignalError(
+            "; ".join(faults),
+            where=signal_map.path or (channels[0].file if channels else ""),
+            hint="name one channel each in a signal map; `aqualog inspect LOG` lists them",
+        )
+    return found
+
+
+def _matching(channels: Iterable[ChannelInfo], wanted: str) -> list[ChannelInfo]:
+    listed = list(channels)
+    for test in (
+        lambda c: channel_id(c) == wanted,
+        lambda c: c.path == wanted,
+        lambda c: _ends_with_path(channel_id(c), wanted),
+        lambda c: c.name == wanted,
+    ):
+        hits = [c for c in listed if test(c)]
+        if hits:
+            return hits
+    return []
+
+
+def _ends_with_path(path: str, wanted: str) -> bool:
+    return path.endswith(wanted) and len(path) > len(wanted) and path[-len(wanted) - 1] in "./:"
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return " or ".join(f'"{n}"' for n in names)
+
+
+def _listed(matches: Sequence[ChannelInfo]) -> str:
+    text = ", ".join(channel_id(m) + (f" [{m.unit}]" if m.unit else "") for m in matches[:4])
+    return text + (f" and {len(matches) - 4} more" if len(matches) > 4 else "")
+
+
+def _nearest(wanted: Sequence[str], channels: Sequence[ChannelInfo]) -> str:
+    names = sorted({c.path for c in channels} | {c.name for c in channels})
+    near = difflib.get_close_matches(wanted[0], names, n=1, cutoff=0.5)
+    return f' (nearest: "{near[0]}")' if near else ""

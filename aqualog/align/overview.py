@@ -1,0 +1,119 @@
+"""What a channel holds at a glance: rate, range, gaps, faults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.align.resample import median_period_ns
+from aqualog.align.timebase import ClockRepair
+from aqualog.types import Channel, TimeFaults
+from aqualog.units import is_unit, parse_unit
+
+__all__ = ["ChannelOverview", "find_mounting", "overview"]
+
+_G = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelOverview:
+    """Figures of one channel; `low`, `high`, `mean` in the channel's own unit, NaN without a finite sample."""
+
+    file: str
+    path: str
+    name: str
+    unit: str
+    samples: int
+    rate_hz: float
+    start_s: float
+    end_s: float
+    low: float
+    high: float
+    mean: float
+    not_finite: int
+    gaps: int
+    longest_gap_s: float
+    faults: TimeFaults
+    remark: str = ""
+
+
+def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
+    """Figures of one channel. Times count from `origin_ns`; a gap is more than five median sample times."""
+    t_ns, _, faults = ClockRepair().repair(channel.t_ns)
+    finite = channel.values[np.isfinite(channel.values)]
+    steps = np.diff(t_ns)
+    period = median_period_ns(t_ns)
+    gaps = steps[steps > 5 * max(period, 1)]
+    return ChannelOverview(
+        file=channel.info.file,
+        path=channel.info.path,
+        name=channel.info.name,
+        unit=channel.info.unit,
+        samples=channel.values.size,
+        rate_hz=1e9 / float(steps[steps <= 5 * period].mean()) if period else 0.0,
+        start_s=float(t_ns[0] - origin_ns) * 1e-9 if t_ns.size else np.nan,
+        end_s=float(t_ns[-1] - origin_ns) * 1e-9 if t_ns.size else np.nan,
+        low=float(finite.min()) if finite.size else np.nan,
+        high=float(finite.max()) if finite.size else np.nan,
+        mean=float(finite.mean()) if finite.size else np.nan,
+        not_finite=int(channel.values.size - finite.size),
+        gaps=int(gaps.size),
+        longest_gap_s=float(gaps.max()) * 1e-9 if gaps.size else 0.0,
+        faults=faults,
+        remark=_remark(channel, finite),
+    )
+
+
+def _remark(channel: Channel, finite: np.ndarray) -> str:  # type: ignore[type-arg]
+    if finite.size == 0:
+        return "no value"
+    if finite.size > 10 and finite.min() == finite.max():
+        return "constant"
+    top = finite.max()
+    is_code = top >= 255 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
+    if is_code and finite.size > 10 and (finite == top).mean() < 0.2:
+        return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
+    return ""
+
+
+def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
+    """Sentences on three-axis accelerometers whose vertical is not z.
+
+    Gravity tells how a sensor is mounted: on a car whose sensor stands upright, the mean of z is about 1 g and those of
+    x and y are small.
+    """
+    sentences = []
+    for stem, axes in _triples(found).items():
+        factor = _acceleration_factor(axes["x"].unit)
+        mean = {a: axes[a].mean * factor for a in "xyz"}
+        total = float(np.sqrt(sum(v * v for v in mean.values())))
+        if not 0.8 * _G < total < 1.2 * _G:
+            continue
+        down = max(mean, key=lambda a: abs(mean[a]))
+        tilt = float(np.degrees(np.arccos(min(abs(mean[down]) / total, 1.0))))
+        listed = ", ".join(f"{a} {mean[a]:+.2f}" for a in "xyz")
+        if down != "z":
+            sentences.append(
+                f"{stem}: gravity is on {down} (mean {listed} m/s^2), so the sensor is mounted rotated; its axes are "
+                f"not the car's: {down} is vertical and carries no driving acceleration"
+            )
+        elif tilt > 3.0:
+            sentences.append(f"{stem}: tilted by {tilt:.0f} deg (mean {listed} m/s^2); x and y hold part of gravity")
+    return sentences
+
+
+def _triples(found: Iterable[ChannelOverview]) -> dict[str, dict[str, ChannelOverview]]:
+    groups: dict[str, dict[str, ChannelOverview]] = {}
+    for channel in found:
+        axis = channel.name[-1:].lower()
+        if axis in "xyz" and axis and _acceleration_factor(channel.unit) > 0 and np.isfinite(channel.mean):
+            groups.setdefault(f"{channel.file}:{channel.path[:-1]}*", {})[axis] = channel
+    return {stem: axes for stem, axes in groups.items() if len(axes) == 3}
+
+
+def _acceleration_factor(unit: str) -> float:
+    if not is_unit(unit) or parse_unit(unit).dimension != "acceleration":
+        return 0.0
+    return parse_unit(unit).factor

@@ -1,0 +1,275 @@
+"""Propose a signal map for a log with names of its own.
+
+Names say which channel a signal may be, units rule out what cannot be, and the data decide among what is left: an
+accelerometer must move with the derivative of the speed, a yaw rate with the difference of the wheels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.align.mapping import Entry, channel_id
+from aqualog.align.resample import linear
+from aqualog.align.timebase import ClockRepair
+from aqualog.notation import ACCEPTED, SYMBOLS, WHEELS
+from aqualog.types import Channel, FloatArray, TimeArray
+from aqualog.units import is_unit, parse_unit
+
+__all__ = ["Proposal", "propose_map"]
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A channel proposed for a symbol, and why."""
+
+    entry: Entry
+    reason: str
+    score: float
+
+
+_POSITIONS = {
+    "fl": ("fl", "vl", "lf", "front left", "left front", "vorne links", "frontleft", "leftfront"),
+    "fr": ("fr", "vr", "rf", "front right", "right front", "vorne rechts", "frontright", "rightfront"),
+    "rl": ("rl", "hl", "lr", "rear left", "left rear", "hinten links", "rearleft", "leftrear"),
+    "rr": ("rr", "hr", "rear right", "right rear", "hinten rechts", "rearright", "rightrear"),
+}
+_NOT_A_VALUE = {
+    "fault", "valid", "status", "qbit", "counter", "checksum", "crc", "flag", "state", "error", "quality", "accuracy",
+    "offset", "sensor", "max", "min", "req", "request", "requested", "target", "displayed", "init", "initializing",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """One of `words` in the name and a unit of `dimensions` ("" = none given); `bonus` words raise the score."""
+
+    symbol: str
+    words: tuple[str, ...]
+    dimensions: tuple[str, ...]
+    bonus: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+    fallback_unit: str = ""
+
+
+_WHEEL_WORDS = ("wheel", "whl", "rad", "radgeschw", "radgeschwindigkeit", "raddrehzahl", "wss", "ws", "omega", "wspd")
+_RULES = (
+    _Rule("v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "vx", "spd"), ("speed",),
+          ("gps", "gnss", "optical", "correvit", "reference", "vx"), ("wheel", "whl", "wind", "engine", "fan", "limit",
+          "set", "steer", "accuracy", "vertical", "lateral", "east", "north", "up", "down", *_WHEEL_WORDS)),
+    _Rule("a_x", ("ax", "accel", "acceleration", "acc", "inline", "laengs", "longitudinal", "gvc"),
+          ("acceleration",), ("longitudinal", "inline", "laengs", "long", "x", "ax", "esc", "esp"),
+          ("lateral", "vertical", "quer", "y", "z", "ay", "az", "angular")),
+    _Rule("a_y", ("ay", "accel", "acceleration", "acc", "quer", "lateral"), ("acceleration",),
+          ("lateral", "quer", "y", "ay"), ("longitudinal", "inline", "vertical", "x", "z", "ax", "az", "laengs")),
+    _Rule("yaw_rate", ("yaw", "gier", "yawrate", "gierrate"), ("angular_speed",), ("rate",), ("acceleration",)),
+    _Rule("steering_wheel_angle", ("steer", "steering", "lenk", "lenkrad", "lenkradwinkel", "lwi", "swa"),
+          ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
+    _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",), ("pressure", "druck")),
+    _Rule("torque_f", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("rear", "hinten", "steer", "motor")),
+    _Rule("torque_r", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("front", "vorne", "steer", "motor")),
+    _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
+    _Rule("latitude", ("latitude", "lat"), ("", "angle"), (), ("lateral", "acc"), "deg"),
+    _Rule("longitude", ("longitude", "lon", "lng"), ("", "angle"), (), ("longitudinal", "acc"), "deg"),
+    _Rule("altitude", ("altitude", "elevation", "height", "alt"), ("length",)),
+    _Rule("ambient_temperature", ("ambient", "outside", "aussen", "outdoor"), ("temperature",)),
+)  # fmt: skip
+
+
+def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
+    """The most likely channel of each signal.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        With samples, all files of one drive.
+
+    Returns
+    -------
+    mapping symbol -> Proposal
+        Only what name and unit support; the reason says what the data said. A guess to be checked, never used silently.
+    """
+    usable = [c for c in channels if c.values.size > 1 and np.isfinite(c.values).any()]
+    found: dict[str, Proposal] = {}
+    for symbol in (*SYMBOLS, *ACCEPTED):
+        exact = [c for c in usable if c.info.name == symbol]
+        if len(exact) == 1:
+            found[symbol] = Proposal(Entry(symbol, (_address(exact[0], usable),)), "its canonical name", 10.0)
+    for wheel in WHEELS:
+        _keep_best(found, f"omega_{wheel}", _wheel_candidates(usable, wheel, _WHEEL_WORDS, ("speed", "angular_speed")))
+        _keep_best(
+            found, f"torque_{wheel}", _wheel_candidates(usable, wheel, ("torque", "trq", "moment", "tq"), ("torque",))
+        )
+        _keep_best(
+            found,
+            f"pressure_{wheel}",
+            _wheel_candidates(usable, wheel, ("tire", "tyre", "tpms", "reifen"), ("pressure",)),
+        )
+    speed = _speed(found, usable)
+    for rule in _RULES:
+        candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
+        if rule.symbol in ("torque_f", "torque_r"):
+            want = {"torque_f": ("front", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
+            candidates = [p for p in candidates if set(_words(p.entry.channel[0])) & set(want)]
+        if rule.symbol == "a_x" and speed is not None:
+            candidates = [_check_acceleration(p, usable, speed) for p in candidates]
+        if rule.symbol == "yaw_rate":
+            candidates = [_check_yaw(p, usable, found) for p in candidates]
+        _keep_best(found, rule.symbol, candidates)
+        if rule.symbol == "v_x" and speed is None:
+            speed = _speed(found, usable)
+    if "steer_angle" in found:
+        found.pop("steering_wheel_angle", None)
+    return {s: found[s] for s in (*SYMBOLS, *ACCEPTED) if s in found}
+
+
+def _keep_best(found: dict[str, Proposal], symbol: str, candidates: list[Proposal]) -> None:
+    good = [p for p in candidates if p.score > 0.0]
+    if symbol not in found and good:
+        found[symbol] = max(good, key=lambda p: p.score)
+
+
+def _words(text: str) -> list[str]:
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text)
+    return [w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w]
+
+
+def _dimension(channel: Channel) -> str:
+    unit = channel.info.unit
+    if not unit:
+        return ""
+    return parse_unit(unit).dimension if is_unit(unit) else "?"
+
+
+def _address(channel: Channel, channels: Sequence[Channel]) -> str:
+    """Shortest unique name: the path where it is unique, else with the file."""
+    same = sum(c.info.path == channel.info.path for c in channels)
+    return channel.info.path if same == 1 else channel_id(channel.info)
+
+
+def _proposal(symbol: str, channel: Channel, channels: Sequence[Channel], score: float, unit: str = "") -> Proposal:
+    own = channel.info.unit
+    entry = Entry(symbol, (_address(channel, channels),), own if own and is_unit(own) else (unit or None))
+    reason = "name and unit" if own else "name"
+    finite = channel.values[np.isfinite(channel.values)]
+    if finite.size > 10 and finite.min() == finite.max():
+        return Proposal(entry, f"{reason}, but it is constant", score - 5.0)
+    return Proposal(entry, reason, score)
+
+
+def _wheel_candidates(
+    channels: Sequence[Channel], wheel: str, words: tuple[str, ...], dimensions: tuple[str, ...]
+) -> list[Proposal]:
+    result = []
+    for channel in channels:
+        name = _words(channel.info.name)
+        joined = " ".join(name)
+        has_position = any(p in name if " " not in p else p in joined for p in _POSITIONS[wheel])
+        has_word = set(words) & set(_words(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
+        if (
+            not has_position
+            or not has_word
+            or set(name) & _NOT_A_VALUE
+            or _dimension(channel) not in dimensions + ("",)
+        ):
+            continue
+        symbol = {"speed": "omega", "torque": "torque", "pressure": "pressure"}[dimensions[0]]
+        score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (_dimension(channel) == "")
+        result.append(_proposal(f"{symbol}_{wheel}", channel, channels, score))
+    return result
+
+
+def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Proposal | None:
+    words = _words(channel.info.name)
+    path_words = set(_words(channel_id(channel.info)))
+    dimension = _dimension(channel)
+    named = set(rule.words) & set(words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
+    if not named or set(words) & (set(rule.never) | _NOT_A_VALUE):
+        return None
+    if dimension not in rule.dimensions and not (dimension == "" and rule.fallback_unit):
+        # a channel without a unit is proposed only where the name leaves no doubt what the unit is
+        if not (dimension == "" and rule.symbol == "gear"):
+            return None
+    score = 2.0 + len(set(rule.bonus) & path_words)
+    return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit)
+
+
+# --- the data's word ---------------------------------------------------------------------------------------------
+
+
+def _by_address(channels: Sequence[Channel], address: str) -> Channel:
+    return next(c for c in channels if address in (c.info.path, channel_id(c.info)))
+
+
+def _clean(channel: Channel) -> tuple[TimeArray, FloatArray]:
+    t, order, _ = ClockRepair().repair(channel.t_ns)
+    x = channel.values[order]
+    good = np.isfinite(x)
+    return t[good], x[good]
+
+
+def _on_grid(channel: Channel, grid: TimeArray) -> FloatArray:
+    t, x = _clean(channel)
+    return linear(t, x, grid, gap_ns=2_000_000_000)[0]
+
+
+_GRID_NS = 100_000_000
+
+
+def _speed(found: dict[str, Proposal], channels: Sequence[Channel]) -> tuple[TimeArray, FloatArray] | None:
+    """Speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
+    for symbol in ("omega_rl", "omega_fl", "v_x"):
+        if symbol in found:
+            channel = _by_address(channels, found[symbol].entry.channel[0])
+            t, _ = _clean(channel)
+            if t.size > 20:
+                grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
+                return grid, _on_grid(channel, grid)
+    return None
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    good = np.isfinite(a) & np.isfinite(b)
+    if good.sum() < 50 or a[good].std() == 0.0 or b[good].std() == 0.0:
+        return np.nan
+    return float(np.corrcoef(a[good], b[good])[0, 1])
+
+
+def _smooth(x: FloatArray, width: int = 11) -> FloatArray:
+    kernel = np.ones(width) / width
+    return np.convolve(x, kernel, mode="same")
+
+
+def _check_acceleration(p: Proposal, channels: Sequence[Channel], speed: tuple[TimeArray, FloatArray]) -> Proposal:
+    grid, v = speed
+    a = _on_grid(_by_address(channels, p.entry.channel[0]), grid)
+    r = _correlation(_smooth(np.gradient(v)), _smooth(a))
+    if np.isnan(r):
+        return p
+    reason = f"{p.reason}; correlation {r:+.2f} with the derivative of the speed"
+    if abs(r) < 0.5:
+        return replace(p, reason=f"{reason}: not the car's a_x", score=-1.0)
+    if r < 0:
+        # a wrong sign is a guess too far for the map: said, and ranked behind any channel that needs none
+        return replace(p, reason=f"{reason}: sign turned", score=p.score - 1.0 - r, entry=replace(p.entry, scale=-1.0))
+    return replace(p, reason=reason, score=p.score + 2.0 * r)
+
+
+def _check_yaw(p: Proposal, channels: Sequence[Channel], found: dict[str, Proposal]) -> Proposal:
+    if "omega_rl" not in found or "omega_rr" not in found:
+        return p
+    left = _by_address(channels, found["omega_rl"].entry.channel[0])
+    right = _by_address(channels, found["omega_rr"].entry.channel[0])
+    t, _ = _clean(left)
+    grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
+    turn = _on_grid(right, grid) - _on_grid(left, grid)
+    r = _correlation(_smooth(turn), _smooth(_on_grid(_by_address(channels, p.entry.channel[0]), grid)))
+    if np.isnan(r) or abs(r) < 0.5:
+        return replace(p, reason=f"{p.reason}; the wheels turn too little to check its sign")
+    reason = f"{p.reason}; correlation {r:+.2f} with the rear wheels' difference"
+    if r < 0:
+        return replace(p, reason=f"{reason}: sign turned", entry=replace(p.entry, scale=-1.0))
+    return replace(p, reason=reason, score=p.score + r)

@@ -1,0 +1,99 @@
+"""One channel onto the common grid: linear or hold, never across a gap, never beyond the ends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.types import BoolArray, FloatArray, TimeArray
+
+__all__ = ["bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns"]
+
+
+def median_period_ns(t_ns: TimeArray) -> int:
+    """Median sample time. [ns] 0 for fewer than two samples."""
+    return int(np.median(np.diff(t_ns))) if t_ns.size > 1 else 0
+
+
+def gap_limit_ns(t_ns: TimeArray, *, is_state: bool) -> int:
+    """Longest interval across which a value may be carried. [ns]
+
+    Five sample times for a continuous signal (at least 50 ms), ten for a state (at least 2 s): a lost frame or two is
+    bridged, an outage is not.
+    """
+    period = median_period_ns(t_ns)
+    return max(10 * period, 2_000_000_000) if is_state else max(5 * period, 50_000_000)
+
+
+def linear(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> tuple[FloatArray, BoolArray]:
+    """Linear interpolation.
+
+    Parameters
+    ----------
+    t_ns : int64 array (n,)
+        Strictly increasing stamps.
+    x : array (n,)
+        Finite samples.
+    grid_ns : int64 array (m,)
+        Where values are wanted.
+    gap_ns : int
+        Longest interval that may be bridged.
+
+    Returns
+    -------
+    y : array (m,)
+        NaN outside the first and last stamp and inside longer intervals.
+    bridged : bool array (m,)
+        Grid points inside an interval of more than 1.5 median sample times: a sample was missing there.
+    """
+    y = np.full(grid_ns.size, np.nan)
+    bridged = np.zeros(grid_ns.size, dtype=bool)
+    if t_ns.size == 0:
+        return y, bridged
+    right = np.searchsorted(t_ns, grid_ns, side="left")
+    exact = (right < t_ns.size) & (t_ns[np.minimum(right, t_ns.size - 1)] == grid_ns)
+    y[exact] = x[right[exact]]
+    between = ~exact & (right > 0) & (right < t_ns.size)
+    i = right[between]
+    span = t_ns[i] - t_ns[i - 1]
+    # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
+    share = (grid_ns[between] - t_ns[i - 1]).astype(np.float64) / span.astype(np.float64)
+    values = x[i - 1] + share * (x[i] - x[i - 1])
+    y[between] = np.where(span <= gap_ns, values, np.nan)
+    bridged[between] = span > 1.5 * median_period_ns(t_ns)
+    return y, bridged
+
+
+def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> FloatArray:
+    """Last value held, at most `gap_ns` long and not beyond the last stamp by more than that. Shapes as `linear`."""
+    y = np.full(grid_ns.size, np.nan)
+    if t_ns.size == 0:
+        return y
+    last = np.searchsorted(t_ns, grid_ns, side="right") - 1
+    known = last >= 0
+    age = grid_ns[known] - t_ns[last[known]]
+    y[known] = np.where(age <= gap_ns, x[last[known]], np.nan)
+    return y
+
+
+def bin_mean(
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int
+) -> tuple[FloatArray, BoolArray]:
+    """Mean of the samples within half a grid step on either side, for signals much faster than the grid.
+
+    Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
+    Returns as `linear`.
+    """
+    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns)
+    if t_ns.size == 0:
+        return y, bridged
+    low = np.searchsorted(t_ns, grid_ns - dt_ns // 2, side="left")
+    high = np.searchsorted(t_ns, grid_ns + dt_ns - dt_ns // 2, side="left")
+    count = high - low
+    full = count >= 2
+    # sums of each bin by itself: differences of one long running sum would lose digits over hours
+    edges = np.column_stack([low[full], np.minimum(high[full], x.size - 1)]).ravel()
+    sums = np.add.reduceat(x, edges)[::2] if edges.size else np.zeros(0)
+    tail = high[full] == x.size  # reduceat needs an end index; the last sample is added where the bin holds it
+    sums = sums + np.where(tail, x[-1], 0.0)
+    y[full & ~np.isnan(y)] = (sums / count[full])[~np.isnan(y[full])]
+    return y, bridged

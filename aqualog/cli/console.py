@@ -1,0 +1,116 @@
+"""What goes to stderr, and how errors become exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import typer
+
+from aqualog.errors import AqualogError, ConfigError, ExitCode
+
+__all__ = ["Console", "clean", "guarded"]
+
+PROGRESS_MODES = ("auto", "bar", "plain", "off")
+
+
+def clean(text: str) -> str:
+    """Text without control characters, so that a name in a log cannot drive the terminal."""
+    return "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
+
+
+@dataclass(frozen=True, slots=True)
+class Console:
+    """Messages to stderr. Data goes to stdout and never through here."""
+
+    quiet: bool = False
+    verbose: bool = False
+    progress: str = "auto"
+
+    @classmethod
+    def make(cls, *, quiet: bool, verbose: bool, progress: str) -> Console:
+        """Check the progress mode."""
+        if progress not in PROGRESS_MODES:
+            raise ConfigError(f'--progress "{progress}"', expected=" ".join(PROGRESS_MODES))
+        return cls(quiet, verbose, progress)
+
+    def note(self, text: str) -> None:
+        """Something the user should know."""
+        if not self.quiet:
+            sys.stderr.write(f"note: {clean(text)}\n")
+
+    def detail(self, text: str) -> None:
+        """Something the user may want to know."""
+        if self.verbose and not self.quiet:
+            sys.stderr.write(f"{clean(text)}\n")
+
+    @contextmanager
+    def steps(self) -> Iterator[Steps]:
+        """Progress of a piece of work: one line that renews itself on a terminal, a line a step with `plain`."""
+        on_terminal = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        mode = self.progress
+        if mode == "auto":
+            mode = "bar" if on_terminal else "off"
+        steps = Steps("off" if self.quiet else mode)
+        try:
+            yield steps
+        finally:
+            steps.clear()
+
+
+class Steps:
+    """Tells which step is being worked on."""
+
+    def __init__(self, mode: str) -> None:
+        self._mode = mode
+        self._width = 0
+
+    def __call__(self, text: str) -> None:
+        """Begin a step."""
+        if self._mode == "bar":
+            line = f"{clean(text)} ..."
+            sys.stderr.write(f"\r{line.ljust(self._width)}")
+            sys.stderr.flush()
+            self._width = len(line)
+        elif self._mode == "plain":
+            sys.stderr.write(f"{clean(text)}\n")
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self._mode == "bar" and self._width:
+            sys.stderr.write(f"\r{' ' * self._width}\r")
+            sys.stderr.flush()
+
+
+@contextmanager
+def guarded(*, debug: bool) -> Iterator[None]:
+    """One line and the contract's exit code for every error; a traceback only with `--debug`."""
+    try:
+        yield
+    except AqualogError as error:
+        if debug:
+            traceback.print_exc()
+        sys.stderr.write(f"error: {clean(error.line())}\n")
+        raise typer.Exit(int(error.exit_code)) from error
+    except BrokenPipeError:
+        # the reader of our output has gone; nothing to say, and nobody to say it to
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise typer.Exit(int(ExitCode.DONE)) from None
+    except OSError as error:
+        if debug:
+            traceback.print_exc()
+        where = f"{error.filename}: " if error.filename else ""
+        sys.stderr.write(f"error: {clean(where)}{error.strerror or error}\n")
+        raise typer.Exit(int(ExitCode.FAILED)) from error
+    except (typer.Exit, typer.Abort, KeyboardInterrupt):
+        raise
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        kind = type(error).__name__
+        sys.stderr.write(f"error: aqualog failed ({kind}: {clean(str(error))[:300]}). Try: --debug, and report it\n")
+        raise typer.Exit(int(ExitCode.FAILED)) from error

@@ -1,0 +1,111 @@
+"""`aqualog convert`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aqualog.cli.options import (
+    Dbc,
+    Debug,
+    Force,
+    Logs,
+    Progress,
+    Quiet,
+    Rate,
+    Signals,
+    Vehicle,
+    Verbose,
+)  # fmt: skip
+
+__all__ = ["convert"]
+
+
+def convert(
+    logs: Logs,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="File to write: .mf4, .mcap, .csv or .parquet.", metavar="FILE")
+    ],
+    vehicle: Vehicle = None,
+    signals: Signals = None,
+    dbc: Dbc = None,
+    rate: Rate = None,
+    decimal_comma: Annotated[
+        bool, typer.Option("--decimal-comma", help="CSV with decimal comma and semicolons.")
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    progress: Progress = "auto",
+    debug: Debug = False,
+) -> None:
+    """Write the aligned signals of one drive as one log, in SI units and with canonical names.
+
+    What is written needs no signal map any more.
+
+    \b
+    Examples:
+      aqualog convert can.mf4 --dbc car.dbc --signals map.toml --vehicle car.toml -o drive.parquet
+      aqualog convert wheels.csv imu.csv --signals map.toml -o drive.mf4
+      aqualog convert drive.mcap -o drive.csv --decimal-comma --rate 50
+    """
+    from aqualog.cli.console import guarded
+
+    with guarded(debug=debug):
+        code = _convert(
+            logs, out, vehicle, signals, dbc or [], rate,
+            decimal_comma=decimal_comma, force=force, quiet=quiet, verbose=verbose, progress=progress,
+        )  # fmt: skip
+    if code:
+        raise typer.Exit(code)
+
+
+def _convert(
+    logs: list[str],
+    out: Path,
+    vehicle_file: Path | None,
+    map_file: Path | None,
+    dbc: list[Path],
+    rate: float | None,
+    *,
+    decimal_comma: bool,
+    force: bool,
+    quiet: bool,
+    verbose: bool,
+    progress: str,
+) -> int:
+    from aqualog.cli.console import Console
+    from aqualog.cli.files import expand, refuse_existing, write_whole
+    from aqualog.config.signal_map import load_signal_map
+    from aqualog.config.vehicle import load_vehicle
+    from aqualog.errors import ExitCode
+    from aqualog.io.write_log import check_suffix, write_log
+    from aqualog.vehicle import Vehicle as VehicleRecord
+
+    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
+    suffix = check_suffix(out)
+    refuse_existing([out], force=force)
+    vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
+    signal_map = load_signal_map(map_file) if map_file else None
+    paths = expand(logs)
+    with console.steps() as steps:
+        import numpy as np
+
+        from aqualog.align.load import load_signals
+        from aqualog.report.document import signal_groups
+
+        loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
+        steps("writing")
+        t_ns = np.arange(loaded.frame.height, dtype=np.int64) * loaded.dt_ns
+        groups = signal_groups(loaded)
+        write_whole(
+            out,
+            lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=loaded.start_ns, decimal_comma=decimal_comma),
+        )
+    for text in loaded.quality.notes:
+        console.note(text)
+    console.note(f"{len(loaded.symbols)} signals, {t_ns.size} samples at {1e9 / loaded.dt_ns:g} Hz are in {out}")
+    lost = loaded.quality.truncated or loaded.quality.lost_in_files
+    return int(ExitCode.PARTIAL) if lost else int(ExitCode.DONE)

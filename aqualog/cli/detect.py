@@ -1,0 +1,212 @@
+"""`aqualog detect`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aqualog.cli.options import (
+    Dbc,
+    Debug,
+    Force,
+    Json,
+    Logs,
+    Progress,
+    Quiet,
+    Rate,
+    Signals,
+    Vehicle,
+    Verbose,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from aqualog.types import DriveResult
+
+__all__ = ["detect"]
+
+_RESULTS = ("events.json", "signals.parquet", "report.html")
+
+
+def detect(
+    logs: Logs,
+    vehicle: Vehicle = None,
+    signals: Signals = None,
+    dbc: Dbc = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write",
+            help="Signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.",
+            metavar="FILE",
+        ),
+    ] = None,
+    rate: Rate = None,
+    fail_on_event: Annotated[
+        bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
+    ] = False,
+    as_json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    progress: Progress = "auto",
+    debug: Debug = False,
+) -> None:
+    """Detect aquaplaning in one drive.
+
+    The files named are ONE drive: a single log, or the files of several loggers. Events go to stdout as a table or as
+    JSON; -o leaves a page to look at.
+
+    \b
+    Examples:
+      aqualog detect drive.mf4 --vehicle car.toml -o out
+      aqualog detect wheels.csv imu.csv gps.csv --signals map.toml --vehicle car.toml
+      aqualog detect can.mf4 --dbc car.dbc --signals map.toml --json
+      aqualog detect drive.mcap --vehicle car.toml --write drive_detected.mf4
+    """
+    from aqualog.cli.console import guarded
+
+    with guarded(debug=debug):
+        code = _detect(
+            logs, vehicle, signals, dbc or [], out, write, rate,
+            fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+        )  # fmt: skip
+    if code:
+        raise typer.Exit(code)
+
+
+def _detect(
+    logs: list[str],
+    vehicle_file: Path | None,
+    map_file: Path | None,
+    dbc: list[Path],
+    out: Path | None,
+    write: Path | None,
+    rate: float | None,
+    *,
+    fail_on_event: bool,
+    as_json: bool,
+    force: bool,
+    quiet: bool,
+    verbose: bool,
+    progress: str,
+) -> int:
+    from aqualog.cli.console import Console
+    from aqualog.cli.files import expand, refuse_existing
+    from aqualog.config.signal_map import load_signal_map
+    from aqualog.config.vehicle import load_vehicle
+    from aqualog.io.write_log import check_suffix
+    from aqualog.vehicle import Vehicle as VehicleRecord
+
+    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
+    targets = [out / name for name in _RESULTS] if out else []
+    if write is not None:
+        check_suffix(write)
+        targets.append(write)
+    refuse_existing(targets, force=force)
+    paths = expand(logs)
+    signal_map = load_signal_map(map_file) if map_file else None
+    vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
+    if vehicle_file is None:
+        console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
+    with console.steps() as steps:
+        from aqualog.align.load import load_signals
+        from aqualog.detect.stream import detect_drive
+
+        loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
+        _something_to_do(loaded.symbols, vehicle, paths, loaded.quality.notes)
+        steps("detecting")
+        result = detect_drive(loaded, vehicle)
+        name = ", ".join(str(p) for p in paths)
+        steps("writing")
+        if out is not None:
+            _write_results(result, out, name)
+        if write is not None:
+            _write_log(result, write)
+    _print(result, name, as_json=as_json)
+    for text in (*loaded.quality.notes, *result.notes):
+        console.note(text)
+    if out is not None:
+        console.note(f"results are in {out}: {', '.join(_RESULTS)}")
+    return _exit_code(result, fail_on_event=fail_on_event)
+
+
+def _something_to_do(symbols: tuple[str, ...], vehicle: Any, paths: list[Path], notes: tuple[str, ...]) -> None:
+    """Stop with one line if no detector can run."""
+    from aqualog.detect.needs import DETECTORS, check_needs
+    from aqualog.errors import SignalError
+
+    unavailable, _ = check_needs(vehicle, symbols)
+    if len(unavailable) < len(DETECTORS):
+        return
+    missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(("omega_", "torque_", "a_x")))
+    raise SignalError(
+        f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
+        where=", ".join(p.name for p in paths),
+        expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
+        hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+    )
+
+
+def _write_results(result: DriveResult, out: Path, name: str) -> None:
+    from aqualog.cli.files import write_whole
+    from aqualog.io.write_log import write_log
+    from aqualog.report.document import document, result_groups
+    from aqualog.report.page import write_page
+
+    out.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(document(result, log=name), indent=1, allow_nan=False) + "\n"
+    write_whole(out / "events.json", lambda p: _put(p, text))
+    t_ns, start_ns = _times(result)
+    groups = result_groups(result)
+    write_whole(out / "signals.parquet", lambda p: write_log(p, t_ns, groups, suffix=".parquet", start_ns=start_ns))
+    write_whole(out / "report.html", lambda p: write_page(result, p, title=name))
+
+
+def _put(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _times(result: DriveResult) -> tuple[Any, int | None]:
+    import numpy as np
+
+    signals = result.signals
+    return np.arange(signals.frame.height, dtype=np.int64) * signals.dt_ns, signals.start_ns
+
+
+def _write_log(result: DriveResult, path: Path) -> None:
+    from aqualog.cli.files import write_whole
+    from aqualog.io.write_log import check_suffix, write_log
+    from aqualog.report.document import result_groups
+
+    t_ns, start_ns = _times(result)
+    groups, suffix = result_groups(result), check_suffix(path)
+    write_whole(path, lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=start_ns))
+
+
+def _print(result: DriveResult, name: str, *, as_json: bool) -> None:
+    if as_json:
+        from aqualog.report.document import document
+
+        sys.stdout.write(json.dumps(document(result, log=name), indent=1, allow_nan=False) + "\n")
+        return
+    from aqualog.cli.console import clean
+    from aqualog.report.text import event_table
+
+    sys.stdout.write(clean(event_table(result)))
+
+
+def _exit_code(result: DriveResult, *, fail_on_event: bool) -> int:
+    from aqualog.errors import ExitCode
+
+    quality = result.signals.quality
+    if fail_on_event and result.events:
+        return int(ExitCode.GATE_TRIPPED)
+    return int(ExitCode.PARTIAL) if quality.truncated or quality.lost_in_files else int(ExitCode.DONE)

@@ -1,0 +1,117 @@
+"""Inputs named on the command line, and outputs that are there whole or not at all."""
+
+from __future__ import annotations
+
+import glob
+import os
+import tempfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from aqualog.errors import ConfigError, LogError
+from aqualog.io.sniff import sniff
+
+__all__ = ["expand", "refuse_existing", "write_whole"]
+
+
+def expand(names: Iterable[str]) -> list[Path]:
+    """Files behind what the user typed: files, folders, globs, `@list.txt`.
+
+    A folder that is a ROS 2 bag is one input; of any other folder, all logs in it (not below) by content. The same
+    file twice counts once.
+
+    Raises
+    ------
+    ConfigError
+        If a glob or folder matches nothing.
+    """
+    found: dict[str, Path] = {}
+    for name in names:
+        for path in _one(name):
+            found.setdefault(os.path.realpath(path), path)
+    return list(found.values())
+
+
+def _one(name: str) -> list[Path]:
+    if name.startswith("@"):
+        return _from_list(Path(name[1:]))
+    path = Path(name)
+    if path.is_dir():
+        return _from_folder(path)
+    if not path.exists() and glob.has_magic(name):
+        hits = sorted(Path(p) for p in glob.glob(name, recursive=True))  # noqa: PTH207 - absolute patterns too
+        if not hits:
+            raise ConfigError("nothing matches", where=name, hint="check the pattern")
+        return [f for h in hits for f in (_from_folder(h) if h.is_dir() else [h])]
+    return [path]
+
+
+def _from_list(path: Path) -> list[Path]:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"list of logs cannot be read ({error})", where=str(path)) from error
+    names = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    base = path.parent
+    return [p for n in names for p in _one(n if Path(n).is_absolute() else str(base / n))]
+
+
+def _from_folder(path: Path) -> list[Path]:
+    if _is_log(path):
+        return [path]
+    hits = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix.lower() in _LOG_SUFFIXES and _is_log(p)]
+    if not hits:
+        raise ConfigError("no log in this folder", where=str(path), expected=" ".join(_LOG_SUFFIXES))
+    return hits
+
+
+# In a folder, text files that are no logs (README, notes, maps) stand beside them, so there the suffix is asked too.
+_LOG_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
+
+
+def _is_log(path: Path) -> bool:
+    try:
+        sniff(path)
+    except LogError:
+        return False
+    return True
+
+
+def refuse_existing(paths: Iterable[Path], *, force: bool) -> None:
+    """Stop before any work if a result would overwrite something.
+
+    Raises
+    ------
+    ConfigError
+        Naming the first file that exists.
+    """
+    for path in paths:
+        if path.is_dir():
+            raise ConfigError("is a folder", where=str(path), expected="a file to write")
+        if path.exists() and not force:
+            raise ConfigError("exists already", where=str(path), hint="--force to overwrite, or another name")
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` make a file under a temporary name beside its place, then rename it.
+
+    Whatever goes wrong, the old file is still there or the new one is complete.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}-", suffix=f"{path.suffix}.tmp", dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,195 @@
+"""`aqualog inspect`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aqualog.cli.options import Dbc, Debug, Force, Json, Logs, Progress, Quiet, Signals, Verbose
+
+if TYPE_CHECKING:
+    from aqualog.align.overview import ChannelOverview
+    from aqualog.align.propose import Proposal
+    from aqualog.types import Channel
+
+__all__ = ["inspect"]
+
+
+def inspect(
+    logs: Logs,
+    signals: Signals = None,
+    dbc: Dbc = None,
+    write_map: Annotated[
+        Path | None,
+        typer.Option("--write-map", help="Write the proposed signal map to this file.", metavar="FILE"),
+    ] = None,
+    as_json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    progress: Progress = "auto",
+    debug: Debug = False,
+) -> None:
+    """List what a log holds, and propose which channel is which signal.
+
+    Every channel with its rate, unit, range, gaps and faults; how an IMU is mounted; a signal map to start from. The
+    proposal is a guess from names, units and data: read it before you use it.
+
+    \b
+    Examples:
+      aqualog inspect drive.mf4
+      aqualog inspect can.mf4 --dbc car.dbc --write-map map.toml
+      aqualog inspect wheels.csv imu.csv gps.csv --write-map map.toml
+    """
+    from aqualog.cli.console import guarded
+
+    with guarded(debug=debug):
+        code = _inspect(
+            logs, signals, dbc or [], write_map,
+            as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+        )  # fmt: skip
+    if code:
+        raise typer.Exit(code)
+
+
+def _inspect(
+    logs: list[str],
+    map_file: Path | None,
+    dbc: list[Path],
+    write_map: Path | None,
+    *,
+    as_json: bool,
+    force: bool,
+    quiet: bool,
+    verbose: bool,
+    progress: str,
+) -> int:
+    from aqualog.align.load import read_options
+    from aqualog.align.mapping import SignalMap
+    from aqualog.align.overview import find_mounting, overview
+    from aqualog.align.propose import propose_map
+    from aqualog.cli.console import Console
+    from aqualog.cli.files import expand, refuse_existing
+    from aqualog.config.signal_map import load_signal_map
+    from aqualog.io.open_log import DriveLog
+
+    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
+    refuse_existing([write_map] if write_map else [], force=force)
+    signal_map = load_signal_map(map_file) if map_file else SignalMap()
+    paths = expand(logs)
+    with console.steps() as steps, DriveLog(paths, read_options(signal_map, dbc)) as log:
+        steps("reading")
+        channels = list(log.read(log.channels()).values())
+        formats, faults = log.formats, log.faults
+        steps("looking at the channels")
+        origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
+        found = [overview(c, origin_ns=origin) for c in channels]
+        proposals = propose_map(channels)
+    notes = [*(f"{p.name}: {n}" for p, f in zip(paths, faults, strict=True) for n in f.notes), *find_mounting(found)]
+    if write_map is not None:
+        _write_map(write_map, proposals, paths)
+    if as_json:
+        sys.stdout.write(json.dumps(_document(paths, formats, found, proposals, notes), indent=1) + "\n")
+    else:
+        _print(paths, formats, channels, found, proposals, notes)
+    if write_map is not None:
+        console.note(f"proposed map with {len(proposals)} signals is in {write_map}: check it before you use it")
+    damaged = any(f.truncated or f.lost_samples for f in faults)
+    return 3 if damaged else (0 if found else 4)
+
+
+def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path]) -> None:
+    from aqualog.align.mapping import SignalMap
+    from aqualog.cli.files import write_whole
+    from aqualog.config.signal_map import map_text
+
+    text = map_text(
+        SignalMap({s: p.entry for s, p in proposals.items()}),
+        comments=[f"proposed for {', '.join(p.name for p in paths)}: check every line"],
+        remarks={s: p.reason for s, p in proposals.items()},
+    )
+    write_whole(path, lambda p: _put(p, text))
+
+
+def _put(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _print(
+    paths: list[Path],
+    formats: tuple[str, ...],
+    channels: list[Channel],
+    found: list[ChannelOverview],
+    proposals: dict[str, Proposal],
+    notes: list[str],
+) -> None:
+    from aqualog.cli.console import clean
+    from aqualog.report.text import table
+
+    lines = []
+    by_channel = {p.entry.channel[0]: s for s, p in proposals.items()}
+    for path, kind in zip(paths, formats, strict=True):
+        own = [o for o in found if o.file == path.name]
+        absolute = any(c.absolute for c in channels if c.info.file == path.name)
+        clock = "absolute time" if absolute else "a clock of its own"
+        lines.append(f"{path.name}: {kind.upper()}, {len(own)} channels, {clock}")
+        if own:
+            rows = [_row(o, by_channel) for o in own]
+            header = ("channel", "unit", "samples", "Hz", "from s", "to s", "min", "max", "gaps", "faults", "signal?")
+            lines += [table(header, rows), ""]
+    if proposals:
+        lines.append("proposed signals:")
+        lines += [f"  {s} = {p.entry.channel[0]}  ({p.reason})" for s, p in proposals.items()]
+    else:
+        lines.append("no channel looks like a signal that aqualog knows")
+    if notes:
+        lines += ["", "notes:", *(f"  {n}" for n in notes)]
+    sys.stdout.write(clean("\n".join(lines) + "\n"))
+
+
+def _row(o: ChannelOverview, by_channel: dict[str, str]) -> tuple[str, ...]:
+    gaps = f"{o.gaps} (to {o.longest_gap_s:.2g} s)" if o.gaps else "-"
+    symbol = by_channel.get(o.path) or by_channel.get(f"{o.file}:{o.path}") or ""
+    numbers = (f"{o.start_s:.2f}", f"{o.end_s:.2f}", f"{o.low:.6g}", f"{o.high:.6g}")
+    return (o.path, o.unit or "-", str(o.samples), f"{o.rate_hz:.4g}", *numbers, gaps, _faults(o), symbol)
+
+
+def _faults(o: ChannelOverview) -> str:
+    counts = {n.replace("_", "-"): getattr(o.faults, n) for n in type(o.faults).__slots__ if n != "pauses"}
+    counts["not finite"] = o.not_finite
+    text = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
+    return ", ".join(t for t in (text, o.remark) if t) or "-"
+
+
+def _document(
+    paths: list[Path],
+    formats: tuple[str, ...],
+    found: list[ChannelOverview],
+    proposals: dict[str, Proposal],
+    notes: list[str],
+) -> dict[str, Any]:
+    import dataclasses
+    import math
+
+    from aqualog import __version__
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: plain(v) for k, v in value.items()}
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return {
+        "schema_version": 1,
+        "tool_version": __version__,
+        "files": [{"file": str(p), "format": f} for p, f in zip(paths, formats, strict=True)],
+        "channels": [plain(dataclasses.asdict(o)) for o in found],
+        "proposed": {
+            s: {"channel": p.entry.channel[0], "unit": p.entry.unit, "scale": p.entry.scale, "reason": p.reason}
+            for s, p in proposals.items()
+        },
+        "notes": notes,
+    }

@@ -1,0 +1,47 @@
+"""The command line. Nothing heavy is imported until a command runs."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from aqualog import __version__
+from aqualog.cli.clock import align
+from aqualog.cli.convert import convert
+from aqualog.cli.detect import detect
+from aqualog.cli.inspect import inspect
+
+__all__ = ["app", "run"]
+
+app = typer.Typer(
+    name="aqualog",
+    help="Find aquaplaning in drive logs: MDF, MCAP, ROS bag, CSV and Parquet in, events and a page out.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    epilog="Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 done but data was lost, 4 nothing usable, "
+    "5 a gate has tripped, 130 interrupted.",
+)
+app.command(no_args_is_help=True)(detect)
+app.command(no_args_is_help=True)(inspect)
+app.command(no_args_is_help=True)(convert)
+app.command(no_args_is_help=True)(align)
+
+
+def _version(value: bool) -> None:
+    if value:
+        sys.stdout.write(f"aqualog {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Show the version."),
+) -> None:
+    """Common options of all commands."""
+
+
+def run() -> None:
+    """Entry point of the installed command."""
+    app()

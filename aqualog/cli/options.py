@@ -1,0 +1,39 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["Dbc", "Debug", "Force", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals", "Vehicle", "Verbose"]
+
+Logs = Annotated[
+    list[str],
+    typer.Argument(
+        help="Log files of one drive: files, folders, globs, @list.txt.", metavar="LOG...", show_default=False
+    ),
+]
+Vehicle = Annotated[
+    Path | None,
+    typer.Option("--vehicle", help="Vehicle file (TOML). Without it a default car is taken.", metavar="FILE"),
+]
+Signals = Annotated[
+    Path | None,
+    typer.Option("--signals", help="Signal map (TOML): which channel is which signal.", metavar="FILE"),
+]
+Dbc = Annotated[
+    list[Path] | None,
+    typer.Option("--dbc", help="CAN database for raw frames; may be given several times.", metavar="FILE"),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate", help="Grid rate in Hz; default that of the wheel speeds.", min=0.1, max=100000.0),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Errors only on stderr.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Tell more on stderr.")]
+Progress = Annotated[str, typer.Option("--progress", help="auto, bar, plain or off.", metavar="MODE")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")]

@@ -1,0 +1,147 @@
+"""Signal maps: TOML to record and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aqualog.align.mapping import Entry, SignalMap, SourceClock
+from aqualog.config.toml_file import Faults, load_toml
+from aqualog.notation import ACCEPTED, SYMBOLS
+from aqualog.units import is_unit
+
+__all__ = ["load_signal_map", "map_text"]
+
+_ENTRY_KEYS = ("channel", "unit", "scale", "offset", "invalid")
+_TABLES = ("signals", "time", "sources")
+
+
+def load_signal_map(path: Path) -> SignalMap:
+    """Read and check a signal map.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of the file in one message.
+    """
+    document, text = load_toml(path, what="signal map")
+    faults = Faults(path, text)
+    for name in document:
+        if name not in _TABLES:
+            faults.unknown(name, _TABLES)
+    entries = {}
+    for symbol, table in _table(document, "signals", faults).items():
+        if symbol not in SYMBOLS and symbol not in ACCEPTED:
+            faults.unknown(symbol, [*SYMBOLS, *ACCEPTED])
+            continue
+        entry = _entry(symbol, table, faults)
+        if entry is not None:
+            entries[symbol] = entry
+    clocks = {name: _clock(name, t, faults) for name, t in _table(document, "sources", faults).items()}
+    time = _table(document, "time", faults)
+    for key in time:
+        if key not in ("channel", "unit"):
+            faults.unknown(key, ("channel", "unit"))
+    unit = time.get("unit")
+    if unit is not None and not is_unit(str(unit)):
+        faults.add("unit", f'[time] unit = "{unit}" is not known; use s, ms, us or ns')
+    faults.raise_if_any()
+    return SignalMap(entries, clocks, time.get("channel"), unit, str(path))
+
+
+def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any]:
+    table = document.get(name, {})
+    if isinstance(table, dict):
+        return table
+    faults.add(name, f"{name} is not a table")
+    return {}
+
+
+def _entry(symbol: str, table: Any, faults: Faults) -> Entry | None:
+    if isinstance(table, str):
+        table = {"channel": table}
+    if not isinstance(table, dict) or "channel" not in table:
+        faults.add(symbol, f'{symbol} names no channel; expected {symbol} = {{ channel = "..." }}')
+        return None
+    for key in table:
+        if key not in _ENTRY_KEYS:
+            faults.unknown(key, _ENTRY_KEYS)
+    channel = table["channel"]
+    names = tuple(channel) if isinstance(channel, list) else (channel,)
+    if not names or not all(isinstance(n, str) and n for n in names):
+        faults.add(symbol, f"{symbol}: channel = {channel!r} is not a name or a list of names")
+        return None
+    unit = table.get("unit")
+    if unit is not None and not is_unit(str(unit)):
+        faults.add(symbol, f'{symbol}: unknown unit "{unit}"')
+        return None
+    big = 1e12
+    scale = faults.number({"scale": table.get("scale", 1.0)}, "scale", low=-big, high=big, unit="")
+    offset = faults.number({"offset": table.get("offset", 0.0)}, "offset", low=-big, high=big, unit="")
+    invalid = table.get("invalid", [])
+    if not isinstance(invalid, list) or any(isinstance(i, bool) or not isinstance(i, (int, float)) for i in invalid):
+        faults.add(symbol, f"{symbol}: invalid = {invalid!r} is not a list of numbers")
+        return None
+    if scale is None or offset is None:
+        return None
+    if scale == 0.0:
+        faults.add(symbol, f"{symbol}: scale = 0 would erase the signal")
+    return Entry(symbol, names, None if unit is None else str(unit), scale, offset, tuple(float(i) for i in invalid))
+
+
+def _clock(name: str, table: Any, faults: Faults) -> SourceClock:
+    if not isinstance(table, dict):
+        faults.add(name, f"sources.{name} is not a table")
+        return SourceClock()
+    for key in table:
+        if key not in ("offset_s", "drift_ppm"):
+            faults.unknown(key, ("offset_s", "drift_ppm"))
+    offset = faults.number({"offset_s": table.get("offset_s", 0.0)}, "offset_s", low=-1e10, high=1e10, unit="s")
+    drift = faults.number({"drift_ppm": table.get("drift_ppm", 0.0)}, "drift_ppm", low=-1e5, high=1e5, unit="ppm")
+    return SourceClock(offset or 0.0, drift or 0.0)
+
+
+def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None) -> str:
+    """The TOML text of a signal map, with remarks behind its lines; reading it again gives the same map."""
+    remarks = remarks or {}
+    lines = [f"# {_one_line(c)}" for c in comments]
+    if signal_map.time_channel or signal_map.time_unit:
+        lines.append("[time]")
+        if signal_map.time_channel:
+            lines.append(f"channel = {_quote(signal_map.time_channel)}")
+        if signal_map.time_unit:
+            lines.append(f"unit = {_quote(signal_map.time_unit)}")
+        lines.append("")
+    lines.append("[signals]")
+    for symbol, entry in signal_map.entries.items():
+        remark = f"  # {_one_line(remarks[symbol])}" if symbol in remarks else ""
+        lines.append(f"{symbol} = {_entry_text(entry)}{remark}")
+    for name, clock in signal_map.clocks.items():
+        lines += ["", f"[sources.{_quote(name)}]", f"offset_s = {clock.offset_s!r}"]
+        if clock.drift_ppm:
+            lines.append(f"drift_ppm = {clock.drift_ppm!r}")
+    return "\n".join(lines) + "\n"
+
+
+def _one_line(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _quote(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # a JSON string is a TOML basic string
+
+
+def _entry_text(entry: Entry) -> str:
+    names = [_quote(c) for c in entry.channel]
+    parts = [f"channel = {names[0]}" if len(names) == 1 else f"channel = [{', '.join(names)}]"]
+    if entry.unit is not None:
+        parts.append(f"unit = {_quote(entry.unit)}")
+    if entry.scale != 1.0:
+        parts.append(f"scale = {entry.scale!r}")
+    if entry.offset != 0.0:
+        parts.append(f"offset = {entry.offset!r}")
+    if entry.invalid:
+        parts.append(f"invalid = [{', '.join(repr(i) for i in entry.invalid)}]")
+    return "{ " + ", ".join(parts) + " }"

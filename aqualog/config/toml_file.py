@@ -1,0 +1,93 @@
+"""TOML files: read, and complain about all faults at once with line and nearest valid name."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aqualog.errors import ConfigError
+
+__all__ = ["Faults", "line_of", "load_toml"]
+
+
+def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
+    """Parse a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    what : str
+        What the file is to the user, e.g. `vehicle file`; used in errors.
+
+    Returns
+    -------
+    document, text
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing, not UTF-8 or not TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
+    except IsADirectoryError as error:
+        raise ConfigError(f"{what} is a folder", where=str(path), expected="a TOML file") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a TOML file") from error
+    except OSError as error:
+        raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
+    try:
+        return tomllib.loads(text), text
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{what} is not valid TOML: {error}", where=str(path)) from error
+
+
+def line_of(text: str, key: str) -> int | None:
+    """Line (from 1) on which a key or table first stands; None where it cannot be told."""
+    for number, line in enumerate(text.splitlines(), 1):
+        stripped = line.lstrip()
+        if stripped.startswith((key, f'"{key}"', f"[{key}", f"[[{key}")):
+            return number
+    return None
+
+
+class Faults:
+    """Collects all faults of one file, then raises them in one message."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        self._text = text
+        self._found: list[str] = []
+
+    def add(self, key: str, message: str) -> None:
+        """Note a fault at a key."""
+        line = line_of(self._text, key.rsplit(".", maxsplit=1)[-1])
+        self._found.append(f"line {line}: {message}" if line else message)
+
+    def unknown(self, key: str, known: Iterable[str]) -> None:
+        """Note a key that does not exist, with the nearest one that does."""
+        names = sorted(known)
+        near = difflib.get_close_matches(key, names, n=1, cutoff=0.5)
+        self.add(key, f'unknown key "{key}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
+
+    def number(self, table: Mapping[str, Any], key: str, *, low: float, high: float, unit: str) -> float | None:
+        """A number within its bounds, or None with the fault noted."""
+        value = table.get(key)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.add(key, f"{key} = {value!r} is not a number")
+            return None
+        if not low <= value <= high:
+            self.add(key, f"{key} = {value:g} is outside {low:g} ... {high:g} {unit}".rstrip())
+            return None
+        return float(value)
+
+    def raise_if_any(self) -> None:
+        """Raise one ConfigError with all faults."""
+        if self._found:
+            raise ConfigError("; ".join(self._found), where=str(self._path))

@@ -1,0 +1,68 @@
+"""What each detector needs, checked before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from aqualog.notation import SIDES, WHEELS
+from aqualog.types import Unavailable
+from aqualog.vehicle import Vehicle
+
+__all__ = ["DETECTORS", "check_needs"]
+
+DETECTORS = (
+    "spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
+    "joint_cusum",
+)  # fmt: skip
+
+_NOT_YET = "a later version of aqualog"
+
+
+def check_needs(vehicle: Vehicle, available: Collection[str]) -> tuple[list[Unavailable], list[Unavailable]]:
+    """Which detectors cannot run, and which run without one of their conditions.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    available : collection of str
+        Symbols of the drive.
+
+    Returns
+    -------
+    unavailable, limited : lists
+        Each with the signals (or `vehicle.KEY`) that are missing.
+    """
+    have = set(available)
+    omega = [f"omega_{w}" for w in WHEELS if f"omega_{w}" not in have]
+    torque = [f"torque_{w}" for w in vehicle.driven if f"torque_{w}" not in have]
+    no_speed = ["v_x"] if "v_x" not in have and len(omega) == len(WHEELS) else []
+    resistance = [*torque, *(["a_x"] if "a_x" not in have else []), *no_speed, *_not_given(vehicle, "mass")]
+    sides = {s: [f"omega_{w}" for w in ws if f"omega_{w}" in omega] for s, ws in SIDES.items()}
+    driven_omega = [f"omega_{w}" for w in vehicle.driven if f"omega_{w}" in omega]
+    missing = {
+        "spin_down": omega if len(omega) == len(WHEELS) else _lone_wheel(have, omega),
+        "minor_spin_down": omega if all(sides.values()) else [],
+        "spin_up": driven_omega if len(driven_omega) == len(vehicle.driven) else [],
+        "resistance": resistance,
+        "slip_slope_drop": [*omega, *torque] or [_NOT_YET],
+        "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [_NOT_YET],
+        "joint_criteria": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
+        "joint_cusum": [*omega, *resistance] or [_NOT_YET],
+    }
+    unavailable = [Unavailable(d, tuple(dict.fromkeys(missing[d]))) for d in DETECTORS if missing[d]]
+    gone = {u.detector for u in unavailable}
+    limited = {
+        "spin_down": omega,
+        "minor_spin_down": omega,
+        "spin_up": [*driven_omega, *torque],
+    }
+    return unavailable, [Unavailable(d, tuple(m)) for d, m in limited.items() if m and d not in gone]
+
+
+def _lone_wheel(have: set[str], omega: list[str]) -> list[str]:
+    """A single wheel without a reference has nothing to be compared with."""
+    return omega if len(omega) == len(WHEELS) - 1 and "v_x" not in have else []
+
+
+def _not_given(vehicle: Vehicle, *keys: str) -> list[str]:
+    return [f"vehicle.{k}" for k in keys if k not in vehicle.given]

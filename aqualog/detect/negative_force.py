@@ -1,0 +1,74 @@
+"""Where a braking force acts on a wheel, from whatever the log has to tell it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "hold_on", "is_braking"]
+
+A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
+BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
+TRACTION = -0.03  # [-] wheel torque over radius and load; engine braking stays above
+HOLD = 0.3  # [s] brakes and wheels need this long to settle after release
+
+
+def is_braking(
+    a_kin: FloatArray, brake_pressure: FloatArray | None, torque_coefficient: FloatArray | None
+) -> BoolArray:
+    """Whether a negative force acts, sample by sample.
+
+    Parameters
+    ----------
+    a_kin : array (n,)
+        Kinematic acceleration, low-passed. [m/s^2]
+    brake_pressure : array (n,), optional
+        [Pa]
+    torque_coefficient : array (n,), optional
+        Net wheel torque over radius and load. [-]
+
+    Returns
+    -------
+    bool array (n,)
+        NaN compares as not braking.
+
+    Thesis: "without negative tyre forces" of criteria 1 and 2 in section 2.5 (C65, C66).
+    """
+    with np.errstate(invalid="ignore"):
+        braking = a_kin < A_BRAKING
+        if brake_pressure is not None:
+            braking |= brake_pressure > BRAKE_PRESSURE
+        if torque_coefficient is not None:
+            braking |= torque_coefficient < TRACTION
+    return braking
+
+
+@njit(cache=True)
+def _hold_on(samples, left, x):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    for i in range(x.size):
+        left = samples if x[i] else max(left - 1, 0)
+        out[i] = x[i] or left > 0
+    return out, left
+
+
+def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[BoolArray, int]:
+    """Keep a bit on for a while after it goes off.
+
+    Parameters
+    ----------
+    x : bool array (n,)
+    state : int
+        Samples left; 0, or what the call before returned.
+    seconds, dt : float
+        How long; sample time. [s]
+
+    Returns
+    -------
+    y : bool array (n,)
+    state : int
+    """
+    y, left = _hold_on(max(1, round(seconds / dt)), state, x)
+    return y, int(left)

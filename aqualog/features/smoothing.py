@@ -1,0 +1,98 @@
+"""First-order low-pass and the derivative of it, as recursions.
+
+Both are tuned by a time constant in seconds, so that they behave alike at any sample rate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from aqualog.types import FloatArray
+
+__all__ = ["UNSET", "derivative", "gain", "lowpass"]
+
+UNSET = math.nan  # state before the first sample
+
+
+def gain(tau: float, dt: float) -> float:
+    """Share of a new sample in a first-order low-pass, 1 - exp(-dt / tau); 1 for tau = 0. [s, s]"""
+    return 1.0 if tau <= 0.0 else -math.expm1(-dt / tau)
+
+
+@njit(cache=True)
+def _lowpass(k, y, x):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    for i in range(x.size):
+        if math.isnan(x[i]):
+            out[i] = math.nan
+            continue
+        y = x[i] if math.isnan(y) else y + k * (x[i] - y)
+        out[i] = y
+    return out, y
+
+
+@njit(cache=True)
+def _derivative(k, dt, y, x):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    for i in range(x.size):
+        if math.isnan(x[i]):
+            # a value held over a gap would show the whole gap's change as one step
+            y = math.nan
+            out[i] = math.nan
+        elif math.isnan(y):
+            y = x[i]
+            out[i] = math.nan
+        else:
+            step = k * (x[i] - y)
+            y = y + step
+            out[i] = step / dt
+    return out, y
+
+
+def lowpass(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[FloatArray, float]:
+    """Low-pass y += (1 - exp(-dt / tau)) (x - y), starting at the first sample.
+
+    Parameters
+    ----------
+    x : array (n,)
+        Input. NaN: state held, output NaN.
+    state : float
+        `UNSET`, or what the call before returned.
+    tau, dt : float
+        Time constant, sample time. [s]
+
+    Returns
+    -------
+    y : array (n,)
+    state : float
+    """
+    y, last = _lowpass(gain(tau, dt), state, np.ascontiguousarray(x, dtype=np.float64))
+    return y, last
+
+
+def derivative(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[FloatArray, float]:
+    """Time derivative of the low-passed input.
+
+    Parameters
+    ----------
+    x : array (n,)
+        Input. NaN: restarts after the gap; the first sample and the first after a gap give NaN.
+    state : float
+        `UNSET`, or what the call before returned.
+    tau, dt : float
+        Time constant, sample time. [s] tau = 0 is the backward difference.
+
+    Returns
+    -------
+    dx_dt : array (n,)
+        [unit of x / s]
+    state : float
+
+    A plain difference of 10 ms samples of a wheel speed carries 1 m/s^2 rms of tooth noise, and five times that at
+    500 Hz; the time constant makes it one quantity.
+    """
+    y, last = _derivative(gain(tau, dt), dt, state, np.ascontiguousarray(x, dtype=np.float64))
+    return y, last

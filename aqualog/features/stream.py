@@ -1,0 +1,172 @@
+"""All features of a drive, sample by sample or in one go.
+
+A `FeatureStream` is fed with pieces of a drive of any length; the features of the pieces put together are bit for bit
+those of the whole, because every step is either one sample by itself or a recursion whose state is carried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from aqualog.features.smoothing import UNSET, derivative, lowpass
+from aqualog.features.velocity import initial_state, observe, params_from_seconds
+from aqualog.notation import WHEELS
+from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
+from aqualog.physics.load import wheel_loads
+from aqualog.physics.resistance import nominal_acceleration
+from aqualog.physics.traction import traction_coefficient
+from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["INPUTS", "FeatureStream", "Features"]
+
+# Everything that features read. Truth and labels are not among them, so that no detector can see them.
+INPUTS = (
+    "v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure",
+    *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS),
+)  # fmt: skip
+
+TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
+TAU_WHEEL = 0.03  # [s] wheel acceleration
+TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
+
+Features = Mapping[str, FloatArray]
+
+
+class FeatureStream:
+    """Features of one drive.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    dt : float
+        Sample time. [s]
+    available : collection of str
+        Symbols that the drive has at all; fixed for the drive.
+    correct_yaw : bool
+        Move the wheel speeds to the centre line; off only to show what that does.
+    """
+
+    def __init__(self, vehicle: Vehicle, dt: float, available: Collection[str], *, correct_yaw: bool = True) -> None:
+        self.vehicle = vehicle
+        self.dt = dt
+        self.available = frozenset(available) & frozenset(INPUTS)
+        self._correct_yaw = correct_yaw
+        self._has_wheels = any(f"omega_{w}" in self.available for w in WHEELS)
+        self._has_torque = all(f"torque_{w}" in self.available for w in vehicle.driven)
+        self._velocity_params = params_from_seconds(dt, has_accelerometer="a_x" in self.available)
+        self._velocity = initial_state()
+        self._memory: dict[str, float] = {}
+        trust = 1.0 if vehicle.drivetrain == "awd" else 0.25
+        self._weights = np.array([trust if w in vehicle.driven else 1.0 for w in WHEELS])
+        self._r_e = np.array([vehicle.r_e(w) for w in WHEELS])
+        self._r_l = np.array([vehicle.r_l(w) for w in WHEELS])
+        self._inertia = np.array([vehicle.inertia(w) for w in WHEELS])
+
+    def push(self, columns: Mapping[str, FloatArray]) -> Features:
+        """Features of the next piece.
+
+        Parameters
+        ----------
+        columns : mapping symbol -> array (n,)
+            SI; at least the symbols named as available.
+
+        Returns
+        -------
+        mapping name -> array (n,)
+            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_sum`, `delta_a_x` (2.9),
+            `a_x_slow`, `a_y_slow`; only those whose signals are available.
+        """
+        n = next(iter(columns.values())).size
+        get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}
+        out: dict[str, FloatArray] = {}
+        yaw_rate = self._lowpass("yaw_rate", get["yaw_rate"], TAU_YAW)
+        omega = np.array([get[f"omega_{w}"] for w in WHEELS])
+        v_w = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
+        v_x, a_kin, v_w, self._velocity = observe(
+            self._velocity_params, self._velocity, get["v_x"], v_w, get["a_x"], yaw_rate, weights=self._weights
+        )
+        out["v_x_hat"], out["a_kin"] = v_x, a_kin
+        if self._has_wheels:
+            self._differences(v_w, v_x, a_kin, out)
+        a_x = get["a_x"] if "a_x" in self.available else a_kin
+        a_y = get["a_y"] if "a_y" in self.available else v_x * yaw_rate
+        out["a_x_slow"] = self._lowpass("a_x", a_x, TAU_LOAD)
+        out["a_y_slow"] = self._lowpass("a_y", np.nan_to_num(a_y), TAU_LOAD)
+        out["a_kin_slow"] = self._lowpass("a_kin_slow", a_kin, TAU_LOAD)
+        if self._has_torque:
+            self._forces(get, omega, out)
+        if "brake_pressure" in self.available:
+            out["brake_pressure"] = get["brake_pressure"]
+        return out
+
+    def _lowpass(self, name: str, x: FloatArray, tau: float) -> FloatArray:
+        y, self._memory[name] = lowpass(x, self._memory.get(name, UNSET), tau=tau, dt=self.dt)
+        return y
+
+    def _derivative(self, name: str, x: FloatArray) -> FloatArray:
+        y, self._memory[name] = derivative(x, self._memory.get(name, UNSET), tau=TAU_WHEEL, dt=self.dt)
+        return y
+
+    def _centre_line(self, v_rim: FloatArray, yaw_rate: FloatArray, steer: FloatArray) -> FloatArray:
+        if not self._correct_yaw or "yaw_rate" not in self.available:
+            return v_rim
+        vehicle = self.vehicle
+        if "steer_angle" not in self.available:
+            # the rear axle rolls straight ahead, so its mean is the speed; a spinning pair errs by its slip only
+            steer = kinematic_steer_angle(yaw_rate, 0.5 * (v_rim[2] + v_rim[3]), wheelbase=vehicle.wheelbase)
+        straight = np.zeros_like(steer)
+        half = 0.5 * vehicle.track
+        return np.array(
+            [
+                centre_line_speed(v, yaw_rate, delta, y=y, wheelbase=vehicle.wheelbase)
+                for v, delta, y in zip(
+                    v_rim, (steer, steer, straight, straight), (half, -half, half, -half), strict=True
+                )
+            ]
+        )
+
+    def _differences(self, v_w: FloatArray, v_x: FloatArray, a_kin: FloatArray, out: dict[str, FloatArray]) -> None:
+        # the wheel's derivative is of a low-passed speed, so the vehicle's acceleration gets the same lag
+        a_ref = self._lowpass("a_kin", a_kin, TAU_WHEEL)
+        for i, wheel in enumerate(WHEELS):
+            if f"omega_{wheel}" not in self.available:
+                continue
+            out[f"v_w_{wheel}"] = v_w[i]
+            out[f"v_w_delta_{wheel}"] = v_w[i] - v_x
+            out[f"a_w_delta_{wheel}"] = self._derivative(f"v_w_{wheel}", v_w[i]) - a_ref
+
+    def _forces(self, get: Mapping[str, FloatArray], omega: FloatArray, out: dict[str, FloatArray]) -> None:
+        vehicle = self.vehicle
+        loads = wheel_loads(
+            out["a_x_slow"], out["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r,
+            h_cg=vehicle.h_cg, track=vehicle.track,
+        )  # fmt: skip
+        # a wheel without a torque signal of its own is a non-driven one that rolls freely
+        torque = np.array(
+            [get[f"torque_{w}"] if f"torque_{w}" in self.available else np.zeros_like(out["v_x_hat"]) for w in WHEELS]
+        )
+        # without wheel speeds the wheels are taken to follow the vehicle
+        omega_dot = np.array(
+            [
+                self._derivative(f"omega_{w}", omega[i])
+                if f"omega_{w}" in self.available
+                else out["a_kin_slow"] / self._r_e[i]
+                for i, w in enumerate(WHEELS)
+            ]
+        )
+        for i, wheel in enumerate(WHEELS):
+            if f"torque_{wheel}" in self.available:
+                out[f"mu_{wheel}"] = traction_coefficient(
+                    torque[i], loads[i], omega_dot[i], r_l=float(self._r_l[i]), inertia=float(self._inertia[i]),
+                    r_w=vehicle.rolling_resistance,
+                )  # fmt: skip
+        out["torque_sum"] = torque[0] + torque[1] + torque[2] + torque[3]
+        if "a_x" in self.available:
+            a_nom = nominal_acceleration(
+                torque, loads, out["v_x_hat"], omega_dot, r_l=self._r_l, inertia=self._inertia, mass=vehicle.mass,
+                r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
+            )  # fmt: skip
+            out["delta_a_x"] = a_nom - get["a_x"]

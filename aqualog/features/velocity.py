@@ -1,0 +1,205 @@
+"""Velocity and kinematic acceleration of the vehicle from what there is: a reference, the wheels, the accelerometer.
+
+The detectors need the velocity only to tell a slow wheel from a fast one, and the kinematic acceleration to know what
+a healthy wheel does. Both must not follow a wheel that has left the road's speed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from aqualog.features.smoothing import gain
+from aqualog.types import FloatArray
+
+__all__ = ["VelocityParams", "VelocityState", "initial_state", "observe", "params_from_seconds"]
+
+_N = 4
+
+
+class VelocityParams(NamedTuple):
+    """Per-sample factors of the observer; made by `params_from_seconds`."""
+
+    dt: float
+    k_v: float  # share of the innovation that corrects the velocity
+    k_b: float  # the same for the offset between accelerometer and kinematic acceleration [1/s]
+    has_accelerometer: bool
+    gate_abs: float  # [m/s] innovations beyond gate_abs + gate_rel v are not believed
+    gate_rel: float
+    tau_radius: float  # [s] time constant of the radius correction
+
+
+class VelocityState(NamedTuple):
+    """What the observer carries from sample to sample: v [m/s], b [m/s^2], time without a believed measurement [s]."""
+
+    v: float
+    b: float
+    lost: float
+    kappa: FloatArray  # (4,) share by which a wheel's effective radius is larger than the file says
+    age: FloatArray  # (4,)
+
+
+def initial_state() -> VelocityState:
+    """Before the first sample."""
+    return VelocityState(math.nan, 0.0, 0.0, np.zeros(_N), np.ones(_N))
+
+
+def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams:
+    """Tuning in seconds turned into per-sample factors.
+
+    With an accelerometer its integral carries the short run, and the offset b (mounting, drift, grade) follows in
+    about 5 s; without one b itself is the acceleration and must follow in 0.3 s.
+    """
+    tau_v, tau_b = (0.25, 5.0) if has_accelerometer else (0.15, 0.3)
+    k_v = gain(tau_v, dt)
+    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0)
+
+
+@njit(cache=True)
+def _step(p, v, b, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+    """One sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
+    for i in range(_N):
+        w[i] = w[i] * (1.0 + kappa[i])
+    accelerometer_gone = p.has_accelerometer and math.isnan(a_x)
+    a = -b if not p.has_accelerometer else (0.0 if accelerometer_gone else a_x - b)
+
+    if math.isnan(v):
+        v = v_ref if not math.isnan(v_ref) else _median(w)
+        if math.isnan(v):
+            return math.nan, b, lost, math.nan, math.nan
+        lost = 0.0
+    else:
+        v = v + a * p.dt
+
+    gate = p.gate_abs + p.gate_rel * abs(v)
+    total = 0.0
+    error = 0.0
+    far = 0.0
+    known = 0.0
+    if not math.isnan(v_ref):
+        # a reference may be late or coarse, but it cannot spin: it is believed, in bounded steps
+        error = min(max(v_ref - v, -4.0 * gate), 4.0 * gate)
+        total = 1.0
+    else:
+        for i in range(_N):
+            if math.isnan(w[i]):
+                continue
+            e = w[i] - v
+            known += weights[i]
+            far += weights[i] * min(max(e, -gate), gate)
+            if abs(e) <= gate:
+                total += weights[i]
+                error += weights[i] * e
+    if total > 0.0:
+        error /= total
+        lost = 0.0
+        v += p.k_v * error
+        b -= p.k_b * error
+    else:
+        lost += p.dt
+        if known > 0.0:
+            v += 0.3 * p.k_v * far / known
+        if lost > 2.0:
+            v = _median(w)
+            lost = 0.0
+            if math.isnan(v):
+                return math.nan, b, lost, math.nan, math.nan
+
+    if v > 8.0 and abs(a) < 1.0 and not abs(yaw_rate) > 0.1:
+        mean = 0.0
+        count = 0
+        for i in range(_N):
+            e = w[i] - v
+            if abs(e) < 0.02 * v:
+                kappa[i] -= p.dt / age[i] * e / v
+                kappa[i] = min(max(kappa[i], -0.03), 0.03)
+                age[i] = min(age[i] + p.dt, p.tau_radius)
+            if not math.isnan(w[i]):
+                mean += kappa[i]
+                count += 1
+        if math.isnan(v_ref) and count > 0:
+            # without a reference only the ratios can be known: their mean must not wander
+            for i in range(_N):
+                kappa[i] -= mean / count
+    is_seen = known > 0.0 or not math.isnan(v_ref)
+    a_out = math.nan if accelerometer_gone else (a_x - b if p.has_accelerometer else -b)
+    return v, b, lost, (v if is_seen else math.nan), (a_out if is_seen else math.nan)
+
+
+@njit(cache=True)
+def _median(w):  # type: ignore[no-untyped-def]
+    known = w[~np.isnan(w)]
+    return math.nan if known.size == 0 else np.median(known)
+
+
+@njit(cache=True)
+def _scan(p, v, b, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+    n = v_ref.size
+    velocity = np.empty(n)
+    acceleration = np.empty(n)
+    corrected = np.empty((_N, n))
+    w = np.empty(_N)
+    for k in range(n):
+        for i in range(_N):
+            w[i] = v_w[i, k]
+        v, b, lost, velocity[k], acceleration[k] = _step(
+            p, v, b, lost, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k]
+        )
+        for i in range(_N):
+            corrected[i, k] = w[i]
+    return velocity, acceleration, corrected, v, b, lost
+
+
+def observe(
+    p: VelocityParams,
+    state: VelocityState,
+    v_ref: FloatArray,
+    v_w: FloatArray,
+    a_x: FloatArray,
+    yaw_rate: FloatArray,
+    *,
+    weights: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, VelocityState]:
+    """Velocity observer with bounded trust in every source.
+
+    dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), where v_m is the reference velocity or,
+    without one, the weighted mean of those wheels that agree with the prediction. A wheel that spins or locks leaves
+    the gate and no longer counts. Where no wheel agrees for 2 s the observer starts again.
+
+    A slow correction per wheel (time constant 30 s, within 3 %, learnt only while rolling steadily) takes out radius
+    errors: a reference that differs by 1 % in scale must not look like slip.
+
+    Parameters
+    ----------
+    p : VelocityParams
+    state : VelocityState
+        Not changed.
+    v_ref : array (n,)
+        Reference velocity, NaN where there is none. [m/s]
+    v_w : array (4, n)
+        Wheel speeds on the centre line. [m/s]
+    a_x : array (n,)
+        Accelerometer, specific force; NaN where there is none. [m/s^2]
+    yaw_rate : array (n,)
+        NaN where there is none. [rad/s]
+    weights : array (4,)
+        Trust in each wheel; less for driven ones.
+
+    Returns
+    -------
+    v_x : array (n,)
+        Velocity. NaN where neither a reference nor a wheel was there. [m/s]
+    a_kin : array (n,)
+        Kinematic acceleration dv_x/dt, free of grade and of the accelerometer's offset (E2). [m/s^2]
+    v_w : array (4, n)
+        Wheel speeds with the radius correction. [m/s]
+    state : VelocityState
+    """
+    kappa, age = state.kappa.copy(), state.age.copy()
+    velocity, acceleration, corrected, v, b, lost = _scan(
+        p, state.v, state.b, state.lost, kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
+    )
+    return velocity, acceleration, corrected, VelocityState(v, b, lost, kappa, age)

@@ -1,0 +1,379 @@
+"""MCAP logs: JSON, protobuf, ROS 1 and ROS 2 messages, indexed or not, whole or damaged.
+
+The data section is walked record by record, and every chunk is unpacked within its declared size and checked against
+its checksum. So a file that was cut off, or whose index is gone, gives all that stands before the cut, and a damaged
+chunk costs that chunk only. The summary at the end, where it is sound, saves a pass over the file.
+
+Format: https://mcap.dev/spec
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Schema as SchemaRecord
+from mcap.summary import Summary
+
+from aqualog.errors import LogError
+from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.messages import (
+    MAX_UNPACKED,
+    SAMPLES,
+    MessageReader,
+    Stream,
+    UndecodableError,
+    codec_for,
+    make_stream,
+)
+
+__all__ = ["MAGIC", "DamagedError", "McapReader", "McapSource", "unpack"]
+
+MAGIC = b"\x89MCAP0\r\n"
+
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_CHUNK = struct.Struct("<QQQII")  # start, end, unpacked size, crc, length of the compression's name
+_FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offsets start, crc
+_TAIL = _FOOTER.size + len(MAGIC)
+
+_WALKED = frozenset(
+    {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END}
+)
+
+Message = tuple[int, int, bytes]
+
+
+class DamagedError(Exception):
+    """A chunk cannot be unpacked; its text is the reason."""
+
+
+class McapReader(MessageReader):
+    """Reader of one MCAP file."""
+
+    format = "mcap"
+
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        super().__init__(path, [McapSource(path)], FaultLog())
+
+
+class McapSource:
+    """One MCAP file as a source of messages.
+
+    Raises
+    ------
+    LogError
+        If the file is not MCAP.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.truncated = False
+        self._notes: list[str] = []
+        self._damaged: dict[int, str] = {}
+        self._lost: dict[int, int] = {}
+        self._schemas: dict[int, SchemaRecord] = {}
+        self._channels: dict[int, ChannelRecord] = {}
+        self._counts: dict[int, int] = {}
+        self._indexed = False
+        _check_magic(path)
+        self._size = path.stat().st_size
+
+    def streams(self) -> Sequence[Stream]:
+        """All connections with messages that can be decoded, in the order of their ids."""
+        with self.path.open("rb") as file:
+            summary = _sound_summary(file, self._size)
+            samples = self._scan(file) if summary is None else self._sample(file, summary)
+        return [s for i in sorted(self._channels) if (s := self._stream(i, samples.get(i, []))) is not None]
+
+    def _stream(self, channel_id: int, samples: Sequence[bytes]) -> Stream | None:
+        channel, count = self._channels[channel_id], self._counts.get(channel_id, 0)
+        if not count:
+            return None
+        try:
+            if not samples:
+                raise UndecodableError("none of its messages can be read")
+            schema = self._schemas.get(channel.schema_id)
+            if schema is None and channel.schema_id:
+                raise UndecodableError("its schema is missing")
+            described = (schema.encoding, schema.name, schema.data) if schema else ("", "", b"")
+            codec = codec_for(channel.message_encoding, *described)
+            return make_stream(channel_id, channel.topic, count, codec, samples)
+        except UndecodableError as error:
+            self._notes.append(f'topic "{channel.topic}" is left out: {error}')
+            return None
+
+    def _sample(self, file: BinaryIO, summary: Summary) -> dict[int, list[bytes]]:
+        """First messages of each channel, from as few chunks as hold them all."""
+        assert summary.statistics is not None
+        self._schemas, self._channels = dict(summary.schemas), dict(summary.channels)
+        self._counts = dict(summary.statistics.channel_message_counts)
+        self._indexed = True
+        missing = {i for i, n in self._counts.items() if n and i in self._channels}
+        samples: dict[int, list[bytes]] = {}
+        for chunk in sorted(summary.chunk_indexes, key=lambda c: c.chunk_start_offset):
+            here = frozenset(missing.intersection(chunk.message_index_offsets))
+            if not here:
+                continue
+            file.seek(chunk.chunk_start_offset)
+            opcode, length = _HEAD.unpack(file.read(_HEAD.size))
+            if opcode == Opcode.CHUNK and length <= self._size:
+                for channel_id, _, data in self._chunk(chunk.chunk_start_offset, file.read(length), here):
+                    _keep(samples, channel_id, data)
+            missing.difference_update(samples)
+        return samples
+
+    def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
+        """Count all messages and keep the first ones of each channel: for a file without a sound index."""
+        samples: dict[int, list[bytes]] = {}
+        for channel_id, _, data in self._walk(file, None):
+            self._counts[channel_id] = self._counts.get(channel_id, 0) + 1
+            _keep(samples, channel_id, data)
+        orphans = sum(n for i, n in self._counts.items() if i not in self._channels)
+        if orphans:
+            self._notes.append(f"{self.path.name}: {orphans} messages are left out, their channel records are lost")
+        return samples
+
+    def messages(self, ids: frozenset[int]) -> Iterator[Message]:
+        """Channel id, log time and bytes of these channels' messages, in file order."""
+        self._lost = {}
+        seen = dict.fromkeys(ids, 0)
+        with self.path.open("rb") as file:
+            for message in self._walk(file, ids):
+                seen[message[0]] += 1
+                yield message
+        if self._indexed:
+            self._lost = {i: max(0, self._counts.get(i, 0) - n) for i, n in seen.items()}
+
+    def lost(self, stream_id: int) -> int:
+        """Messages of a channel that the last pass could not get at."""
+        return self._lost.get(stream_id, 0)
+
+    def notes(self) -> Sequence[str]:
+        """What was left out so far."""
+        if not self._damaged:
+            return self._notes
+        offset, reason = min(self._damaged.items())
+        many = f"{len(self._damaged)} damaged chunk{'s are' if len(self._damaged) > 1 else ' is'} left out"
+        return [*self._notes, f"{self.path.name}: {many} (first at byte {offset}: {reason})"]
+
+    def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Message]:
+        """All messages of the data section; `None` asks for all channels and keeps their records."""
+        in_damaged = loose = False
+        for offset, opcode, body in self._records(file):
+            if opcode == Opcode.CHUNK:
+                yield from (messages := self._chunk(offset, body, ids))
+                in_damaged = not messages and offset in self._damaged
+            elif opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
+                loose = True
+                channel_id, _, log_time, _ = _MESSAGE.unpack_from(body)
+                if ids is None or channel_id in ids:
+                    yield channel_id, log_time, body[_MESSAGE.size :]
+            elif opcode == Opcode.MESSAGE_INDEX and in_damaged:
+                self._count_lost(body)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._note_record(opcode, body)
+            elif opcode == Opcode.DATA_END and loose:
+                self._check_data(file, offset, body)
+
+    def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
+        """Offset, opcode and body of the records up to the end of the data section or the cut."""
+        offset = len(MAGIC)
+        while True:
+            file.seek(offset)
+            head = file.read(_HEAD.size)
+            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
+            end = offset + _HEAD.size + length
+            if opcode == 0 or end > self._size:
+                self._cut(offset)
+                return
+            yield offset, opcode, file.read(length) if opcode in _WALKED else b""
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                return
+            offset = end
+
+    def _cut(self, offset: int) -> None:
+        self.truncated = True
+        self._notes.append(
+            f"{self.path.name}: no sound record from byte {offset} of {self._size} on: cut off, damaged there or never "
+            "closed; what stands before is read"
+        )
+
+    def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> list[Message]:
+        """Messages of one chunk; none if it is damaged, for then no byte of it can be trusted."""
+        try:
+            return list(_split(_unpacked(body), ids, self._note_record))
+        except (DamagedError, struct.error, UnicodeDecodeError) as error:
+            self._damaged[offset] = str(error)
+            return []
+
+    def _note_record(self, opcode: int, body: bytes) -> None:
+        if self._indexed:
+            return  # the summary has them, and under its own checksum
+        try:
+            stream = ReadDataStream(BytesIO(body))
+            if opcode == Opcode.SCHEMA:
+                schema = SchemaRecord.read(stream)
+                self._schemas.setdefault(schema.id, schema)
+            else:
+                channel = ChannelRecord.read(stream)
+                self._channels.setdefault(channel.id, channel)
+        except Exception as error:  # the record parser raises whatever the bytes lead it to
+            self._notes.append(f"{self.path.name}: a schema or channel record is damaged ({error})")
+
+    def _count_lost(self, body: bytes) -> None:
+        """Add what the index behind a damaged chunk says was in it; 16 bytes per message."""
+        if len(body) >= 6:
+            channel_id, size = struct.unpack_from("<HI", body)
+            self._lost[channel_id] = self._lost.get(channel_id, 0) + min(size, len(body)) // 16
+
+    def _check_data(self, file: BinaryIO, end: int, body: bytes) -> None:
+        """Messages outside of chunks have no other checksum than the one over the whole data section."""
+        expected = int.from_bytes(body[:4], "little")
+        if expected and _crc(file, 0, end) != expected:
+            self._notes.append(f"{self.path.name}: the checksum of the data is wrong; values may be altered")
+
+
+def _check_magic(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            magic = file.read(len(MAGIC))
+    except OSError as error:
+        raise LogError(f"cannot be opened ({error.strerror})", where=str(path), hint="check the path") from error
+    if magic != MAGIC:
+        what = "is empty" if not magic else "is no MCAP file"
+        raise LogError(what, where=str(path), expected="a file that begins with \\x89MCAP0", hint="record it again")
+
+
+def _keep(samples: dict[int, list[bytes]], channel_id: int, data: bytes) -> None:
+    kept = samples.setdefault(channel_id, [])
+    if len(kept) < SAMPLES:
+        kept.append(data)
+
+
+def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, bytes], None]) -> Iterator[Message]:
+    """Messages of an unpacked chunk."""
+    position, size = 0, len(data)
+    while position < size:
+        opcode, length = _HEAD.unpack_from(data, position)
+        start = position + _HEAD.size
+        position = start + length
+        if position > size:
+            raise DamagedError("a record is longer than its chunk")
+        if opcode == Opcode.MESSAGE:
+            channel_id, _, log_time, _ = _MESSAGE.unpack_from(data, start)
+            if ids is None or channel_id in ids:
+                yield channel_id, log_time, data[start + _MESSAGE.size : position]
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            on_record(opcode, data[start:position])
+        elif opcode < 0x80:  # from there on opcodes are private and skipped
+            raise DamagedError(f"a record of kind {opcode} stands in a chunk")
+
+
+def _unpacked(body: bytes) -> bytes:
+    """Content of a chunk record, checked against its size and checksum."""
+    _, _, size, crc, name_length = _CHUNK.unpack_from(body)
+    data_start = _CHUNK.size + name_length + 8
+    if data_start > len(body):
+        raise DamagedError("it is shorter than its head")
+    compression = body[_CHUNK.size : _CHUNK.size + name_length].decode()
+    data = unpack(body[data_start:], compression, size)
+    if crc and zlib.crc32(data) != crc:
+        raise DamagedError("its checksum is wrong")
+    return data
+
+
+def unpack(data: bytes, compression: str, size: int) -> bytes:
+    """Decompress a block to its declared size and not a byte further.
+
+    Parameters
+    ----------
+    data : bytes
+        Compressed block.
+    compression : str
+        `zstd`, `lz4`, `bz2`, or empty or `none` for plain bytes.
+    size : int
+        Declared size. [byte]
+
+    Raises
+    ------
+    DamagedError
+        If the block is damaged, of another size, larger than `MAX_UNPACKED` or of an unknown compression.
+    """
+    if size > MAX_UNPACKED:
+        raise DamagedError(f"it would unpack to {size} bytes, more than {MAX_UNPACKED}")
+    try:
+        plain = _decompress(data, compression, size + 1)
+    except (zstandard.ZstdError, RuntimeError, EOFError, OSError, ValueError) as error:
+        raise DamagedError(f"{compression} cannot unpack it ({error})") from error
+    if len(plain) != size:
+        raise DamagedError(f"it does not unpack to the {size} bytes that it declares")
+    return plain
+
+
+def _decompress(data: bytes, compression: str, limit: int) -> bytes:
+    if compression in ("", "none"):
+        return data
+    if compression == "zstd":
+        # As a stream, for the one-call form believes the size in the frame and not the limit.
+        with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
+            return stream.read(limit)
+    if compression == "lz4":
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit))
+    if compression == "bz2":
+        return bz2.BZ2Decompressor().decompress(data, max_length=limit)
+    raise DamagedError(f'compression "{compression}" is not known')
+
+
+def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
+    """The summary, if it is whole, passes its checksum and knows where every message is."""
+    if size < len(MAGIC) + _TAIL:
+        return None
+    file.seek(size - _TAIL)
+    tail = file.read(_TAIL)
+    opcode, length, start, _, crc = _FOOTER.unpack_from(tail)
+    if not tail.endswith(MAGIC) or (opcode, length) != (Opcode.FOOTER, 20) or not 0 < start < size:
+        return None
+    if crc and _crc(file, start, size - len(MAGIC) - 4) != crc:
+        return None
+    try:
+        summary = make_reader(file, record_size_limit=size).get_summary()
+    except Exception:  # whatever is wrong with it, the data section is still there to be walked
+        return None
+    return summary if summary is not None and _is_complete(summary) else None
+
+
+def _is_complete(summary: Summary) -> bool:
+    statistics = summary.statistics
+    if statistics is None or not summary.channels or not summary.chunk_indexes:
+        return False
+    counts = statistics.channel_message_counts
+    listed = {channel for chunk in summary.chunk_indexes for channel in chunk.message_index_offsets}
+    used = {channel for channel, count in counts.items() if count}
+    return (
+        sum(counts.values()) == statistics.message_count
+        and len(summary.chunk_indexes) == statistics.chunk_count
+        and used <= listed
+        and used <= summary.channels.keys()
+        and all(c.schema_id == 0 or c.schema_id in summary.schemas for c in summary.channels.values())
+    )
+
+
+def _crc(file: BinaryIO, start: int, end: int) -> int:
+    file.seek(start)
+    crc = 0
+    while start < end and (block := file.read(min(1 << 20, end - start))):
+        crc = zlib.crc32(block, crc)
+        start += len(block)
+    return crc

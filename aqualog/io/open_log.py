@@ -1,0 +1,116 @@
+"""Open one log, or the several files of one drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from aqualog.errors import LogError
+from aqualog.io.base import Reader, ReadOptions
+from aqualog.io.sniff import sniff
+from aqualog.types import Channel, ChannelInfo, FileFaults
+
+__all__ = ["DriveLog", "open_log"]
+
+
+def _mdf(path: Path, options: ReadOptions) -> Reader:
+    from aqualog.io.mdf import MdfReader
+
+    return MdfReader(path, options)
+
+
+def _mcap(path: Path, options: ReadOptions) -> Reader:
+    from aqualog.io.mcap import McapReader
+
+    return McapReader(path, options)
+
+
+def _ros(path: Path, options: ReadOptions) -> Reader:
+    from aqualog.io.ros import RosReader
+
+    return RosReader(path, options)
+
+
+def _csv(path: Path, options: ReadOptions) -> Reader:
+    from aqualog.io.csv import CsvReader
+
+    return CsvReader(path, options)
+
+
+def _parquet(path: Path, options: ReadOptions) -> Reader:
+    from aqualog.io.parquet import ParquetReader
+
+    return ParquetReader(path, options)
+
+
+# Each reader's libraries are imported when a file of its format is opened, not before.
+_READERS: dict[str, Callable[[Path, ReadOptions], Reader]] = {
+    "mdf": _mdf, "mcap": _mcap, "ros": _ros, "csv": _csv, "parquet": _parquet,
+}  # fmt: skip
+
+
+def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
+    """Open one file with the reader of its content.
+
+    Raises
+    ------
+    LogError
+        If the file is missing, unknown or damaged beyond reading.
+    """
+    return _READERS[sniff(path)](path, options or ReadOptions())
+
+
+class DriveLog:
+    """The files of one drive as one reader; a context manager.
+
+    If one file cannot be opened, those opened before it are closed again.
+    """
+
+    def __init__(self, paths: Sequence[Path], options: ReadOptions | None = None) -> None:
+        names = [p.name for p in paths]
+        twice = {n for n in names if names.count(n) > 1}
+        if twice:
+            raise LogError(f"two files of one drive are both called {sorted(twice)[0]}", hint="rename one of them")
+        self.paths = tuple(paths)
+        with ExitStack() as stack:
+            self._readers = [stack.enter_context(open_log(p, options)) for p in paths]
+            self._stack = stack.pop_all()
+
+    def channels(self) -> list[ChannelInfo]:
+        """Channels of all files."""
+        return [c for r in self._readers for c in r.channels()]
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """Format of each file."""
+        return tuple(r.format for r in self._readers)
+
+    @property
+    def faults(self) -> list[FileFaults]:
+        """What each file lost; complete after `read`."""
+        return [r.faults for r in self._readers]
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> dict[tuple[str, str], Channel]:
+        """Decode channels of any of the files, keyed by (file, path)."""
+        asked = list({(w.file, w.path): w for w in wanted}.values())
+        result: dict[tuple[str, str], Channel] = {}
+        for path, reader in zip(self.paths, self._readers, strict=True):
+            own = [w for w in asked if w.file == path.name]
+            if own:
+                result |= {(c.info.file, c.info.path): c for c in reader.read(own)}
+        return result
+
+    def close(self) -> None:
+        """Close all files."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,62 @@
+"""Which format a file has, by its content; the suffix is not asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aqualog.errors import LogError
+
+__all__ = ["sniff"]
+
+_HEAD = 4096
+_MCAP = b"\x89MCAP0\r\n"
+
+
+def sniff(path: Path) -> str:
+    """Format of a log: `mdf`, `mcap`, `ros`, `parquet` or `csv`.
+
+    Raises
+    ------
+    LogError
+        If there is no such file, it is empty, or its content is none of these.
+    """
+    if path.is_dir():
+        if any(path.glob("*.db3")) or any(path.glob("*.mcap")) or (path / "metadata.yaml").exists():
+            return "ros"
+        raise LogError("is a folder without a ROS 2 bag", where=str(path), expected="a log file", hint="name the files")
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except FileNotFoundError as error:
+        raise LogError("no such file", where=str(path), hint="check the path") from error
+    except OSError as error:
+        raise LogError(f"cannot be opened: {error.strerror}", where=str(path)) from error
+    if not head:
+        raise LogError("is empty", where=str(path), expected="a log")
+    for magic, name in _MAGIC:
+        if head.startswith(magic):
+            return name
+    if _is_text(head):
+        return "csv"
+    raise LogError(
+        f"unknown format (starts with {head[:8]!r})",
+        where=str(path),
+        expected="MDF 3/4, MCAP, ROS 1 bag, ROS 2 bag, Parquet or CSV",
+    )
+
+
+_MAGIC = (
+    (b"MDF     ", "mdf"),
+    (b"UnFinMF ", "mdf"),
+    (_MCAP, "mcap"),
+    (b"#ROSBAG V", "ros"),
+    (b"SQLite format 3\x00", "ros"),
+    (b"PAR1", "parquet"),
+)
+
+
+def _is_text(head: bytes) -> bool:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
+        return True
+    control = sum(b < 32 and b not in (9, 10, 12, 13, 27) for b in head)
+    return control == 0

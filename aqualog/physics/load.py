@@ -1,0 +1,49 @@
+"""Wheel loads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.types import FloatArray
+
+__all__ = ["G", "wheel_loads"]
+
+G = 9.80665  # [m/s^2]
+
+
+def wheel_loads(
+    a_x: FloatArray, a_y: FloatArray, *, mass: float, l_f: float, l_r: float, h_cg: float, track: float
+) -> FloatArray:
+    """Quasi-static wheel loads with longitudinal and lateral transfer.
+
+    Parameters
+    ----------
+    a_x, a_y : array (n,)
+        Specific force, forward and left (what an accelerometer shows: a grade shifts load as acceleration does).
+        [m/s^2]
+    mass, l_f, l_r, h_cg, track : float
+        Vehicle. [kg, m]
+
+    Returns
+    -------
+    F_z : array (4, n)
+        fl, fr, rl, rr; never negative. [N]
+
+    Limits: a = 0 splits m g by l_r : l_f and left = right; the sum is m g as long as no wheel lifts. A left turn
+    (a_y > 0) loads the right wheels. The lateral transfer is split by the static axle loads. Small grades: cos = 1.
+    """
+    l = l_f + l_r  # noqa: E741 - the field's symbol of the wheelbase
+    axle_f = mass * (G * l_r - a_x * h_cg) / l
+    axle_r = mass * (G * l_f + a_x * h_cg) / l
+    lateral = mass * a_y * h_cg / track
+    share_f = l_r / l
+    loads = np.array(
+        [
+            0.5 * axle_f - lateral * share_f,
+            0.5 * axle_f + lateral * share_f,
+            0.5 * axle_r - lateral * (1.0 - share_f),
+            0.5 * axle_r + lateral * (1.0 - share_f),
+        ]
+    )
+    clipped: FloatArray = np.maximum(loads, 0.0)
+    return clipped

@@ -1,0 +1,80 @@
+"""Driving resistance and the acceleration that it leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.types import FloatArray
+
+__all__ = ["air_drag", "nominal_acceleration", "rolling_resistance_force"]
+
+
+def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArray:
+    """Air drag, c_x v^2 with c_x = 1/2 c_w A rho.
+
+    Parameters
+    ----------
+    v : array (n,)
+        Speed through the air. [m/s]
+    drag_area : float
+        c_w A. [m^2]
+    air_density : float
+        [kg/m^3]
+
+    Returns
+    -------
+    F : array (n,)
+        Against the motion, positive. [N]
+    """
+    return 0.5 * drag_area * air_density * v * np.abs(v)
+
+
+def rolling_resistance_force(F_z: FloatArray, *, r_w: float) -> FloatArray:
+    """Rolling resistance r_w F_z. [N] Load [N], coefficient [-]; against the motion, positive."""
+    return r_w * F_z
+
+
+def nominal_acceleration(
+    torque: FloatArray,
+    F_z: FloatArray,
+    v_x: FloatArray,
+    omega_dot: FloatArray,
+    *,
+    r_l: FloatArray,
+    inertia: FloatArray,
+    mass: float,
+    r_w: float,
+    drag_area: float,
+    air_density: float,
+) -> FloatArray:
+    """Acceleration that the wheel torques give a car on dry road, as an accelerometer shows it.
+
+    Parameters
+    ----------
+    torque : array (4, n)
+        Net wheel torques, drive minus brake. [N m]
+    F_z : array (4, n)
+        Wheel loads. [N]
+    v_x : array (n,)
+        Velocity. [m/s]
+    omega_dot : array (4, n)
+        Angular accelerations of the wheels; zeros give the equation as printed. [rad/s^2]
+    r_l, inertia : array (4,)
+        Loaded radii [m], wheel inertias [kg m^2].
+    mass, r_w, drag_area, air_density : float
+        Vehicle. [kg, -, m^2, kg/m^3]
+
+    Returns
+    -------
+    a_nom : array (n,)
+        Forward positive. A grade is absent on purpose: it is absent from the accelerometer's specific force too, so
+        that it cancels in the difference (E2). [m/s^2]
+
+    Thesis: Eq. (2.10), with the part of the torque that spins the wheels taken off (E5): without it a wheel that
+    spins up by 100 rad/s^2 looks like 0.23 m/s^2 of resistance.
+    """
+    traction = (torque - inertia[:, None] * omega_dot) / r_l[:, None]
+    rolling = rolling_resistance_force(F_z, r_w=r_w)
+    drag = air_drag(v_x, drag_area=drag_area, air_density=air_density)
+    a_nom: FloatArray = ((traction - rolling).sum(axis=0) - drag) / mass
+    return a_nom

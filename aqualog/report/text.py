@@ -1,0 +1,73 @@
+"""A drive's result as text for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from aqualog.types import DriveResult, Event
+
+__all__ = ["event_table", "table"]
+
+
+def event_table(result: DriveResult) -> str:
+    """Events, what could not be judged and why, and what was lost."""
+    signals = result.signals
+    duration = signals.frame.height * signals.dt
+    lines = [f"{result.vehicle_name}: {duration:.1f} s at {1e9 / signals.dt_ns:g} Hz, {len(signals.symbols)} signals"]
+    if result.events:
+        header = ("detector", "wheel", "from s", "to s", "severity", "peak", "limit", "v km/h", "evidence")
+        lines.append(table(header, [_row(e) for e in result.events]))
+    else:
+        lines.append("no event")
+    judged = [u for u in result.unavailable if u.missing]
+    if judged:
+        lines.append("\nnot judged:")
+        lines += [f"  {u.detector}: missing {', '.join(u.missing)}" for u in judged]
+    if result.limited:
+        lines.append("\njudged in part:")
+        lines += [f"  {u.detector}: without {', '.join(u.missing)}" for u in result.limited]
+    return "\n".join(lines) + "\n"
+
+
+def _row(event: Event) -> tuple[str, ...]:
+    v_x = event.evidence.get("v_x")
+    return (
+        event.detector,
+        event.wheel or "-",
+        f"{event.start_s:.2f}",
+        f"{event.end_s:.2f}",
+        event.severity,
+        f"{event.peak:.3g}",
+        f"{event.threshold:.3g}",
+        f"{3.6 * v_x:.0f}" if v_x is not None else "-",
+        _evidence(event),
+    )
+
+
+def _evidence(event: Event) -> str:
+    evidence = event.evidence
+    parts = []
+    slip = evidence.get("slip_max") if event.detector == "spin_up" else evidence.get("slip_min")
+    if slip is not None:
+        parts.append(f"slip {100 * slip:.1f} %")
+    if event.detector == "spin_up" and "mu_min" in evidence:
+        parts.append(f"mu {evidence['mu_min']:.3f}")
+    if "delta_a_x_max" in evidence:
+        parts.append(f"resistance up to {evidence['delta_a_x_max']:.2f} m/s^2")
+    met = [n for n in (1, 2, 3, 5) if evidence.get(f"criterion_{n}")]
+    if met:
+        parts.append("criteria " + "+".join(str(n) for n in met))
+    if evidence.get("braking"):
+        parts.append("while braking")
+    return ", ".join(parts)
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns padded to their widest cell; numbers to the right."""
+    widths = [max(len(str(r[i])) for r in (header, *rows)) for i in range(len(header))]
+    return "\n".join("  ".join(_pad(c, w) for c, w in zip(r, widths, strict=True)).rstrip() for r in (header, *rows))
+
+
+def _pad(cell: str, width: int) -> str:
+    is_number = cell[:1].isdigit() or (cell[:1] in "+-" and cell[1:2].isdigit())
+    return cell.rjust(width) if is_number else cell.ljust(width)

@@ -1,0 +1,131 @@
+"""The vehicle as a record of SI floats, and the dictionary of its keys.
+
+Each key carries its default and where that comes from; `V` read in the source named, `D` derived, `K` general
+knowledge, not verified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aqualog.notation import WHEELS
+
+__all__ = ["KEYS", "Drivetrain", "Key", "Vehicle"]
+
+Drivetrain = Literal["rwd", "fwd", "awd"]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a vehicle file. `section` is the TOML table, empty for the top level."""
+
+    section: str
+    name: str
+    unit: str
+    default: float
+    low: float
+    high: float
+    meaning: str
+    source: str
+
+    @property
+    def path(self) -> str:
+        """`wheels.r_e_f`."""
+        return f"{self.section}.{self.name}" if self.section else self.name
+
+
+_MID = "mid-size car (K)"
+
+_ALL = [
+    Key("", "mass", "kg", 1650.0, 200.0, 60000.0, "mass as driven, with driver and rig", _MID),
+    Key("", "l_f", "m", 1.40, 0.3, 10.0, "centre of mass to front axle", _MID),
+    Key("", "l_r", "m", 1.41, 0.3, 10.0, "centre of mass to rear axle", _MID),
+    Key("", "h_cg", "m", 0.54, 0.1, 3.0, "height of the centre of mass", _MID),
+    Key("", "track", "m", 1.55, 0.5, 3.0, "track width, mean of both axles", _MID),
+    Key("", "drag_area", "m^2", 0.66, 0.0, 15.0, "drag coefficient times frontal area", "2.2 m^2 * 0.30 (K)"),
+    Key("", "air_density", "kg/m^3", 1.204, 0.5, 1.6, "air density", "ISA at 20 degC, sea level"),
+    Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017, mean 0.010 (V, TRB)"),
+    Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
+    Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),
+    Key("wheels", "r_e_f", "m", 0.317, 0.1, 1.0, "effective rolling radius, front", "205/55R16 (D)"),
+    Key("wheels", "r_e_r", "m", 0.317, 0.1, 1.0, "effective rolling radius, rear", "205/55R16 (D)"),
+    Key("wheels", "r_l_f", "m", 0.309, 0.1, 1.0, "loaded radius, front", "0.975 r_e (D)"),
+    Key("wheels", "r_l_r", "m", 0.309, 0.1, 1.0, "loaded radius, rear", "0.975 r_e (D)"),
+    Key("wheels", "inertia_f", "kg*m^2", 1.15, 0.05, 50.0, "wheel inertia, front", "1.0-1.2 per wheel (K)"),
+    Key("wheels", "inertia_r", "kg*m^2", 1.15, 0.05, 50.0, "wheel inertia, rear", "1.0-1.2 per wheel (K)"),
+    Key("tyre", "slip_slope_f", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, front", "31.7 +- 3.5 (V, Gustafsson)"),
+    Key("tyre", "slip_slope_r", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, rear", "as front"),
+    Key("tyre", "mu_max", "-", 1.02, 0.05, 3.0, "friction of tyre and dry road", "dry asphalt (K)"),
+]  # fmt: skip
+
+KEYS: dict[str, Key] = {k.path: k for k in _ALL}
+
+
+def _default(path: str) -> float:
+    return KEYS[path].default
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """One vehicle, SI. No behaviour beyond naming its wheels.
+
+    `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
+    trusting a default.
+    """
+
+    name: str = "default car"
+    drivetrain: Drivetrain = "rwd"
+    mass: float = _default("mass")
+    l_f: float = _default("l_f")
+    l_r: float = _default("l_r")
+    h_cg: float = _default("h_cg")
+    track: float = _default("track")
+    drag_area: float = _default("drag_area")
+    air_density: float = _default("air_density")
+    rolling_resistance: float = _default("rolling_resistance")
+    torque_split_rear: float = 1.0
+    steering_ratio: float = _default("steering_ratio")
+    r_e_f: float = _default("wheels.r_e_f")
+    r_e_r: float = _default("wheels.r_e_r")
+    r_l_f: float = _default("wheels.r_l_f")
+    r_l_r: float = _default("wheels.r_l_r")
+    inertia_f: float = _default("wheels.inertia_f")
+    inertia_r: float = _default("wheels.inertia_r")
+    slip_slope_f: float = _default("tyre.slip_slope_f")
+    slip_slope_r: float = _default("tyre.slip_slope_r")
+    mu_max: float = _default("tyre.mu_max")
+    tie_rod: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    given: frozenset[str] = frozenset()
+
+    def r_e(self, wheel: str) -> float:
+        """Effective rolling radius of a wheel. [m]"""
+        return self.r_e_f if wheel[0] == "f" else self.r_e_r
+
+    def r_l(self, wheel: str) -> float:
+        """Loaded radius of a wheel. [m]"""
+        return self.r_l_f if wheel[0] == "f" else self.r_l_r
+
+    def inertia(self, wheel: str) -> float:
+        """Inertia of a wheel about its axis. [kg m^2]"""
+        return self.inertia_f if wheel[0] == "f" else self.inertia_r
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance of the axles. [m]"""
+        return self.l_f + self.l_r
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Driven wheels."""
+        return {"rwd": WHEELS[2:], "fwd": WHEELS[:2], "awd": WHEELS}[self.drivetrain]
+
+    @property
+    def watched_axle(self) -> str:
+        """Axle on which minor spin-downs are looked for: the non-driven one, or the front one of an AWD car.
+
+        On an AWD car the front wheels meet the water first and the rear wheels run in their tracks (thesis 2.8 as
+        printed: front minus rear).
+        """
+        return "r" if self.drivetrain == "fwd" else "f"
