@@ -9,10 +9,10 @@ import numpy as np
 
 from aqualog.align.resample import median_period_ns
 from aqualog.align.timebase import ClockRepair
-from aqualog.types import Channel, TimeFaults
+from aqualog.types import Channel, FloatArray, TimeFaults
 from aqualog.units import is_unit, parse_unit
 
-__all__ = ["ChannelOverview", "find_mounting", "overview"]
+__all__ = ["ChannelOverview", "find_mounting", "overview", "rotated_channels"]
 
 _G = 9.80665
 
@@ -66,7 +66,7 @@ def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
     )
 
 
-def _remark(channel: Channel, finite: np.ndarray) -> str:  # type: ignore[type-arg]
+def _remark(channel: Channel, finite: FloatArray) -> str:
     if finite.size == 0:
         return "no value"
     if finite.size > 10 and finite.min() == finite.max():
@@ -75,6 +75,12 @@ def _remark(channel: Channel, finite: np.ndarray) -> str:  # type: ignore[type-a
     is_code = top >= 255 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
     if is_code and finite.size > 10 and (finite == top).mean() < 0.2:
         return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
+    if finite.size > 100:
+        inner_low, inner_high = np.percentile(finite, (1.0, 99.0))
+        reach = 3.0 * (inner_high - inner_low)
+        for value, is_far in ((finite.min(), finite.min() < inner_low - reach), (top, top > inner_high + reach)):
+            if is_far and (finite == value).sum() >= 3:
+                return f"{value:g} stands apart, perhaps a code: invalid = [{value:g}] in the map"
     return ""
 
 
@@ -86,13 +92,9 @@ def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
     """
     sentences = []
     for stem, axes in _triples(found).items():
-        factor = _acceleration_factor(axes["x"].unit)
-        mean = {a: axes[a].mean * factor for a in "xyz"}
-        total = float(np.sqrt(sum(v * v for v in mean.values())))
-        if not 0.8 * _G < total < 1.2 * _G:
+        mean, down, tilt = _gravity(axes)
+        if down is None:
             continue
-        down = max(mean, key=lambda a: abs(mean[a]))
-        tilt = float(np.degrees(np.arccos(min(abs(mean[down]) / total, 1.0))))
         listed = ", ".join(f"{a} {mean[a]:+.2f}" for a in "xyz")
         if down != "z":
             sentences.append(
@@ -102,6 +104,27 @@ def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
         elif tilt > 3.0:
             sentences.append(f"{stem}: tilted by {tilt:.0f} deg (mean {listed} m/s^2); x and y hold part of gravity")
     return sentences
+
+
+def rotated_channels(found: Sequence[ChannelOverview]) -> set[tuple[str, str]]:
+    """(file, path) of the accelerometer axes that are not the car's, because gravity is not on z."""
+    return {
+        (axis.file, axis.path)
+        for axes in _triples(found).values()
+        if _gravity(axes)[1] in ("x", "y")
+        for axis in axes.values()
+    }
+
+
+def _gravity(axes: dict[str, ChannelOverview]) -> tuple[dict[str, float], str | None, float]:
+    """Mean of each axis [m/s^2], the axis that gravity is on (None if the sum is not 1 g), tilt from it [deg]."""
+    factor = _acceleration_factor(axes["x"].unit)
+    mean = {a: axes[a].mean * factor for a in "xyz"}
+    total = float(np.sqrt(sum(v * v for v in mean.values())))
+    if not 0.8 * _G < total < 1.2 * _G:
+        return mean, None, 0.0
+    down = max(mean, key=lambda a: abs(mean[a]))
+    return mean, down, float(np.degrees(np.arccos(min(abs(mean[down]) / total, 1.0))))
 
 
 def _triples(found: Iterable[ChannelOverview]) -> dict[str, dict[str, ChannelOverview]]:

@@ -114,6 +114,9 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
         if rule.symbol in ("torque_f", "torque_r"):
             want = {"torque_f": ("front", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
             candidates = [p for p in candidates if set(_words(p.entry.channel[0])) & set(want)]
+        if rule.symbol == "v_x" and all(f"omega_{w}" in found for w in WHEELS):
+            # beside four wheel speeds, a "vehicle speed" is made from them: only a sensor of its own is a reference
+            candidates = [p for p in candidates if set(_words(_file_and_path(p, usable))) & set(rule.bonus)]
         if rule.symbol == "a_x" and speed is not None:
             candidates = [_check_acceleration(p, usable, speed) for p in candidates]
         if rule.symbol == "yaw_rate":
@@ -169,12 +172,7 @@ def _wheel_candidates(
         joined = " ".join(name)
         has_position = any(p in name if " " not in p else p in joined for p in _POSITIONS[wheel])
         has_word = set(words) & set(_words(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
-        if (
-            not has_position
-            or not has_word
-            or set(name) & _NOT_A_VALUE
-            or _dimension(channel) not in dimensions + ("",)
-        ):
+        if not has_position or not has_word or set(name) & _NOT_A_VALUE or _dimension(channel) not in (*dimensions, ""):
             continue
         symbol = {"speed": "omega", "torque": "torque", "pressure": "pressure"}[dimensions[0]]
         score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (_dimension(channel) == "")
@@ -189,15 +187,19 @@ def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Pr
     named = set(rule.words) & set(words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
     if not named or set(words) & (set(rule.never) | _NOT_A_VALUE):
         return None
-    if dimension not in rule.dimensions and not (dimension == "" and rule.fallback_unit):
-        # a channel without a unit is proposed only where the name leaves no doubt what the unit is
-        if not (dimension == "" and rule.symbol == "gear"):
-            return None
+    # a channel without a unit is proposed only where the name leaves no doubt what the unit is
+    is_clear = dimension == "" and (rule.fallback_unit or rule.symbol == "gear")
+    if dimension not in rule.dimensions and not is_clear:
+        return None
     score = 2.0 + len(set(rule.bonus) & path_words)
     return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit)
 
 
 # --- the data's word ---------------------------------------------------------------------------------------------
+
+
+def _file_and_path(p: Proposal, channels: Sequence[Channel]) -> str:
+    return channel_id(_by_address(channels, p.entry.channel[0]).info)
 
 
 def _by_address(channels: Sequence[Channel], address: str) -> Channel:

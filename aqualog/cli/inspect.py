@@ -70,7 +70,7 @@ def _inspect(
 ) -> int:
     from aqualog.align.load import read_options
     from aqualog.align.mapping import SignalMap
-    from aqualog.align.overview import find_mounting, overview
+    from aqualog.align.overview import find_mounting, overview, rotated_channels
     from aqualog.align.propose import propose_map
     from aqualog.cli.console import Console
     from aqualog.cli.files import expand, refuse_existing
@@ -88,7 +88,8 @@ def _inspect(
         steps("looking at the channels")
         origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
         found = [overview(c, origin_ns=origin) for c in channels]
-        proposals = propose_map(channels)
+        rotated = rotated_channels(found)
+        proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
     notes = [*(f"{p.name}: {n}" for p, f in zip(paths, faults, strict=True) for n in f.notes), *find_mounting(found)]
     if write_map is not None:
         _write_map(write_map, proposals, paths)

@@ -1,0 +1,780 @@
+"""MDF 3 and 4: measured channels, and raw CAN frames decoded by a DBC.
+
+asammdf parses the blocks. It is kept from everything that a log has no business to cause: it never evaluates a formula
+(see `mdf_conversion`), never opens an attachment, writes only into a folder of our own, and prints nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+import shutil
+import struct
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+import asammdf
+import numpy as np
+from asammdf.blocks import mdf_v3, mdf_v4, v2_v3_blocks, v4_blocks
+from asammdf.blocks.utils import extract_xml_comment
+from numpy.typing import NDArray
+
+from aqualog.errors import LogError
+from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, pgn, selected
+from aqualog.io.mdf_conversion import formula_text, is_text_only, physical, refusal
+from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
+
+__all__ = ["MdfReader"]
+
+_Array = NDArray[Any]
+
+
+def _disarm_asammdf() -> None:
+    """Switch off, once, what asammdf does behind the back of its caller."""
+    v4_blocks.lambdify = None  # sympy.lambdify executes the text of a formula
+    v2_v3_blocks.lambdify = None
+    # a block that the cut went through is left out instead of the whole file
+    asammdf.set_global_option("raise_on_incomplete_blocks", value=False)
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # faults are reported by the reader, once
+    for kind in (mdf_v4.MDF4, mdf_v3.MDF3):
+        kind.__del__ = _quiet_del  # the original raises, onto stderr, when its constructor has failed
+
+
+def _quiet_del(self: Any) -> None:
+    with suppress(Exception), redirect_stdout(io.StringIO()):
+        self.close()
+
+
+_disarm_asammdf()
+
+_VIRTUAL = (3, 6)  # channel types without bytes in the record
+_VARIABLE_LENGTH = 1
+_LONGEST_RECORD = 1 << 30
+_LONGEST_PAYLOAD = 64
+_NUMERIC_V4_CHANNELS = (0, 6)  # fixed length, virtual
+_NUMERIC_V4_DATA = range(6)  # unsigned, signed, float; both byte orders
+_NUMERIC_V3_DATA = (0, 1, 2, 3, *range(9, 17))
+_CHANNEL_ALL_INVALID = 1
+_GROUP_BUS_EVENT, _GROUP_REMOTE_MASTER, _GROUP_VLSD = 0x2, 0x8, 0x1
+_BUS_EVENT_NAME = re.compile(r"(CAN|LIN|FLX|FLEXRAY|ETH|MOST|K_LINE)_\w+(\.|$)")
+_FRAME = "CAN_DataFrame."
+_ARCHIVES = (".bz2", ".gzip", ".mf4z", ".zip")  # asammdf unpacks these by suffix, and deletes the file it then reads
+_DLC_LENGTH = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64])
+_EXTENDED = np.uint64(1 << 32)  # in a frame code: id in bits 0-28, IDE in bit 32, bus from bit 33
+_OLDEST = int(datetime(1990, 1, 1, tzinfo=UTC).timestamp()) * 10**9
+_FIRST_BLOCK = 64
+_MOST_BLOCKS = 200_000  # looked at to tell a cut file
+_LATEST_S = 9.0e9  # int64 nanoseconds end in the year 2262
+_SHOWN = 8  # ids listed in a note
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """Address of a measured channel."""
+
+    group: int
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Signal:
+    """Address of a DBC signal on one bus."""
+
+    code: int
+    message: Any
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class _FrameGroup:
+    """A group of raw CAN frames: where its members are and the code (bus, IDE, id) of each frame."""
+
+    index: int
+    members: dict[str, int]
+    codes: NDArray[np.uint64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A channel on its way into the list; `sources` may make its path unique."""
+
+    info: ChannelInfo
+    sources: tuple[str, ...]
+
+
+class MdfReader:
+    """One open MDF file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; only ever read.
+    options : ReadOptions
+        `dbc` decodes raw CAN frames.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read.
+    """
+
+    format = "mdf"
+
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        self._path = path
+        self._faults = FaultLog()
+        self._mdf: Any = None
+        self._scratch: tempfile.TemporaryDirectory[str] | None = None
+        self._channels: tuple[ChannelInfo, ...] = ()
+        try:
+            dbc = load_dbc(options.dbc) if options.dbc else None
+            with self._guard("cannot be read as MDF"):
+                self._open()
+                self._channels = _unique(self._listed(dbc))
+        except BaseException:
+            self.close()
+            raise
+
+    def channels(self) -> Sequence[ChannelInfo]:
+        """All channels: measured ones in file order, then the signals of the DBC."""
+        return self._channels
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
+        """Decode these channels; each group of records is gone through once."""
+        wanted = list(wanted)
+        with self._guard("cannot be decoded"):
+            found = self._read_measured([w for w in wanted if isinstance(w.key, _Measured)])
+            found |= self._read_signals([w for w in wanted if isinstance(w.key, _Signal)])
+        return [found[w.path] for w in wanted]
+
+    @property
+    def faults(self) -> FileFaults:
+        """What was lost so far."""
+        return self._faults.freeze()
+
+    def close(self) -> None:
+        """Release the file and the temporary copy, if there is one."""
+        if self._mdf is not None:
+            with suppress(Exception):
+                self._mdf.close()
+            self._mdf = None
+        if self._scratch is not None:
+            self._scratch.cleanup()
+            self._scratch = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # --- opening ---
+
+    @contextmanager
+    def _guard(self, what: str) -> Iterator[None]:
+        """Turn whatever a damaged file makes asammdf raise into a `LogError`."""
+        try:
+            yield
+        except LogError:
+            raise
+        except Exception as error:
+            if _is_cut(self._path):
+                raise LogError(
+                    "file is cut: it refers to data behind its end", where=str(self._path),
+                    expected="a complete MDF file", hint="copy it from the logger again or stop the recording properly",
+                ) from error  # fmt: skip
+            reason = f"{what} ({type(error).__name__}: {error})"
+            raise LogError(reason, where=str(self._path), hint="check it with the logger's own tool") from error
+
+    def _open(self) -> None:
+        if self._path.suffix.lower() in _ARCHIVES:
+            raise LogError("is named as an archive", where=str(self._path), hint="unpack or rename it to .mf4")
+        with self._path.open("rb") as file:
+            unfinished = file.read(8) == b"UnFinMF "
+        self._scratch = tempfile.TemporaryDirectory(prefix="aqualog-", ignore_cleanup_errors=True)
+        if unfinished:
+            self._check_space()
+            self._faults.notes.append("file was not finalised by the logger; a temporary copy was repaired for reading")
+        source = self._path
+        if not unfinished and _records_are_cut(source):
+            self._check_space()
+            source = _marked_copy(source, Path(self._scratch.name))
+        with redirect_stdout(io.StringIO()):  # asammdf prints tracebacks
+            opened = asammdf.MDF(
+                str(source), temporary_folder=self._scratch.name, process_bus_logging=False,
+                raise_on_multiple_occurrences=False,
+            )  # fmt: skip
+        self._mdf = opened
+        self._inner = opened._mdf
+        self._inner.extract_attachment = _no_attachment
+        self._version4 = opened.version >= "4"
+        self._start_ns, self._absolute = self._start()
+
+    def _check_space(self) -> None:
+        assert self._scratch is not None
+        size, free = self._path.stat().st_size, shutil.disk_usage(self._scratch.name).free
+        if size > free:
+            raise LogError(
+                "file is cut or was not finalised, and there is no space for a repaired copy", where=str(self._path),
+                expected=f"{size} bytes in {tempfile.gettempdir()}, {free} are free", hint="set TMPDIR",
+            )  # fmt: skip
+
+    def _start(self) -> tuple[int, bool]:
+        """Start time in ns and whether it is a real one; loggers without a clock write 1970 or 1980."""
+        header = self._inner.header
+        start = int(getattr(header, "abs_time", 0) or 0)
+        if not self._version4 and not start:
+            with suppress(ValueError, UnicodeDecodeError):
+                text = f"{header.date.decode('ascii')} {header.time.decode('ascii')}".replace("\0", "").strip()
+                moment = datetime.strptime(text, "%d:%m:%Y %H:%M:%S").replace(tzinfo=UTC)
+                start = int(moment.timestamp()) * 10**9
+        if not _OLDEST <= start < int(_LATEST_S * 1e9):
+            return 0, False
+        if self._version4 and header.time_flags & 1:
+            self._faults.notes.append("start time is local time without a time zone; taken as UTC")
+        return start, True
+
+    # --- listing ---
+
+    def _listed(self, dbc: Dbc | None) -> list[_Entry]:
+        entries: list[_Entry] = []
+        frames: list[_FrameGroup] = []
+        for index, group in enumerate(self._inner.groups):
+            if not group.channel_group.cycles_nr or (self._version4 and group.channel_group.flags & _GROUP_VLSD):
+                continue
+            obstacle = self._no_time(index)
+            if obstacle:
+                self._faults.notes.append(f"group {self._group_name(index)} is left out: {obstacle}")
+                continue
+            members = _frame_members(group) if self._version4 else {}
+            if members:
+                frames.append(_FrameGroup(index, members, self._codes(index, members)))
+            entries += self._measured(index)
+        self._frames = frames
+        self._describe_frames(dbc)
+        return [*entries, *(self._signals(dbc) if dbc is not None else ())]
+
+    def _no_time(self, index: int) -> str | None:
+        """Why the samples of a group have no time, or None."""
+        group = self._inner.groups[index]
+        if self._version4 and group.channel_group.flags & _GROUP_REMOTE_MASTER:
+            index = int(group.channel_group.cg_master_index)
+            group = self._inner.groups[index]
+        master = self._inner.masters_db.get(index)
+        if master is None:
+            return "it has no time channel"
+        channel = group.channels[master]
+        if self._version4 and channel.sync_type not in (0, 1):
+            return "its samples are over angle, distance or index, not over time"
+        if not _fits(group, channel, version4=self._version4):
+            return "its time channel lies outside the record"
+        if formula_text(channel.conversion, version4=self._version4) is not None:
+            return "its time channel has a conversion formula"
+        return None
+
+    def _group_name(self, index: int) -> str:
+        name = self._inner.groups[index].channel_group.acq_name if self._version4 else ""
+        return " ".join(str(name or "").split()) or f"group{index}"
+
+    def _measured(self, index: int) -> Iterator[_Entry]:
+        group = self._inner.groups[index]
+        prefix = self._group_name(index)
+        is_bus = self._version4 and bool(group.channel_group.flags & _GROUP_BUS_EVENT)
+        for number, channel in enumerate(group.channels):
+            full = str(channel.name)
+            if not self._is_number(group, number) or (is_bus and _BUS_EVENT_NAME.match(full)):
+                continue
+            if full.startswith(_FRAME):
+                continue
+            name, _, device = full.partition("\\")
+            reason = refusal(channel.conversion, version4=self._version4)
+            if not _fits(group, channel, version4=self._version4):
+                reason = "it lies outside the record"
+            if reason is not None:
+                self._faults.notes.append(f"channel {prefix}.{name} is left out: {reason}")
+                continue
+            if "log" in (formula_text(channel.conversion, version4=self._version4) or "").replace("log10", ""):
+                self._faults.notes.append(f"channel {prefix}.{name}: log is taken as the natural logarithm")
+            info = ChannelInfo(
+                f"{prefix}.{name}", name, _unit(channel), int(group.channel_group.cycles_nr), self._path.name,
+                _Measured(index, number), _comment(channel),
+            )  # fmt: skip
+            yield _Entry(info, (*_sources(group, channel), device))
+
+    def _is_number(self, group: Any, index: int) -> bool:
+        channel = group.channels[index]
+        if group.channel_dependencies[index]:  # a structure or an array
+            return False
+        if not self._version4:
+            known = channel.data_type in _NUMERIC_V3_DATA and 0 < channel.bit_count <= 64
+            return known and channel.channel_type != 1
+        known = channel.data_type in _NUMERIC_V4_DATA and channel.channel_type in _NUMERIC_V4_CHANNELS
+        return known and channel.bit_count <= 64 and not is_text_only(channel.conversion, version4=True)
+
+    # --- records ---
+
+    def _columns(self, group: int, indexes: Sequence[int]) -> Iterator[tuple[_Array, dict[int, _Array]]]:
+        """Time stamps [s] and physical values of some channels, a stretch of records at a time.
+
+        `MDF.select` is not used: where records are missing behind a cut it returns uninitialised memory.
+        """
+        inner = self._inner
+        for fragment in inner._load_data(inner.groups[group]):
+            if self._version4:
+                t = inner.get_master(group, fragment, one_piece=True)
+            else:
+                t = inner.get_master(group, fragment)
+            yield t.astype(np.float64), {i: self._values(group, i, fragment, len(t)) for i in indexes}
+        with suppress(AttributeError):
+            inner._invalidation_cache.clear()
+
+    def _raw(self, group: int, index: int, fragment: Any) -> tuple[_Array, _Array | None]:
+        raw, invalid = self._inner.get(
+            group=group, index=index, data=fragment, samples_only=True, raw=True, ignore_invalidation_bits=True
+        )
+        return raw, invalid
+
+    def _values(self, group: int, index: int, fragment: Any, n: int) -> _Array:
+        channel = self._inner.groups[group].channels[index]
+        raw, invalid = self._raw(group, index, fragment)
+        if len(raw) != n or (self._version4 and channel.flags & _CHANNEL_ALL_INVALID):
+            return np.full(n, np.nan)
+        values = physical(channel.conversion, np.asarray(raw), version4=self._version4)
+        if invalid is not None:
+            values = np.where(np.asarray(invalid, dtype=np.bool_), np.nan, values)
+        return values
+
+    def _nanoseconds(self, t: _Array) -> tuple[TimeArray, BoolArray]:
+        """Time stamps in ns, and which of them are times at all."""
+        usable = np.isfinite(t) & (np.abs(t) < _LATEST_S - self._start_ns * 1e-9)
+        return np.round(t[usable] * 1e9).astype(np.int64) + self._start_ns, usable
+
+    def _count_records(self, group: int, n: int, n_bad: int, channels: int) -> None:
+        declared = int(self._inner.groups[group].channel_group.cycles_nr)
+        name = self._group_name(group)
+        if n < declared:
+            self._faults.truncated = True
+            self._faults.lost_samples += (declared - n) * channels
+            self._faults.notes.append(f"group {name} is cut: {n} of {declared} records are there")
+        self._count_bad_times(group, n_bad, channels)
+
+    def _count_bad_times(self, group: int, n_bad: int, channels: int) -> None:
+        if n_bad:
+            name = self._group_name(group)
+            self._faults.lost_samples += n_bad * channels
+            self._faults.notes.append(f"group {name}: {n_bad} records without a usable time stamp are left out")
+
+    def _read_measured(self, wanted: Sequence[ChannelInfo]) -> dict[str, Channel]:
+        by_group: dict[int, list[ChannelInfo]] = defaultdict(list)
+        for info in wanted:
+            by_group[info.key.group].append(info)
+        found: dict[str, Channel] = {}
+        for group, infos in by_group.items():
+            pieces = list(self._columns(group, [i.key.index for i in infos]))
+            t = _joined([p[0] for p in pieces])
+            t_ns, usable = self._nanoseconds(t)
+            self._count_records(group, len(t), len(t) - len(t_ns), len(infos))
+            for info in infos:
+                values = _joined([p[1][info.key.index] for p in pieces])
+                found[info.path] = Channel(info, t_ns, values[usable], self._absolute)
+        return found
+
+    # --- raw CAN frames ---
+
+    def _codes(self, group: int, members: dict[str, int]) -> NDArray[np.uint64]:
+        """Code of each frame: bus, IDE flag and id in one integer."""
+        heads = [members[m] for m in ("ID", "IDE", "BusChannel") if m in members]
+        default_bus = _bus_number(self._inner.groups[group])
+        codes = []
+        for t, columns in self._columns(group, heads):
+            ids = columns[members["ID"]].astype(np.uint64)
+            ide = np.zeros(len(t)) if "IDE" not in members else columns[members["IDE"]]
+            extended = (ide != 0) | (ids >> np.uint64(31) != 0)
+            if "IDE" not in members:
+                extended |= ids > np.uint64(0x7FF)
+            bus = np.full(len(t), default_bus) if "BusChannel" not in members else columns[members["BusChannel"]]
+            ids &= np.uint64(0x1FFFFFFF)
+            codes.append(
+                ids + _EXTENDED * extended.astype(np.uint64) + _EXTENDED * np.uint64(2) * bus.astype(np.uint64)
+            )
+        found = _joined(codes).astype(np.uint64)
+        self._count_records(group, len(found), 0, 1)
+        return found
+
+    def _describe_frames(self, dbc: Dbc | None) -> None:
+        self._census: Counter[int] = Counter()
+        for group in self._frames:
+            for code, count in zip(*np.unique(group.codes, return_counts=True), strict=True):
+                self._census[int(code)] += int(count)
+        if not self._census:
+            if dbc is not None:
+                self._faults.notes.append("holds no raw CAN frames; --dbc has no effect on it")
+            return
+        buses = sorted({_bus(c) for c in self._census})
+        where = f"bus {buses[0]}" if len(buses) == 1 else "buses " + ", ".join(map(str, buses))
+        ids = len({_frame_key(c) for c in self._census})
+        total = f"{self._census.total()} raw CAN frames with {ids} ids on {where}"
+        if dbc is None:
+            self._faults.notes.append(f"holds {total}; give --dbc FILE to decode them")
+        else:
+            self._faults.notes += [*dbc.notes, *_match_notes(self._census, dbc, total)]
+
+    def _signals(self, dbc: Dbc) -> Iterator[_Entry]:
+        buses_of: dict[tuple[int, bool], set[int]] = defaultdict(set)
+        for code in self._census:
+            buses_of[_frame_key(code)].add(_bus(code))
+        for code in sorted(self._census, key=lambda c: (_bus(c), c)):
+            message = dbc.messages.get(_frame_key(code))
+            if message is None:
+                continue
+            prefix = f"CAN{_bus(code)}." if len(buses_of[_frame_key(code)]) > 1 else ""
+            for signal in message.signals:
+                if not is_decodable(signal):
+                    self._faults.notes.append(f"{message.name}.{signal.name} has {signal.length} bits and is left out")
+                    continue
+                info = ChannelInfo(
+                    f"{prefix}{message.name}.{signal.name}", signal.name, signal.unit or "", self._census[code],
+                    self._path.name, _Signal(code, message, signal.name), _short(signal.comment or ""),
+                )  # fmt: skip
+                yield _Entry(info, (f"CAN{_bus(code)}",))
+
+    def _read_signals(self, wanted: Sequence[ChannelInfo]) -> dict[str, Channel]:
+        by_code: dict[int, list[ChannelInfo]] = defaultdict(list)
+        for info in wanted:
+            by_code[info.key.code].append(info)
+        frames = self._payloads(set(by_code))
+        found: dict[str, Channel] = {}
+        for code, infos in by_code.items():
+            t_ns, data, length = frames[code]
+            for info in infos:
+                carried, values = decode_signal(info.key.message, info.key.name, data, length)
+                self._count_short(info, data, length, int(carried.sum()))
+                found[info.path] = Channel(info, t_ns[carried], values, self._absolute)
+        return found
+
+    def _count_short(self, info: ChannelInfo, data: _Array, length: _Array, carried: int) -> None:
+        """Count the frames that select the signal but are too short for it."""
+        signal = info.key.message.get_signal_by_name(info.key.name)
+        short = int(selected(info.key.message, signal, data, length).sum()) - carried
+        if short:
+            self._faults.lost_samples += short
+            need = BitField.of(signal).needed
+            self._faults.notes.append(
+                f"{info.path}: {short} frames are shorter than the {need} bytes it needs; left out"
+            )
+
+    def _payloads(self, wanted: set[int]) -> dict[int, tuple[TimeArray, _Array, _Array]]:
+        """Time stamps, payloads and payload lengths of the wanted frames."""
+        parts: dict[int, list[tuple[TimeArray, _Array, _Array]]] = defaultdict(list)
+        codes = np.array(sorted(wanted), dtype=np.uint64)
+        for group in self._frames:
+            if not np.isin(codes, group.codes).any():
+                continue
+            t_ns, own, data, length = self._frame_rows(group, codes)
+            for code in np.unique(own):
+                rows = own == code
+                parts[int(code)].append((t_ns[rows], data[rows], length[rows]))
+        return {code: _merged(p) for code, p in parts.items()}
+
+    def _frame_rows(self, group: _FrameGroup, codes: NDArray[np.uint64]) -> tuple[TimeArray, _Array, _Array, _Array]:
+        members = group.members
+        size = members.get("DataLength", members.get("DLC"))
+        inner, at = self._inner, 0
+        kept: list[tuple[_Array, _Array, _Array, _Array]] = []
+        for fragment in inner._load_data(inner.groups[group.index]):
+            t = inner.get_master(group.index, fragment, one_piece=True).astype(np.float64)
+            own = group.codes[at : at + len(t)]
+            at += len(t)
+            rows = np.isin(own, codes)
+            data = self._payload_bytes(group.index, members["DataBytes"], fragment, len(t))
+            length = np.full(len(t), data.shape[1])
+            if size is not None:
+                length = self._values(group.index, size, fragment, len(t)).astype(np.int64)
+                if "DataLength" not in members:
+                    length = _DLC_LENGTH[np.clip(length, 0, 15)]
+            length = np.minimum(length, data.shape[1])
+            kept.append((t[rows], own[rows], data[rows], length[rows]))
+        t = _joined([k[0] for k in kept])
+        t_ns, usable = self._nanoseconds(t)
+        # records behind a cut were counted when the ids were read
+        self._count_bad_times(group.index, len(t) - len(t_ns), 1)
+        own, length = _joined([k[1] for k in kept]), _joined([k[3] for k in kept])
+        return t_ns, own[usable], _stacked([k[2] for k in kept])[usable], length[usable]
+
+    def _payload_bytes(self, group: int, index: int, fragment: Any, n: int) -> NDArray[np.uint8]:
+        owner = self._inner.groups[group]
+        channel = owner.channels[index]
+        if channel.channel_type != _VARIABLE_LENGTH:
+            return _octets(self._raw(group, index, fragment)[0], n)
+        # asammdf's C code follows the offsets of a damaged file out of the memory, so they are followed here
+        at = self._inner._get_scalar(
+            channel, owner, group, index, None, None, fragment, True, 0, None, False, skip_vlsd=True  # noqa: FBT003
+        )[0].astype(np.int64)  # fmt: skip
+        if not n or not np.all(at >= at[0]):
+            return np.zeros((n, 0), dtype=np.uint8)
+        stored = self._inner._load_signal_data(group=owner, index=index, offsets=(int(at[0]), int(at[-1])))
+        return _variable(np.frombuffer(stored, dtype=np.uint8), at - at[0])
+
+
+# --- single facts about blocks ---
+
+
+def _no_attachment(*_: object, **__: object) -> tuple[bytes, Path, bytes]:
+    """Stands in for asammdf's extraction, which opens any path that the file names."""
+    return b"", Path(), b""
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether a link leads, or a block reaches, behind the end of the file. Asked only when something went wrong."""
+    try:
+        with path.open("rb") as file:
+            return _leads_out(file)
+    except struct.error:  # a block's head is incomplete
+        return True
+    except OSError:
+        return False
+
+
+def _leads_out(file: BinaryIO) -> bool:
+    size = file.seek(0, 2)
+    if size < _FIRST_BLOCK + 24:
+        return True
+    file.seek(8)
+    links_of = _links4 if file.read(2) >= b"4." else _links3
+    seen, pending = {_FIRST_BLOCK}, [_FIRST_BLOCK]
+    while pending and len(seen) < _MOST_BLOCKS:
+        length, links = links_of(file, at := pending.pop())
+        if at + length > size or any(link >= size for link in links):
+            return True
+        new = {link for link in links if link} - seen
+        seen |= new
+        pending += new
+    return False
+
+
+def _records_are_cut(path: Path) -> bool:
+    """Whether the plain record block of a data group of MDF 4.10 and later reaches behind the end of the file."""
+    with suppress(struct.error, OSError), path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(8)
+        if file.read(4) < b"4.10":
+            return False
+        group, seen = _links4(file, _FIRST_BLOCK)[1][0], set[int]()
+        while group and group not in seen:
+            seen.add(group)
+            following, _, records, *_ = _links4(file, group)[1]
+            file.seek(records)
+            mark, length = struct.unpack("<4s4xQ", file.read(16)) if records else (b"", 0)
+            if mark == b"##DT" and records + length > size:
+                return True
+            group = following
+    return False
+
+
+def _marked_copy(path: Path, folder: Path) -> Path:
+    """A copy marked as unfinished: asammdf then corrects the block's length instead of leaving the block out."""
+    copy = folder / "cut.mf4"
+    shutil.copyfile(path, copy)
+    with copy.open("r+b") as file:
+        file.write(b"UnFinMF ")
+        file.seek(60)
+        file.write(struct.pack("<H", 4))
+    return copy
+
+
+def _links4(file: BinaryIO, at: int) -> tuple[int, tuple[int, ...]]:
+    file.seek(at)
+    mark, length, count = struct.unpack("<2s6xQQ", file.read(24))
+    if mark != b"##" or count > 100_000:
+        return 0, ()
+    return length, struct.unpack(f"<{count}Q", file.read(8 * count))
+
+
+def _links3(file: BinaryIO, at: int) -> tuple[int, tuple[int, ...]]:
+    # the blocks of MDF 3 do not say how many links they have
+    file.seek(at)
+    mark, length = struct.unpack("<2sH", file.read(4))
+    count = {b"HD": 1, b"DG": 4, b"CG": 3, b"CN": 5}.get(mark, 0)
+    return length, struct.unpack(f"<{count}I", file.read(4 * count))
+
+
+def _fits(group: Any, channel: Any, *, version4: bool) -> bool:
+    """Whether a channel lies inside its record; asammdf's C code reads outside the memory where it does not."""
+    size = int(group.channel_group.samples_byte_nr)
+    if version4:
+        if channel.channel_type in _VIRTUAL:
+            return True
+        begin, bits = int(channel.byte_offset), int(channel.bit_offset) + int(channel.bit_count)
+    else:
+        begin, bits = int(channel.additional_byte_offset), int(channel.start_offset) + int(channel.bit_count)
+    return 0 < size < _LONGEST_RECORD and channel.bit_count > 0 and begin + (bits + 7) // 8 <= size
+
+
+def _frame_members(group: Any) -> dict[str, int]:
+    """Channel index by member of the CAN data frame (`ID`, `DataBytes`, ...), or nothing."""
+    members = {
+        str(c.name).removeprefix(_FRAME): i
+        for i, c in enumerate(group.channels)
+        if str(c.name).startswith(_FRAME) and _fits(group, c, version4=True)
+    }
+    return members if {"ID", "DataBytes"} <= members.keys() else {}
+
+
+def _bus_number(group: Any) -> int:
+    """Bus by the name of the group or its source (`CAN2`), for loggers that do not record it per frame."""
+    source = group.channel_group.acq_source
+    for name in (source.name if source else "", source.path if source else "", group.channel_group.acq_name):
+        number = re.search(r"(\d+)", str(name or ""))
+        if number:
+            return int(number[1])
+    return 0
+
+
+def _sources(group: Any, channel: Any) -> tuple[str, ...]:
+    sources = (channel.source, getattr(group.channel_group, "acq_source", None))
+    return tuple(str(s.name or s.path) for s in sources if s is not None)
+
+
+def _unit(channel: Any) -> str:
+    unit = (channel.conversion.unit if channel.conversion is not None else "") or getattr(channel, "unit", "") or ""
+    text = unit.decode("latin-1") if isinstance(unit, bytes) else str(unit)
+    return (extract_xml_comment(text) if text.startswith("<") else text).strip("\0 \t\r\n")
+
+
+def _comment(channel: Any) -> str:
+    text = str(channel.comment or "")
+    if text.startswith("<"):
+        text = extract_xml_comment(text)
+        if text.startswith("<"):  # XML without a text in it
+            return ""
+    description = getattr(channel, "description", b"")
+    if not text and isinstance(description, bytes):
+        text = description.split(b"\0")[0].decode("latin-1")
+    return _short(text)
+
+
+def _short(text: str) -> str:
+    return " ".join(text.strip().split("\n")[0].split())[:120]
+
+
+# --- frames ---
+
+
+def _frame_key(code: int) -> tuple[int, bool]:
+    return code & 0x1FFFFFFF, bool(code >> 32 & 1)
+
+
+def _bus(code: int) -> int:
+    return code >> 33
+
+
+def _match_notes(census: Counter[int], dbc: Dbc, total: str) -> list[str]:
+    """What the DBC decodes and what it does not, with the reason where one can be told."""
+    seen = sorted({_frame_key(c) for c in census})
+    missed = [k for k in seen if k not in dbc.messages]
+    frames = sum(n for c, n in census.items() if _frame_key(c) in dbc.messages)
+    text = f"{total}: {len(seen) - len(missed)} ids ({frames} frames) are in {', '.join(dbc.names)}"
+    if missed:
+        more = ", ..." if len(missed) > _SHOWN else ""
+        text += f", {len(missed)} are not: " + ", ".join(_id_text(k) for k in missed[:_SHOWN]) + more
+    groups = {pgn(i): m.name for (i, extended), m in dbc.messages.items() if extended}
+    same_group = [k for k in missed if k[1] and pgn(k[0]) in groups]
+    notes = [text]
+    if same_group:
+        names = ", ".join(f"{_id_text(k)} ({groups[pgn(k[0])]})" for k in same_group[:_SHOWN])
+        notes.append(f"same J1939 parameter group but another sender or priority, not decoded: {names}")
+    twins = [k for k in missed if (k[0], not k[1]) in dbc.messages]
+    if twins:
+        notes.append(
+            f"the DBC has these ids with the other id length: {', '.join(_id_text(k) for k in twins[:_SHOWN])}"
+        )
+    return notes
+
+
+def _id_text(key: tuple[int, bool]) -> str:
+    return f"0x{key[0]:X}" + ("x" if key[1] else "")
+
+
+def _octets(raw: _Array, n: int) -> NDArray[np.uint8]:
+    """Payloads as a matrix of bytes. Shape (n, width)."""
+    data = np.ascontiguousarray(raw)
+    if data.dtype.kind == "S" or data.ndim == 1:
+        data = data.view(np.uint8)
+    return data.reshape(n, -1).astype(np.uint8, copy=False)
+
+
+def _variable(stored: NDArray[np.uint8], at: TimeArray) -> NDArray[np.uint8]:
+    """Payloads of variable length; each is stored as its length in 4 bytes, then its bytes. Shape (n, width)."""
+    padded = np.concatenate([stored, np.zeros(4 + _LONGEST_PAYLOAD, dtype=np.uint8)])
+    at = np.minimum(at, len(stored))  # the zeros behind the end are an empty payload
+    length = padded[at[:, None] + np.arange(4)].astype(np.int64) @ (1 << 8 * np.arange(4))
+    width = int(min(length.max(initial=0), _LONGEST_PAYLOAD))
+    octet = np.arange(width)
+    payload: NDArray[np.uint8] = np.where(octet < length[:, None], padded[at[:, None] + 4 + octet], 0).astype(np.uint8)
+    return payload
+
+
+def _stacked(parts: Sequence[_Array]) -> _Array:
+    """Payload matrices below each other, filled up to the widest."""
+    width = max((p.shape[1] for p in parts), default=0)
+    return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1]))) for p in parts] or [np.zeros((0, 0), np.uint8)])
+
+
+def _merged(parts: Sequence[tuple[TimeArray, _Array, _Array]]) -> tuple[TimeArray, _Array, _Array]:
+    """Frames of one message out of several groups, by time where each group is in order."""
+    t_ns, data, length = _joined([p[0] for p in parts]), _stacked([p[1] for p in parts]), _joined([p[2] for p in parts])
+    if len(parts) > 1 and all(np.all(np.diff(p[0]) >= 0) for p in parts):
+        order = np.argsort(t_ns, kind="stable")
+        return t_ns[order], data[order], length[order]
+    return t_ns, data, length
+
+
+def _joined(parts: Sequence[_Array]) -> _Array:
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+# --- names ---
+
+
+def _unique(entries: Sequence[_Entry]) -> tuple[ChannelInfo, ...]:
+    """Give every channel a path of its own: source in front where that tells them apart, else a number behind."""
+    infos = [e.info for e in entries]
+    for level in range(max((len(e.sources) for e in entries), default=0)):
+        count = Counter(i.path for i in infos)
+        candidates = [
+            _prefixed(i, e, level) if count[i.path] > 1 else i.path for i, e in zip(infos, entries, strict=True)
+        ]
+        apart: dict[str, set[str]] = defaultdict(set)
+        for info, candidate in zip(infos, candidates, strict=True):
+            apart[info.path].add(candidate)
+        infos = [
+            replace(i, path=c) if len(apart[i.path]) > 1 else i for i, c in zip(infos, candidates, strict=True)
+        ]  # a source that all of them share says nothing
+    return tuple(_numbered(infos))
+
+
+def _prefixed(info: ChannelInfo, entry: _Entry, level: int) -> str:
+    source = entry.sources[level] if level < len(entry.sources) else ""
+    return f"{source}.{info.path}" if source and not info.path.startswith(f"{source}.") else info.path
+
+
+def _numbered(infos: Sequence[ChannelInfo]) -> Iterator[ChannelInfo]:
+    used: set[str] = set()
+    for info in infos:
+        path, k = info.path, 1
+        while path in used:
+            k += 1
+            path = f"{info.path}#{k}"
+        used.add(path)
+        yield replace(info, path=path)

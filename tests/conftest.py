@@ -1,0 +1,19 @@
+"""Fixtures that all tests share."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+REAL_LOGS = ROOT.parent / "shared" / "real_logs"
+sys.path.insert(0, str(ROOT / "sample_logs"))
+sys.path.insert(0, str(ROOT / "tests"))
+
+
+@pytest.fixture(scope="session")
+def real_logs() -> Path:
+    """The measured drives; skips the test where they are not."""
+    if not REAL_LOGS.is_dir():
+        pytest.skip(f"no measured drives at {REAL_LOGS}")
+    return REAL_LOGS

@@ -1,0 +1,77 @@
+"""A drive fed in pieces gives the same features, statistics and events as in one go, bit for bit."""
+
+import numpy as np
+import pytest
+from drives import AWD, CAR, FWD, drive, lane
+
+from aqualog.detect.stream import DriveStream
+
+DRIVES = {
+    "rwd": (CAR, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),
+    "fwd": (FWD, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),
+    "awd in a curve": (AWD, {"lanes": (lane(),), "speed_kmh": ((0.0, 100.0),), "yaw_rate": ((0, 0), (5, 0.1), (20, -0.1))}),
+}
+
+
+def run(vehicle, columns, symbols, edges):
+    stream = DriveStream(vehicle, 10_000_000, symbols)
+    features, tracks, events = [], [], []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        piece = stream.push({s: columns[s][a:b] for s in symbols})
+        features.append(piece.features)
+        tracks.append(piece.tracks)
+        events += piece.events
+    events += stream.finish()
+    joined = {name: np.concatenate([f[name] for f in features]) for name in features[0]}
+    statistics = {
+        (t.detector, t.wheel): (np.concatenate([p[i].statistic for p in tracks]), np.concatenate([p[i].active for p in tracks]))
+        for i, t in enumerate(tracks[0])
+    }
+    return joined, statistics, sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or ""))
+
+
+def prepared(name, drop=()):
+    vehicle, kw = DRIVES[name]
+    signals, _ = drive(vehicle, duration_s=16.0, **kw)
+    symbols = [s for s in signals.symbols if s not in drop]
+    columns = {s: signals.array(s).copy() for s in symbols}
+    rng = np.random.default_rng(0)
+    for s in symbols:  # holes anywhere must not matter
+        at = rng.integers(100, 1500)
+        columns[s][at : at + 7] = np.nan
+    return vehicle, columns, symbols
+
+
+def assert_same(one, two):
+    for name in one[0]:
+        assert one[0][name].tobytes() == two[0][name].tobytes(), name
+    for key in one[1]:
+        assert one[1][key][0].tobytes() == two[1][key][0].tobytes(), key
+        assert (one[1][key][1] == two[1][key][1]).all(), key
+    assert one[2] == two[2]
+
+
+@pytest.mark.parametrize("name", list(DRIVES))
+@pytest.mark.parametrize("drop", [(), ("v_x",), ("v_x", "a_x"), ("yaw_rate",), ("steer_angle",)])
+def test_twenty_cuts(name, drop):
+    vehicle, columns, symbols = prepared(name, drop)
+    n = columns["omega_fl"].size
+    whole = run(vehicle, columns, symbols, [0, n])
+    assert whole[2], "the drive must hold events, or the test shows nothing"
+    for seed in range(3):
+        cuts = np.sort(np.random.default_rng(seed).choice(np.arange(1, n), 20, replace=False))
+        assert_same(whole, run(vehicle, columns, symbols, [0, *cuts.tolist(), n]))
+
+
+def test_sample_by_sample():
+    vehicle, columns, symbols = prepared("rwd")
+    n = columns["omega_fl"].size
+    assert_same(run(vehicle, columns, symbols, [0, n]), run(vehicle, columns, symbols, list(range(n + 1))))
+
+
+def test_cut_inside_every_event():
+    vehicle, columns, symbols = prepared("rwd")
+    n = columns["omega_fl"].size
+    whole = run(vehicle, columns, symbols, [0, n])
+    inside = sorted({round((e.start_s + e.end_s) / 2 / 0.01) for e in whole[2]} | {round(e.end_s / 0.01) for e in whole[2]})
+    assert_same(whole, run(vehicle, columns, symbols, [0, *(i for i in inside if 0 < i < n), n]))

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear
+
+MS = 1_000_000
+EPOCH = 1_760_000_000_000_000_000
+
+
+def grid(n, dt=10 * MS, start=EPOCH):
+    return start + np.arange(n, dtype=np.int64) * dt
+
+
+def test_linear_is_exact_on_a_line_at_epoch_times():
+    t = grid(11, 100 * MS)
+    y, bridged = linear(t, np.arange(11.0), grid(101), gap_ns=500 * MS)
+    assert y == pytest.approx(np.arange(101) / 10.0, abs=1e-12)
+    assert not bridged.any()
+
+
+def test_no_extrapolation():
+    t = grid(5, start=EPOCH + 20 * MS)
+    y, _ = linear(t, np.ones(5), grid(10), gap_ns=500 * MS)
+    assert np.isnan(y[:2]).all()
+    assert np.isnan(y[7:]).all()
+    assert (y[2:7] == 1.0).all()
+
+
+def test_long_gaps_stay_open_and_short_ones_are_bridged():
+    t = np.delete(grid(100), np.r_[20:22, 50:70])
+    y, bridged = linear(t, np.arange(100.0)[np.r_[0:20, 22:50, 70:100]], grid(100), gap_ns=50 * MS)
+    assert (y[20:22] == [20.0, 21.0]).all()
+    assert bridged[20:22].all()
+    assert np.isnan(y[50:70]).all()
+    assert bridged[50:70].all()
+    assert not bridged[:20].any()
+
+
+def test_hold_takes_the_last_value_and_no_longer_than_allowed():
+    t = EPOCH + np.array([0, 30 * MS], dtype=np.int64)
+    y = hold(t, np.array([1.0, 2.0]), grid(20), gap_ns=100 * MS)
+    assert (y[:3] == 1.0).all()
+    assert (y[3:14] == 2.0).all()
+    assert np.isnan(y[14:]).all()
+
+
+def test_bin_mean_is_the_mean_of_the_bin():
+    rng = np.random.default_rng(0)
+    t = grid(1000, MS)
+    x = rng.normal(size=1000)
+    g = grid(99, 10 * MS, EPOCH + 10 * MS)
+    y, _ = bin_mean(t, x, g, dt_ns=10 * MS, gap_ns=50 * MS)
+    expected = [x[(t >= a - 5 * MS) & (t < a + 5 * MS)].mean() for a in g]
+    assert y == pytest.approx(expected, abs=1e-12)
+
+
+def test_bin_mean_suppresses_aliases():
+    t = grid(10000, MS)
+    x = np.sin(2 * np.pi * 100.0 * np.arange(10000) * 1e-3)  # falls onto the 100 Hz grid as a constant
+    y, _ = bin_mean(t, x, grid(990, 10 * MS, EPOCH + 12 * MS), dt_ns=10 * MS, gap_ns=50 * MS)
+    assert np.nanmax(np.abs(y)) < 1e-9
+
+
+def test_empty_channel():
+    y, _ = linear(np.zeros(0, dtype=np.int64), np.zeros(0), grid(5), gap_ns=MS)
+    assert np.isnan(y).all()
+
+
+def test_gap_limits():
+    assert gap_limit_ns(grid(10), is_state=False) == 50 * MS
+    assert gap_limit_ns(grid(10, 100 * MS), is_state=False) == 500 * MS
+    assert gap_limit_ns(grid(10), is_state=True) == 2000 * MS

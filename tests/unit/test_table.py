@@ -1,0 +1,145 @@
+import numpy as np
+import pytest
+
+from aqualog.align.mapping import Entry, SignalMap, SourceClock, resolve
+from aqualog.align.table import build_signals
+from aqualog.errors import SignalError
+from aqualog.types import Channel, ChannelInfo, FileFaults
+from aqualog.vehicle import Vehicle
+
+CAR = Vehicle(r_e_f=0.3, r_e_r=0.32, steering_ratio=16.0)
+MS = 1_000_000
+
+
+def channel(name, values, unit="", dt=10 * MS, start=0, file="a.mf4", absolute=False, path=None):
+    values = np.asarray(values, dtype=np.float64)
+    info = ChannelInfo(path or name, name, unit, values.size, file)
+    return Channel(info, start + np.arange(values.size, dtype=np.int64) * dt, values, absolute)
+
+
+def build(*channels, entries=None, clocks=None, **kw):
+    signal_map = SignalMap(entries or {}, clocks or {})
+    found = resolve([c.info for c in channels], signal_map)
+    by_info = {(c.info.file, c.info.path): c for c in channels}
+    mapped = {s: (e, by_info[i.file, i.path]) for s, (e, i) in found.items()}
+    return build_signals(mapped, signal_map=signal_map, vehicle=CAR, **kw)
+
+
+def test_canonical_names_need_no_map():
+    s = build(channel("omega_fl", np.full(100, 90.0), "rad/s"), channel("v_x", np.full(100, 100.0), "km/h"))
+    assert s.symbols == ("v_x", "omega_fl")
+    assert s.dt == pytest.approx(0.01)
+    assert s.array("v_x") == pytest.approx(np.full(100, 100 / 3.6))
+    assert s.frame["t"][0] == 0.0
+    assert s.start_ns is None
+
+
+def test_speed_at_the_rim_becomes_wheel_speed_by_its_own_radius():
+    s = build(channel("omega_fl", np.full(9, 108.0), "km/h"), channel("omega_rl", np.full(9, 30.0), "m/s"))
+    assert s.array("omega_fl")[0] == pytest.approx(30.0 / 0.3)
+    assert s.array("omega_rl")[0] == pytest.approx(30.0 / 0.32)
+
+
+def test_axle_torque_is_halved_and_steering_wheel_divided():
+    s = build(channel("torque_r", np.full(9, 500.0), "Nm"), channel("steering_wheel_angle", np.full(9, 160.0), "deg"))
+    assert s.array("torque_rl")[0] == s.array("torque_rr")[0] == pytest.approx(250.0)
+    assert s.array("steer_angle")[0] == pytest.approx(np.radians(10.0))
+    assert np.isnan(s.array("torque_fl")).all()
+
+
+def test_scale_and_offset_act_on_si_values():
+    entry = Entry("a_x", ("acc",), "g", scale=-1.0, offset=1.5)
+    s = build(channel("acc", np.full(9, 0.1)), entries={"a_x": entry})
+    assert s.array("a_x")[0] == pytest.approx(-0.980665 + 1.5)
+
+
+def test_error_codes_and_nonsense_are_masked_and_counted():
+    x = np.full(200, 100.0)
+    x[20] = np.nan
+    x[40:60] = 1023.0
+    x[100] = 1e9
+    s = build(channel("tq", x, "Nm"), entries={"torque_r": Entry("torque_r", ("tq",), invalid=(1023.0,))})
+    origin = s.origins["torque_rl"]
+    assert (origin.not_finite, origin.invalid_code, origin.out_of_range) == (1, 20, 1)
+    assert np.isnan(s.array("torque_rl")[41:59]).all()
+    assert s.array("torque_rl")[20] == pytest.approx(50.0)  # one lost sample is bridged
+    assert origin.missing_fraction == pytest.approx(22 / 200, abs=0.011)
+    assert s.quality.dropped_samples == 22
+    assert any("outside" in n for n in s.quality.notes)
+
+
+def test_grid_ignores_jitter():
+    rng = np.random.default_rng(1)
+    c = channel("omega_fl", np.full(1000, 90.0), "rad/s")
+    jittered = Channel(c.info, c.t_ns + rng.integers(-2 * MS, 2 * MS, 1000), c.values, absolute=False)
+    assert build(jittered).dt_ns == 10 * MS
+
+
+def test_wheels_set_the_rate():
+    s = build(channel("omega_fl", np.full(100, 90.0), "rad/s", 20 * MS), channel("a_x", np.zeros(2000), "g", MS))
+    assert s.dt_ns == 20 * MS
+
+
+def test_states_are_held_and_labels_are_booleans():
+    wheel = channel("omega_fl", np.full(100, 90.0), "rad/s")
+    water = channel("on_water", [0, 1, 0, 0], "", 250 * MS)
+    s = build(wheel, water)
+    assert s.frame["on_water"].to_list()[24:27] == [False, True, True]
+
+
+def test_late_source_is_moved_by_its_clock():
+    wheel = channel("omega_fl", np.full(300, 90.0), "rad/s")
+    gps = channel("v_x", np.arange(200) * 0.1, "m/s", start=200 * MS, file="gps.csv")
+    s = build(wheel, gps, clocks={"gps.csv": SourceClock(offset_s=0.2)})
+    assert s.array("v_x")[:3] == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_clocks_without_a_common_zero_are_refused():
+    a = channel("omega_fl", np.ones(9), "rad/s", absolute=True, start=10**18)
+    b = channel("v_x", np.ones(9), "m/s", file="gps.csv")
+    with pytest.raises(SignalError, match=r"gps\.csv.*clock"):
+        build(a, b)
+
+
+def test_absolute_start_is_kept():
+    s = build(channel("omega_fl", np.ones(9), "rad/s", absolute=True, start=10**18))
+    assert s.start_ns == 10**18
+
+
+def test_unknown_unit_of_a_mapped_channel_is_an_error_and_of_another_a_note():
+    with pytest.raises(SignalError, match="unknown unit"):
+        build(channel("x", np.ones(9), "furlong"), entries={"v_x": Entry("v_x", ("x",))})
+    s = build(channel("v_x", np.ones(9), "furlong"), channel("omega_fl", np.ones(9), "rad/s"))
+    assert s.symbols == ("omega_fl",)
+    assert any("furlong" in n for n in s.quality.notes)
+
+
+def test_missing_and_ambiguous_channels_are_named():
+    with pytest.raises(SignalError, match=r"omega_fl.*nearest.*wheel_fl"):
+        build(channel("wheel_fl", np.ones(9)), entries={"omega_fl": Entry("omega_fl", ("wheel_f",))})
+    twins = [channel("speed", np.ones(9), "m/s", path=f"g{i}.speed") for i in (1, 2)]
+    with pytest.raises(SignalError, match=r"ambiguous.*g1\.speed.*g2\.speed"):
+        build(*twins, entries={"v_x": Entry("v_x", ("speed",))})
+    assert build(*twins, entries={"v_x": Entry("v_x", ("g2.speed",))}).symbols == ("v_x",)
+
+
+def test_lost_samples_of_readers_are_counted():
+    s = build(channel("omega_fl", np.ones(9), "rad/s"), file_faults=[FileFaults(truncated=True, lost_samples=7)])
+    assert s.quality.truncated
+    assert s.quality.lost_in_files == 7
+
+
+def test_time_faults_reach_the_quality_record():
+    c = channel("omega_fl", np.ones(500), "rad/s")
+    t = c.t_ns.copy()
+    t[10] = t[9]
+    t[300:] += 5_000 * MS
+    s = build(Channel(c.info, t, c.values, absolute=False))
+    assert s.quality.faults.duplicates == 1
+    assert s.quality.faults.pauses == 1
+    assert s.quality.time_jumps == 1
+
+
+def test_no_usable_signal():
+    with pytest.raises(SignalError, match="no usable signal"):
+        build()
