@@ -117,7 +117,9 @@ def _integrate(  # type: ignore[no-untyped-def]
             water = RHO_WATER * TYRE_WIDTH * max(film - STORAGE_DEPTH, 0.0) * v_i * v_i
             resist = (r_w * F_z[i] + water) * r_l[i] + FRONT_SHIFT * F_z[i] * (1.0 - contact)
             load = (torque - force * r_l[i] + rough[k, i]) - (resist + braking) * np.sign(omega[i])
-            stiff = C * r_e[i] * r_l[i] / max(abs(v_i), 1.0)
+            # the local slope of the brush curve: with the initial one, a sliding wheel would seem to have more inertia
+            theta = min(C * abs(s) / max(3.0 * mu * F_z[i], 1.0), 1.0)
+            stiff = C * (1.0 - theta) ** 2 * r_e[i] * r_l[i] / max(abs(v_i), 1.0)
             omega[i] += dt * load / (inertia[i] + dt * stiff)
             if omega[i] < 0.0:
                 omega[i] = 0.0

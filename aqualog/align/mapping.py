@@ -11,7 +11,7 @@ from aqualog.errors import SignalError
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.types import ChannelInfo
 
-__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "resolve"]
+__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "matching", "resolve"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +32,15 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class SourceClock:
-    """Correction of one source's clock: t = t_file - offset_s - drift_ppm * 1e-6 * (time since the source's start).
+    """Correction of one source's clock: t = t_file - offset_s - drift_ppm * 1e-6 * (t_file - at_s).
 
-    A positive offset means that the source is late.
+    A positive offset means that the source is late. `at_s` is the stamp on the file's own clock for which the offset
+    holds; it matters only with a drift.
     """
 
     offset_s: float = 0.0
     drift_ppm: float = 0.0
+    at_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +55,15 @@ class SignalMap:
 
     def clock_of(self, file: str) -> SourceClock:
         """The clock correction of a file, by name or glob pattern."""
-        for pattern, clock in self.clocks.items():
-            if fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern:
-                return clock
-        return SourceClock()
+        return next((c for pattern, c in self.clocks.items() if _names(pattern, file)), SourceClock())
+
+    def joins(self, file: str) -> bool:
+        """Whether the map says how this file's clock stands against the others'."""
+        return any(_names(pattern, file) for pattern in self.clocks)
+
+
+def _names(pattern: str, file: str) -> bool:
+    return fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern
 
 
 def channel_id(info: ChannelInfo) -> str:
@@ -78,7 +85,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     found: dict[str, tuple[Entry, ChannelInfo]] = {}
     faults: list[str] = []
     for symbol, entry in signal_map.entries.items():
-        matches = next((m for m in (_matching(channels, c) for c in entry.channel) if m), [])
+        matches = next((m for m in (matching(channels, c) for c in entry.channel) if m), [])
         if len(matches) == 1:
             found[symbol] = (entry, matches[0])
         elif not matches:
@@ -102,7 +109,8 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     return found
 
 
-def _matching(channels: Iterable[ChannelInfo], wanted: str) -> list[ChannelInfo]:
+def matching(channels: Iterable[ChannelInfo], wanted: str) -> list[ChannelInfo]:
+    """Channels that a name of the map may mean: the most specific kind of match that hits at all."""
     listed = list(channels)
     for test in (
         lambda c: channel_id(c) == wanted,

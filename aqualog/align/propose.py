@@ -19,7 +19,7 @@ from aqualog.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.types import Channel, FloatArray, TimeArray
 from aqualog.units import is_unit, parse_unit
 
-__all__ = ["Proposal", "propose_map"]
+__all__ = ["Proposal", "propose_map", "words_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +113,10 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
         candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
         if rule.symbol in ("torque_f", "torque_r"):
             want = {"torque_f": ("front", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
-            candidates = [p for p in candidates if set(_words(p.entry.channel[0])) & set(want)]
+            candidates = [p for p in candidates if set(words_of(p.entry.channel[0])) & set(want)]
         if rule.symbol == "v_x" and all(f"omega_{w}" in found for w in WHEELS):
             # beside four wheel speeds, a "vehicle speed" is made from them: only a sensor of its own is a reference
-            candidates = [p for p in candidates if set(_words(_file_and_path(p, usable))) & set(rule.bonus)]
+            candidates = [p for p in candidates if set(words_of(_file_and_path(p, usable))) & set(rule.bonus)]
         if rule.symbol == "a_x" and speed is not None:
             candidates = [_check_acceleration(p, usable, speed) for p in candidates]
         if rule.symbol == "yaw_rate":
@@ -135,7 +135,8 @@ def _keep_best(found: dict[str, Proposal], symbol: str, candidates: list[Proposa
         found[symbol] = max(good, key=lambda p: p.score)
 
 
-def _words(text: str) -> list[str]:
+def words_of(text: str) -> list[str]:
+    """Words of a name, lower case: `VehSpd_FL` -> veh, spd, fl."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text)
     return [w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w]
 
@@ -168,10 +169,10 @@ def _wheel_candidates(
 ) -> list[Proposal]:
     result = []
     for channel in channels:
-        name = _words(channel.info.name)
+        name = words_of(channel.info.name)
         joined = " ".join(name)
         has_position = any(p in name if " " not in p else p in joined for p in _POSITIONS[wheel])
-        has_word = set(words) & set(_words(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
+        has_word = set(words) & set(words_of(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
         if not has_position or not has_word or set(name) & _NOT_A_VALUE or _dimension(channel) not in (*dimensions, ""):
             continue
         symbol = {"speed": "omega", "torque": "torque", "pressure": "pressure"}[dimensions[0]]
@@ -181,8 +182,8 @@ def _wheel_candidates(
 
 
 def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Proposal | None:
-    words = _words(channel.info.name)
-    path_words = set(_words(channel_id(channel.info)))
+    words = words_of(channel.info.name)
+    path_words = set(words_of(channel_id(channel.info)))
     dimension = _dimension(channel)
     named = set(rule.words) & set(words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
     if not named or set(words) & (set(rule.never) | _NOT_A_VALUE):

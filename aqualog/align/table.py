@@ -75,7 +75,7 @@ def build_signals(
     cleaned = [c for c in cleaned if c.t_ns.size > 0]
     if not cleaned:
         raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
-    absolute = _common_clock([mapped[c.origin.symbol][1] for c in cleaned])
+    absolute = _common_clock([mapped[c.origin.symbol][1] for c in cleaned], signal_map)
     dt_ns = _grid_step(cleaned, rate_hz)
     grid = _grid(cleaned, dt_ns)
     columns: dict[str, pl.Series] = {}
@@ -166,21 +166,26 @@ def _corrected(t_ns: TimeArray, signal_map: SignalMap, file: str) -> TimeArray:
     if not (clock.offset_s or clock.drift_ppm) or t_ns.size == 0:
         return t_ns
     shift = np.int64(round(clock.offset_s * 1e9))
-    drift: TimeArray = np.rint((t_ns - t_ns[0]) * (clock.drift_ppm * 1e-6)).astype(np.int64)
+    elapsed = t_ns - np.int64(round(clock.at_s * 1e9))
+    drift: TimeArray = np.rint(elapsed * (clock.drift_ppm * 1e-6)).astype(np.int64)
     corrected: TimeArray = t_ns - shift - drift
     return corrected
 
 
-def _common_clock(channels: Sequence[Channel]) -> bool:
-    """Whether the drive has absolute time; refuses to join clocks that have nothing in common."""
-    kinds = {c.absolute for c in channels}
+def _common_clock(channels: Sequence[Channel], signal_map: SignalMap) -> bool:
+    """Whether the drive has absolute time; refuses to join clocks that have nothing in common.
+
+    A file whose offset the map gives has been moved onto the others' clock already.
+    """
+    free = [c for c in channels if not signal_map.joins(c.info.file)]
+    kinds = {c.absolute for c in free or channels}
     if len(kinds) > 1:
         by_kind = {k: sorted({c.info.file for c in channels if c.absolute == k}) for k in kinds}
         raise SignalError(
             "the files do not share a clock",
             where=", ".join(by_kind[False]),
             expected=f"absolute time as in {', '.join(by_kind[True])}",
-            hint="export all with absolute time, or analyse the files that share a clock",
+            hint="`aqualog align FILE FILE --write-map map.toml`",
         )
     return kinds.pop()
 

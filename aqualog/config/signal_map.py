@@ -15,6 +15,7 @@ from aqualog.units import is_unit
 __all__ = ["load_signal_map", "map_text"]
 
 _ENTRY_KEYS = ("channel", "unit", "scale", "offset", "invalid")
+_CLOCK_KEYS = ("offset_s", "drift_ppm", "at_s")
 _TABLES = ("signals", "time", "sources")
 
 
@@ -96,11 +97,12 @@ def _clock(name: str, table: Any, faults: Faults) -> SourceClock:
         faults.add(name, f"sources.{name} is not a table")
         return SourceClock()
     for key in table:
-        if key not in ("offset_s", "drift_ppm"):
-            faults.unknown(key, ("offset_s", "drift_ppm"))
+        if key not in _CLOCK_KEYS:
+            faults.unknown(key, _CLOCK_KEYS)
     offset = faults.number({"offset_s": table.get("offset_s", 0.0)}, "offset_s", low=-1e10, high=1e10, unit="s")
     drift = faults.number({"drift_ppm": table.get("drift_ppm", 0.0)}, "drift_ppm", low=-1e5, high=1e5, unit="ppm")
-    return SourceClock(offset or 0.0, drift or 0.0)
+    at = faults.number({"at_s": table.get("at_s", 0.0)}, "at_s", low=-1e10, high=1e10, unit="s")
+    return SourceClock(offset or 0.0, drift or 0.0, at or 0.0)
 
 
 def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None) -> str:
@@ -121,7 +123,7 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
     for name, clock in signal_map.clocks.items():
         lines += ["", f"[sources.{_quote(name)}]", f"offset_s = {clock.offset_s!r}"]
         if clock.drift_ppm:
-            lines.append(f"drift_ppm = {clock.drift_ppm!r}")
+            lines += [f"drift_ppm = {clock.drift_ppm!r}", f"at_s = {clock.at_s!r}"]
     return "\n".join(lines) + "\n"
 
 

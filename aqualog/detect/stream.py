@@ -26,6 +26,7 @@ MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquap
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 A_RESISTANCE = 0.2  # [m/s^2] thesis 2.2: threshold of partial aquaplaning (C44)
 V_RESISTANCE = 10.0  # [m/s] below, gear changes and traffic rule the balance
+A_Y_MINOR = 4.0  # [m/s^2] beyond, the inner wheels lose load enough to slow down on dry road too
 A_Y_RESISTANCE = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 GATE_HOLD = 1.0  # [s] the resistance gate of the joint detector stays open this long
 JOINT_HOLD = 0.5  # [s] a joint warning outlasts its criteria by this
@@ -134,7 +135,7 @@ class DriveStream:
             return [], []
         always = np.ones(f["v_x_hat"].size, dtype=bool)
         with np.errstate(invalid="ignore"):
-            allowed = {w: f[f"mu_{w}"] < MU_SPIN_UP if f"mu_{w}" in f else always for w in WHEELS}
+            allowed = {w: always if (mu := _traction(f, w)) is None else mu < MU_SPIN_UP for w in WHEELS}
         driven = [w for w in self._wheels(f) if w in self.vehicle.driven]
         return self._spins("spin_up", self._up, driven, f, braking, allowed)
 
@@ -169,6 +170,8 @@ class DriveStream:
         if "minor_spin_down" in self._off:
             return tracks, events
         axle = self.vehicle.watched_axle
+        with np.errstate(invalid="ignore"):
+            is_upright = ~(np.abs(f["a_y_slow"]) > A_Y_MINOR)
         for side, pair in SIDES.items():
             watched = next(w for w in pair if w[0] == axle)
             other = next(w for w in pair if w[0] != axle)
@@ -181,7 +184,7 @@ class DriveStream:
                 f[f"a_w_delta_{other}"],
                 f[f"v_w_delta_{watched}"],
                 f["v_x_hat"],
-                ~braking[watched],
+                ~braking[watched] & is_upright,
             )
             track = Track("minor_spin_down", watched, side, "(m/s^2)^2", delta, self._minor.delta_min, bits)
             evidence = {**self._wheel_evidence(watched, f, braking), "variance_max": ("max", var)}
@@ -229,7 +232,8 @@ class DriveStream:
             bits = track.active & ~braking[track.wheel]
             criteria[number[track.detector]] |= bits
             slip = slip_of_wheel_speed(f[f"v_w_{track.wheel}"], f["v_x_hat"])
-            mu = f.get(f"mu_{track.wheel}", np.full(n, np.nan))
+            mu = _traction(f, track.wheel)
+            mu = np.full(n, np.nan) if mu is None else mu
             with np.errstate(invalid="ignore"):
                 full |= bits & ((slip < SLIP_FULL) if track.detector != "spin_up" else (mu < MU_FULL))
             slip_min = np.fmin(slip_min, np.where(bits, slip, np.nan))
@@ -263,9 +267,10 @@ class DriveStream:
             "a_w_delta_max": ("max", f[f"a_w_delta_{wheel}"]),
             "braking": ("any", braking[wheel]),
         }
-        if f"mu_{wheel}" in f:
-            evidence["mu"] = ("first", f[f"mu_{wheel}"])
-            evidence["mu_min"] = ("min", f[f"mu_{wheel}"])
+        mu = _traction(f, wheel)
+        if mu is not None:
+            evidence["mu"] = ("first", mu)
+            evidence["mu_min"] = ("min", mu)
         return evidence
 
     def _events(self, track: Track, evidence: Evidence, severity: Callable[[Mapping[str, Any]], str]) -> list[Event]:
@@ -280,6 +285,11 @@ class DriveStream:
                 severity=severity,
             )
         return self._builders[key].push(track.active, track.statistic, evidence)
+
+
+def _traction(f: Features, wheel: str) -> FloatArray | None:
+    """Traction coefficient of a wheel without the water's resistance where that is known; None without torque."""
+    return f.get(f"mu_res_{wheel}", f.get(f"mu_{wheel}"))
 
 
 def _partial(_: Mapping[str, Any]) -> str:

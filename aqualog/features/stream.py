@@ -16,7 +16,7 @@ from aqualog.notation import WHEELS
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 from aqualog.physics.load import wheel_loads
 from aqualog.physics.resistance import nominal_acceleration
-from aqualog.physics.traction import traction_coefficient
+from aqualog.physics.traction import residual_traction, traction_coefficient
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
@@ -76,7 +76,7 @@ class FeatureStream:
         Returns
         -------
         mapping name -> array (n,)
-            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_sum`, `delta_a_x` (2.9),
+            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`, `torque_sum`, `delta_a_x` (2.9),
             `a_x_slow`, `a_y_slow`; only those whose signals are available.
         """
         n = next(iter(columns.values())).size
@@ -170,3 +170,9 @@ class FeatureStream:
                 r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
             )  # fmt: skip
             out["delta_a_x"] = a_nom - get["a_x"]
+            slow = self._lowpass("delta_a_x", out["delta_a_x"], TAU_LOAD)
+            for i, wheel in enumerate(WHEELS):
+                if f"mu_{wheel}" in out:
+                    out[f"mu_res_{wheel}"] = residual_traction(
+                        out[f"mu_{wheel}"], slow, loads[i], mass=vehicle.mass
+                    )

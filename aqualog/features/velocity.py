@@ -84,15 +84,22 @@ def _step(p, v, b, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type:
         error = min(max(v_ref - v, -4.0 * gate), 4.0 * gate)
         total = 1.0
     else:
+        middle = _median(w)
+        close = 0.5 * gate
+        agreeing = 0
+        for i in range(_N):
+            if abs(w[i] - middle) <= close:
+                agreeing += 1
         for i in range(_N):
             if math.isnan(w[i]):
                 continue
             e = w[i] - v
             known += weights[i]
             far += weights[i] * min(max(e, -gate), gate)
-            if abs(e) <= gate:
+            # three wheels that agree outvote a prediction that has gone astray; otherwise the prediction chooses
+            if (agreeing >= 3 and abs(w[i] - middle) <= close) or (agreeing < 3 and abs(e) <= gate):
                 total += weights[i]
-                error += weights[i] * e
+                error += weights[i] * min(max(e, -gate), gate)
     if total > 0.0:
         error /= total
         lost = 0.0
@@ -166,8 +173,9 @@ def observe(
     """Velocity observer with bounded trust in every source.
 
     dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), where v_m is the reference velocity or,
-    without one, the weighted mean of those wheels that agree with the prediction. A wheel that spins or locks leaves
-    the gate and no longer counts. Where no wheel agrees for 2 s the observer starts again.
+    without one, the weighted mean of the wheels that agree: three or more with each other, else those that agree with
+    the prediction. A wheel that spins or locks leaves the gate and no longer counts. Where no wheel agrees for 2 s the
+    observer starts again.
 
     A slow correction per wheel (time constant 30 s, within 3 %, learnt only while rolling steadily) takes out radius
     errors: a reference that differs by 1 % in scale must not look like slip.

@@ -67,7 +67,7 @@ def write_log(
     if suffix == ".mf4":
         from aqualog.io.write_mdf import MdfGroup, write_mf4
 
-        t_s = t_ns * 1e-9
+        t_s: FloatArray = t_ns.astype(np.float64) * 1e-9
         write_mf4(path, [MdfGroup(g.name, t_s, g.columns) for g in groups], start_ns, "written by aqualog")
         return
     if suffix == ".mcap":

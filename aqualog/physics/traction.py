@@ -6,7 +6,7 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["traction_coefficient"]
+__all__ = ["residual_traction", "traction_coefficient"]
 
 
 def traction_coefficient(
@@ -36,3 +36,32 @@ def traction_coefficient(
     with np.errstate(invalid="ignore", divide="ignore"):
         mu = (torque - inertia * omega_dot) / (r_l * F_z) - r_w
     return np.where(F_z > 100.0, mu, np.nan)
+
+
+def residual_traction(mu: FloatArray, delta_a_x: FloatArray, F_z: FloatArray, *, mass: float) -> FloatArray:
+    """Traction coefficient of a spinning wheel after the water's resistance has taken its share of the torque.
+
+    Parameters
+    ----------
+    mu : array (n,)
+        Traction coefficient from torque, as `traction_coefficient` gives it. [-]
+    delta_a_x : array (n,)
+        Resistance measure of the vehicle (thesis 2.9), low-passed. [m/s^2]
+    F_z : array (n,)
+        Load of the wheel. [N]
+    mass : float
+        Vehicle mass. [kg]
+
+    Returns
+    -------
+    mu : array (n,)
+        mu - m max(delta_a_x, 0) / F_z, NaN where the wheel carries less than 100 N. [-]
+
+    A wheel that spins on water works against the shifted wheel load as well as the road: with a shift of 0.06 m that
+    alone looks like a traction coefficient of 0.2, and the thesis' limit of 0.07 would reject full aquaplaning. What
+    the torques should have done to the vehicle and did not, bounds what the road has taken: all of it is booked on
+    this wheel. On snow or ice nothing is missing, and the value is that of the torque.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        reduced = mu - mass * np.maximum(delta_a_x, 0.0) / F_z
+    return np.where(F_z > 100.0, reduced, np.nan)

@@ -6,7 +6,7 @@ from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag, nominal_acceleration
 from aqualog.physics.slip import slip_of_wheel_speed, wheel_slip
-from aqualog.physics.traction import traction_coefficient
+from aqualog.physics.traction import residual_traction, traction_coefficient
 
 CAR = {"mass": 1600.0, "l_f": 1.2, "l_r": 1.6, "h_cg": 0.55, "track": 1.5}
 
@@ -94,6 +94,15 @@ def test_traction_coefficient():
     # torque that only spins the wheel is no traction
     assert traction_coefficient(np.array([120.0]), F_z, np.array([100.0]), **kw)[0] == pytest.approx(-0.01)
     assert np.isnan(traction_coefficient(zero, np.array([50.0]), zero, **kw)[0])
+
+
+def test_residual_traction():
+    """A wheel that only works against 240 N m of water resistance has no traction left; on snow nothing changes."""
+    F_z, mu = np.array([4000.0]), np.array([0.2])
+    missing = 0.2 * 4000.0 / 1600.0
+    assert residual_traction(mu, np.array([missing]), F_z, mass=1600.0)[0] == pytest.approx(0.0)
+    assert residual_traction(mu, np.zeros(1), F_z, mass=1600.0)[0] == 0.2
+    assert residual_traction(mu, np.array([-0.5]), F_z, mass=1600.0)[0] == 0.2
 
 
 def test_contact_ratios_of_the_thesis():

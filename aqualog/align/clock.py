@@ -1,0 +1,679 @@
+"""Offset, drift and scale between two sources that carry the same quantity on clocks of their own.
+
+Model, with t the stamp of the other source and s the same instant on the reference's clock:
+
+    x(t) = scale * x_ref(s) + bias + noise,    s = t - offset - drift * (t - t_mid)
+
+The offset is found on the smoothed rate of change, not on the level: bias, slow changes of the rolling radius and slow
+noise vanish from it, and a constant scale is a free gain there. Scale and bias are then read from the levels.
+Intervals come from leaving out one block of several seconds after the other (cluster jackknife, CR3), so neighbouring
+residuals may depend on each other; nothing is random.
+
+An offset is all that delays one signal against the other: the clock and also the run time and the filter of a sensor.
+The two cannot be told apart from one pair of signals. Tyre slip in proportion to acceleration, k v dv/dt, looks like a
+wheel speed that is early by k v (0.05 s and more on a race track); the fit with slip takes it out where the speed
+varies enough to tell the two apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.errors import FitError
+from aqualog.types import BoolArray, FloatArray, TimeArray
+
+__all__ = ["ClockFit", "estimate_clock"]
+
+Interval = tuple[float, float]
+
+_SMOOTHING_S = 0.4  # Gaussian; its slope passes 0.05 to 1 Hz, where cars accelerate and turn
+_STEPS_PER_SMOOTHING = 16
+_REACH = 3.5  # half-width of the filter in standard deviations
+_BLOCK_S = 5.0
+_RATE_BLOCKS = 40  # at most so many blocks for the offset; longer drives get longer blocks
+_SLOW_BLOCKS = 8  # for drift and levels: driving style, slip, grade and warm tyres stay alike for minutes
+_LEAST_BLOCKS = 4
+_HUBER = 1.345
+_CHANCE = 1e-3  # probability that unrelated Gaussian signals reach the limit of the peak
+_SURE = 0.9  # unrelated drives do not reach it by chance once they hold some events:
+_EVENTS = 5.0
+_AMBIGUOUS = 0.9  # a second peak this close to the first may be the true one
+_MOST_POINTS = 30_000_000
+# Rates of change that noise alone reaches: below, a source shows nothing that could be matched.
+_LEAST_CHANGE = {"v_x": 0.02, "yaw_rate": 0.002, **{f"omega_{w}": 0.07 for w in ("fl", "fr", "rl", "rr")}}
+
+
+@dataclass(frozen=True, slots=True)
+class ClockFit:
+    """How the clock and the values of one source stand against a reference.
+
+    Attributes
+    ----------
+    offset_s : float
+        Positive: the source is LATE, an event bears a stamp that is `offset_s` larger than the reference's.
+        Holds at `mid_ns`.
+    offset_ci95 : (low, high)
+        95 % interval of `offset_s`. Covers noise, not the run time or filter of a sensor.
+    slip_offset_s : float
+        Offset if x - x_ref may also hold tyre slip k v dv/dt; NaN unless the quantity is a speed. Where its interval
+        and that of `offset_s` are apart, part of `offset_s` is slip and not time.
+    slip_offset_ci95 : (low, high)
+    drift_ppm : float
+        Growth of the offset in microseconds per second of the source's clock; an estimate even if not significant.
+    drift_ppm_ci95 : (low, high)
+    drift_significant : bool
+        The 99 % interval of the drift excludes 0. Only then `to_reference` uses it.
+    scale, bias : float
+        x = scale * x_ref + bias, at the same instant; bias in the unit of x.
+    scale_ci95, bias_ci95 : (low, high)
+    ratio : float
+        Scale if there is no bias, as between two speeds: x = ratio * x_ref.
+    ratio_ci95 : (low, high)
+    peak : float
+        Correlation of the rates of change at the best lag, -1 to 1.
+    peak_limit : float
+        What `peak` had to reach to be taken for more than chance.
+    runner_up : float
+        Best correlation outside the main peak; -1 if the main peak fills the search range.
+    overlap_s : float
+        Time in which both sources were usable after alignment.
+    n : int
+        Samples of the source in that time.
+    rms : float
+        Residual of the smoothed levels, unit of x.
+    mid_ns : int
+        Stamp of the source, in the middle of the overlap, for which `offset_s` holds.
+    """
+
+    offset_s: float
+    offset_ci95: Interval
+    slip_offset_s: float
+    slip_offset_ci95: Interval
+    drift_ppm: float
+    drift_ppm_ci95: Interval
+    drift_significant: bool
+    scale: float
+    scale_ci95: Interval
+    bias: float
+    bias_ci95: Interval
+    ratio: float
+    ratio_ci95: Interval
+    peak: float
+    peak_limit: float
+    runner_up: float
+    overlap_s: float
+    n: int
+    rms: float
+    mid_ns: int
+
+    @property
+    def sharpness(self) -> float:
+        """How far the peak stands above the second best, relative to the peak. 0 ambiguous, 1 and more clear."""
+        return (self.peak - self.runner_up) / self.peak
+
+    def to_reference(self, t_ns: TimeArray) -> TimeArray:
+        """Stamps of the source on the reference's clock: t - offset - drift * (t - t_mid). int64 (n,), new array."""
+        shift = np.full(t_ns.shape, self.offset_s)
+        if self.drift_significant:
+            shift += self.drift_ppm * 1e-6 * ((t_ns - self.mid_ns) * 1e-9)
+        return t_ns - np.rint(shift * 1e9).astype(np.int64)
+
+
+def estimate_clock(
+    t_ref_ns: TimeArray,
+    x_ref: FloatArray,
+    t_ns: TimeArray,
+    x: FloatArray,
+    *,
+    max_offset_s: float = 10.0,
+    start_offset_s: float = 0.0,
+    quantity: str = "v_x",
+    min_overlap_s: float = 30.0,
+    min_peak: float = 0.5,
+) -> ClockFit:
+    """Estimate offset, drift and scale of a source against a reference that carries the same quantity.
+
+    Parameters
+    ----------
+    t_ref_ns, t_ns : int64 arrays (n,), (m,)
+        Stamps of the reference and of the other source, not decreasing; of equal stamps the later sample counts.
+    x_ref, x : arrays (n,), (m,)
+        Samples; NaN and infinite ones are left out. Rates, gaps and units may differ. Inputs are not changed.
+    max_offset_s : float
+        Search range on either side of `start_offset_s`, > 0. [s]
+    start_offset_s : float
+        Known rough offset, e.g. of clocks hours apart; sign as `ClockFit.offset_s`. [s]
+    quantity : str
+        Name of the quantity, for messages. `v_x`, `yaw_rate` and `omega_*` (SI) also set the least rate of change,
+        `v_x` and `omega_*` the fit with slip.
+    min_overlap_s : float
+        Usable common time that is needed, at least 20. [s]
+    min_peak : float
+        Least correlation of the rates of change. The limit is higher where chance alone reaches it.
+
+    Returns
+    -------
+    ClockFit
+
+    Valid range: drifts up to about 1000 ppm; rates of 1 Hz and more. A value that was held in the log at a higher rate
+    than it was measured looks late by half its true sample time.
+
+    Raises
+    ------
+    FitError
+        Too little overlap, a source without variation, a weak or ambiguous peak, a peak at the edge of the search
+        range, opposite signs, or stamps that run backwards.
+
+    References: Padfield, Masked object registration in the Fourier domain, 2012, 10.1109/TIP.2011.2181402 (masked
+    correlation); Cameron and Miller, A practitioner's guide to cluster-robust inference, 2015, 10.3368/jhr.50.2.317
+    (section VI: few clusters).
+    """
+    o = _Options(max_offset_s, start_offset_s, min_overlap_s, min_peak, quantity, f"clock fit on {quantity}")
+    _check_options(o)
+    ref = _series(t_ref_ns, x_ref, where=f"{o.where}, reference")
+    other = _series(t_ns, x, where=f"{o.where}, other source")
+    # integers are subtracted before they become seconds: epoch nanoseconds do not fit a double
+    lead = (other.origin_ns - round(start_offset_s * 1e9) - ref.origin_ns) * 1e-9
+    other = other._replace(t=other.t + lead)
+    smoothing = max(_SMOOTHING_S, ref.period, other.period)
+    step = smoothing / _STEPS_PER_SMOOTHING
+    start, count = _grid(ref, other, step, o)
+    a = _smooth(ref, start, step, count, smoothing)
+    b = _smooth(other, start, step, count, smoothing)
+    _check_variation(a, quantity, where=f"{o.where}, reference")
+    _check_variation(b, quantity, where=f"{o.where}, other source")
+    peak = _search(a, b, step, o)
+    mid = _middle(a, b, start, step, peak.lag)
+    pair = _Pair(a, b, start, step, mid, max(_BLOCK_S, 10 * smoothing))
+    return _fit(pair, peak, other, lead, o)
+
+
+# ---------------------------------------------------------------------------------------------------- preparation
+
+
+class _Options(NamedTuple):
+    max_offset_s: float
+    start_offset_s: float
+    min_overlap_s: float
+    min_peak: float
+    quantity: str
+    where: str
+
+    @property
+    def has_slip(self) -> bool:
+        return self.quantity == "v_x" or self.quantity.startswith("omega_")
+
+
+class _Series(NamedTuple):
+    t: FloatArray  # seconds from the first sample
+    x: FloatArray
+    period: float
+    origin_ns: int
+
+
+class _Smoothed(NamedTuple):
+    level: FloatArray
+    rate: FloatArray
+    bend: FloatArray  # rate of the rate
+    good: BoolArray
+
+
+def _check_options(o: _Options) -> None:
+    least = _LEAST_BLOCKS * _BLOCK_S
+    if not (math.isfinite(o.max_offset_s) and o.max_offset_s > 0.0):
+        raise FitError(f"search range {o.max_offset_s} s", where=o.where, expected="a positive number of seconds")
+    if not math.isfinite(o.start_offset_s):
+        raise FitError(f"start offset {o.start_offset_s} s", where=o.where, expected="a number of seconds")
+    if not o.min_overlap_s >= least:
+        raise FitError(f"least overlap {o.min_overlap_s} s", where=o.where, expected=f"{least:g} s or more")
+
+
+def _series(t_ns: TimeArray, x: FloatArray, *, where: str) -> _Series:
+    """Finite samples with strictly increasing time, in seconds from the first."""
+    if t_ns.shape != x.shape or t_ns.ndim != 1:
+        raise FitError(f"{t_ns.shape} stamps for {x.shape} samples", where=where, expected="two vectors of one length")
+    good = np.isfinite(x)
+    t, values = t_ns[good], np.asarray(x[good], dtype=np.float64)
+    steps = np.diff(t)
+    if (steps < 0).any():
+        raise FitError(
+            "time stamps run backwards", where=where, expected="rising stamps", hint="repair the clock resets first"
+        )
+    last = np.append(steps != 0, True)[: t.size]
+    t, values = t[last], values[last]
+    if t.size < 10:
+        raise FitError(f"{t.size} finite samples", where=where, expected="at least 10", hint="another signal")
+    seconds = (t - t[0]) * 1e-9
+    return _Series(seconds, values, float(np.median(np.diff(seconds))), int(t[0]))
+
+
+def _grid(ref: _Series, other: _Series, step: float, o: _Options) -> tuple[float, int]:
+    """Start and number of points of a grid on the reference's clock that holds all that any lag may pair."""
+    reach = o.max_offset_s
+    ref_low, ref_high = max(ref.t[0], other.t[0] - reach), min(ref.t[-1], other.t[-1] + reach)
+    low, high = max(other.t[0], ref.t[0] - reach), min(other.t[-1], ref.t[-1] + reach)
+    possible = min(ref_high - ref_low, high - low)
+    expected = f"{o.min_overlap_s:g} s of common time within an offset of {reach:g} s"
+    if possible <= 0.0:
+        began = o.start_offset_s + float(other.t[0] - ref.t[0])
+        hint = f"start_offset_s = {began:.1f} if both began together"
+        raise FitError("the sources do not overlap in time", where=o.where, expected=expected, hint=hint)
+    if possible < o.min_overlap_s:
+        hint = "a longer drive, a larger max_offset_s or a start_offset_s"
+        raise FitError(f"the sources share at most {possible:.1f} s", where=o.where, expected=expected, hint=hint)
+    start, end = min(ref_low, low), max(ref_high, high)
+    count = math.ceil((end - start) / step) + 1
+    if count > _MOST_POINTS:
+        raise FitError(f"a common time of {end - start:.0f} s", where=o.where, expected="a few days at most")
+    return float(start), count
+
+
+def _thin(series: _Series, step: float) -> tuple[FloatArray, FloatArray]:
+    """Samples much faster than the grid, averaged over one step: time and value alike, so that nothing is delayed."""
+    if series.period > 0.6 * step:
+        return series.t, series.x
+    bins = np.floor((series.t - series.t[0]) / step).astype(np.int64)
+    first = np.flatnonzero(np.diff(bins, prepend=-1))
+    sizes = np.diff(np.append(first, bins.size))
+    return np.add.reduceat(series.t, first) / sizes, np.add.reduceat(series.x, first) / sizes
+
+
+def _smooth(series: _Series, start: float, step: float, count: int, smoothing: float) -> _Smoothed:
+    """Level and rate of change behind one symmetric filter, the same for both sources."""
+    t, x = _thin(series, step)
+    grid: FloatArray = start + step * np.arange(count, dtype=np.float64)
+    centre = float(np.mean(x))
+    values = np.interp(grid, t, x - centre)
+    half = math.ceil(4.5 * smoothing / step)
+    u = np.arange(-half, half + 1) * step
+    bell = np.exp(-0.5 * (u / smoothing) ** 2)
+    bell /= bell.sum()
+    slope = u * bell / float(np.sum(u * u * bell))  # a ramp comes out with its exact slope
+    padded = np.pad(values, half, mode="edge")
+    level = np.convolve(padded, bell, mode="valid") + centre
+    rate = np.convolve(padded, slope[::-1], mode="valid")
+    return _Smoothed(level, rate, np.gradient(rate, step), _usable(t, grid, series.period, smoothing))
+
+
+def _usable(t: FloatArray, grid: FloatArray, period: float, smoothing: float) -> BoolArray:
+    """Grid points whose filter touches neither a gap nor an end."""
+    reach = _REACH * smoothing
+    gaps = np.flatnonzero(np.diff(t) > max(3.0 * period, smoothing))
+    opens = np.concatenate([t[:1], t[gaps + 1]]) + reach
+    closes = np.concatenate([t[gaps], t[-1:]]) - reach
+    long = closes > opens
+    edges = np.column_stack([opens[long], closes[long]]).ravel()
+    return np.asarray(np.searchsorted(edges, grid) % 2 == 1)
+
+
+def _check_variation(source: _Smoothed, quantity: str, *, where: str) -> None:
+    if not source.good.any():
+        raise FitError(
+            "no stretch without gaps", where=where, expected="a few seconds in one piece", hint="another signal"
+        )
+    change = float(np.std(source.rate[source.good]))
+    size = float(np.max(np.abs(source.level[source.good])))
+    if change > max(_LEAST_CHANGE.get(quantity, 0.0), 1e-9 * size):
+        return
+    raise FitError(
+        f"no variation: the rate of change is {change:.2g}/s rms",
+        where=where,
+        expected=f"more than {_LEAST_CHANGE.get(quantity, 0.0):g}/s",
+        hint="a stretch with braking or turning, or another signal",
+    )
+
+
+# ------------------------------------------------------------------------------------------------- coarse search
+
+
+class _Peak(NamedTuple):
+    lag: float
+    height: float
+    runner_up: float
+    limit: float
+
+
+def _correlation(a: _Smoothed, b: _Smoothed, lags: TimeArray) -> tuple[FloatArray, FloatArray]:
+    """Pearson correlation of a(t) with b(t + lag) over the points where both are usable, and their number."""
+    size = 1 << (a.rate.size + int(np.max(np.abs(lags)))).bit_length()
+
+    def cross(p: FloatArray, q: FloatArray) -> FloatArray:
+        return np.asarray(np.fft.irfft(np.conj(np.fft.rfft(p, size)) * np.fft.rfft(q, size), size)[lags])
+
+    ma, mb = a.good.astype(np.float64), b.good.astype(np.float64)
+    pa, pb = np.where(a.good, a.rate, 0.0), np.where(b.good, b.rate, 0.0)
+    pa, pb = pa / np.sqrt(np.sum(pa**2) / ma.sum()), pb / np.sqrt(np.sum(pb**2) / mb.sum())
+    count = np.maximum(np.rint(cross(ma, mb)), 1.0)
+    mean_a, mean_b = cross(pa, mb) / count, cross(ma, pb) / count
+    var_a = cross(pa**2, mb) / count - mean_a**2
+    var_b = cross(ma, pb**2) / count - mean_b**2
+    product = var_a * var_b
+    # where one side hardly varies the quotient is rounding noise
+    known = (var_a > 1e-6) & (var_b > 1e-6)
+    r = np.where(known, (cross(pa, pb) / count - mean_a * mean_b) / np.sqrt(np.where(known, product, 1.0)), 0.0)
+    return np.clip(r, -1.0, 1.0), count
+
+
+def _search(a: _Smoothed, b: _Smoothed, step: float, o: _Options) -> _Peak:
+    reach = math.ceil(o.max_offset_s / step)
+    lags = np.arange(-reach, reach + 1)
+    r, count = _correlation(a, b, lags)
+    enough = count * step >= o.min_overlap_s
+    if not enough.any():
+        raise FitError(
+            f"at most {float(np.max(count)) * step:.1f} s are usable in both sources",
+            where=o.where,
+            expected=f"{o.min_overlap_s:g} s",
+            hint="a drive with fewer gaps, a larger max_offset_s or a start_offset_s",
+        )
+    r = np.where(enough, r, -1.0)
+    top = int(np.argmax(r))
+    low, high = _main_peak(r, top)
+    outside = np.concatenate([r[:low], r[high + 1 :]])
+    runner_up = float(outside.max()) if outside.size else -1.0
+    limit = max(o.min_peak, _chance_limit(a, b, step, float(count[top]), 2.0 * o.max_offset_s))
+    _check_peak(r, top, enough, limit, runner_up, float(lags[top] * step), where=o.where)
+    bent = r[top - 1] - 2.0 * r[top] + r[top + 1]
+    share = 0.5 * (r[top - 1] - r[top + 1]) / bent if bent < 0.0 else 0.0
+    return _Peak(float((lags[top] + share) * step), float(r[top]), runner_up, limit)
+
+
+def _main_peak(r: FloatArray, top: int) -> tuple[int, int]:
+    """First and last lag of the main peak: down to half its height and on to the next valley."""
+
+    def walk(direction: int) -> int:
+        i = top
+        while 0 <= i + direction < r.size and (r[i + direction] < r[i] or r[i] > 0.5 * r[top] + 0.5 * r.min()):
+            if r[i + direction] > r[i] and r[i] < 0.95 * r[top]:
+                break  # a valley above half height: what follows is a peak of its own
+            i += direction
+        return i
+
+    return walk(-1), walk(1)
+
+
+def _chance_limit(a: _Smoothed, b: _Smoothed, step: float, count: float, width_s: float) -> float:
+    """Correlation that unrelated signals with these spectra reach somewhere in the range once in a thousand cases."""
+    reach = min(int(10.0 / step), a.rate.size - 1)
+    lags = np.arange(-reach, reach + 1)
+    own = _correlation(a, a, lags)[0] * _correlation(b, b, lags)[0]
+    memory = max(float(own.sum()), 1.0)  # Bartlett: samples per independent one
+    trials = 1.0 + width_s / (memory * step)
+    z = NormalDist().inv_cdf(1.0 - _CHANCE / trials)
+    bursts = math.sqrt(_burstiness(a, step) * _burstiness(b, step))
+    limit = math.tanh(z / math.sqrt(max(count / memory / bursts - 3.0, 1.0)))
+    events = count * step / _BLOCK_S / bursts
+    return min(limit, _SURE) if events >= _EVENTS else limit
+
+
+def _burstiness(source: _Smoothed, step: float) -> float:
+    """Blocks per block that counts, 1 or more: in stop and go a few pulls hold all the energy and match by chance."""
+    power = np.where(source.good, source.rate, 0.0) ** 2
+    first = np.arange(0, power.size, max(round(_BLOCK_S / step), 1))
+    energy, used = np.add.reduceat(power, first), np.add.reduceat(source.good.astype(np.float64), first)
+    energy = energy[used > 0.5 * used.max()]
+    return float(energy.size * np.sum(energy**2) / np.sum(energy) ** 2)
+
+
+def _check_peak(
+    r: FloatArray, top: int, enough: BoolArray, limit: float, runner_up: float, lag_s: float, *, where: str
+) -> None:
+    found = f"correlation {r[top]:.3f} at {lag_s:+.2f} s"
+    lowest = np.min(np.where(enough, r, 1.0))
+    if r[top] < limit and -lowest > limit:
+        raise FitError(
+            f"the signals have opposite signs (correlation {lowest:.2f})",
+            where=where,
+            expected="one sign convention",
+            hint="turn the sign of one signal in the signal map",
+        )
+    if r[top] < limit:
+        raise FitError(
+            f"weak peak: {found}",
+            where=where,
+            expected=f"at least {limit:.3f} for what so few changes and so wide a search can show by chance",
+            hint="a longer stretch with braking or turning, another max_offset_s, or check that both are one quantity",
+        )
+    if top in (0, r.size - 1) or not (enough[top - 1] and enough[top + 1]):
+        raise FitError(
+            f"the peak lies at the edge of the search range: {found}",
+            where=where,
+            expected="a peak inside the range",
+            hint="a larger max_offset_s or a start_offset_s",
+        )
+    if runner_up > _AMBIGUOUS * r[top]:
+        raise FitError(
+            f"ambiguous: {found}, {runner_up:.2f} at another lag",
+            where=where,
+            expected=f"a second peak below {_AMBIGUOUS:.0%} of the first",
+            hint="a smaller max_offset_s around a known start_offset_s, or a stretch that does not repeat",
+        )
+
+
+# --------------------------------------------------------------------------------------------------- fine fit
+
+
+class _Pair(NamedTuple):
+    a: _Smoothed
+    b: _Smoothed
+    start: float
+    step: float
+    mid: float
+    block_s: float
+
+
+class _Rows(NamedTuple):
+    t: FloatArray
+    design: FloatArray  # (n, p)
+    residual: FloatArray
+    weight: FloatArray
+
+
+class _Estimate(NamedTuple):
+    value: FloatArray
+    sigma: FloatArray
+    dof: FloatArray
+
+    def interval(self, i: int, *, level: float = 0.95) -> Interval:
+        half = _student(0.5 + level / 2.0, float(self.dof[i])) * float(self.sigma[i])
+        return float(self.value[i]) - half, float(self.value[i]) + half
+
+
+def _middle(a: _Smoothed, b: _Smoothed, start: float, step: float, lag: float) -> float:
+    """Middle of the common time, on the other source's clock."""
+    k = np.flatnonzero(b.good)
+    k = k[_at(a.good.astype(np.float64), np.asarray(k - lag / step, dtype=np.float64)) > 0.999]
+    return start + step * 0.5 * float(k[0] + k[-1])
+
+
+def _at(y: FloatArray, k: FloatArray) -> FloatArray:
+    """Linear interpolation at fractional grid indices, 0 outside."""
+    return np.interp(k, np.arange(y.size), y, left=0.0, right=0.0)
+
+
+def _common(pair: _Pair, offset: float, drift: float) -> tuple[TimeArray, FloatArray, FloatArray]:
+    """Grid indices of the other source that have a usable partner, their times, and the partners' indices."""
+    k = np.flatnonzero(pair.b.good)
+    t: FloatArray = pair.start + pair.step * k.astype(np.float64)
+    partner: FloatArray = (t - pair.start - offset - drift * (t - pair.mid)) / pair.step
+    both = _at(pair.a.good.astype(np.float64), partner) > 0.999
+    return k[both].astype(np.int64), t[both], partner[both]
+
+
+def _lag_rows(pair: _Pair, value: FloatArray, terms: tuple[str, ...]) -> _Rows:
+    """Residual and slopes of the rates at `value` = (offset, gain, *terms)."""
+    more = dict(zip(terms, value[2:], strict=True))
+    gain = float(value[1])
+    k, t, partner = _common(pair, float(value[0]), float(more.get("drift", 0.0)))
+    rate, delay = _at(pair.a.rate, partner), -gain * _at(pair.a.bend, partner)
+    columns = {"offset": delay, "gain": rate, "drift": delay * (t - pair.mid)}
+    residual = pair.b.rate[k] - gain * rate
+    if "slip" in more:
+        columns["slip"] = _at(np.gradient(pair.a.level * pair.a.rate, pair.step), partner)
+        residual = residual - more["slip"] * columns["slip"]
+    design = np.column_stack([columns[name] for name in ("offset", "gain", *terms)])
+    return _Rows(t, design, residual, _huber(residual))
+
+
+def _fit_lag(pair: _Pair, start: FloatArray, terms: tuple[str, ...] = ()) -> tuple[FloatArray, _Rows]:
+    """Gauss-Newton over (offset, gain, *terms) with Huber weights; `terms` out of drift and slip."""
+    value = np.append(start[:2], np.zeros(len(terms)))
+    rows = _lag_rows(pair, value, terms)
+    for _ in range(40):
+        change = _solve(rows)
+        # beyond the smoothing time the linear step means nothing
+        change *= min(1.0, 0.2 / max(abs(float(change[0])), 1e-300))
+        value = value + change
+        rows = _lag_rows(pair, value, terms)
+        if rows.t.size < 10 or abs(float(change[0])) < 1e-8:
+            break
+    return value, rows
+
+
+def _fit_level(pair: _Pair, offset: float, drift: float, *, with_bias: bool) -> tuple[FloatArray, _Rows]:
+    """Scale and, on demand, bias; the rate is a column too, lest an offset pass for a bias on a ramp."""
+    k, t, partner = _common(pair, offset, drift)
+    level = _at(pair.a.level, partner)
+    constant = [np.ones(k.size)] if with_bias else []
+    design = np.column_stack([level, *constant, _at(pair.a.rate, partner)])
+    y, weight = pair.b.level[k], np.ones(k.size)
+    beta = np.zeros(design.shape[1])
+    for _ in range(50):
+        weighted = design * weight[:, None]
+        new = np.linalg.lstsq(design.T @ weighted, weighted.T @ y, rcond=None)[0]
+        done = bool(np.max(np.abs(design @ (new - beta))) < 1e-9 * (1.0 + float(np.max(np.abs(y)))))
+        beta = new
+        weight = _huber(y - design @ beta)
+        if done:
+            break
+    return beta, _Rows(t, design, y - design @ beta, weight)
+
+
+def _huber(residual: FloatArray) -> FloatArray:
+    spread = 1.4826 * float(np.median(np.abs(residual)))
+    if spread == 0.0:
+        return np.ones(residual.size)
+    return np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(residual), 1e-300))
+
+
+def _solve(rows: _Rows) -> FloatArray:
+    weighted = rows.design * rows.weight[:, None]
+    return np.asarray(np.linalg.lstsq(rows.design.T @ weighted, weighted.T @ rows.residual, rcond=None)[0])
+
+
+def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
+    """Standard errors from leaving out one block after the other, each by one Gauss-Newton step.
+
+    Degrees of freedom count the blocks by the information that they hold: one braking among quiet minutes is one
+    observation, not many.
+    """
+    if rows.t.size < 10:
+        return _unknown(value)
+    label = np.floor((rows.t - rows.t[0]) / block_s).astype(np.int64)
+    first = np.flatnonzero(np.diff(label, prepend=-1))
+    weighted = rows.design * rows.weight[:, None]
+    # a clipped residual no longer answers to the parameters: it counts in the sum of scores, not in its slope
+    inner = rows.design * (rows.weight == 1.0)[:, None]
+    h = np.add.reduceat(inner[:, :, None] * rows.design[:, None, :], first, axis=0)
+    g = np.add.reduceat(weighted * rows.residual[:, None], first, axis=0)
+    blocks = g.shape[0]
+    if blocks < _LEAST_BLOCKS:
+        return _unknown(value)
+    # columns differ by orders of magnitude (drift against gain), which a relative pseudo-inverse would not forgive
+    unit = np.sqrt(np.maximum(np.einsum("bii->i", h), 1e-300))
+    h, g = h / (unit[:, None] * unit), g / unit
+    inverse = np.linalg.pinv(h.sum(axis=0) - h, rcond=1e-9, hermitian=True)
+    change = np.einsum("bij,bj->bi", inverse, g.sum(axis=0) - g) / unit
+    variance = (blocks - 1) / blocks * np.sum((change - change.mean(axis=0)) ** 2, axis=0)
+    inform = np.einsum("bii->bi", h)
+    dof = np.maximum(inform.sum(axis=0) ** 2 / np.sum(inform**2, axis=0) - 1.0, 1.0)
+    return _Estimate(value, np.sqrt(variance), dof)
+
+
+def _unknown(value: FloatArray) -> _Estimate:
+    return _Estimate(value, np.full(value.size, math.inf), np.ones(value.size))
+
+
+def _student(probability: float, dof: float) -> float:
+    """Quantile of Student's t: 0.5 < probability < 1, real dof >= 1."""
+    u = np.linspace(0.0, math.pi / 2.0, 20_001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
+    density = np.cos(u) ** (dof - 1.0)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    return math.sqrt(dof) * math.tan(float(np.interp(2.0 * probability - 1.0, area / area[-1], u)))
+
+
+def _fit(pair: _Pair, peak: _Peak, other: _Series, lead: float, o: _Options) -> ClockFit:
+    plain, rows = _fit_lag(pair, np.array([peak.lag, 1.0]))
+    _check_fit(float(plain[0]), peak, rows, pair.step, o)
+    bent, bent_rows = _fit_lag(pair, plain, ("drift",))
+    drifting = _jackknife(bent, bent_rows, _block(pair, bent_rows, _SLOW_BLOCKS))
+    low, high = drifting.interval(2, level=0.99)
+    significant = low > 0.0 or high < 0.0
+    value, rows = (bent, bent_rows) if significant else (plain, rows)
+    lag = _jackknife(value, rows, _block(pair, rows, _RATE_BLOCKS))
+    offset, drift = float(value[0]), float(bent[2]) if significant else 0.0
+    slip, slip_ci = _slip_offset(pair, value, o, with_drift=significant)
+    beta, level_rows = _fit_level(pair, offset, drift, with_bias=True)
+    level = _jackknife(beta, level_rows, _block(pair, level_rows, _SLOW_BLOCKS))
+    ratio, ratio_rows = _fit_level(pair, offset, drift, with_bias=False)
+    pure = _jackknife(ratio, ratio_rows, _block(pair, ratio_rows, _SLOW_BLOCKS))
+    inside = (other.t >= level_rows.t[0]) & (other.t <= level_rows.t[-1])
+    return ClockFit(
+        offset_s=o.start_offset_s + offset,
+        offset_ci95=_shifted(lag.interval(0), o.start_offset_s),
+        slip_offset_s=slip,
+        slip_offset_ci95=slip_ci,
+        drift_ppm=float(bent[2]) * 1e6,
+        drift_ppm_ci95=_scaled(drifting.interval(2), 1e6),
+        drift_significant=significant,
+        scale=float(beta[0]),
+        scale_ci95=level.interval(0),
+        bias=float(beta[1]),
+        bias_ci95=level.interval(1),
+        ratio=float(ratio[0]),
+        ratio_ci95=pure.interval(0),
+        peak=peak.height,
+        peak_limit=peak.limit,
+        runner_up=peak.runner_up,
+        overlap_s=level_rows.t.size * pair.step,
+        n=int(np.count_nonzero(inside)),
+        rms=float(np.sqrt(np.mean(level_rows.residual**2))),
+        mid_ns=other.origin_ns + round((pair.mid - lead) * 1e9),
+    )
+
+
+def _slip_offset(pair: _Pair, value: FloatArray, o: _Options, *, with_drift: bool) -> tuple[float, Interval]:
+    if not o.has_slip:
+        return math.nan, (math.nan, math.nan)
+    slip, rows = _fit_lag(pair, value, ("slip", "drift") if with_drift else ("slip",))
+    estimate = _jackknife(slip, rows, _block(pair, rows, _RATE_BLOCKS))
+    return o.start_offset_s + float(slip[0]), _shifted(estimate.interval(0), o.start_offset_s)
+
+
+def _shifted(interval: Interval, by: float) -> Interval:
+    return interval[0] + by, interval[1] + by
+
+
+def _scaled(interval: Interval, by: float) -> Interval:
+    return interval[0] * by, interval[1] * by
+
+
+def _block(pair: _Pair, rows: _Rows, most: int) -> float:
+    return max(pair.block_s, float(np.ptp(rows.t)) / most) if rows.t.size else pair.block_s
+
+
+def _check_fit(offset: float, peak: _Peak, rows: _Rows, step: float, o: _Options) -> None:
+    if not abs(offset) <= o.max_offset_s or abs(offset - peak.lag) > 1.0:
+        raise FitError(
+            f"the fit ran from {peak.lag:+.2f} s to {offset:+.2f} s",
+            where=o.where,
+            expected="an offset near the peak of the correlation",
+            hint="a larger max_offset_s, or a longer stretch with braking or turning",
+        )
+    if rows.t.size * step < 0.9 * o.min_overlap_s:
+        raise FitError(f"{rows.t.size * step:.1f} s in common", where=o.where, expected=f"{o.min_overlap_s:g} s")

@@ -1,0 +1,61 @@
+"""The order of the layers: a module imports only what stands before it."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import aqualog
+
+PACKAGE = Path(aqualog.__file__).parent
+ORDER = (
+    "errors", "notation", "units", "types", "vehicle", "physics", "io", "align", "features", "detect", "report",
+    "config", "cli",
+)  # fmt: skip
+# align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
+HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
+
+
+def layer(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path: Path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("aqualog."):
+            yield node.module.split(".")[1]
+        if isinstance(node, ast.Import):
+            yield from (n.name.split(".")[1] for n in node.names if n.name.startswith("aqualog."))
+
+
+def modules():
+    return [p for p in sorted(PACKAGE.rglob("*.py")) if p.name not in ("__init__.py", "__main__.py") or p.parent != PACKAGE]
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_point_downwards(path):
+    own = ORDER.index(layer(path))
+    above = [name for name in imports(path) if ORDER.index(name) > own]
+    assert not above, f"{path.name} imports {above}"
+
+
+def test_detectors_read_no_truth_and_no_labels():
+    from aqualog.features.stream import INPUTS
+
+    assert not [s for s in INPUTS if s.startswith(("true_", "on_water", "water_depth"))]
+
+
+@pytest.mark.parametrize("command", [["--help"], ["detect", "--help"], ["inspect", "--help"], ["align", "--help"]])
+def test_help_imports_nothing_heavy(command):
+    code = f"import sys; sys.argv = ['aqualog', *{command!r}]\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    loaded = out.split("LOADED")[-1].split()
+    assert "typer" in loaded
+    assert not [m for m in HEAVY if m in loaded]
+
+
+def test_no_absolute_paths_of_a_machine():
+    for path in modules():
+        assert "/home/" not in path.read_text(encoding="utf-8")

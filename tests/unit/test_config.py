@@ -1,0 +1,128 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aqualog.align.mapping import Entry, SignalMap, SourceClock
+from aqualog.config.signal_map import load_signal_map, map_text
+from aqualog.config.vehicle import load_vehicle
+from aqualog.errors import ConfigError
+from aqualog.vehicle import KEYS
+
+CONTRACT = """
+name = "sedan RWD"
+drivetrain = "rwd"
+mass = 1680.0
+l_f = 1.32
+l_r = 1.48
+h_cg = 0.54
+track = 1.55
+drag_area = 0.66
+air_density = 1.204
+rolling_resistance = 0.0105
+torque_split_rear = 1.0
+steering_ratio = 15.0
+[wheels]
+r_e_f = 0.317
+r_e_r = 0.317
+r_l_f = 0.309
+r_l_r = 0.309
+inertia_f = 1.15
+inertia_r = 1.15
+[tyre]
+slip_slope_f = 31.0
+slip_slope_r = 31.0
+mu_max = 1.02
+[tie_rod]
+c0 = 0.0
+c_y = [0.11, 1e-6]
+c_x = 0.06
+"""
+
+
+def write(tmp_path, text, name="x.toml"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_vehicle_of_the_contract(tmp_path):
+    car = load_vehicle(write(tmp_path, CONTRACT))
+    assert (car.name, car.mass, car.r_e("fl"), car.r_l("rr"), car.inertia("rl")) == ("sedan RWD", 1680.0, 0.317, 0.309, 1.15)
+    assert car.tie_rod == {"c0": (0.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,)}
+    assert car.driven == ("rl", "rr")
+    assert "mass" in car.given
+
+
+def test_left_out_keys_take_defaults_and_are_not_given(tmp_path):
+    car = load_vehicle(write(tmp_path, 'drivetrain = "fwd"\n[wheels]\nr_e_f = 0.4'))
+    assert car.mass == KEYS["mass"].default
+    assert "mass" not in car.given
+    assert car.r_l_f == pytest.approx(0.39)
+    assert car.torque_split_rear == 0.0
+    assert car.watched_axle == "r"
+
+
+def test_all_faults_in_one_message(tmp_path):
+    text = 'drivetrain = "4x4"\nmas = 1680.0\nl_f = "long"\ntrack = 99.0\n[whels]\nr_e_f = 0.3\n[tyre]\nmu_may = 1.0'
+    with pytest.raises(ConfigError) as error:
+        load_vehicle(write(tmp_path, text))
+    line = str(error.value)
+    for part in ("line 1", "4x4", "line 2", '"mass"', "l_f", "99", '"wheels"', '"mu_max"'):
+        assert part in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize("text", ["mass = ", "\x00", "mass = nan"])
+def test_broken_vehicle_files(tmp_path, text):
+    with pytest.raises(ConfigError):
+        load_vehicle(write(tmp_path, text))
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(ConfigError, match="not found"):
+        load_vehicle(tmp_path / "none.toml")
+    with pytest.raises(ConfigError, match="folder"):
+        load_vehicle(tmp_path)
+
+
+def test_every_vehicle_key_says_what_it_is():
+    for key in KEYS.values():
+        assert key.low <= key.default <= key.high
+        assert key.meaning
+        assert key.source
+
+
+def test_signal_map_of_the_contract(tmp_path):
+    text = """
+[signals]
+omega_fl = { channel = "ESP_19.ESP_VL_Radgeschw_02", unit = "km/h" }
+a_x      = { channel = "/imu/data.linear_acceleration.x", scale = 1.0, offset = 0.0 }
+torque_r = { channel = "MotTq", unit = "N*m", scale = 9.1 }
+"""
+    found = load_signal_map(write(tmp_path, text))
+    assert found.entries["torque_r"] == Entry("torque_r", ("MotTq",), "N*m", 9.1)
+    assert found.entries["omega_fl"].unit == "km/h"
+
+
+def test_faults_of_a_map_come_together(tmp_path):
+    text = '[signals]\nomgea_fl = "x"\na_x = { chanel = "y" }\nv_x = { channel = "z", unit = "warp" }\n[tim]\nunit = "s"'
+    with pytest.raises(ConfigError) as error:
+        load_signal_map(write(tmp_path, text))
+    for part in ('"omega_fl"', "a_x names no channel", "warp", '"time"'):
+        assert part in str(error.value)
+
+
+names = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), min_size=1, max_size=20)
+numbers = st.floats(-1e6, 1e6, allow_nan=False).filter(bool)
+
+
+@given(names=st.lists(names, min_size=1, max_size=3), scale=numbers, offset=numbers, remark=names, source=names)
+def test_written_maps_read_back(tmp_path_factory, names, scale, offset, remark, source):
+    entry = Entry("a_x", tuple(names), "g", scale, offset, (1023.0, -64.0))
+    before = SignalMap({"a_x": entry}, {source: SourceClock(0.2, 50.0, 12.5)}, "t_ms", "ms")
+    path = tmp_path_factory.mktemp("map") / "m.toml"
+    path.write_text(map_text(before, comments=[remark], remarks={"a_x": remark}), encoding="utf-8")
+    after = load_signal_map(path)
+    assert after.entries == before.entries
+    assert after.clocks == before.clocks
+    assert (after.time_channel, after.time_unit) == ("t_ms", "ms")
