@@ -7,6 +7,7 @@ from pathlib import Path
 
 from aqualog.align.mapping import SignalMap, resolve
 from aqualog.align.table import build_signals
+from aqualog.errors import SignalError
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
 from aqualog.types import Signals
@@ -58,9 +59,22 @@ def load_signals(
     with DriveLog(paths, read_options(signal_map, dbc)) as log:
         report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
         found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+        if not found:
+            raise _nothing_mapped(paths, len(log.channels()), [n for f in log.faults for n in f.notes])
         report(f"reading {len(found)} channels")
         channels = log.read(info for _, info in found.values())
         faults = log.faults
     report("aligning")
     mapped = {s: (entry, channels[info.file, info.path]) for s, (entry, info) in found.items()}
     return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)
+
+
+def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:
+    frames = next((n for n in notes if "--dbc" in n), "")
+    return SignalError(
+        f"none of {channels} channels is a signal that aqualog knows by name"
+        + (f" ({frames})" if frames else "")
+        + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",
+        where=", ".join(p.name for p in paths),
+        hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+    )

@@ -36,9 +36,7 @@ def align(
     max_offset: Annotated[float, typer.Option("--max-offset", help="Search range in s.", min=0.1, max=3600.0)] = 10.0,
     start_offset: Annotated[
         float | None,
-        typer.Option(
-            "--start-offset", help="Rough offset in s of clocks that are far apart."
-        ),
+        typer.Option("--start-offset", help="Rough offset in s of clocks that are far apart."),
     ] = None,
     write_map: Annotated[
         Path | None,

@@ -114,14 +114,12 @@ def _detect(
     paths = expand(logs)
     signal_map = load_signal_map(map_file) if map_file else None
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
-    if vehicle_file is None:
-        console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
     with console.steps() as steps:
         from aqualog.align.load import load_signals
         from aqualog.detect.stream import detect_drive
 
         loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
-        _something_to_do(loaded.symbols, vehicle, paths, loaded.quality.notes)
+        _something_to_do(loaded, vehicle, paths)
         steps("detecting")
         result = detect_drive(loaded, vehicle)
         name = ", ".join(str(p) for p in paths)
@@ -131,6 +129,8 @@ def _detect(
         if write is not None:
             _write_log(result, write)
     _print(result, name, as_json=as_json)
+    if vehicle_file is None:
+        console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
     for text in (*loaded.quality.notes, *result.notes):
         console.note(text)
     if out is not None:
@@ -138,12 +138,13 @@ def _detect(
     return _exit_code(result, fail_on_event=fail_on_event)
 
 
-def _something_to_do(symbols: tuple[str, ...], vehicle: Any, paths: list[Path], notes: tuple[str, ...]) -> None:
+def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
     """Stop with one line if no detector can run."""
     from aqualog.detect.needs import DETECTORS, check_needs
     from aqualog.errors import SignalError
 
-    unavailable, _ = check_needs(vehicle, symbols)
+    unavailable, _ = check_needs(vehicle, loaded.symbols, rate_hz=1e9 / loaded.dt_ns)
+    notes = loaded.quality.notes
     if len(unavailable) < len(DETECTORS):
         return
     missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(("omega_", "torque_", "a_x")))

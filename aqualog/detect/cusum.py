@@ -14,23 +14,28 @@ __all__ = ["CusumParams", "CusumState", "initial_state", "scan", "step"]
 
 
 class CusumParams(NamedTuple):
-    """`nu` drift in units of x, `h` threshold in units of x * s, `dt` [s]. The sum is clamped at `g_max`."""
+    """`nu` drift in units of x; `h` threshold and `g_max` clamp in units of x * s; `dt` [s].
+
+    An alarm ends when the sum has fallen below `off_share` of the threshold, so that it does not flicker there.
+    """
 
     nu: float
     h: float
     g_max: float
     dt: float
+    off_share: float = 0.5
 
 
 class CusumState(NamedTuple):
-    """The sum."""
+    """The sum and whether the alarm is on."""
 
     g: float
+    active: bool
 
 
 def initial_state() -> CusumState:
     """Nothing summed up."""
-    return CusumState(0.0)
+    return CusumState(0.0, active=False)
 
 
 @njit(cache=True)
@@ -38,7 +43,7 @@ def step(p, g, x):  # type: ignore[no-untyped-def]
     """g <- min(g_max, max(0, g + (x - nu) dt)); NaN holds the sum.
 
     The clamp at zero is missing in thesis 3.24 as printed (E11); the clamp at g_max bounds the time that the alarm
-    outlives its cause, to (g_max - h) / nu. The integration over time makes threshold and detection time independent
+    outlives its cause, to (g_max - off_share h) / nu. The integration over time makes threshold and detection time independent
     of the sample rate.
     """
     if math.isnan(x):
@@ -47,14 +52,15 @@ def step(p, g, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan(p, g, x):  # type: ignore[no-untyped-def]
+def _scan(p, g, active, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
-    active = np.zeros(x.size, dtype=np.bool_)
+    bits = np.zeros(x.size, dtype=np.bool_)
     for i in range(x.size):
         g = step(p, g, x[i])
+        active = g > (p.off_share * p.h if active else p.h)
         out[i] = math.nan if math.isnan(x[i]) else g
-        active[i] = g > p.h and not math.isnan(x[i])
-    return out, active, g
+        bits[i] = active and not math.isnan(x[i])
+    return out, bits, g, active
 
 
 def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, BoolArray, CusumState]:
@@ -73,11 +79,11 @@ def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, 
     g : array (n,)
         Statistic in units of x * s, never negative.
     active : bool array (n,)
-        g > h.
+        From g > h until g <= off_share h.
     state : CusumState
 
-    x and h scaled alike give the same alarms; no reset after an alarm: it ends when the sum falls below h again.
+    x and h scaled alike give the same alarms; no reset after an alarm.
     Thesis: Eq. (3.24) and the text under 2.4 and 2.10.
     """
-    g, active, last = _scan(p, state.g, np.ascontiguousarray(x, dtype=np.float64))
-    return g, active, CusumState(last)
+    g, bits, last, active = _scan(p, state.g, state.active, np.ascontiguousarray(x, dtype=np.float64))
+    return g, bits, CusumState(last, active=bool(active))

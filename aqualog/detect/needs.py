@@ -16,9 +16,12 @@ DETECTORS = (
 )  # fmt: skip
 
 _NOT_YET = "a later version of aqualog"
+MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel speeds show kerbs and noise only
 
 
-def check_needs(vehicle: Vehicle, available: Collection[str]) -> tuple[list[Unavailable], list[Unavailable]]:
+def check_needs(
+    vehicle: Vehicle, available: Collection[str], *, rate_hz: float
+) -> tuple[list[Unavailable], list[Unavailable]]:
     """Which detectors cannot run, and which run without one of their conditions.
 
     Parameters
@@ -26,6 +29,8 @@ def check_needs(vehicle: Vehicle, available: Collection[str]) -> tuple[list[Unav
     vehicle : Vehicle
     available : collection of str
         Symbols of the drive.
+    rate_hz : float
+        Rate of the grid, which is that of the wheel speeds. [Hz]
 
     Returns
     -------
@@ -39,9 +44,10 @@ def check_needs(vehicle: Vehicle, available: Collection[str]) -> tuple[list[Unav
     resistance = [*torque, *(["a_x"] if "a_x" not in have else []), *no_speed, *_not_given(vehicle, "mass")]
     sides = {s: [f"omega_{w}" for w in ws if f"omega_{w}" in omega] for s, ws in SIDES.items()}
     driven_omega = [f"omega_{w}" for w in vehicle.driven if f"omega_{w}" in omega]
+    slow = [f"wheel speeds at {MIN_RATE_MINOR:g} Hz or more"] if rate_hz < MIN_RATE_MINOR else []
     missing = {
         "spin_down": omega if len(omega) == len(WHEELS) else _lone_wheel(have, omega),
-        "minor_spin_down": omega if all(sides.values()) else [],
+        "minor_spin_down": [*(omega if all(sides.values()) else []), *slow],
         "spin_up": driven_omega if len(driven_omega) == len(vehicle.driven) else [],
         "resistance": resistance,
         "slip_slope_drop": [*omega, *torque] or [_NOT_YET],

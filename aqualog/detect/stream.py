@@ -25,7 +25,7 @@ MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippe
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 A_RESISTANCE = 0.2  # [m/s^2] thesis 2.2: threshold of partial aquaplaning (C44)
-V_RESISTANCE = 10.0  # [m/s] below, gear changes and traffic rule the balance
+V_RESISTANCE = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
 A_Y_MINOR = 4.0  # [m/s^2] beyond, the inner wheels lose load enough to slow down on dry road too
 A_Y_RESISTANCE = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 GATE_HOLD = 1.0  # [s] the resistance gate of the joint detector stays open this long
@@ -61,7 +61,7 @@ class DriveStream:
         self.dt = dt_ns * 1e-9
         self._features = FeatureStream(vehicle, self.dt, available, correct_yaw=correct_yaw)
         self._available = self._features.available
-        unavailable, limited = check_needs(vehicle, available)
+        unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns)
         self.unavailable: tuple[Unavailable, ...] = tuple(unavailable)
         self.limited: tuple[Unavailable, ...] = tuple(limited)
         self._off = {u.detector for u in unavailable}
@@ -69,7 +69,7 @@ class DriveStream:
         self._up = spin.SpinParams.make(1.0, self.dt)
         self._minor = minor_spin_down.MinorParams.make(self.dt)
         # half the change that is to be found as drift: 0.2 m/s^2 is reported 2 s after it begins, 0.4 after 0.7 s
-        self._resistance = cusum.CusumParams(0.5 * A_RESISTANCE, 0.2, 0.4, self.dt)
+        self._resistance = cusum.CusumParams(0.5 * A_RESISTANCE, 0.2, 0.3, self.dt)
         self._gate = cusum.CusumParams(0.5 * A_RESISTANCE, 0.03, 0.06, self.dt)
         self._spin_states = {(d, w): spin.initial_state() for d in ("spin_down", "spin_up") for w in WHEELS}
         self._minor_states = {s: minor_spin_down.initial_state() for s in SIDES}
