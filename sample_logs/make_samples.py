@@ -1,0 +1,116 @@
+"""Make the sample logs again: `python sample_logs/make_samples.py [FOLDER]`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from mcap.writer import Writer
+from rosbags.typesys import Stores, get_typestore
+from small_model import Drive, Lane, simulate
+
+from aqualog.config.vehicle import load_vehicle
+from aqualog.io.write_mdf import MdfGroup, write_mf4
+from aqualog.io.write_table import TableColumn, write_csv, write_parquet
+from aqualog.notation import SYMBOLS, WHEELS
+
+HERE = Path(__file__).resolve().parent
+START_NS = 1_748_000_000_000_000_000  # a made-up moment, so that the logs have absolute time
+ROS_TYPES = {
+    "/imu/data": "sensor_msgs/msg/Imu",
+    "/wheels": "sensor_msgs/msg/JointState",
+    "/reference/velocity": "geometry_msgs/msg/TwistStamped",
+    "/brake": "sensor_msgs/msg/FluidPressure",
+    "/steering": "std_msgs/msg/Float64",
+}
+
+
+def sample_drive():
+    """The drive of all sample logs."""
+    lane = Lane(8.0, 16.0, depth_left=1.0e-3, depth_right=1.3e-3)
+    drive = Drive(
+        load_vehicle(HERE / "vehicle.toml"), duration_s=24.0, seed=7, speed_kmh=((0.0, 98.0),), lanes=(lane,)
+    )
+    signals = {k: v for k, v in simulate(drive).items() if not k.startswith("true_")}
+    return signals.pop("t"), signals
+
+
+def write_ros2(path, t, s):
+    """Write ROS 2 messages into an MCAP file."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="aqualog")
+        channels = {}
+        for topic, name in ROS_TYPES.items():
+            text, _ = store.generate_msgdef(name, ros_version=2)
+            schema = writer.register_schema(name, "ros2msg", text.encode())
+            channels[topic] = writer.register_channel(topic, "cdr", schema)
+        for k, seconds in enumerate(t):
+            t_ns = START_NS + round(seconds * 1e9)
+            for topic, message in _messages(types, t_ns, {n: float(x[k]) for n, x in s.items()}).items():
+                data = store.serialize_cdr(message, ROS_TYPES[topic])
+                writer.add_message(channels[topic], t_ns, bytes(data), t_ns)
+        writer.finish()
+
+
+def _messages(types, t_ns, s):
+    header = types["std_msgs/msg/Header"](
+        types["builtin_interfaces/msg/Time"](t_ns // 10**9, t_ns % 10**9), "car"
+    )
+    vector = types["geometry_msgs/msg/Vector3"]
+    nothing = np.zeros(9)
+    return {
+        "/imu/data": types["sensor_msgs/msg/Imu"](
+            header, types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0), nothing,
+            vector(0.0, 0.0, s["yaw_rate"]), nothing, vector(s["a_x"], s["a_y"], 9.81), nothing,
+        ),
+        "/wheels": types["sensor_msgs/msg/JointState"](
+            header, list(WHEELS), np.zeros(4), np.array([s[f"omega_{w}"] for w in WHEELS]),
+            np.array([s[f"torque_{w}"] for w in WHEELS]),
+        ),
+        "/reference/velocity": types["geometry_msgs/msg/TwistStamped"](
+            header, types["geometry_msgs/msg/Twist"](vector(s["v_x"], 0.0, 0.0), vector(0.0, 0.0, 0.0))
+        ),
+        "/brake": types["sensor_msgs/msg/FluidPressure"](header, s["brake_pressure"], 0.0),
+        "/steering": types["std_msgs/msg/Float64"](s["steer_angle"]),
+    }  # fmt: skip
+
+
+def csv_columns(t, s, ratio):
+    """The drive as a German logger would name it."""
+    rpm = {"fl": "VL", "fr": "VR", "rl": "HL", "rr": "HR"}
+    return [
+        TableColumn("Zeit", "s", np.round(t, 4)),
+        TableColumn("v_Referenz", "km/h", np.round(s["v_x"] * 3.6, 5)),
+        TableColumn("Laengsbeschleunigung", "g", np.round(s["a_x"] / 9.80665, 8)),
+        TableColumn("Querbeschleunigung", "g", np.round(s["a_y"] / 9.80665, 8)),
+        TableColumn("Gierrate", "deg/s", np.round(np.degrees(s["yaw_rate"]), 6)),
+        TableColumn("Lenkradwinkel", "deg", np.round(np.degrees(s["steer_angle"]) * ratio, 6)),
+        *(
+            TableColumn(f"Raddrehzahl_{n}", "U/min", np.round(s[f"omega_{w}"] * 30.0 / np.pi, 6))
+            for w, n in rpm.items()
+        ),
+        TableColumn("Achsmoment_VA", "Nm", np.round(s["torque_fl"] + s["torque_fr"], 4)),
+        TableColumn("Achsmoment_HA", "Nm", np.round(s["torque_rl"] + s["torque_rr"], 4)),
+        TableColumn("Bremsdruck", "bar", np.round(s["brake_pressure"] * 1e-5, 4)),
+    ]
+
+
+def main(folder):
+    """Write all four logs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    t, s = sample_drive()
+    meta = {n: (SYMBOLS[n].unit, SYMBOLS[n].meaning, x) for n, x in s.items()}
+    write_mf4(folder / "lane_drive.mf4", [MdfGroup("signals", t, meta)], START_NS, "simulated drive over a watered lane")
+    write_ros2(folder / "lane_drive.mcap", t, s)
+    write_csv(folder / "lane_drive.csv", csv_columns(t, s, load_vehicle(HERE / "vehicle.toml").steering_ratio),
+              decimal_comma=True)  # fmt: skip
+    columns = [TableColumn("t", "s", t), *(TableColumn(n, SYMBOLS[n].unit, x) for n, x in s.items())]
+    write_parquet(folder / "lane_drive.parquet", columns, start_ns=START_NS)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)
