@@ -57,13 +57,14 @@ class _Rule:
 
 _WHEEL_WORDS = ("wheel", "whl", "rad", "radgeschw", "radgeschwindigkeit", "raddrehzahl", "wss", "ws", "omega", "wspd")
 _RULES = (
-    _Rule("v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "vx", "spd"), ("speed",),
-          ("gps", "gnss", "optical", "correvit", "reference", "vx"), ("wheel", "whl", "wind", "engine", "fan", "limit",
+    _Rule("v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "v", "vx", "spd"), ("speed",),
+          ("gps", "gnss", "optical", "correvit", "reference", "referenz", "vx"),
+          ("wheel", "whl", "wind", "engine", "fan", "limit",
           "set", "steer", "accuracy", "vertical", "lateral", "east", "north", "up", "down", *_WHEEL_WORDS)),
-    _Rule("a_x", ("ax", "accel", "acceleration", "acc", "inline", "laengs", "longitudinal", "gvc"),
+    _Rule("a_x", ("ax", "accel", "acceleration", "acc", "inline", "laengs", "longitudinal", "gvc", "beschl"),
           ("acceleration",), ("longitudinal", "inline", "laengs", "long", "x", "ax", "esc", "esp"),
-          ("lateral", "vertical", "quer", "y", "z", "ay", "az", "angular")),
-    _Rule("a_y", ("ay", "accel", "acceleration", "acc", "quer", "lateral"), ("acceleration",),
+          ("lateral", "vertical", "querb", "quer", "y", "z", "ay", "az", "angular")),
+    _Rule("a_y", ("ay", "accel", "acceleration", "acc", "quer", "lateral", "beschl"), ("acceleration",),
           ("lateral", "quer", "y", "ay"), ("longitudinal", "inline", "vertical", "x", "z", "ax", "az", "laengs")),
     _Rule("yaw_rate", ("yaw", "gier", "yawrate", "gierrate"), ("angular_speed",), ("rate",), ("acceleration",)),
     _Rule("steering_wheel_angle", ("steer", "steering", "lenk", "lenkrad", "lenkradwinkel", "lwi", "swa"),
@@ -141,6 +142,11 @@ def words_of(text: str) -> list[str]:
     return [w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w]
 
 
+def _has(wanted: Sequence[str], words: Sequence[str]) -> bool:
+    """Whether one of the words stands in a name, by itself or (from four letters on) inside a compound."""
+    return any(w in words or (len(w) >= 4 and any(w in word for word in words)) for w in wanted)
+
+
 def _dimension(channel: Channel) -> str:
     unit = channel.info.unit
     if not unit:
@@ -185,14 +191,15 @@ def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Pr
     words = words_of(channel.info.name)
     path_words = set(words_of(channel_id(channel.info)))
     dimension = _dimension(channel)
-    named = set(rule.words) & set(words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
-    if not named or set(words) & (set(rule.never) | _NOT_A_VALUE):
+    named = _has(rule.words, words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
+    never = set(rule.never) & set(words) or _has([w for w in rule.never if len(w) > 4], words)
+    if not named or never or set(words) & _NOT_A_VALUE:
         return None
     # a channel without a unit is proposed only where the name leaves no doubt what the unit is
     is_clear = dimension == "" and (rule.fallback_unit or rule.symbol == "gear")
     if dimension not in rule.dimensions and not is_clear:
         return None
-    score = 2.0 + len(set(rule.bonus) & path_words)
+    score = 2.0 + len(set(rule.bonus) & path_words) + _has(rule.bonus, words)
     return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit)
 
 

@@ -1,0 +1,5 @@
+"""`python -m aqualog`."""
+
+from aqualog.cli.main import run
+
+run()

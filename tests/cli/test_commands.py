@@ -1,0 +1,263 @@
+"""The commands as a user calls them, in processes of their own."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import polars as pl
+import pytest
+from conftest import ROOT
+
+SAMPLES = ROOT / "sample_logs"
+CAR = str(SAMPLES / "vehicle.toml")
+MF4 = str(SAMPLES / "lane_drive.mf4")
+
+
+def run(*args, cwd=None, env=None):
+    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200", **(env or {})}
+    return subprocess.run(
+        [sys.executable, "-m", "aqualog", *map(str, args)], capture_output=True, text=True, cwd=cwd, env=environment,
+        check=False,
+    )  # fmt: skip
+
+
+def one_error_line(result):
+    lines = [line for line in result.stderr.splitlines() if line.startswith("error:")]
+    assert len(lines) == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    return lines[0]
+
+
+def test_table_of_events():
+    result = run("detect", MF4, "--vehicle", CAR)
+    assert result.returncode == 0, result.stderr
+    assert "minor_spin_down" in result.stdout
+    assert "not judged" in result.stdout
+
+
+def test_json_of_the_contract():
+    result = run("detect", MF4, "--vehicle", CAR, "--json")
+    assert result.returncode == 0
+    document = json.loads(result.stdout, parse_constant=lambda c: pytest.fail(f"{c} is no JSON"))
+    assert document["schema_version"] == 1
+    assert document["sample_rate_hz"] == 100.0
+    assert document["duration_s"] == pytest.approx(24.0)
+    assert document["signals"]["omega_fl"]["unit"] == "rad/s"
+    assert document["signals"]["omega_fl"]["missing_fraction"] == 0.0
+    event = next(e for e in document["events"] if e["detector"] == "minor_spin_down")
+    assert set(event) >= {"detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence"}
+    assert (event["wheel"], event["side"], event["severity"]) == ("fr", "right", "partial")
+    assert event["evidence"]["slip_min"] < 0
+    assert {u["detector"] for u in document["unavailable"]} == {"slip_slope_drop", "tie_rod", "joint_cusum"}
+    assert set(document["quality"]) >= {"dropped_samples", "time_jumps", "truncated"}
+
+
+def test_results_folder_and_refusal_to_overwrite(tmp_path):
+    out = tmp_path / "out"
+    assert run("detect", MF4, "--vehicle", CAR, "-o", out).returncode == 0
+    assert sorted(p.name for p in out.iterdir()) == ["events.json", "report.html", "signals.parquet"]
+    assert json.loads((out / "events.json").read_text())["events"]
+    frame = pl.read_parquet(out / "signals.parquet")
+    assert {"t", "omega_fl", "minor_spin_down_fr", "minor_spin_down_fr_bit"} <= set(frame.columns)
+    again = run("detect", MF4, "--vehicle", CAR, "-o", out)
+    assert again.returncode == 2
+    assert "--force" in one_error_line(again)
+    assert run("detect", MF4, "--vehicle", CAR, "-o", out, "--force").returncode == 0
+
+
+@pytest.mark.parametrize("suffix", [".mf4", ".mcap", ".csv", ".parquet"])
+def test_written_log_gives_the_same_events_again(tmp_path, suffix):
+    path = tmp_path / f"again{suffix}"
+    first = run("detect", MF4, "--vehicle", CAR, "--write", path, "--json")
+    assert first.returncode == 0, first.stderr
+    second = run("detect", path, "--vehicle", CAR, "--json")
+    assert second.returncode == 0, second.stderr
+    a, b = (json.loads(r.stdout)["events"] for r in (first, second))
+    assert [(e["detector"], e["wheel"]) for e in a] == [(e["detector"], e["wheel"]) for e in b]
+    assert [e["start_s"] for e in a] == pytest.approx([e["start_s"] for e in b], abs=0.0101)
+
+
+def test_bits_and_statistics_are_channels_that_asammdf_opens(tmp_path):
+    import asammdf
+
+    path = tmp_path / "again.mf4"
+    run("detect", MF4, "--vehicle", CAR, "--write", path)
+    with asammdf.MDF(path) as mdf:
+        bit = mdf.get("minor_spin_down_fr_bit")
+        statistic = mdf.get("minor_spin_down_fr")
+    assert set(np.unique(bit.samples)) == {0.0, 1.0}
+    assert np.nanmax(statistic.samples) > 1.0
+
+
+@pytest.mark.parametrize("suffix", [".mf4", ".mcap", ".csv", ".parquet"])
+def test_convert(tmp_path, suffix):
+    path = tmp_path / f"c{suffix}"
+    source = SAMPLES / "lane_drive.csv"
+    made = run("convert", source, "--signals", SAMPLES / "map_csv.toml", "--vehicle", CAR, "-o", path)
+    assert made.returncode == 0, made.stderr
+    seen = json.loads(run("inspect", path, "--json").stdout)
+    assert {"omega_fl", "torque_rr", "steer_angle"} <= {c["name"] for c in seen["channels"]}
+    assert seen["proposed"]["omega_fl"]["reason"] == "its canonical name"
+    wheel = next(c for c in seen["channels"] if c["name"] == "omega_fl")
+    assert wheel["unit"] == "rad/s"
+    assert wheel["high"] == pytest.approx(86.5, abs=2.0)
+
+
+def test_convert_with_decimal_comma(tmp_path):
+    path = tmp_path / "c.csv"
+    assert run("convert", MF4, "-o", path, "--decimal-comma").returncode == 0
+    assert ";" in path.read_text(encoding="utf-8").splitlines()[0]
+    assert run("detect", path, "--vehicle", CAR).returncode == 0
+
+
+def test_inspect_proposes_a_map_that_works(tmp_path):
+    german = SAMPLES / "lane_drive.csv"
+    made = run("inspect", german, "--write-map", tmp_path / "map.toml")
+    assert made.returncode == 0, made.stderr
+    text = (tmp_path / "map.toml").read_text()
+    for symbol in ("omega_fl", "omega_rr", "a_x", "yaw_rate", "steering_wheel_angle", "v_x", "torque_r"):
+        assert symbol in text
+    result = run("detect", german, "--vehicle", CAR, "--signals", tmp_path / "map.toml", "--json")
+    assert {e["detector"] for e in json.loads(result.stdout)["events"]} >= {"joint_criteria", "minor_spin_down"}
+
+
+def test_gate(tmp_path):
+    assert run("detect", MF4, "--vehicle", CAR, "--fail-on-event").returncode == 5
+
+
+def test_missing_signals_end_with_4_and_one_line(tmp_path):
+    path = tmp_path / "gps.csv"
+    t = np.arange(100) * 0.1
+    pl.DataFrame({"t [s]": t, "latitude [deg]": 48 + t * 1e-4}).write_csv(path)
+    result = run("detect", path)
+    assert result.returncode == 4
+    assert "omega_fl" in one_error_line(result)
+
+
+def test_usage_and_configuration_errors(tmp_path):
+    bad = tmp_path / "car.toml"
+    bad.write_text("mas = 1\n")
+    result = run("detect", MF4, "--vehicle", bad)
+    assert result.returncode == 2
+    assert '"mass"' in one_error_line(result)
+    assert run("detect", MF4, "--vehicle", tmp_path / "none.toml").returncode == 2
+    assert run("detect", MF4, "--no-such-option").returncode == 2
+    assert run("detect", "nothing*.mf4", cwd=tmp_path).returncode == 2
+    assert run("convert", MF4, "-o", tmp_path / "x.xls").returncode == 2
+    assert run("detect", MF4, "--progress", "loud").returncode == 2
+
+
+def test_unreadable_logs(tmp_path):
+    assert run("detect", tmp_path / "none.mf4").returncode == 1
+    junk = tmp_path / "junk.mf4"
+    junk.write_bytes(bytes(range(256)) * 10)
+    result = run("detect", junk)
+    assert result.returncode == 1
+    assert "unknown format" in one_error_line(result)
+    (tmp_path / "empty.csv").write_bytes(b"")
+    assert "empty" in one_error_line(run("detect", tmp_path / "empty.csv"))
+
+
+def test_damaged_log_ends_with_3(tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((SAMPLES / "lane_drive.mcap").read_bytes()[:300_000])
+    result = run("detect", cut, "--vehicle", CAR, "--signals", SAMPLES / "map_mcap.toml", "--json")
+    assert result.returncode == 3, result.stderr
+    assert json.loads(result.stdout)["quality"]["truncated"] is True
+
+
+def test_sources_are_never_touched(tmp_path):
+    source = tmp_path / "drive.mf4"
+    source.write_bytes((SAMPLES / "lane_drive.mf4").read_bytes())
+    source.chmod(0o444)
+    before = (source.read_bytes(), source.stat().st_mtime_ns)
+    run("detect", source, "--vehicle", CAR, "-o", tmp_path / "out")
+    run("inspect", source)
+    assert (source.read_bytes(), source.stat().st_mtime_ns) == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["drive.mf4", "out"]
+
+
+def test_two_files_with_the_same_signal_are_refused():
+    result = run("detect", MF4, SAMPLES / "lane_drive.parquet", "--vehicle", CAR)
+    assert result.returncode == 4
+    assert "several channels" in one_error_line(result)
+
+
+def test_list_file_and_folder(tmp_path):
+    (tmp_path / "list.txt").write_text(f"# one drive\n{MF4}\n")
+    assert run("detect", f"@{tmp_path / 'list.txt'}", "--vehicle", CAR).returncode == 0
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    (folder / "a.mf4").write_bytes((SAMPLES / "lane_drive.mf4").read_bytes())
+    (folder / "notes.txt").write_text("nothing")
+    assert run("detect", folder, "--vehicle", CAR).returncode == 0
+
+
+def test_results_are_whole_or_not_at_all(tmp_path):
+    target = tmp_path / "no" / "such"
+    target.parent.mkdir()
+    target.parent.chmod(0o500)
+    result = run("convert", MF4, "-o", target / "x.parquet")
+    target.parent.chmod(0o700)
+    if os.geteuid() == 0:
+        pytest.skip("root may write anywhere")
+    assert result.returncode == 1
+    assert not list(target.parent.iterdir())
+
+
+def test_hostile_names_do_not_reach_the_terminal_raw(tmp_path):
+    path = tmp_path / "x.csv"
+    t = np.arange(100) * 0.01
+    pl.DataFrame({"t [s]": t, "\x1b[31mred": t, "[bold]x": t}).write_csv(path)
+    result = run("inspect", path)
+    assert "\x1b" not in result.stdout
+    assert "[bold]x" in result.stdout
+
+
+def test_every_command_has_help_with_examples():
+    listed = run("--help").stdout
+    for command in ("detect", "inspect", "convert", "align"):
+        assert command in listed
+        text = run(command, "--help").stdout
+        assert "Examples:" in text
+        assert f"aqualog {command}" in text
+
+
+def test_align_command(tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 200, 0.02)
+    v = 20 + 5 * np.sin(0.3 * t) + 3 * np.sin(0.11 * t + 1) + 2 * np.sin(0.71 * t)
+    pl.DataFrame({"t [s]": t, "speed [m/s]": v + 0.02 * rng.normal(size=t.size)}).write_csv(tmp_path / "a.csv")
+    late = np.arange(0, 200, 0.1)
+    at = np.interp(late - 0.25, t, v) * 1.01
+    pl.DataFrame({"t [s]": late, "speed [m/s]": at + 0.05 * rng.normal(size=late.size)}).write_csv(tmp_path / "b.csv")
+    result = run("align", tmp_path / "a.csv", tmp_path / "b.csv", "--json", "--write-map", tmp_path / "map.toml")
+    assert result.returncode == 0, result.stderr
+    source = json.loads(result.stdout)["sources"][0]
+    assert source["offset_s"] == pytest.approx(0.25, abs=0.02)
+    assert source["offset_ci95"][0] < 0.25 < source["offset_ci95"][1]
+    assert source["ratio"] == pytest.approx(1.01, abs=0.003)
+    assert '[sources."b.csv"]' in (tmp_path / "map.toml").read_text()
+
+
+def test_align_refuses_what_does_not_match(tmp_path):
+    rng = np.random.default_rng(1)
+    t = np.arange(0, 100, 0.1)
+    for name in "ab":
+        walk = 20 + np.cumsum(rng.normal(0, 0.1, t.size))
+        pl.DataFrame({"t [s]": t, "speed [m/s]": walk}).write_csv(tmp_path / f"{name}.csv")
+    result = run("align", tmp_path / "a.csv", tmp_path / "b.csv")
+    assert result.returncode == 4
+    assert "refused" in result.stdout
+
+
+def test_time_column_of_the_map(tmp_path):
+    t = np.arange(0, 5, 0.01)
+    frame = pl.DataFrame({"clk": np.rint(t * 1e3), "w [rad/s]": 90 + t, "v_x [m/s]": 28 + t})
+    frame.write_csv(tmp_path / "x.csv")
+    (tmp_path / "m.toml").write_text('[time]\nchannel = "clk"\nunit = "ms"\n[signals]\nomega_fl = "w"\n')
+    result = run("detect", tmp_path / "x.csv", "--signals", tmp_path / "m.toml", "--json")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["duration_s"] == pytest.approx(5.0)
