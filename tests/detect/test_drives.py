@@ -5,6 +5,7 @@ import pytest
 from drives import AWD, CAR, FWD, drive, lane
 from small_model import Lane
 
+from aqualog.detect import minor_spin_down
 from aqualog.detect.stream import detect_drive
 
 
@@ -210,3 +211,39 @@ def test_mirrored_drive_gives_mirrored_events():
     mine = sorted((e.detector, flip[e.wheel] or "", e.start_s, e.end_s) for e in detect_drive(signals, CAR).events)
     theirs = sorted((e.detector, e.wheel or "", e.start_s, e.end_s) for e in other)
     assert mine == theirs
+
+
+def test_common_roughness_drops_out_of_the_front_rear_difference():
+    """C32: the same shaking on both axles is the road; on the watched wheel alone it is the wheel."""
+    rng = np.random.default_rng(0)
+    n = 1000
+    shaken, calm = rng.normal(0, 4, n), rng.normal(0, 0.2, n)
+    dv, v, free = np.full(n, -1.0), np.full(n, 27.0), np.ones(n, dtype=bool)
+    params, state = minor_spin_down.MinorParams.make(0.01), minor_spin_down.initial_state()
+    delta, var, alone, _ = minor_spin_down.scan(params, state, shaken, calm, dv, v, free)
+    assert alone.any()
+    assert np.median(delta[300:] / var[300:]) > 0.8  # C33
+    _, _, both, _ = minor_spin_down.scan(params, state, shaken, shaken, dv, v, free)
+    assert not both.any()
+    _, _, braked, _ = minor_spin_down.scan(params, state, shaken, calm, dv, v, ~free)
+    assert not braked.any()
+
+
+def test_wheel_criteria_without_resistance_are_no_joint_detection():
+    """C64: the gate. The same spin-downs with an accelerometer that shows no missing acceleration."""
+    signals, _ = drive(CAR, **WATER, **SPEED[98])
+    delta = detect_drive(signals, CAR).features["delta_a_x"].fill_nan(0.0)
+    dry = signals.frame.with_columns(a_x=signals.frame["a_x"] + delta)
+    found = detect_drive(type(signals)(dry, signals.dt_ns, None, {}, signals.quality, ()), CAR).events
+    assert [e for e in found if e.detector == "minor_spin_down"]
+    assert not [e for e in found if e.detector in ("joint_criteria", "resistance")]
+
+
+@pytest.mark.parametrize("scale", [0.985, 1.015])
+def test_radius_correction_takes_a_scale_error_out(scale):
+    signals, _ = drive(CAR, duration_s=60.0)
+    wrong = signals.frame.with_columns(v_x=signals.frame["v_x"] * scale)
+    features = detect_drive(type(signals)(wrong, signals.dt_ns, None, {}, signals.quality, ()), CAR).features
+    for wheel in ("fl", "rr"):
+        slip = features[f"v_w_delta_{wheel}"].to_numpy() / features["v_x_hat"].to_numpy()
+        assert abs(np.nanmean(slip[-1000:])) < 0.002
