@@ -193,6 +193,8 @@ def _text(reference: Carrier, source: Carrier, fit: Any, quantity: str) -> str:
     if quantity == "speed" and fit.slip_offset_s == fit.slip_offset_s:  # not NaN
         low, high = fit.slip_offset_ci95
         lines.append(f"        with tyre slip in the model: {fit.slip_offset_s:+.4f} s  95 % [{low:+.4f}, {high:+.4f}]")
+        if low > offset_high or high < offset_low:
+            lines.append("        the two do not agree: part of the offset is tyre slip, not time")
     return head + "".join(f"  {line}\n" for line in lines)
 
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.detect import cusum, minor_spin_down, spin
+from aqualog.detect import cusum, joint, minor_spin_down, resistance, spin
 from aqualog.detect.events import EventBuilder, Evidence
 from aqualog.detect.needs import check_needs
+from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
 from aqualog.detect.negative_force import hold_on, is_braking
 from aqualog.features.stream import Features, FeatureStream
 from aqualog.notation import SIDES, WHEELS, side_of
@@ -22,14 +23,7 @@ from aqualog.vehicle import Vehicle
 __all__ = ["DriveStream", "Piece", "detect_drive"]
 
 MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
-MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
-SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
-A_RESISTANCE = 0.2  # [m/s^2] thesis 2.2: threshold of partial aquaplaning (C44)
-V_RESISTANCE = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
 A_Y_MINOR = 4.0  # [m/s^2] beyond, the inner wheels lose load enough to slow down on dry road too
-A_Y_RESISTANCE = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
-GATE_HOLD = 1.0  # [s] the resistance gate of the joint detector stays open this long
-JOINT_HOLD = 0.5  # [s] a joint warning outlasts its criteria by this
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +62,8 @@ class DriveStream:
         self._down = spin.SpinParams.make(-1.0, self.dt)
         self._up = spin.SpinParams.make(1.0, self.dt)
         self._minor = minor_spin_down.MinorParams.make(self.dt)
-        # half the change that is to be found as drift: 0.2 m/s^2 is reported 2 s after it begins, 0.4 after 0.7 s
-        self._resistance = cusum.CusumParams(0.5 * A_RESISTANCE, 0.2, 0.3, self.dt)
-        self._gate = cusum.CusumParams(0.5 * A_RESISTANCE, 0.03, 0.06, self.dt)
+        self._resistance = resistance.alarm_params(self.dt)
+        self._gate = resistance.gate_params(self.dt)
         self._spin_states = {(d, w): spin.initial_state() for d in ("spin_down", "spin_up") for w in WHEELS}
         self._minor_states = {s: minor_spin_down.initial_state() for s in SIDES}
         self._sums = {"resistance": cusum.initial_state(), "gate": cusum.initial_state()}
@@ -112,7 +105,7 @@ class DriveStream:
             name = f"torque_{wheel}"
             torque = columns[name] / (self.vehicle.r_l(wheel) * weight) if name in self._available else None
             bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), torque)
-            result[wheel] = self._hold(f"braking_{wheel}", bits, 0.3)
+            result[wheel] = self._hold(f"braking_{wheel}", bits, BRAKE_HOLD)
         return result
 
     def _hold(self, name: str, bits: BoolArray, seconds: float) -> BoolArray:
@@ -207,51 +200,32 @@ class DriveStream:
         return [track], self._events(track, evidence, _partial)
 
     def _resistance_input(self, f: Features, braking: Mapping[str, BoolArray]) -> FloatArray:
-        """Resistance measure where the longitudinal balance can be trusted, else zero: no evidence, the sum decays."""
-        with np.errstate(invalid="ignore"):
-            trusted = (f["v_x_hat"] > V_RESISTANCE) & (np.abs(f["a_y_slow"]) < A_Y_RESISTANCE)
-        for wheel in WHEELS:
-            trusted &= ~braking[wheel]
-        return np.where(np.isnan(f["delta_a_x"]), np.nan, np.where(trusted, f["delta_a_x"], 0.0))
+        any_braking = braking["fl"] | braking["fr"] | braking["rl"] | braking["rr"]
+        return resistance.trusted_measure(f["delta_a_x"], f["v_x_hat"], f["a_y_slow"], any_braking)
 
     # --- joint detector ----------------------------------------------------------------------------------------
 
     def _joint(self, f: Features, braking: Mapping[str, BoolArray], tracks: list[Track]) -> tuple[Track, list[Event]]:
-        """Thesis 2.5, first joint detector: resistance as gate, and one of the wheel criteria (Fig. 2.24)."""
-        n = f["v_x_hat"].size
         x = self._resistance_input(f, braking)
         _, gate, self._sums["gate"] = cusum.scan(self._gate, self._sums["gate"], x)
-        gate = self._hold("gate", gate, GATE_HOLD)
-        criteria = {1: np.zeros(n, dtype=bool), 2: np.zeros(n, dtype=bool), 3: np.zeros(n, dtype=bool)}
-        number = {"spin_down": 1, "minor_spin_down": 2, "spin_up": 3}
-        full = np.zeros(n, dtype=bool)
-        slip_min = np.full(n, np.nan)
-        for track in tracks:
-            if track.detector not in number or track.wheel is None:
-                continue
-            bits = track.active & ~braking[track.wheel]
-            criteria[number[track.detector]] |= bits
-            slip = slip_of_wheel_speed(f[f"v_w_{track.wheel}"], f["v_x_hat"])
-            mu = _traction(f, track.wheel)
-            mu = np.full(n, np.nan) if mu is None else mu
-            with np.errstate(invalid="ignore"):
-                full |= bits & ((slip < SLIP_FULL) if track.detector != "spin_up" else (mu < MU_FULL))
-            slip_min = np.fmin(slip_min, np.where(bits, slip, np.nan))
-        resistance = next(t.active for t in tracks if t.detector == "resistance")
-        count = sum(bits.astype(np.float64) for bits in criteria.values())
-        met = gate & (count > 0)
-        active = self._hold("joint", met, JOINT_HOLD)
-        statistic = np.where(np.isnan(x), np.nan, np.where(gate, count, 0.0))
+        gate = self._hold("gate", gate, joint.GATE_HOLD)
+        criteria = joint.wheel_criteria(
+            tracks,
+            braking,
+            {w: f[f"v_w_{w}"] for w in self._wheels(f)},
+            {w: _traction(f, w) for w in WHEELS},
+            f["v_x_hat"],
+        )
+        active = self._hold("joint", gate & (criteria.count > 0), joint.HOLD)
+        statistic = np.where(np.isnan(x), np.nan, np.where(gate, criteria.count, 0.0))
         track = Track("joint_criteria", None, None, "-", statistic, 1.0, active)
         evidence: Evidence = {
             "v_x": ("first", f["v_x_hat"]),
-            "slip_min": ("min", slip_min),
+            "slip_min": ("min", criteria.slip_min),
             "delta_a_x_max": ("max", f["delta_a_x"]),
-            "criterion_1": ("any", criteria[1] & gate),
-            "criterion_2": ("any", criteria[2] & gate),
-            "criterion_3": ("any", criteria[3] & gate),
-            "criterion_5": ("any", resistance),
-            "full": ("any", full),
+            **{f"criterion_{number}": ("any", bits & gate) for number, bits in criteria.met.items()},
+            "criterion_5": ("any", next(t.active for t in tracks if t.detector == "resistance")),
+            "full": ("any", criteria.is_full),
         }
         return track, self._events(track, evidence, _severity_joint)
 
@@ -297,12 +271,12 @@ def _partial(_: Mapping[str, Any]) -> str:
 
 
 def _severity_down(evidence: Mapping[str, Any]) -> str:
-    return "full" if evidence.get("slip_min", 0.0) < SLIP_FULL else "partial"
+    return "full" if evidence.get("slip_min", 0.0) < joint.SLIP_FULL else "partial"
 
 
 def _severity_up(evidence: Mapping[str, Any]) -> str:
     """Thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is not known."""
-    return "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial"
+    return "full" if evidence.get("mu_min", 1.0) < joint.MU_FULL else "partial"
 
 
 def _severity_joint(evidence: Mapping[str, Any]) -> str:

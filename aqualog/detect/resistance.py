@@ -1,0 +1,51 @@
+"""Resistance detector: what the balance of forces says, where it can be trusted, into a CUSUM."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.detect.cusum import CusumParams
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure"]
+
+THRESHOLD = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
+V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
+A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
+
+
+def alarm_params(dt: float) -> CusumParams:
+    """The detector by itself, robust: half the change that is to be found as drift.
+
+    0.2 m/s^2 is reported 2 s after it begins, 0.4 m/s^2 after 0.7 s (C76).
+    """
+    return CusumParams(0.5 * THRESHOLD, 0.2, 0.3, dt)
+
+
+def gate_params(dt: float) -> CusumParams:
+    """The gate of the joint detector, sensitive: it only has to say that something holds the car back (C64)."""
+    return CusumParams(0.5 * THRESHOLD, 0.03, 0.06, dt)
+
+
+def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_braking: BoolArray) -> FloatArray:
+    """Resistance measure where the longitudinal balance can be trusted, else zero: no evidence, and sums decay.
+
+    Parameters
+    ----------
+    delta_a_x : array (n,)
+        Nominal minus measured acceleration (thesis 2.9); more resistance is positive. [m/s^2]
+    v_x : array (n,)
+        Velocity. [m/s]
+    a_y : array (n,)
+        Lateral acceleration, low-passed. [m/s^2]
+    is_braking : bool array (n,)
+        A braking force acts on any wheel: brake torque is rarely known well enough.
+
+    Returns
+    -------
+    x : array (n,)
+        NaN stays NaN. [m/s^2]
+    """
+    with np.errstate(invalid="ignore"):
+        trusted = (v_x > V_MIN) & (np.abs(a_y) < A_Y_MAX) & ~is_braking
+    return np.where(np.isnan(delta_a_x), np.nan, np.where(trusted, delta_a_x, 0.0))
