@@ -29,9 +29,7 @@ ROS_TYPES = {
 def sample_drive():
     """The drive of all sample logs."""
     lane = Lane(8.0, 16.0, depth_left=1.0e-3, depth_right=1.3e-3)
-    drive = Drive(
-        load_vehicle(HERE / "vehicle.toml"), duration_s=24.0, seed=7, speed_kmh=((0.0, 98.0),), lanes=(lane,)
-    )
+    drive = Drive(load_vehicle(HERE / "vehicle.toml"), duration_s=24.0, seed=7, speed_kmh=((0.0, 98.0),), lanes=(lane,))
     signals = {k: v for k, v in simulate(drive).items() if not k.startswith("true_")}
     return signals.pop("t"), signals
 
@@ -57,9 +55,7 @@ def write_ros2(path, t, s):
 
 
 def _messages(types, t_ns, s):
-    header = types["std_msgs/msg/Header"](
-        types["builtin_interfaces/msg/Time"](t_ns // 10**9, t_ns % 10**9), "car"
-    )
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](t_ns // 10**9, t_ns % 10**9), "car")
     vector = types["geometry_msgs/msg/Vector3"]
     nothing = np.zeros(9)
     return {
@@ -104,7 +100,9 @@ def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
     t, s = sample_drive()
     meta = {n: (SYMBOLS[n].unit, SYMBOLS[n].meaning, x) for n, x in s.items()}
-    write_mf4(folder / "lane_drive.mf4", [MdfGroup("signals", t, meta)], START_NS, "simulated drive over a watered lane")
+    write_mf4(
+        folder / "lane_drive.mf4", [MdfGroup("signals", t, meta)], START_NS, "simulated drive over a watered lane"
+    )
     write_ros2(folder / "lane_drive.mcap", t, s)
     write_csv(folder / "lane_drive.csv", csv_columns(t, s, load_vehicle(HERE / "vehicle.toml").steering_ratio),
               decimal_comma=True)  # fmt: skip

@@ -43,8 +43,8 @@ def step(p, g, x):  # type: ignore[no-untyped-def]
     """g <- min(g_max, max(0, g + (x - nu) dt)); NaN holds the sum.
 
     The clamp at zero is missing in thesis 3.24 as printed (E11); the clamp at g_max bounds the time that the alarm
-    outlives its cause, to (g_max - off_share h) / nu. The integration over time makes threshold and detection time independent
-    of the sample rate.
+    outlives its cause, to (g_max - off_share h) / nu. The integration over time makes threshold and detection time
+    independent of the sample rate.
     """
     if math.isnan(x):
         return g

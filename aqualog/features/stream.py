@@ -76,8 +76,8 @@ class FeatureStream:
         Returns
         -------
         mapping name -> array (n,)
-            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`, `torque_sum`, `delta_a_x` (2.9),
-            `a_x_slow`, `a_y_slow`; only those whose signals are available.
+            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`, `torque_sum`,
+            `delta_a_x` (2.9), and low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`; only those whose signals are there.
         """
         n = next(iter(columns.values())).size
         get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}
@@ -173,6 +173,4 @@ class FeatureStream:
             slow = self._lowpass("delta_a_x", out["delta_a_x"], TAU_LOAD)
             for i, wheel in enumerate(WHEELS):
                 if f"mu_{wheel}" in out:
-                    out[f"mu_res_{wheel}"] = residual_traction(
-                        out[f"mu_{wheel}"], slow, loads[i], mass=vehicle.mass
-                    )
+                    out[f"mu_res_{wheel}"] = residual_traction(out[f"mu_{wheel}"], slow, loads[i], mass=vehicle.mass)

@@ -1,89 +1,145 @@
-"""CSV logs: any separator, decimal sign and encoding, units in the header or in a row of their own."""
+"""CSV logs of any separator, decimal sign and encoding."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import numpy as np
 import polars as pl
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
-from aqualog.io.csv_dialect import BAD_WORDS, Dialect, decode, find_dialect
-from aqualog.io.table_time import TimeColumn, choose_time, numbers_to_ns, texts_to_ns
-from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
+from aqualog.io.csv_cells import Numbers, numbers, plain
+from aqualog.io.csv_dialect import Column, find_layout
+from aqualog.io.csv_rows import RowFaults, Rows, find_rows
+from aqualog.io.csv_text import read_text
+from aqualog.io.table_time import FieldKind, Stamps, TableField, TimeChoice, choose_time, from_dates, from_numbers
+from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults
 
 __all__ = ["CsvReader"]
 
-_NEWLINE = 10
+# Above this share of short rows the writer leaves out blank cells at the end; below it rows are damaged.
+_HABIT = 0.1
 
 
 class CsvReader:
-    """One CSV file.
+    """Reader of one CSV file.
 
-    A blank cell is no sample of that channel in that row (files that merge several rates are full of them); a word
-    such as `NaN` is a bad sample. Whatever cannot be understood is counted and noted with its line.
+    A blank cell is no sample of its channel; a cell that stands for a bad sample, or that cannot be understood, is NaN.
+    Rows are kept in the order of the file, also if their times are not.
     """
 
     format = "csv"
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self._name = path.name
-        self._where = str(path)
+        self._path = path
         self._faults = FaultLog()
-        try:
-            raw = path.read_bytes()
-        except OSError as error:
-            raise LogError(f"cannot be read: {error.strerror}", where=self._where) from error
-        text, note = decode(raw, where=path.name)
-        if note:
-            self._faults.notes.append(note)
-        if "\n" not in text and "\r" in text:
-            text = text.replace("\r", "\n")
-        self._dialect: Dialect = find_dialect(text, where=self._where)
-        names, units = self._dialect.names, self._dialect.units
-        self._time: TimeColumn = choose_time(names, units, options, where=self._where)
-        self._body = self._clean_body(text)
-        self._rows = self._body.count(b"\n")
-        if not self._rows:
-            raise LogError("has a header and no rows", where=self._where)
-        self._infos = tuple(
-            ChannelInfo(name, name, units[i], self._rows, self._name, key=i)
-            for i, name in enumerate(names)
-            if self._dialect.numeric[i] and i not in self._time.columns
-        )
-        self._stamps: tuple[TimeArray, BoolArray, bool] | None = None
+        self._rows: Rows | None = None
+        self._stamps: Stamps | None = None
+        self._counted: set[int] = set()
+        text = read_text(path)
+        self._faults.notes += text.notes
+        self._data = text.data
+        self._layout = find_layout(text.data, where=str(path))
+        ends = text.data.count(b"\n") + (not text.data.endswith(b"\n"))
+        self._count = max(0, ends - self._layout.first_line + 1)
+        self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
+        if self._time.note:
+            self._note(self._time.note)
+        self._note_columns()
 
     def channels(self) -> Sequence[ChannelInfo]:
-        """Columns of numbers, in file order."""
-        return self._infos
+        """All numeric columns but the time; `count` is the number of lines below the header."""
+        return [
+            ChannelInfo(c.name, c.name, c.unit, self._count, self._path.name, key=c.index)
+            for c in self._layout.columns
+            if _is_channel(c, self._time)
+        ]
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
+        """Parse these columns only."""
+        asked = list(wanted)
+        rows = self._found_rows()
+        times = [k for k in (self._time.index, self._time.day) if k is not None and self._stamps is None]
+        needed = list({w.key for w in asked}.union(times))
+        cells = rows.cells(needed, where=str(self._path)) if needed else {}
+        if self._stamps is None:
+            self._stamps = self._read_time(cells, rows)
+        columns = self._layout.columns
+        return [self._channel(w, numbers(cells[w.key], columns[w.key].style), self._stamps, rows) for w in asked]
+
+    def _channel(self, info: ChannelInfo, samples: Numbers, stamps: Stamps, rows: Rows) -> Channel:
+        keep = stamps.valid & ~samples.blank
+        if info.key not in self._counted:
+            self._counted.add(info.key)
+            self._lose(samples.unreadable & keep, rows, f'column "{info.path}": {{}} not a number')
+        return Channel(info, stamps.t_ns[keep], samples.values[keep], stamps.absolute)
+
+    def _read_time(self, cells: dict[int, pl.Series], rows: Rows) -> Stamps:
+        column, choice = self._layout.columns[self._time.index], self._time
+        stamps = self._as_stamps(column, cells[choice.index], None if choice.day is None else cells[choice.day])
+        for note in stamps.notes:
+            self._note(note)
+        self._lose(~stamps.valid, rows, f'time column "{column.name}": {{}} without a time, the row is left out')
+        return stamps
+
+    def _as_stamps(self, column: Column, cells: pl.Series, day: pl.Series | None) -> Stamps:
+        if column.kind in ("stamp", "clock"):
+            try:
+                return from_dates(cells, day, "clock" if column.kind == "clock" else "stamp")
+            except LogError as error:  # it does not know the file
+                raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
+        values = numbers(cells, column.style).values
+        return from_numbers(values, self._time.unit, cells=plain(cells, column.style))
+
+    def _found_rows(self) -> Rows:
+        if self._rows is None:
+            self._rows, self._data = find_rows(self._data, self._layout), b""
+            self._note_rows(self._rows.faults, len(self._rows.lines))
+        return self._rows
+
+    def _lose(self, bad: BoolArray, rows: Rows, text: str) -> None:
+        count = int(bad.sum())
+        if count:
+            self._faults.lost_samples += count
+            cells = f"{count} cell{'s' if count > 1 else ''}"
+            self._note(f"{text.format(cells)} (first at line {int(rows.lines[bad][0])})")
+
+    def _note_rows(self, faults: RowFaults, count: int) -> None:
+        if faults.long:
+            self._faults.lost_samples += len(faults.long)
+            self._note(_lines(faults.long, "has more cells than the header and is left out"))
+        if faults.short:
+            is_habit = len(faults.short) > max(1, _HABIT * count)
+            self._faults.lost_samples += 0 if is_habit else len(faults.short)
+            self._note(_lines(faults.short, "has fewer cells than the header; the missing ones are blank"))
+        if faults.comments:
+            self._note(_lines(faults.comments, "is a comment among the data and is left out"))
+        if faults.cut_line:
+            self._faults.truncated = True
+            self._note(f"ends inside line {faults.cut_line}; its last cell is left out")
+
+    def _note_columns(self) -> None:
+        for name in self._layout.twice:
+            self._note(f'several columns are called "{name}"; the others are "{name}#2" and so on')
+        for column in self._layout.columns:
+            if column.kind == "text" and column.text_share < 1.0:
+                share = f'{100 * column.text_share:.0f} % of its cells are text such as "{column.example[:40]}"'
+                self._note(f'column "{column.name}" is left out: {share}')
+
+    def _note(self, text: str) -> None:
+        self._faults.notes.append(f"{self._path.name}: {text}")
 
     @property
     def faults(self) -> FileFaults:
-        """Rows and cells that could not be used."""
+        """What was lost so far; complete after `read`."""
         return self._faults.freeze()
 
-    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
-        """Parse these columns."""
-        wanted = list(wanted)
-        table = self._table([*self._time.columns, *(w.key for w in wanted)])
-        if self._stamps is None:
-            self._stamps = self._read_time(table)
-        t_ns, known, absolute = self._stamps
-        channels = []
-        for info in wanted:
-            values, has_sample = self._numbers(table[f"c{info.key}"], info.name)
-            use = known & has_sample
-            channels.append(Channel(info, t_ns[use], values[use], absolute))
-        return channels
-
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Let go of the text."""
+        self._data, self._rows = b"", None
 
     def __enter__(self) -> Self:
         return self
@@ -93,180 +149,16 @@ class CsvReader:
     ) -> None:
         self.close()
 
-    # --- rows --------------------------------------------------------------------------------------------------
 
-    def _clean_body(self, text: str) -> bytes:
-        """Data rows that all have as many cells as the header, each ended by a newline."""
-        start = 0
-        for _ in range(self._dialect.first_data_line - 1):
-            start = text.find("\n", start) + 1
-            if start == 0:
-                return b""
-        body = text[start:].encode("utf-8").replace(b"\r\n", b"\n")
-        is_cut = bool(body) and not body.endswith(b"\n")
-        if is_cut:
-            body += b"\n"
-        counts, starts, ends = _cells_per_line(body, self._dialect.separator)
-        width = len(self._dialect.names)
-        odd = np.flatnonzero(counts != width)
-        if odd.size == 0:
-            return body
-        return self._mend(body, odd, counts, starts, ends, width, is_cut=is_cut)
-
-    def _mend(
-        self,
-        body: bytes,
-        odd: TimeArray,
-        counts: TimeArray,
-        starts: TimeArray,
-        ends: TimeArray,
-        width: int,
-        *,
-        is_cut: bool,
-    ) -> bytes:
-        parts: list[bytes] = []
-        done = 0
-        short: list[int] = []
-        long: list[int] = []
-        separator = self._dialect.separator.encode()
-        for i in odd:
-            line = body[starts[i] : ends[i]]
-            parts.append(body[done : starts[i]])
-            done = int(ends[i]) + 1
-            if not line.strip(b" \t" + separator):
-                continue
-            if counts[i] == width + 1 and line.rstrip().endswith(separator):
-                parts.append(line.rstrip()[: -len(separator)] + b"\n")  # a separator behind the last cell
-            elif counts[i] > width:
-                long.append(int(i))
-            elif is_cut and i == counts.size - 1:
-                # the last number of a row that breaks off may be half a number
-                self._faults.truncated = True
-                self._note(1, f"breaks off in line {self._line(int(i))}; that row is left out")
-            else:
-                short.append(int(i))
-                parts.append(line + separator * (width - int(counts[i])) + b"\n")
-        parts.append(body[done:])
-        if short:
-            self._note(
-                0, f"{len(short)} rows have too few cells (first: line {self._line(short[0])}); the rest is blank"
-            )
-        if long:
-            self._note(len(long), f"{len(long)} rows have too many cells (first: line {self._line(long[0])}); left out")
-        return b"".join(parts)
-
-    def _line(self, row: int) -> int:
-        return self._dialect.first_data_line + row
-
-    def _note(self, lost: int, text: str) -> None:
-        self._faults.lost_samples += lost
-        note = f"{self._name}: {text}"
-        if note not in self._faults.notes:
-            self._faults.notes.append(note)
-
-    # --- cells -------------------------------------------------------------------------------------------------
-
-    def _table(self, columns: Sequence[int]) -> pl.DataFrame:
-        """These columns as text; text keeps every cell until it is known what it means."""
-        try:
-            return pl.read_csv(
-                io.BytesIO(self._body),
-                has_header=False,
-                separator=self._dialect.separator,
-                columns=sorted(set(columns)),
-                new_columns=[f"c{i}" for i in sorted(set(columns))],
-                infer_schema=False,
-            )
-        except pl.exceptions.PolarsError as error:
-            raise LogError(f"rows cannot be read ({error})", where=self._where) from error
-
-    def _read_time(self, table: pl.DataFrame) -> tuple[TimeArray, BoolArray, bool]:
-        columns = [table[f"c{i}"] for i in self._time.columns]
-        name = self._dialect.names[self._time.columns[0]]
-        if len(columns) == 2:
-            texts = pl.select(pl.concat_str(columns, separator=" ")).to_series()
-        else:
-            numbers, known = self._parse(columns[0])
-            known &= np.isfinite(numbers)
-            if known.mean() > 0.5:
-                where = f"{self._name}:{name}"
-                t_ns = np.zeros(numbers.size, dtype=np.int64)
-                t_ns[known], absolute, note = numbers_to_ns(numbers[known], self._time.unit, where=where)
-                if note:
-                    self._note(0, note.removeprefix(f"{self._name}: "))
-                self._count_bad_times(known)
-                return t_ns, known, absolute
-            texts = columns[0]
-        found = texts_to_ns(texts.fill_null(""))
-        if found is None:
-            first = next((v for v in texts if v), "")
-            raise LogError(
-                f'time "{first}" in column {name} is neither a number nor a date',
-                where=self._where,
-                expected="seconds, or 2026-03-01T12:00:00.010",
-                hint="[time] channel and unit in the signal map",
-            )
-        self._count_bad_times(found[1])
-        return found
-
-    def _count_bad_times(self, known: BoolArray) -> None:
-        bad = np.flatnonzero(~known)
-        if bad.size:
-            self._note(int(bad.size), f"{bad.size} rows have no time (first: line {self._line(int(bad[0]))}); left out")
-
-    def _numbers(self, cells: pl.Series, name: str) -> tuple[FloatArray, BoolArray]:
-        """Values and where there is a sample; a cell that is no number is a NaN sample, counted."""
-        values, has_sample = self._parse(cells)
-        odd = np.flatnonzero(np.isnan(values) & has_sample)
-        if odd.size:
-            words = cells.gather(odd).str.strip_chars().str.to_lowercase()
-            strange = odd[(~words.is_in(list(BAD_WORDS))).to_numpy()]
-            if strange.size:
-                line = self._line(int(strange[0]))
-                text = str(cells[int(strange[0])])[:40]
-                self._note(
-                    int(strange.size), f'{strange.size} cells of {name} are no numbers (first: "{text}", line {line})'
-                )
-        return values, has_sample
-
-    def _parse(self, cells: pl.Series) -> tuple[FloatArray, BoolArray]:
-        values = cells.cast(pl.Float64, strict=False)
-        blank = cells.is_null()
-        unread = values.is_null() & ~blank
-        if unread.any():
-            text = cells.str.strip_chars()
-            blank = blank | (text == "").fill_null(value=False)
-            values = _decimal(text, self._dialect.separator).cast(pl.Float64, strict=False)
-            logical = text.str.to_lowercase().replace_strict({"true": 1.0, "false": 0.0}, default=None)
-            values = values.fill_null(logical.cast(pl.Float64))
-        has_sample = (~blank).to_numpy()
-        return values.fill_null(float("nan")).to_numpy().astype(np.float64), has_sample
+def _field(column: Column) -> TableField:
+    kind: FieldKind = "text" if column.kind == "blank" else column.kind
+    return TableField(column.name, column.unit, kind)
 
 
-def _decimal(text: pl.Series, separator: str) -> pl.Series:
-    """Numbers of one column with a decimal point and no thousands separators."""
-    if separator == ",":
-        has_thousands = text.str.contains(r"\d,\d{3}(\D|$)").any()
-        return text.str.replace_all(",", "") if has_thousands else text
-    if text.str.contains(",", literal=True).any():
-        last_is_point = text.str.contains(r",\d{3}.*\.\d*$").any()
-        if last_is_point:
-            return text.str.replace_all(",", "", literal=True)
-        return text.str.replace_all(".", "", literal=True).str.replace_all(",", ".", literal=True)
-    return text
+def _is_channel(column: Column, time: TimeChoice) -> bool:
+    return column.kind in ("number", "blank") and column.index != time.index
 
 
-def _cells_per_line(body: bytes, separator: str) -> tuple[TimeArray, TimeArray, TimeArray]:
-    """Number of cells, begin and end of every line."""
-    data = np.frombuffer(body, dtype=np.uint8)
-    ends = np.flatnonzero(data == _NEWLINE)
-    starts = np.concatenate([[0], ends[:-1] + 1]) if ends.size else ends
-    if b'"' in body:
-        rows = csv.reader(io.StringIO(body.decode("utf-8")), delimiter=separator)
-        counts = np.array([len(r) for r in rows], dtype=np.int64)
-        if counts.size == ends.size:
-            return counts, starts, ends
-        raise LogError("has line breaks inside quoted cells", expected="one row a line")
-    at = np.flatnonzero(data == ord(separator))
-    counts = np.searchsorted(at, ends) - np.searchsorted(at, starts) + 1
-    return counts.astype(np.int64), starts, ends
+def _lines(lines: Sequence[int], what: str) -> str:
+    more = f" (and {len(lines) - 1} more such lines)" if len(lines) > 1 else ""
+    return f"line {lines[0]} {what}{more}"

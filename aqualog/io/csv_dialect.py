@@ -1,182 +1,337 @@
-"""How a CSV is written: encoding, separator, decimal sign, header, units row. Found by trying, accepted by proof."""
+"""How a CSV file is written: separator, decimal sign, header, units, first line of data.
+
+Nothing is taken for granted: every separator is tried with every possible header line, and what the cells below it say
+decides. A reading counts as proven only if at least two columns hold (nearly) nothing but numbers, times and blanks.
+"""
 
 from __future__ import annotations
 
-import codecs
 import csv
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import takewhile
+from typing import Literal
 
 from aqualog.errors import LogError
-from aqualog.io.table_time import split_unit
+from aqualog.io.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
+from aqualog.io.table_names import split_unit, unique_names
 from aqualog.units import is_unit
 
-__all__ = ["BAD_WORDS", "Dialect", "decode", "find_dialect"]
+__all__ = ["Column", "ColumnKind", "Layout", "find_layout", "is_comment", "split_line"]
+
+ColumnKind = Literal["number", "stamp", "date", "clock", "blank", "text"]
+Row = list[str]
 
 _SEPARATORS = (",", ";", "\t", "|")
-_SAMPLE_ROWS = 300
-_HEADER_LIMIT = 100  # a header stands within the first so many lines
-_POINT = re.compile(r"^\s*[+-]?(\d[\d,]*\.?\d*|\.\d+)([eE][+-]?\d+)?\s*$")
-_COMMA = re.compile(r"^\s*[+-]?(\d[\d.]*,?\d*|,\d+)([eE][+-]?\d+)?\s*$")
-_TIME_TEXT = re.compile(r"^\s*(\d{4}[-/]\d\d[-/]\d\d|\d\d\.\d\d\.\d{4}|\d{1,2}:\d\d:\d\d)")
-# What loggers write for "no value": a sample that is bad, not a column of text.
-BAD_WORDS = frozenset({"nan", "-nan", "inf", "-inf", "+inf", "-", "--", "null", "none", "n/a", "#n/a", "?", "#value!"})
-_LOGICAL = frozenset({"true", "false"})
+_HEAD_LINES = 600
+_HEAD_BYTES = 1 << 21
+_BODY_ROWS = 300
+_SPREAD = 12  # places behind the head where rows are looked at
+_SPREAD_ROWS = 20
+_COMMENTS = ("#", "%", "//", "!")
+_SHOWN = {"\t": "tab", ",": "comma", ";": "semicolon", "|": "bar"}
+_HINT = "export it with one header line (name [unit]), one separator and one decimal sign"
 
 
 @dataclass(frozen=True, slots=True)
-class Dialect:
-    """How the file is written. Line numbers count from 1."""
+class Column:
+    """One column as its header and its sampled cells show it; `text_share` is the share of cells that say nothing."""
+
+    index: int
+    name: str
+    unit: str
+    style: Style
+    kind: ColumnKind
+    text_share: float = 0.0
+    example: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Everything that is needed to read the cells.
+
+    `width` is how many cells a whole row has: that of the header, or more if every row ends with separators.
+    `first_line` counts from 1; `twice` are names that stand over several columns.
+    """
 
     separator: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    numeric: tuple[bool, ...]
-    header_line: int
-    first_data_line: int
+    columns: tuple[Column, ...]
+    width: int
+    first_line: int
+    twice: tuple[str, ...] = ()
 
 
-def decode(raw: bytes, *, where: str) -> tuple[str, str]:
-    """Text of a file and the note on its encoding: byte order mark, else strict UTF-8, else Windows-1252.
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    layout: Layout
+    proven: int
 
-    Raises
-    ------
-    LogError
-        If it is binary.
-    """
-    for mark, name in (
-        (codecs.BOM_UTF8, "utf-8-sig"),
-        (codecs.BOM_UTF16_LE, "utf-16"),
-        (codecs.BOM_UTF16_BE, "utf-16"),
-    ):
-        if raw.startswith(mark):
-            try:
-                return raw.decode(name), ""
-            except UnicodeDecodeError as error:
-                raise LogError(f"is not the {name} its first bytes say", where=where) from error
-    if b"\0" in raw[:65536]:
-        raise LogError("holds zero bytes", where=where, expected="text (UTF-16 needs its byte order mark)")
+    @property
+    def score(self) -> tuple[float, int]:
+        return self.proven / len(self.layout.columns), self.proven
+
+
+def split_line(line: str, separator: str) -> Row:
+    """Cells of one line, without the blanks around them."""
     try:
-        return raw.decode("utf-8"), ""
-    except UnicodeDecodeError:
-        note = f"{where}: not UTF-8, read as Windows-1252"
-        try:
-            return raw.decode("cp1252"), note
-        except UnicodeDecodeError:
-            return raw.decode("latin-1"), note.replace("Windows-1252", "Latin-1")
+        cells = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:  # a cell beyond the size limit, or a NUL
+        cells = line.split(separator)
+    return [c.strip() for c in cells]
 
 
-def find_dialect(text: str, *, where: str) -> Dialect:
-    """Find separator, header and units row.
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment."""
+    return line.lstrip().startswith(_COMMENTS)
 
-    A separator is accepted if it splits the sampled rows alike and at least two columns (or one beside a column of
-    times) are numbers in 99 % of their cells.
+
+def find_layout(data: bytes, *, where: str) -> Layout:
+    """Find and prove the layout of a CSV file.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file in UTF-8.
+    where : str
+        Named in an error.
 
     Raises
     ------
     LogError
-        If none is, with what was tried.
+        If no reading of the file is proven; the message says what was tried.
     """
-    lines = [line.rstrip("\r") for line in islice(_lines(text), _HEADER_LIMIT + _SAMPLE_ROWS)]
-    best: tuple[int, Dialect] | None = None
-    for separator in _SEPARATORS:
-        found = _try(lines, separator)
-        if found is not None and (best is None or found[0] > best[0]):
-            best = found
-    if best is None:
-        raise LogError(
-            "is not a table of numbers that aqualog can read",
-            where=where,
-            expected="a header line, then rows split by comma, semicolon, tab or |",
-            hint="check separator and header; a file without a header needs one",
-        )
-    return best[1]
+    head, spread = _sample(data)
+    used = [s for s in _SEPARATORS if sum(s in line for line in head) >= 2]
+    if not used:
+        raise LogError("has one column only", where=where, expected="a time and at least one signal", hint=_HINT)
+    candidates, reasons = [], []
+    for separator in used:
+        found = _with_separator(head, spread, separator)
+        if isinstance(found, str):
+            reasons.append(f"{_SHOWN[separator]}: {found}")
+        else:
+            candidates.append(found)
+    if candidates:
+        return max(candidates, key=lambda c: c.score).layout
+    raise _unproven(reasons, where)
 
 
-def _lines(text: str) -> Iterator[str]:
-    start = 0
-    while start < len(text):
-        end = text.find("\n", start)
-        if end < 0:
-            end = len(text)
-        yield text[start:end]
-        start = end + 1
+def _unproven(reasons: Sequence[str], where: str) -> LogError:
+    if any("no header" in r for r in reasons):
+        what, hint = "has no header line", "put one line such as t [s],omega_fl [rad/s] above the data"
+    else:
+        what, hint = "is not a table that can be understood", _HINT
+    tried = "; ".join(reasons)
+    return LogError(f"{what} (tried {tried})", where=where, expected="a header and columns of numbers", hint=hint)
 
 
-def _try(lines: Sequence[str], separator: str) -> tuple[int, Dialect] | None:
-    rows = [next(csv.reader([line], delimiter=separator), []) for line in lines]
-    width = _common_width(rows)
-    if width < 2:
-        return None
-    for header in range(min(len(rows), _HEADER_LIMIT)):
-        if not _is_header(rows[header], width):
+def _sample(data: bytes) -> tuple[list[str], list[str]]:
+    """Lines of the head, and whole lines from places spread over the rest."""
+    head = data[:_HEAD_BYTES]
+    is_whole = len(head) == len(data)
+    lines = head.split(b"\n", _HEAD_LINES)
+    rest = len(lines) > _HEAD_LINES or not is_whole
+    if rest and len(lines) > 1:
+        lines.pop()
+    start = sum(len(line) + 1 for line in lines)
+    spread = list(_spread(data, start)) if rest else []
+    return [_text(line) for line in lines], [_text(line) for line in spread]
+
+
+def _spread(data: bytes, start: int) -> Iterator[bytes]:
+    step = (len(data) - start) // _SPREAD
+    for k in range(_SPREAD if step else 0):
+        begin = data.find(b"\n", start + k * step) + 1
+        if begin:
+            yield from data[begin : begin + (1 << 16)].split(b"\n", _SPREAD_ROWS)[:-1]
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8", errors="replace").rstrip("\r")
+
+
+def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str) -> _Candidate | str:
+    """The best reading with this separator, or why there is none."""
+    rows = [split_line(line, separator) for line in head]
+    reason = ""
+    for k, row in enumerate(rows):
+        if not _is_header_like(row):
             continue
-        first = header + 1
-        units: list[str] = []
-        if first < len(rows) and _is_units_row(rows[first]):
-            units = [c.strip().strip("[]()") for c in rows[first]]
-            first += 1
-        body = [r for r in rows[first : first + _SAMPLE_ROWS] if any(c.strip() for c in r)]
-        numeric, proven, has_times = _numeric_columns(body, width, separator)
-        if proven + has_times < 2 or not proven:
-            continue
-        parts = [split_unit(c) for c in rows[header][:width]]
-        names = _unique([n or f"column {i + 1}" for i, (n, _) in enumerate(parts)])
-        padded = [*units, *[""] * (width - len(units))]
-        merged = tuple(u or ("" if p in ("", "-") else p) for (_, u), p in zip(parts, padded, strict=False))
-        return proven, Dialect(separator, names, merged, tuple(numeric), header + 1, first + 1)
-    return None
+        header, units, body_at = _header_block(head, rows, k)
+        body = [r for line, r in zip(head[body_at:], rows[body_at:], strict=True) if any(r) and not is_comment(line)]
+        body = body[:_BODY_ROWS] + [split_line(line, separator) for line in spread if line and not is_comment(line)]
+        found = _prove(header, units, body, separator, _first_data(head, rows, body_at) + 1)
+        if not isinstance(found, str):
+            return found
+        reason = reason or found
+    return reason or "no header line above the data"
 
 
-def _common_width(rows: Sequence[Sequence[str]]) -> int:
-    widths = [len(r) for r in rows if any(c.strip() for c in r)]
-    return max(set(widths), key=lambda w: (widths.count(w), w)) if widths else 0
+def _first_data(head: Sequence[str], rows: Sequence[Row], at: int) -> int:
+    """Index of the first line from `at` that is neither blank nor a comment."""
+    for k in range(at, len(rows)):
+        if any(rows[k]) and not is_comment(head[k]):
+            return k
+    return at
 
 
-def _is_header(row: Sequence[str], width: int) -> bool:
-    cells = [c.strip() for c in row]
-    if len(cells) not in (width, width - 1) and not (len(cells) == width + 1 and not cells[-1]):
+def _is_header_like(row: Row) -> bool:
+    """Whether a row names at least two columns and holds no number and no time."""
+    filled = [c for c in row if c and not is_bad(c)]
+    if len(filled) < 2:
         return False
-    filled = [c for c in cells if c]
-    words = [c for c in filled if not _POINT.match(c) and not _TIME_TEXT.match(c) and c.lower() not in BAD_WORDS]
-    return len(filled) >= 2 and len(words) >= 0.8 * len(filled) and not cells[0].startswith(("#", "//", "%"))
+    return not any(_is_datum(c) for c in filled)
 
 
-def _is_units_row(row: Sequence[str]) -> bool:
-    cells = [c.strip().strip("[]()") for c in row]
-    filled = [c for c in cells if c and c != "-"]
+def _is_datum(cell: str) -> bool:
+    return any(is_number(cell, s) for s in STYLES[:2]) or is_stamp(cell) or is_clock(cell) or is_date(cell)
+
+
+def _is_units(row: Row) -> bool:
+    """Whether a row holds units: most of its cells are known spellings, at least one of them a word."""
+    filled = [_bare(c) for c in row if c and c != "-"]
     known = [c for c in filled if is_unit(c)]
-    return len(known) >= max(1.0, 0.5 * len(filled)) and not any(_POINT.match(c) and c != "1" for c in filled)
+    return len(known) * 2 > len(filled) and any(not c.isdigit() for c in known)
 
 
-def _numeric_columns(body: Sequence[Sequence[str]], width: int, separator: str) -> tuple[list[bool], int, bool]:
-    numeric, proven, times = [], 0, False
-    for i in range(width):
-        cells = [r[i].strip() for r in body if len(r) > i and r[i].strip()]
-        good = sum(_is_number(c, separator) for c in cells)
-        # a column that is blank in the sample may hold a slow signal: it is kept, and proves nothing
-        numeric.append(good >= 0.99 * len(cells))
-        proven += numeric[-1] and bool(cells)
-        times |= bool(cells) and all(_TIME_TEXT.match(c) for c in cells)
-    return numeric, proven, times
+def _bare(cell: str) -> str:
+    return cell.strip("[](){} ")
 
 
-def _is_number(cell: str, separator: str) -> bool:
-    lower = cell.lower()
-    if lower in BAD_WORDS or lower in _LOGICAL:
-        return True
-    return bool(_POINT.match(cell) and (separator == "," or "," not in cell)) or bool(
-        separator != "," and _COMMA.match(cell)
-    )
+def _header_block(head: Sequence[str], rows: Sequence[Row], first: int) -> tuple[Row, Row, int]:
+    """Names, units and the index of the line behind them.
+
+    Above the data there may stand several lines of words (groups, names, units, types): the units are known by their
+    spelling and the names stand above them; without units the last line is that of the names. A comment sign before
+    the only line of names is dropped, as numpy writes it.
+    """
+    block = [first]
+    for k in range(first + 1, len(rows)):
+        if _is_header_like(rows[k]) or (_is_units(rows[k]) and not is_comment(head[k])):
+            block.append(k)
+        elif any(rows[k]) and not is_comment(head[k]):
+            break
+    names = [k for k in block if not is_comment(head[k])] or block[-1:]
+    units_at = next((k for k in names[1:] if _is_units(rows[k])), None)
+    if units_at is None:
+        header = rows[names[-1]]
+        return [_uncommented(header[0]), *header[1:]], [], names[-1] + 1
+    return rows[names[names.index(units_at) - 1]], [_bare(c) if c != "-" else c for c in rows[units_at]], names[-1] + 1
 
 
-def _unique(names: Sequence[str]) -> tuple[str, ...]:
-    """Second and later columns of one name become `name#2`, so that none is lost and none is taken for the other."""
-    seen: dict[str, int] = {}
-    result = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        result.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return tuple(result)
+def _uncommented(cell: str) -> str:
+    for sign in _COMMENTS:
+        if cell.startswith(sign):
+            return cell.removeprefix(sign).strip()
+    return cell
+
+
+def _prove(
+    header: Row, units: Row, body: Sequence[Row], separator: str, first_line: int
+) -> _Candidate | str:  # fmt: skip
+    names = _trimmed(header)
+    if not body:
+        return "a header, but no data below it"
+    used = [len(_trimmed(r)) for r in body]
+    long = sum(u > len(names) for u in used)
+    if long > max(1, len(body) // 100):
+        return f"{len(names)} names, but {max(used)} cells in a row"
+    if not any(len(r) >= len(names) for r in body):
+        return f"{len(names)} names, but at most {max(map(len, body))} cells in a row"
+    columns = _columns(names, units, body, separator)
+    proven = sum(c.kind not in ("text", "blank") for c in columns)
+    sound = sum(c.kind != "text" for c in columns)
+    if proven < 1 or sound < 2:
+        return f"{proven} of {len(names)} columns hold numbers in 99 % of their cells"
+    twice = tuple(dict.fromkeys(n for n in (split_unit(h)[0] for h in names) if n and _count(names, n) > 1))
+    widths = [len(r) for r in body]
+    width = max(len(names), max(set(widths), key=widths.count))
+    return _Candidate(Layout(separator, columns, width, first_line, twice), proven)
+
+
+def _count(headers: Sequence[str], name: str) -> int:
+    return sum(split_unit(h)[0] == name for h in headers)
+
+
+def _trimmed(row: Row) -> Row:
+    """A row without the blank cells at its end."""
+    blank = sum(1 for _ in takewhile(lambda c: not c, reversed(row)))
+    return row[: len(row) - blank]
+
+
+def _columns(names: Row, units: Row, body: Sequence[Row], separator: str) -> tuple[Column, ...]:
+    """Kind and decimal sign of each column; a name or a cell that says neither goes with the rest of the file."""
+    cells = [[r[k] for r in body if k < len(r) and r[k]] for k in range(len(names))]
+    order = _preferred(cells, separator)
+    split = [split_unit(n.removeprefix("'") if _is_defused(n) else n) for n in names]
+    paths = unique_names([name for name, _ in split])
+    below = units + [""] * len(names)
+    columns = []
+    for k, column in enumerate(cells):
+        style = _style(column, order)
+        columns.append(Column(k, paths[k], split[k][1] or below[k], style, *_kind(column, style)))
+    return tuple(columns)
+
+
+def _preferred(columns: Sequence[Sequence[str]], separator: str) -> tuple[Style, ...]:
+    """The styles that may be, those first that the file as a whole speaks for: they decide where a column does not.
+
+    A group of three behind a sign is as good a fraction as it is thousands: only cells with both signs, or with two
+    groups, prove thousands; a damaged cell among hundreds does not. Where commas separate the cells, a comma in quotes
+    is one of thousands rather than a decimal sign.
+    """
+    point, comma = (sum(_only(column, s, o) for column in columns) for s, o in (STYLES[:2], STYLES[1::-1]))
+    plain: tuple[Style, ...] = STYLES[1::-1] if comma > point else STYLES[:2]
+    if separator == "," and plain[0] == STYLES[0]:
+        plain = (STYLES[0], STYLES[3], STYLES[1])
+    proven = [s for s in STYLES if s.thousands and any(_proves(column, s) for column in columns)]
+    return tuple(dict.fromkeys((*proven, *plain)))
+
+
+def _only(column: Sequence[str], style: Style, other: Style) -> bool:
+    """Whether one decimal sign explains a column better than the other."""
+    return _explained(column, style) > _explained(column, other)
+
+
+def _explained(column: Sequence[str], style: Style) -> int:
+    return sum(is_number(c, style) for c in column)
+
+
+def _proves(column: Sequence[str], style: Style) -> bool:
+    """Whether more than a stray cell cannot be a number but with this sign between thousands."""
+    proofs = sum(is_number(c, style) and not any(is_number(c, s) for s in STYLES[:2]) for c in column)
+    return proofs > len(column) // 100
+
+
+def _style(column: Sequence[str], order: Sequence[Style]) -> Style:
+    """The style that explains the most cells of a column, the first of equals."""
+    usable = [s for s in order if not (s.thousands and any(_has_leading_zero(c, s.thousands) for c in column))]
+    return max(usable, key=lambda s: _explained(column, s))
+
+
+def _has_leading_zero(cell: str, thousands: str) -> bool:
+    """Whether a cell such as `0.250` is no group of thousands."""
+    whole, sign, _ = cell.lstrip("+-").partition(thousands)
+    return bool(sign) and whole.startswith("0")
+
+
+def _is_defused(header: str) -> bool:
+    """Whether an apostrophe stands before the name only to keep a spreadsheet from running it."""
+    return header[:1] == "'" and header[1:2] in ("=", "+", "-", "@", "\t")
+
+
+def _kind(cells: Sequence[str], style: Style) -> tuple[ColumnKind, float, str]:
+    """Kind of a column by its filled cells, the share of cells that do not fit, and one of these."""
+    if not cells:
+        return "blank", 0.0, ""
+    texts = [c for c in cells if not is_number(c, style) and not is_bad(c)]
+    allowed = max(int(len(cells) >= 3), len(cells) // 100)
+    if len(texts) <= allowed and len(texts) < len(cells):
+        return "number", 0.0, ""
+    shapes: tuple[tuple[ColumnKind, int], ...] = (
+        ("stamp", sum(map(is_stamp, texts))), ("date", sum(map(is_date, texts))), ("clock", sum(map(is_clock, texts))),
+    )  # fmt: skip
+    kind, hits = max(shapes, key=lambda s: s[1])
+    if hits and len(cells) - hits <= allowed:
+        return kind, 0.0, ""
+    return "text", len(texts) / len(cells), texts[0]

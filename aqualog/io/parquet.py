@@ -1,9 +1,10 @@
-"""Parquet logs."""
+"""Parquet logs: one table whose columns are signals and one of which is the time."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -12,105 +13,148 @@ import numpy as np
 import polars as pl
 
 from aqualog.errors import LogError
-from aqualog.io.base import ReadOptions
-from aqualog.io.table_time import choose_time, numbers_to_ns, split_unit, texts_to_ns
-from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
+from aqualog.io.arrow_schema import field_metadata
+from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.csv_cells import is_clock, is_stamp
+from aqualog.io.table_names import split_unit, unique_names
+from aqualog.io.table_time import FieldKind, Stamps, TableField, choose_time, from_dates, from_numbers
+from aqualog.io.write_table import METADATA_KEY
+from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray
 
-__all__ = ["METADATA_KEY", "ParquetReader"]
+__all__ = ["ParquetReader"]
 
-METADATA_KEY = "aqualog"
+_LOOKED_AT = 50
+_UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6}
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """A column of the file: `stored` is its name there, `path` the name without the unit."""
+
+    stored: str
+    path: str
+    unit: str
+    dtype: pl.DataType
+    kind: FieldKind
 
 
 class ParquetReader:
-    """One Parquet file. A null is no sample, a NaN a bad one. Units: in the column's name, or in our own metadata."""
+    """Reader of one Parquet file.
+
+    A null is no sample of its channel; a NaN is a bad sample. Units stand in the metadata of the file (as aqualog
+    writes them) or of a field (`unit`), or in the name of the column (`v_x [km/h]`).
+    """
 
     format = "parquet"
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         self._path = path
-        self._name = path.name
-        self._notes: list[str] = []
-        try:
-            schema = pl.read_parquet_schema(path)
-            stored = _own_metadata(path)
-            self._rows = int(pl.scan_parquet(path).select(pl.len()).collect().item())
-        except (pl.exceptions.PolarsError, OSError) as error:
-            raise LogError(f"cannot be read ({error})", where=str(path), expected="a complete Parquet file") from error
-        self._start_ns = stored.get("start_ns")
-        own_units = stored.get("units", {})
-        columns = list(schema)
-        parts = [split_unit(c) for c in columns]
-        names = [n for n, _ in parts]
-        units = [u or own_units.get(n, "") for n, u in parts]
-        self._time = choose_time(names, units, options, where=str(path))
-        self._columns = columns
-        self._types = list(schema.values())
-        self._infos = tuple(
-            ChannelInfo(names[i], names[i], units[i], self._rows, self._name, key=i)
-            for i, kind in enumerate(self._types)
-            if i not in self._time.columns and (kind.is_numeric() or kind == pl.Boolean)
+        self._faults = FaultLog()
+        self._stamps: Stamps | None = None
+        schema, metadata = self._wrapped(lambda: (pl.read_parquet_schema(path), pl.read_parquet_metadata(path)))
+        about = _about(metadata)
+        start = about.get("start_ns")
+        self._start_ns = start if isinstance(start, int) else None
+        self._columns = self._listed(schema, _units(about) or field_metadata(metadata.get("ARROW:schema", ""), "unit"))
+        fields = [TableField(c.path, c.unit, c.kind) for c in self._columns]
+        self._time = choose_time(fields, options, where=str(path))
+        self._rows: int = self._wrapped(
+            lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
         )
+        if self._time.note:
+            self._note(self._time.note)
 
     def channels(self) -> Sequence[ChannelInfo]:
-        """Columns of numbers, in file order."""
-        return self._infos
+        """All numeric columns but the time."""
+        return [
+            ChannelInfo(c.path, c.path, c.unit, self._rows, self._path.name, key=k)
+            for k, c in enumerate(self._columns)
+            if c.kind == "number" and k != self._time.index
+        ]
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
+        """Read these columns only."""
+        asked = list(wanted)
+        times = [k for k in (self._time.index, self._time.day) if k is not None and self._stamps is None]
+        stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
+        if not stored:
+            return []
+        scan = pl.scan_parquet(self._path, glob=False).select(stored)
+        frame: pl.DataFrame = self._wrapped(scan.collect)
+        if self._stamps is None:
+            self._stamps = self._read_time(frame)
+        return [self._channel(w, frame[self._columns[w.key].stored], self._stamps) for w in asked]
+
+    def _channel(self, info: ChannelInfo, column: pl.Series, stamps: Stamps) -> Channel:
+        keep = stamps.valid & column.is_not_null().to_numpy()
+        values = _floats(column)[keep]
+        values[~np.isfinite(values)] = np.nan
+        return Channel(info, stamps.t_ns[keep], values, stamps.absolute)
+
+    def _read_time(self, frame: pl.DataFrame) -> Stamps:
+        column, choice = self._columns[self._time.index], self._time
+        day = None if choice.day is None else frame[self._columns[choice.day].stored].cast(pl.String)
+        try:
+            stamps = _stamps(frame[column.stored], day, choice.unit, column.kind)
+        except LogError as error:  # it does not know the file
+            raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
+        if self._start_ns is not None and not stamps.absolute:
+            stamps = replace(stamps, t_ns=stamps.t_ns + self._start_ns, absolute=True)
+        for note in stamps.notes:
+            self._note(note)
+        lost = np.flatnonzero(~stamps.valid)
+        if lost.size:
+            self._faults.lost_samples += int(lost.size)
+            where = f"(first at row {lost[0] + 1})"
+            self._note(f'time column "{column.path}": {lost.size} rows without a time are left out {where}')
+        return stamps
+
+    def _listed(self, schema: Any, units: dict[str, str]) -> tuple[_Column, ...]:
+        known = [(n, units[n]) if n in units else split_unit(n) for n in schema]
+        paths = unique_names([name for name, _ in known])
+        return tuple(
+            _Column(stored, path, unit, dtype, self._kind(stored, dtype))
+            for (stored, dtype), path, (_, unit) in zip(schema.items(), paths, known, strict=True)
+        )
+
+    def _kind(self, stored: str, dtype: pl.DataType) -> FieldKind:
+        if dtype.is_numeric() or dtype == pl.Boolean or isinstance(dtype, pl.Duration):
+            return "number"
+        if isinstance(dtype, pl.Datetime):
+            return "stamp"
+        if dtype == pl.Date:
+            return "date"
+        if dtype == pl.Time:
+            return "clock"
+        return self._text_kind(stored) if dtype == pl.String else "text"
+
+    def _text_kind(self, stored: str) -> FieldKind:
+        """Whether a column of text holds times."""
+        scan = pl.scan_parquet(self._path, glob=False).select(pl.col(stored).head(_LOOKED_AT))
+        cells = [c.strip() for c in self._wrapped(scan.collect)[stored].drop_nulls().to_list()]
+        if cells and all(map(is_stamp, cells)):
+            return "stamp"
+        return "clock" if cells and all(map(is_clock, cells)) else "text"
+
+    def _wrapped(self, action: Callable[[], Any]) -> Any:
+        """Result of a call into the library, whose errors of all kinds become ours."""
+        try:
+            return action()
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
+            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            hint = "check whether it was written to its end: the index stands there"
+            raise LogError(f"cannot be read as Parquet ({reason})", where=str(self._path), hint=hint) from error
+
+    def _note(self, text: str) -> None:
+        self._faults.notes.append(f"{self._path.name}: {text}")
 
     @property
     def faults(self) -> FileFaults:
-        """Notes on how the time was read."""
-        return FileFaults(notes=tuple(self._notes))
-
-    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
-        """Read these columns and the time."""
-        wanted = list(wanted)
-        names = dict.fromkeys(self._columns[i] for i in (*self._time.columns, *(w.key for w in wanted)))
-        try:
-            table = pl.read_parquet(self._path, columns=list(names))
-        except (pl.exceptions.PolarsError, OSError) as error:
-            raise LogError(f"cannot be read ({error})", where=str(self._path)) from error
-        t_ns, known, absolute = self._stamps(table)
-        channels = []
-        for info in wanted:
-            column = table[self._columns[info.key]]
-            use = known & column.is_not_null().to_numpy()
-            values = column.cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64)
-            channels.append(Channel(info, t_ns[use], values[use], absolute))
-        return channels
-
-    def _stamps(self, table: pl.DataFrame) -> tuple[TimeArray, BoolArray, bool]:
-        column = table[self._columns[self._time.columns[0]]]
-        where = f"{self._name}:{column.name}"
-        known = column.is_not_null().to_numpy()
-        if column.dtype in (pl.Datetime, pl.Date):
-            stamps = column.cast(pl.Datetime("ns")).dt.epoch("ns")
-            return stamps.fill_null(0).to_numpy().astype(np.int64), known, True
-        if column.dtype in (pl.Duration, pl.Time):
-            return (
-                column.cast(pl.Int64 if column.dtype == pl.Time else pl.Duration("ns"))
-                .cast(pl.Int64)
-                .fill_null(0)
-                .to_numpy()
-                .astype(np.int64),
-                known,
-                False,
-            )
-        if column.dtype == pl.String:
-            found = texts_to_ns(column.fill_null(""))
-            if found is None:
-                raise LogError("the time is text that is no date", where=where)
-            return found
-        numbers = column.cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64)
-        known = known & np.isfinite(numbers)
-        t_ns = np.zeros(numbers.size, dtype=np.int64)
-        t_ns[known], absolute, note = numbers_to_ns(numbers[known], self._time.unit, where=where)
-        if self._start_ns is not None:
-            t_ns, absolute = t_ns + np.int64(self._start_ns), True
-        elif note:
-            self._notes.append(note)
-        return t_ns, known, absolute
+        """What was lost so far; complete after `read`."""
+        return self._faults.freeze()
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Nothing is held open."""
 
     def __enter__(self) -> Self:
         return self
@@ -121,11 +165,45 @@ class ParquetReader:
         self.close()
 
 
-def _own_metadata(path: Path) -> dict[str, Any]:
-    """Units and start time that our own writer left; empty for files of others."""
-    text = pl.read_parquet_metadata(path).get(METADATA_KEY, "{}")
+def _about(metadata: dict[str, str]) -> dict[str, Any]:
     try:
-        stored = json.loads(text)
+        about = json.loads(metadata.get(METADATA_KEY, "{}"))
     except ValueError:
         return {}
-    return stored if isinstance(stored, dict) else {}
+    return about if isinstance(about, dict) else {}
+
+
+def _units(about: dict[str, Any]) -> dict[str, str]:
+    units = about.get("units")
+    return {str(k): str(v) for k, v in units.items()} if isinstance(units, dict) else {}
+
+
+def _floats(column: pl.Series) -> FloatArray:
+    if isinstance(column.dtype, pl.Duration):
+        column = _duration_ns(column).cast(pl.Float64) * 1e-9
+    values: FloatArray = column.cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64)
+    return values
+
+
+def _duration_ns(column: pl.Series) -> pl.Series:
+    unit = column.dtype.time_unit if isinstance(column.dtype, pl.Duration) else "ns"
+    return column.to_physical().cast(pl.Int64) * _UNIT_NS[str(unit)]
+
+
+def _stamps(column: pl.Series, day: pl.Series | None, unit: str, kind: FieldKind) -> Stamps:
+    dtype = column.dtype
+    if isinstance(dtype, pl.Datetime):
+        return _whole(column.to_physical().cast(pl.Int64) * _UNIT_NS[dtype.time_unit], absolute=True)
+    if isinstance(dtype, pl.Duration):
+        return _whole(_duration_ns(column), absolute=False)
+    if kind in ("stamp", "clock"):
+        # a cast of a time of day to text drops the fraction of the second
+        text = column.dt.to_string("%H:%M:%S%.9f") if dtype == pl.Time else column.cast(pl.String)
+        return from_dates(text, day, kind)
+    if dtype.is_integer() and not column.null_count():
+        return from_numbers(column.cast(pl.Int64).to_numpy(), unit)
+    return from_numbers(_floats(column), unit, cells=column.cast(pl.String) if dtype.is_integer() else None)
+
+
+def _whole(t: pl.Series, *, absolute: bool) -> Stamps:
+    return Stamps(t.fill_null(0).to_numpy().astype(np.int64), t.is_not_null().to_numpy().copy(), absolute)

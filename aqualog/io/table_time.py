@@ -1,178 +1,274 @@
-"""Which column of a table is the time, and what it counts in."""
+"""Which column of a table is the time, what unit it has, and its stamps in nanoseconds."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
-from aqualog.errors import LogError
+from aqualog.errors import ConfigError, LogError
 from aqualog.io.base import ReadOptions
 from aqualog.types import BoolArray, FloatArray, TimeArray
 from aqualog.units import is_unit, parse_unit
 
-__all__ = ["TimeColumn", "choose_time", "numbers_to_ns", "split_unit", "texts_to_ns"]
+__all__ = ["Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "text_to_ns"]
 
-_NAMES = ("t", "time", "timestamp", "timestamps", "zeit", "zeitstempel", "utc", "datetime", "time_stamp", "elapsed")
-_SUFFIXES = {"_ns": "ns", "_us": "us", "_ms": "ms", "_s": "s", "_sec": "s"}
-_YEAR_2000 = 946_684_800.0
-_YEAR_2100 = 4_102_444_800.0
-_FORMATS = ("%Y-%m-%dT%H:%M:%S%.f", "%Y/%m/%dT%H:%M:%S%.f", "%d.%m.%YT%H:%M:%S%.f", "%Y%m%dT%H:%M:%S%.f")
-_BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
+FieldKind = Literal["number", "stamp", "date", "clock", "text"]
+
+# Preferred first: the logger's own clock is finer and steadier than the UTC that some write beside it.
+_STEMS = (
+    "t", "time", "timestamp", "timestamps", "time stamp", "zeit", "zeitstempel", "timebase", "elapsed time", "rel time",
+    "log time", "date time", "datetime", "date/time", "%time", "t rel", "time rel", "gps time", "gpstime", "utc time",
+    "utc", "uhrzeit", "time of day",
+)  # fmt: skip
+_SUFFIX = re.compile(r"^(?P<stem>.*?)[ _]?(?P<unit>seconds|secs|sec|s|ms|msec|us|µs|usec|ns|nsec|min)$")
+_DATES = ("date", "datum", "utc date", "gps date", "day")
+_HINT = '[time] channel = "..." in the map'
+
+_NS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+_DIGITS = {10**9: 9, 10**6: 6, 10**3: 3, 1: 0}
+_EPOCH_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
+_PLAUSIBLE_STEP_S = (1e-6, 60.0)
+_ABSURD_S = 5 * 3600.0
+_LATEST_S = 9.2e9  # what int64 nanoseconds hold
+_EXACT = 1e6  # seconds, up to which float64 resolves a nanosecond
 
 
 @dataclass(frozen=True, slots=True)
-class TimeColumn:
-    """The time of a table: one column, or a date and a time of day. `unit` is empty where nothing says it."""
+class TableField:
+    """A column as a candidate for the time."""
 
-    columns: tuple[int, ...]
+    name: str
     unit: str
+    kind: FieldKind
 
 
-def split_unit(header: str) -> tuple[str, str]:
-    """Name and unit of a header cell: `v_x [km/h]` -> (`v_x`, `km/h`).
+@dataclass(frozen=True, slots=True)
+class TimeChoice:
+    """The time column, the column of the day beside it if there is one, and the unit, empty if not given."""
 
-    A last part in brackets counts as unit if square brackets hold it, or if it is one in round ones; a bracket that is
-    closed by the wrong kind is forgiven.
-    """
-    text = header.strip()
-    match = _BRACKET.match(text)
-    if match is None or not match["name"]:
-        return text, ""
-    unit = match["unit"].strip()
-    if is_unit(unit) or "[" in text[len(match["name"]) :]:
-        return match["name"].strip(), unit
-    return text, ""
+    index: int
+    day: int | None
+    unit: str
+    note: str = ""
 
 
-def choose_time(names: Sequence[str], units: Sequence[str], options: ReadOptions, *, where: str) -> TimeColumn:
-    """Find the time column by its name.
+@dataclass(frozen=True, slots=True)
+class Stamps:
+    """Time stamps (n,) [ns]; only those where `valid` mean anything."""
 
-    Parameters
-    ----------
-    names, units : sequences
-        Of all columns.
-    options : ReadOptions
-        `time_channel` and `time_unit` win.
-    where : str
-        File, for errors.
+    t_ns: TimeArray
+    valid: BoolArray
+    absolute: bool
+    notes: tuple[str, ...] = ()
+
+
+def choose_time(fields: Sequence[TableField], options: ReadOptions, *, where: str) -> TimeChoice:
+    """Find the time column.
+
+    The user's `time_channel` comes first, then the names that loggers give it. A drive may have several tables of which
+    only one has the user's column: in the others the usual names count, which is noted.
 
     Raises
     ------
     LogError
-        If no column or more than one may be it.
+        If no column can be the time.
+    ConfigError
+        If the user's unit is not one of time.
     """
-    lower = [n.strip().lower() for n in names]
-    if options.time_channel is not None:
-        wanted = split_unit(options.time_channel)[0].lower()
-        if wanted not in lower:
-            raise _no_time(names, where, f'no column "{options.time_channel}"')
-        index = lower.index(wanted)
-        return TimeColumn((index,), options.time_unit or units[index] or _suffix_unit(lower[index]))
-    if "date" in lower and "time" in lower:
-        return TimeColumn((lower.index("date"), lower.index("time")), "")
-    for wanted in (lambda n: n in _NAMES, lambda n: _stem(n) in _NAMES, lambda n: n.startswith(("time", "zeit"))):
-        hits = [i for i, n in enumerate(lower) if wanted(n)]
-        if hits:
-            index = hits[0]
-            return TimeColumn((index,), options.time_unit or units[index] or _suffix_unit(lower[index]))
-    raise _no_time(names, where, "no time column")
+    note = ""
+    found = _named(fields, options.time_channel) if options.time_channel else None
+    if found is None:
+        found = _usual(fields)
+        if options.time_channel and found is not None:
+            note = f'no time channel "{options.time_channel}"; "{fields[found].name}" is taken'
+    if found is None:
+        listed = ", ".join(f.name for f in fields[:20]) + (", ..." if len(fields) > 20 else "")
+        asked = f' "{options.time_channel}"' if options.time_channel else ""
+        raise LogError(f"no time column{asked} among: {listed}", where=where, expected="t [s] or time", hint=_HINT)
+    unit = _given_unit(options.time_unit, where) if options.time_unit else _own_unit(fields[found])
+    day = next((k for k, f in enumerate(fields) if f.kind == "date" and k != found), None)
+    return TimeChoice(found, day if fields[found].kind == "clock" else None, unit, note)
 
 
-def _stem(name: str) -> str:
-    return next((name.removesuffix(s) for s in _SUFFIXES if name.endswith(s)), name)
+def _named(fields: Sequence[TableField], name: str) -> int | None:
+    spellings = [(f.name, f"{f.name} [{f.unit}]") for f in fields]
+    exact = next((k for k, s in enumerate(spellings) if name.strip() in s), None)
+    if exact is not None:
+        return exact
+    return next((k for k, s in enumerate(spellings) if name.strip().casefold() in map(str.casefold, s)), None)
 
 
-def _suffix_unit(name: str) -> str:
-    return next((unit for s, unit in _SUFFIXES.items() if name.endswith(s)), "")
+def _usual(fields: Sequence[TableField]) -> int | None:
+    ranked = [(_rank(f), k) for k, f in enumerate(fields) if f.kind in ("number", "stamp", "clock")]
+    best = min((r for r in ranked if r[0] is not None), default=None, key=lambda r: (r[0] or 0, r[1]))
+    return None if best is None else best[1]
 
 
-def _no_time(names: Sequence[str], where: str, what: str) -> LogError:
-    listed = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
-    return LogError(f"{what} among {listed}", where=where, expected="a column such as t [s], time or t_ms",
-                    hint='[time] channel = "NAME" and unit = "s" in the signal map')  # fmt: skip
+def _rank(field: TableField) -> int | None:
+    """Place of a name in the list of usual ones, without a unit at its end."""
+    name = re.sub(r"[ _\-.]+", " ", field.name.casefold()).strip()
+    if name in _STEMS:
+        return _STEMS.index(name)
+    split = _SUFFIX.match(name)
+    stem = split["stem"].strip() if split else ""
+    return _STEMS.index(stem) if stem in _STEMS else None
 
 
-def numbers_to_ns(t: FloatArray, unit: str, *, where: str) -> tuple[TimeArray, bool, str]:
-    """Numbers into nanoseconds.
+def _given_unit(unit: str, where: str) -> str:
+    if not is_unit(unit) or parse_unit(unit).dimension != "time":
+        raise ConfigError(f'"{unit}" is no unit of time', where=where, expected="s, ms, us or ns", hint="[time] unit")
+    return unit
+
+
+def _own_unit(field: TableField) -> str:
+    """Unit of the header, or of the end of the name; empty if there is none that is a time."""
+    if is_unit(field.unit) and parse_unit(field.unit).dimension == "time":
+        return field.unit
+    name = field.name.casefold()
+    split = _SUFFIX.match(name)
+    if split and name not in _STEMS and split["stem"].strip(" _"):
+        return split["unit"]
+    return ""
+
+
+def from_numbers(
+    values: NDArray[np.float64] | NDArray[np.int64], unit: str, *, cells: pl.Series | None = None
+) -> Stamps:
+    """Stamps of a numeric column.
 
     Parameters
     ----------
-    t : array (n,)
-        Finite stamps.
+    values : array (n,)
+        Float, NaN where missing, or int64.
     unit : str
-        Unit of time; empty: decided by the values, and said in the note.
-
-    Returns
-    -------
-    t_ns : int64 array (n,)
-    absolute : bool
-        Whether they count from 1970.
-    note : str
+        Unit of time; empty if it is to be judged by the values.
+    cells : Series of text, optional
+        What `values` were read from: large stamps are converted from it, digit by digit, where float64 is too coarse.
     """
-    note = ""
-    if not unit or not is_unit(unit) or parse_unit(unit).dimension != "time":
-        if unit:
-            raise LogError(
-                f'time is in "{unit}"', where=where, expected="s, ms, us or ns", hint="[time] unit in the map"
-            )
-        unit = _guess_unit(t)
-        note = f"{where}: the time has no unit; taken as {unit}"
-    scale = parse_unit(unit).factor * 1e9
-    with np.errstate(invalid="ignore"):
-        # whole ticks times a whole factor stay exact; only fractions of a tick are rounded
-        t_ns = np.rint(t * round(scale)) if scale >= 1 else np.rint(t * scale)
-    if t.size and np.abs(t_ns).max() > 9e18:
-        raise LogError(f"time stamps reach {np.abs(t).max():g} {unit}", where=where, expected="times within 290 years")
-    first = float(t_ns[0]) * 1e-9 if t.size else 0.0
-    return t_ns.astype(np.int64), _YEAR_2000 < first < _YEAR_2100, note
+    notes: tuple[str, ...] = ()
+    valid: BoolArray = np.isfinite(values)
+    if unit:
+        factor = _ns_per(unit)
+    else:
+        name, reason = _judged(values[valid].astype(np.float64))
+        factor, notes = _NS[name], (f"the time has no unit; taken as {name} ({reason})",)
+    seconds = values.astype(np.float64) * (factor / 1e9)
+    valid &= np.abs(seconds) < _LATEST_S
+    absolute = bool(valid.any()) and _EPOCH_S[0] < float(np.median(seconds[valid])) < _EPOCH_S[1]
+    return Stamps(_scaled(values, valid, factor, cells), valid, absolute, notes)
 
 
-def _guess_unit(t: FloatArray) -> str:
-    if t.size == 0:
-        return "s"
-    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-        if _YEAR_2000 * factor < t[0] < _YEAR_2100 * factor:
-            return unit
-    steps = np.diff(t)
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    # nobody logs a drive every 2 s and slower, but every 2 ms
-    return "ms" if step >= 2.0 and bool(np.all(np.mod(t[:1000], 1.0) == 0.0)) else "s"
+def _scaled(
+    values: NDArray[np.float64] | NDArray[np.int64], valid: BoolArray, factor: int, cells: pl.Series | None
+) -> TimeArray:
+    t_ns: TimeArray = np.zeros(len(values), dtype=np.int64)
+    if values.dtype.kind == "i":
+        t_ns[valid] = values[valid].astype(np.int64) * factor
+        return t_ns
+    t_ns[valid] = np.rint(values[valid] * factor).astype(np.int64)
+    if cells is not None and valid.any() and np.abs(values[valid]).max() * (factor / 1e9) > _EXACT:
+        exact = text_to_ns(cells, factor)
+        known = valid & exact.is_not_null().to_numpy()
+        t_ns[known] = exact.fill_null(0).to_numpy()[known]
+    return t_ns
 
 
-def texts_to_ns(texts: pl.Series) -> tuple[TimeArray, BoolArray, bool] | None:
-    """Dates and times of day into nanoseconds.
-
-    Returns
-    -------
-    t_ns : int64 array (n,)
-    known : bool array (n,)
-        Where the text could be read.
-    absolute : bool
-        False for a time of day without a date.
-
-    None if the texts are no times.
-    """
-    clean = texts.str.strip_chars().str.replace(" +", "T").str.replace(r",(\d+)", ".$1")
-    zoned = clean.str.contains(r"[+-]\d\d:?\d\d$").any()
-    clean = clean.str.replace(r"Z$", "")
-    for form in _FORMATS:
-        stamps = clean.str.to_datetime(form + ("%z" if zoned else ""), time_unit="ns", strict=False)
-        if _mostly(stamps):
-            return _stamps(stamps.dt.epoch("ns"), absolute=True)
-    of_day = clean.str.to_time("%H:%M:%S%.f", strict=False)
-    if _mostly(of_day):
-        return _stamps(of_day.cast(pl.Int64), absolute=False)
-    return None
+def text_to_ns(cells: pl.Series, factor: int) -> pl.Series:
+    """Decimal numbers as text into whole nanoseconds, exact to the last digit; null where the text is not one."""
+    digits = _DIGITS.get(factor)
+    if digits is None:
+        return pl.Series(cells.name, [None] * len(cells), dtype=pl.Int64)
+    parts = pl.col("x").str.strip_chars().str.extract_groups(r"^(\d{1,19})(?:\.(\d*))?$")
+    frame = cells.alias("x").to_frame().select(parts.alias("p")).unnest("p")
+    whole = pl.col(frame.columns[0]).cast(pl.Int64, strict=False) * factor
+    below = pl.col(frame.columns[1]).fill_null("").str.slice(0, digits).str.pad_end(digits, "0")
+    fraction = below.cast(pl.Int64, strict=False) if digits else pl.lit(0, dtype=pl.Int64)
+    return frame.select((whole + fraction).alias("t"))["t"]
 
 
-def _mostly(series: pl.Series) -> bool:
-    return len(series) > 0 and series.null_count() <= 0.01 * len(series) + 1 and series.null_count() < len(series)
+def _ns_per(unit: str) -> int:
+    return round(parse_unit(unit).factor * 1e9)
 
 
-def _stamps(series: pl.Series, *, absolute: bool) -> tuple[TimeArray, BoolArray, bool]:
-    known = series.is_not_null().to_numpy()
-    return series.fill_null(0).to_numpy().astype(np.int64), known, absolute
+def _judged(values: FloatArray) -> tuple[str, str]:
+    """Unit that makes the stamps plausible, and why."""
+    if values.size < 2:
+        return "s", "nothing speaks against it"
+    steps = np.diff(values)
+    moving = np.abs(steps[steps != 0])
+    step = float(np.median(moving)) if moving.size else 0.0
+    middle = float(np.median(values))
+    for name, factor in _NS.items():
+        per_s = 1e9 / factor
+        if _EPOCH_S[0] < middle / per_s < _EPOCH_S[1] and _is_plausible(step / per_s):
+            return name, "it counts from 1970"
+    if (np.rint(values) == values).all() and step >= 1 and float(np.ptp(values)) > _ABSURD_S:
+        name = "ms" if step <= 1e3 else "us" if step <= 1e6 else "ns"
+        return name, f"whole numbers, {step:g} apart"
+    return "s", "its steps are those of seconds"
+
+
+def _is_plausible(step_s: float) -> bool:
+    return step_s == 0.0 or _PLAUSIBLE_STEP_S[0] <= step_s <= _PLAUSIBLE_STEP_S[1]
+
+
+def from_dates(cells: pl.Series, day: pl.Series | None, kind: FieldKind) -> Stamps:
+    """Stamps of a column of date-times, or of times of day with or without a column of days beside them."""
+    clean = _clean(cells)
+    if kind == "clock" and day is None:
+        t = _to_ns(pl.lit("1970-01-01 ") + pl.col("x"), clean)
+        return _stamps(t, absolute=False, notes=("the time is a time of day, without a date",))
+    notes = []
+    if kind == "clock" and day is not None:
+        clean = (_clean(day) + " " + clean).alias("x")
+    iso, order = _iso(clean)
+    if order:
+        notes.append(f"dates are taken as {order}")
+    if not iso.str.contains(r"(?:Z|UTC|GMT|[+-]\d{2}:?\d{2})$").any():
+        notes.append("the date-times have no time zone; taken as UTC")
+    return _stamps(_to_ns(pl.col("x"), iso), absolute=True, notes=tuple(notes))
+
+
+def _clean(cells: pl.Series) -> pl.Series:
+    text = pl.col("x").str.strip_chars().str.replace(r"^(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})[T_ ]+", "$1 ")
+    clock = text.str.replace(r"(:\d{2}),(\d+)", "$1.$2").str.replace(r"(:\d{2}:\d{2}):(\d+)$", "$1.$2")
+    hours = clock.str.replace(r"(^|\s)(\d):", "${1}0$2:").str.replace(r"(^|\s)(\d{2}:\d{2})(\D*$)", "$1$2:00$3")
+    return cells.alias("x").to_frame().select(hours)["x"]
+
+
+def _iso(cells: pl.Series) -> tuple[pl.Series, str]:
+    """Dates as year-month-day. Which of two numbers is the month is read off the file, never guessed."""
+    first = cells.str.extract(r"^(\d{1,2})[./-]\d{1,2}[./-]\d{4}").cast(pl.Int64, strict=False)
+    second = cells.str.extract(r"^\d{1,2}[./-](\d{1,2})[./-]\d{4}").cast(pl.Int64, strict=False)
+    same = cells.str.replace(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})", "$1-$2-$3")
+    if first.is_null().all():
+        return same, ""
+    has_point = bool(cells.str.contains(r"^\d{1,2}\.").any())
+    month_first = bool((second > 12).any())
+    if not (has_point or month_first or (first > 12).any()):
+        raise LogError(
+            f'cannot tell day from month in "{cells.drop_nulls()[0]}"', expected="2026-03-01", hint="export ISO 8601"
+        )
+    swapped = "$3-$1-$2" if month_first else "$3-$2-$1"
+    order = "month/day/year" if month_first else "day.month.year"
+    return same.str.replace(r"^(\d{1,2})[./-](\d{1,2})[./-](\d{4})", swapped), order
+
+
+def _to_ns(text: pl.Expr, cells: pl.Series) -> pl.Series:
+    zone = text.str.extract(r"([+-]\d{2}:?\d{2})$").str.replace(":", "")
+    bare = text.str.replace(r"\s*(?:Z|UTC|GMT|[+-]\d{2}:?\d{2})$", "")
+    local = bare.str.to_datetime("%Y-%m-%d %H:%M:%S%.f", time_unit="ns", strict=False).cast(pl.Int64)
+    minutes = zone.str.slice(1, 2).cast(pl.Int64) * 60 + zone.str.slice(3, 2).cast(pl.Int64)
+    signed = pl.when(zone.str.starts_with("-")).then(-minutes).otherwise(minutes).fill_null(0)
+    return cells.alias("x").to_frame().select((local - signed * 60_000_000_000).alias("t"))["t"]
+
+
+def _stamps(t: pl.Series, *, absolute: bool, notes: tuple[str, ...]) -> Stamps:
+    valid: BoolArray = t.is_not_null().to_numpy().copy()
+    return Stamps(t.fill_null(0).to_numpy().astype(np.int64), valid, absolute, notes)

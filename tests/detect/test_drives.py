@@ -61,7 +61,7 @@ def test_minor_spin_downs_near_full_aquaplaning_and_not_far_below(seed):
 
 def test_minor_detector_is_the_more_sensitive_one():
     """C29: large-spin-down detection misses minor ones."""
-    counts = {d: 0 for d in ("minor_spin_down", "spin_down")}
+    counts = dict.fromkeys(("minor_spin_down", "spin_down"), 0)
     for seed in range(1, 9):
         found = events(seed=seed, **WATER, speed_kmh=((0.0, 92.0),))
         for d in counts:
@@ -191,7 +191,9 @@ def test_reference_speed_with_a_scale_error_is_no_slip():
 def test_events_do_not_depend_on_the_sample_rate(rate):
     signals, _ = drive(CAR, rate_hz=rate, seed=4, ideal=True, **WATER, **SPEED[106])
     found = detect_drive(signals, CAR).events
-    first = {d: min(e.start_s for e in found if e.detector == d) for d in ("spin_down", "minor_spin_down", "resistance")}
+    first = {
+        d: min(e.start_s for e in found if e.detector == d) for d in ("spin_down", "minor_spin_down", "resistance")
+    }
     reference = detect_drive(drive(CAR, seed=4, ideal=True, rate_hz=200.0, **WATER, **SPEED[106])[0], CAR).events
     for detector, at in first.items():
         assert at == pytest.approx(min(e.start_s for e in reference if e.detector == detector), abs=0.06)
@@ -205,7 +207,9 @@ def test_mirrored_drive_gives_mirrored_events():
     for stem in ("omega", "torque"):
         for axle in "fr":
             swap[f"{stem}_{axle}l"], swap[f"{stem}_{axle}r"] = frame[f"{stem}_{axle}r"], frame[f"{stem}_{axle}l"]
-    mirrored = frame.with_columns(**swap, yaw_rate=-frame["yaw_rate"], a_y=-frame["a_y"], steer_angle=-frame["steer_angle"])
+    mirrored = frame.with_columns(
+        **swap, yaw_rate=-frame["yaw_rate"], a_y=-frame["a_y"], steer_angle=-frame["steer_angle"]
+    )
     other = detect_drive(type(signals)(mirrored, signals.dt_ns, None, {}, signals.quality, ()), CAR).events
     flip = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl", None: None}
     mine = sorted((e.detector, flip[e.wheel] or "", e.start_s, e.end_s) for e in detect_drive(signals, CAR).events)

@@ -1,5 +1,7 @@
 """A drive fed in pieces gives the same features, statistics and events as in one go, bit for bit."""
 
+import itertools
+
 import numpy as np
 import pytest
 from drives import AWD, CAR, FWD, drive, lane
@@ -9,14 +11,17 @@ from aqualog.detect.stream import DriveStream
 DRIVES = {
     "rwd": (CAR, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),
     "fwd": (FWD, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),
-    "awd in a curve": (AWD, {"lanes": (lane(),), "speed_kmh": ((0.0, 100.0),), "yaw_rate": ((0, 0), (5, 0.1), (20, -0.1))}),
+    "awd in a curve": (
+        AWD,
+        {"lanes": (lane(),), "speed_kmh": ((0.0, 100.0),), "yaw_rate": ((0, 0), (5, 0.1), (20, -0.1))},
+    ),
 }
 
 
 def run(vehicle, columns, symbols, edges):
     stream = DriveStream(vehicle, 10_000_000, symbols)
     features, tracks, events = [], [], []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         piece = stream.push({s: columns[s][a:b] for s in symbols})
         features.append(piece.features)
         tracks.append(piece.tracks)
@@ -24,7 +29,10 @@ def run(vehicle, columns, symbols, edges):
     events += stream.finish()
     joined = {name: np.concatenate([f[name] for f in features]) for name in features[0]}
     statistics = {
-        (t.detector, t.wheel): (np.concatenate([p[i].statistic for p in tracks]), np.concatenate([p[i].active for p in tracks]))
+        (t.detector, t.wheel): (
+            np.concatenate([p[i].statistic for p in tracks]),
+            np.concatenate([p[i].active for p in tracks]),
+        )
         for i, t in enumerate(tracks[0])
     }
     return joined, statistics, sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or ""))
@@ -73,5 +81,7 @@ def test_cut_inside_every_event():
     vehicle, columns, symbols = prepared("rwd")
     n = columns["omega_fl"].size
     whole = run(vehicle, columns, symbols, [0, n])
-    inside = sorted({round((e.start_s + e.end_s) / 2 / 0.01) for e in whole[2]} | {round(e.end_s / 0.01) for e in whole[2]})
+    inside = sorted(
+        {round((e.start_s + e.end_s) / 2 / 0.01) for e in whole[2]} | {round(e.end_s / 0.01) for e in whole[2]}
+    )
     assert_same(whole, run(vehicle, columns, symbols, [0, *(i for i in inside if 0 < i < n), n]))

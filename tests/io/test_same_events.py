@@ -135,8 +135,10 @@ def bag(tmp_path, kind):
         for k, t in enumerate(T_NS):
             for n, x in S.items():
                 message = float64(float(x[k]))
-                data = store.serialize_ros1(message, "std_msgs/msg/Float64") if ros == 1 else store.serialize_cdr(
-                    message, "std_msgs/msg/Float64"
+                data = (
+                    store.serialize_ros1(message, "std_msgs/msg/Float64")
+                    if ros == 1
+                    else store.serialize_cdr(message, "std_msgs/msg/Float64")
                 )
                 writer.write(topics[n], START_NS + int(t), bytes(data))
     if kind == "bag2 without metadata":

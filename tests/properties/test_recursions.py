@@ -1,5 +1,7 @@
 """Laws that every recursion keeps: any cut equals the whole, NaN holds the state, scaling, sample rate."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,7 +21,7 @@ cuts = st.lists(st.integers(0, 60), max_size=5)
 
 def pieces(n, at):
     edges = sorted({0, n, *(min(a, n) for a in at)})
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(itertools.pairwise(edges))
 
 
 def same(a, b):
@@ -31,9 +33,9 @@ def run_cut(scan, state, n, at):
     collected = None
     for a, b in pieces(n, at):
         *outputs, state = scan(slice(a, b), state)
-        collected = [[o] for o in outputs] if collected is None else [
-            [*c, o] for c, o in zip(collected, outputs, strict=True)
-        ]
+        collected = (
+            [[o] for o in outputs] if collected is None else [[*c, o] for c, o in zip(collected, outputs, strict=True)]
+        )
     return [np.concatenate(c) for c in collected]
 
 
@@ -155,7 +157,9 @@ def test_alarm_time_does_not_depend_on_the_sample_rate():
     times = []
     for dt in (0.002, 0.01, 0.02):
         t = np.arange(0, 10, dt)
-        _, active, _ = cusum.scan(cusum.CusumParams(0.1, 0.2, 0.4, dt), cusum.initial_state(), np.where(t > 2, 0.3, 0.0))
+        _, active, _ = cusum.scan(
+            cusum.CusumParams(0.1, 0.2, 0.4, dt), cusum.initial_state(), np.where(t > 2, 0.3, 0.0)
+        )
         times.append(t[np.argmax(active)])
     assert times == pytest.approx([3.0] * 3, abs=0.05)
 

@@ -47,7 +47,13 @@ def write(tmp_path, text, name="x.toml"):
 
 def test_vehicle_of_the_contract(tmp_path):
     car = load_vehicle(write(tmp_path, CONTRACT))
-    assert (car.name, car.mass, car.r_e("fl"), car.r_l("rr"), car.inertia("rl")) == ("sedan RWD", 1680.0, 0.317, 0.309, 1.15)
+    assert (car.name, car.mass, car.r_e("fl"), car.r_l("rr"), car.inertia("rl")) == (
+        "sedan RWD",
+        1680.0,
+        0.317,
+        0.309,
+        1.15,
+    )
     assert car.tie_rod == {"c0": (0.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,)}
     assert car.driven == ("rl", "rr")
     assert "mass" in car.given
@@ -105,7 +111,9 @@ torque_r = { channel = "MotTq", unit = "N*m", scale = 9.1 }
 
 
 def test_faults_of_a_map_come_together(tmp_path):
-    text = '[signals]\nomgea_fl = "x"\na_x = { chanel = "y" }\nv_x = { channel = "z", unit = "warp" }\n[tim]\nunit = "s"'
+    text = (
+        '[signals]\nomgea_fl = "x"\na_x = { chanel = "y" }\nv_x = { channel = "z", unit = "warp" }\n[tim]\nunit = "s"'
+    )
     with pytest.raises(ConfigError) as error:
         load_signal_map(write(tmp_path, text))
     for part in ('"omega_fl"', "a_x names no channel", "warp", '"time"'):

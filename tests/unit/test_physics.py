@@ -35,9 +35,7 @@ def test_centre_line_of_a_left_turn():
         forward, sideways = v - psi_dot * y, psi_dot * l if steered else 0.0
         angle = delta if steered else 0.0
         rim = forward * np.cos(angle) + sideways * np.sin(angle)
-        back = centre_line_speed(
-            np.array([rim]), np.array([psi_dot]), np.array([angle]), y=y, wheelbase=l
-        )
+        back = centre_line_speed(np.array([rim]), np.array([psi_dot]), np.array([angle]), y=y, wheelbase=l)
         assert back[0] == pytest.approx(v, rel=1e-12)
 
 

@@ -1,0 +1,156 @@
+"""From the text of a CSV file to the cells of some of its columns, with the line of every row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from aqualog.errors import LogError
+from aqualog.io.csv_dialect import Layout, is_comment, split_line
+
+__all__ = ["RowFaults", "Rows", "find_rows"]
+
+_JOIN = "\x1f"  # unit separator: in no cell
+
+
+@dataclass(frozen=True, slots=True)
+class RowFaults:
+    """Lines, counted from 1, that are not as the header says; `cut_line` is the last one if the file ends inside it."""
+
+    short: tuple[int, ...] = ()
+    long: tuple[int, ...] = ()
+    comments: tuple[int, ...] = ()
+    cut_line: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The rows below the header: `text` has one row per line, `lines` (n,) are their line numbers in the file."""
+
+    text: bytes
+    separator: str
+    names: int
+    lines: NDArray[np.int64]
+    faults: RowFaults
+
+    def cells(self, columns: Sequence[int], *, where: str) -> dict[int, pl.Series]:
+        """Cells of these columns as text, null where blank.
+
+        Raises
+        ------
+        LogError
+            If the library finds other rows than there are.
+        """
+        schema = {f"c{k}": pl.String for k in range(self.names)}
+        if not self.text or not columns:
+            return {k: pl.Series(f"c{k}", [], dtype=pl.String) for k in columns}
+        try:
+            frame = pl.read_csv(
+                self.text,
+                has_header=False,
+                schema=schema,
+                columns=sorted(set(columns)),
+                separator=self.separator,
+                quote_char='"' if self.separator != _JOIN and b'"' in self.text else None,
+            )
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            reason = str(error).splitlines()[0]
+            raise LogError(f"cannot be split into cells ({reason})", where=where, hint="check its quotes") from error
+        if frame.height != len(self.lines):
+            what = f"{frame.height} rows in {len(self.lines)} lines"
+            raise LogError(what, where=where, expected="one row per line", hint="check its quotes")
+        return {k: frame[f"c{k}"] for k in columns}
+
+
+def find_rows(data: bytes, layout: Layout) -> Rows:
+    """Find the rows below the header.
+
+    Nearly all files are regular: every line has the separators of a whole row. Only such a file is given to the library
+    as it is, which drops the cells of longer rows and fills up shorter ones without a word.
+    """
+    body = data[_behind(data, layout.first_line - 1) : _end(data)]
+    lines = _regular(body, layout)
+    if lines is not None:
+        numbers = layout.first_line + np.arange(lines, dtype=np.int64)
+        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults())
+        if b'"' not in body or _is_quoted_plainly(rows):
+            return rows
+    return _irregular(body, layout, is_cut=not data.endswith((b"\n", b"\r")))
+
+
+def _behind(data: bytes, lines: int) -> int:
+    at = 0
+    for _ in range(lines):
+        at = data.find(b"\n", at) + 1
+    return at
+
+
+def _end(data: bytes) -> int:
+    """Position behind the last character that ends no line; a file may be large, so it is not copied for this."""
+    end = len(data)
+    while end and data[end - 1] in b"\r\n":
+        end -= 1
+    return end
+
+
+def _regular(body: bytes, layout: Layout) -> int | None:
+    """Number of lines if each has exactly the separators of a whole row and none is a comment."""
+    if not body:
+        return 0
+    separator, per_line = layout.separator.encode(), layout.width - 1
+    lines = body.count(b"\n") + 1
+    if body.count(separator) != lines * per_line or layout.width > len(layout.columns):
+        return None
+    octets = np.frombuffer(body, dtype=np.uint8)
+    ends = np.append(np.flatnonzero(octets == ord("\n")), len(octets))
+    signs = np.flatnonzero(octets == ord(separator)).reshape(lines, per_line)
+    if (signs[:, -1] > ends).any() or (signs[1:, 0] < ends[:-1]).any():
+        return None
+    firsts = octets[np.append(0, ends[:-1] + 1)]
+    return None if np.isin(firsts, np.frombuffer(b"#%!/", dtype=np.uint8)).any() else lines
+
+
+def _is_quoted_plainly(rows: Rows) -> bool:
+    """Whether the library, too, finds one row per line: then no quotes hold a separator or a line's end."""
+    try:
+        rows.cells([0], where="")
+    except LogError:
+        return False
+    return True
+
+
+def _irregular(body: bytes, layout: Layout, *, is_cut: bool) -> Rows:
+    """Line by line: rows that fit are kept, the lines of the others remembered. No cell spans lines."""
+    names = len(layout.columns)
+    kept: list[list[str]] = []
+    lines: list[int] = []
+    short, long, comments = [], [], []
+    for line, text in enumerate(body.decode("utf-8").split("\n"), start=layout.first_line):
+        cells = _split(text, layout.separator)
+        if not any(cells):
+            continue
+        if is_comment(text):
+            comments.append(line)
+        elif any(cells[names:]):
+            long.append(line)
+        else:
+            if len(cells) < names:
+                short.append(line)
+            kept.append(cells[:names])
+            lines.append(line)
+    cut = short[-1] if is_cut and short and lines[-1] == short[-1] else 0
+    if cut:
+        kept[-1] = kept[-1][:-1]  # it may be half a number
+    joined = "\n".join(_JOIN.join(c + [""] * (names - len(c))) for c in kept).encode()
+    faults = RowFaults(tuple(short), tuple(long), tuple(comments), cut)
+    return Rows(joined, _JOIN, names, np.array(lines, dtype=np.int64), faults)
+
+
+def _split(text: str, separator: str) -> list[str]:
+    if '"' in text:
+        return [c.replace(_JOIN, " ").replace("\n", " ") for c in split_line(text, separator)]
+    return [c.strip() for c in text.split(separator)]

@@ -1,0 +1,135 @@
+"""The bytes of a text file as UTF-8, whatever encoding they are in.
+
+A wrong encoding spoils the names and units of channels (`Temperature [°C]`), so the choice is made on evidence: a byte
+order mark, strict UTF-8, and among the old code pages the one that makes the most known units.
+"""
+
+from __future__ import annotations
+
+import codecs
+from dataclasses import dataclass
+from pathlib import Path
+
+from aqualog.errors import LogError
+from aqualog.io.table_names import split_unit
+from aqualog.units import is_unit
+
+__all__ = ["LogText", "read_text"]
+
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_CODE_PAGES = ("cp1252", "cp1250", "mac_roman", "cp850", "cp1251", "gb18030", "cp932", "cp949")
+_HEAD = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class LogText:
+    """Content as UTF-8 without a byte order mark, lines ended by `\\n` or `\\r\\n`."""
+
+    data: bytes
+    encoding: str
+    notes: tuple[str, ...]
+
+
+def read_text(path: Path) -> LogText:
+    """Read a whole text file.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read or is not text in the encoding that it declares.
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise LogError(f"cannot be opened: {error.strerror}", where=str(path)) from error
+    text = _decoded(raw, path)
+    if b"\n" not in text.data and b"\r" in text.data:
+        return LogText(text.data.replace(b"\r", b"\n"), text.encoding, text.notes)
+    return text
+
+
+def _decoded(raw: bytes, path: Path) -> LogText:
+    for mark, encoding in _MARKS:
+        if raw.startswith(mark):
+            return LogText(_marked(raw, encoding, path), encoding, ())
+    raw = raw.removeprefix(codecs.BOM_UTF8)
+    if raw.isascii():
+        return LogText(raw, "ascii", ())
+    try:
+        raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        if _is_damaged_utf8(raw):
+            line = raw.count(b"\n", 0, error.start) + 1
+            note = f"{path.name}: is UTF-8, but not everywhere (first at line {line}); the cells there are bad"
+            return LogText(raw.decode("utf-8", errors="replace").encode(), "utf-8", (note,))
+        return _code_page(raw, path)
+    return LogText(raw, "utf-8", ())
+
+
+def _marked(raw: bytes, encoding: str, path: Path) -> bytes:
+    """Text that declares its encoding; a cut inside its last character costs that character only."""
+    width = 4 if encoding == "utf-32" else 2
+    try:
+        return raw[: len(raw) // width * width].decode(encoding).encode()
+    except UnicodeError as error:
+        raise LogError(f"is not the {encoding} that it begins as ({error})", where=str(path)) from error
+
+
+def _is_damaged_utf8(raw: bytes) -> bool:
+    """Whether the head's lines beyond ASCII are mostly UTF-8: chance does not produce its sequences of bytes."""
+    beyond = [line for line in raw[:_HEAD].split(b"\n")[:-1] if not line.isascii()]
+    sound = sum(_is_utf8(line) for line in beyond)
+    return sound > 0 and 2 * sound >= len(beyond)
+
+
+def _is_utf8(line: bytes) -> bool:
+    try:
+        line.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _code_page(raw: bytes, path: Path) -> LogText:
+    beyond = b"\n".join(line for line in raw[:_HEAD].split(b"\n") if not line.isascii()) or raw[-_HEAD:]
+    usable = [c for c in _CODE_PAGES if _known_units(beyond, c) >= 0]
+    best = max(usable, key=lambda c: _known_units(beyond, c), default="latin-1")
+    notes: tuple[str, ...] = ()
+    if not usable or _known_units(beyond, best) == 0:
+        best = _guessed(beyond, usable)
+        notes = (f"{path.name}: does not declare its encoding; taken as {best}",)
+    try:
+        return LogText(raw.decode(best).encode(), best, notes)
+    except UnicodeDecodeError:  # a byte that the code page does not have, somewhere behind the head
+        return LogText(raw.decode("latin-1").encode(), "latin-1", notes)
+
+
+def _known_units(beyond: bytes, encoding: str) -> int:
+    """How many cells of the lines beyond ASCII hold a known unit that is not ASCII; -1 if the bytes do not decode."""
+    try:
+        text = beyond.decode(encoding)
+    except UnicodeDecodeError:
+        return -1
+    cells = [c.strip().strip('"') for line in text.splitlines()[:20] for c in _cells(line)]
+    units = [split_unit(c)[1] or c.strip("[]()") for c in cells if not c.isascii()]
+    return sum(not u.isascii() and is_unit(u) for u in units)
+
+
+def _cells(line: str) -> list[str]:
+    for separator in (";", "\t", "|"):
+        line = line.replace(separator, ",")
+    return line.split(",")
+
+
+def _guessed(beyond: bytes, usable: list[str]) -> str:
+    from charset_normalizer import from_bytes
+
+    found = from_bytes(beyond, cp_isolation=usable).best() if usable else None
+    if found is not None and found.encoding in usable:
+        return found.encoding
+    return usable[0] if usable else "latin-1"

@@ -1,0 +1,15 @@
+"""Wheel acceleration differences."""
+
+from __future__ import annotations
+
+from aqualog.report.figures.row import Row, wheel_lines
+from aqualog.types import DriveResult
+
+__all__ = ["accelerations"]
+
+
+def accelerations(result: DriveResult) -> list[Row]:
+    """Wheel acceleration minus vehicle acceleration, Eq. (2.3) of the thesis."""
+    lines = wheel_lines(result, "a_w_delta", "m/s^2", "m/s^2")
+    caption = "wheel minus vehicle; a healthy wheel stays near zero"
+    return [Row("Acceleration difference", caption, "m/s²", lines, include=(-2.0, 2.0), height=150)] if lines else []

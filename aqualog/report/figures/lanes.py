@@ -1,0 +1,32 @@
+"""Detection bits as bars, one lane per detector and wheel."""
+
+from __future__ import annotations
+
+from aqualog.report.figures.row import VEHICLE, Lane, Row
+from aqualog.report.figures.water import watered
+from aqualog.report.reduce import spans_of
+from aqualog.report.theme import WATER, detector_colour
+from aqualog.report.wording import detector_name, place
+from aqualog.types import DriveResult, Track
+
+__all__ = ["lanes"]
+
+MOST_BARS = 1500  # per lane; beyond, bars that nearly touch are joined
+
+
+def lanes(result: DriveResult) -> list[Row]:
+    """When which detector held which wheel to be in trouble."""
+    found = [_lane(t) for t in result.tracks]
+    water = watered(result)
+    if water is not None:
+        found.append(Lane("On water (label)", VEHICLE, WATER, water))
+    if not found:
+        return []
+    caption = "a bar where the detector reports; an empty lane was judged and is clear"
+    return [Row("Detections", caption, "", lanes=tuple(found), height=18 * len(found) + 8)]
+
+
+def _lane(track: Track) -> Lane:
+    label = f"{detector_name(track.detector)} {place(track.wheel, track.side)}".rstrip()
+    spans = spans_of(track.active, at_most=MOST_BARS)
+    return Lane(label, track.wheel or VEHICLE, detector_colour(track.detector, track.wheel), spans)

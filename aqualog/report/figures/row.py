@@ -1,0 +1,82 @@
+"""What a row of the stack consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aqualog.notation import WHEELS
+from aqualog.report.reduce import Spans
+from aqualog.report.theme import wheel_colour
+from aqualog.types import DriveResult, FloatArray
+from aqualog.units import convert
+
+if TYPE_CHECKING:
+    import polars as pl
+
+__all__ = ["VEHICLE", "Lane", "Line", "Row", "feature", "wheel_lines"]
+
+VEHICLE = "vehicle"  # group of everything that belongs to no wheel
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One signal over time. Lines of one `group` are shown and hidden together."""
+
+    label: str
+    group: str
+    colour: str
+    values: FloatArray
+    width: float = 1.3
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """One bit over time, drawn as bars."""
+
+    label: str
+    group: str
+    colour: str
+    spans: Spans
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One pair of axes in the stack.
+
+    `caption` says what to see; `thresholds` are drawn dashed; the y axis always shows the values in `include` and
+    never less than `least_span`;    `shades` are index ranges marked by a strip along the bottom.
+    """
+
+    title: str
+    caption: str
+    unit: str
+    lines: tuple[Line, ...] = ()
+    lanes: tuple[Lane, ...] = ()
+    thresholds: tuple[float, ...] = ()
+    include: tuple[float, ...] = ()
+    shades: Spans | None = None
+    least_span: float = 0.0
+    height: int = 120
+    decimals: int = 2
+
+
+def feature(frame: pl.DataFrame, name: str, source: str, target: str) -> FloatArray | None:
+    """A column in the unit of the axis; None where it is absent or has no value at all."""
+    import polars as pl
+
+    if name not in frame.columns:
+        return None
+    values = frame[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+    return convert(values, source, target) if np.isfinite(values).any() else None
+
+
+def wheel_lines(result: DriveResult, stem: str, source: str, target: str) -> tuple[Line, ...]:
+    """The lines of the wheels that have this feature."""
+    columns: Sequence[tuple[str, FloatArray | None]] = [
+        (w, feature(result.features, f"{stem}_{w}", source, target)) for w in WHEELS
+    ]
+    return tuple(Line(w.upper(), w, wheel_colour(w), values) for w, values in columns if values is not None)

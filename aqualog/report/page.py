@@ -1,0 +1,150 @@
+"""The page of one drive: one file that needs no network, to be mailed and opened anywhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from aqualog import __version__
+from aqualog.report import tables
+from aqualog.report.figures.accelerations import accelerations
+from aqualog.report.figures.lanes import lanes
+from aqualog.report.figures.resistance import resistance
+from aqualog.report.figures.row import VEHICLE, Row
+from aqualog.report.figures.speed_differences import speed_differences
+from aqualog.report.figures.speeds import speeds
+from aqualog.report.figures.stack import groups, stack
+from aqualog.report.figures.statistics import statistics
+from aqualog.report.figures.water import water
+from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
+from aqualog.report.theme import WHEEL_COLOURS
+from aqualog.report.verdict import by_importance, verdict
+from aqualog.types import DriveResult
+
+__all__ = ["render_page", "write_page"]
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, resistance, water)
+
+
+def write_page(result: DriveResult, path: Path, *, title: str) -> None:
+    """Write the page of one drive to exactly this path.
+
+    Parameters
+    ----------
+    result : DriveResult
+    path : Path
+    title : str
+        Names the drive; may hold anything, it is escaped.
+    """
+    path.write_bytes(render_page(result, title=title).encode("utf-8", "replace"))
+
+
+def render_page(result: DriveResult, *, title: str) -> str:
+    """The page of one drive as HTML; the same text for the same result.
+
+    Parameters
+    ----------
+    result : DriveResult
+    title : str
+        Names the drive; may hold anything, it is escaped.
+    """
+    ranked = by_importance(result.events)
+    plan = make_plan(ranked, result.signals.frame.height, result.signals.dt)
+    rows = [row for figure in _FIGURES for row in figure(result)]
+    scripts = {"plotly": _plotly_js(), "page": _text("page.js")}
+    return _environment().get_template("page.html.j2").render(
+        title=title,
+        version=__version__,
+        policy=_policy(scripts.values()),
+        # Markup only for the package's own files, plotly.js and what _data has escaped
+        css=Markup(_text("page.css")),
+        scripts={name: Markup(text) for name, text in scripts.items()},
+        data=_data(result, rows, plan),
+        has_plots=bool(rows) and plan.n > 0,
+        toggles=_toggles(rows),
+        note=_reduction_note(plan, len(result.events)),
+        has_water_label="on_water" in result.signals.frame.columns,
+        verdict=verdict(result),
+        facts=tables.head_facts(result),
+        problems=tables.problems(result),
+        events=tables.event_rows(result),
+        detectors=tables.detector_rows(result),
+        signals=tables.signal_rows(result),
+        fault_columns=tables.fault_columns(),
+        faults=tables.fault_rows(result),
+    )  # fmt: skip
+
+
+def _environment() -> Environment:
+    return Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def _text(name: str) -> str:
+    return (_TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def _plotly_js() -> str:
+    from plotly.offline import get_plotlyjs
+
+    # a browser reads CR LF as LF, and the hash in the policy is of what the browser reads
+    return str(get_plotlyjs()).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _policy(scripts: Any) -> str:
+    """Content security policy: nothing is fetched, and only these very scripts run."""
+    digests = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
+    allowed = " ".join(f"'sha256-{d}'" for d in digests)
+    # plotly sets style attributes and style elements; data: and blob: are for its "save as picture"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _data(result: DriveResult, rows: list[Row], plan: Plan) -> Markup:
+    """Everything that the script draws, as JSON that no HTML parser can leave."""
+    document: dict[str, Any] = {"events": [[round(e.start_s, 6), round(e.end_s, 6)] for e in result.events]}
+    if rows and plan.n:
+        document |= stack(rows, result.events, plan, result.signals.dt)
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    for character, escaped in (("<", "\\u003c"), (">", "\\u003e"), ("&", "\\u0026")):
+        text = text.replace(character, escaped)
+    return Markup(text)
+
+
+def _toggles(rows: list[Row]) -> list[dict[str, str]]:
+    return [
+        {"group": g, "label": g if g == VEHICLE else g.upper(), "colour": WHEEL_COLOURS.get(g, "")}
+        for g in groups(rows)
+    ]
+
+
+def _reduction_note(plan: Plan, events: int) -> str:
+    """What is drawn and what is not."""
+    if plan.is_complete:
+        return "Every sample is in this page; zoomed out, minima and maxima are drawn."
+    text = f"Of the whole drive the page holds about {POINTS} minima and maxima per line: no outlier is lost."
+    if not events:
+        return text
+    every = plan.events_in_full == events
+    which = f"each of the {events} events" if every else f"{plan.events_in_full} of {events} events"
+    if plan.events_in_full < events:
+        which += f" (the most important ones; the page holds {DETAIL_SAMPLES} such samples per line)"
+    return (
+        f"{text} Every sample is kept from {MARGIN_S:g} s before to {MARGIN_S:g} s after {which}; "
+        f"of events longer than {LONG_S:g} s, around beginning and end."
+    )

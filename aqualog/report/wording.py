@@ -1,0 +1,112 @@
+"""Names, units and numbers as a reader sees them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from aqualog.types import Event
+
+__all__ = [
+    "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "speed_kmh",
+]  # fmt: skip
+
+_KMH = 3.6
+_DETECTORS = {
+    "spin_down": ("Spin-down", "speed a wheel lost faster than a healthy one can"),
+    "minor_spin_down": ("Minor spin-down", "variance of wheel acceleration, watched axle minus the other one"),
+    "spin_up": ("Spin-up", "speed a driven wheel gained faster than the vehicle"),
+    "resistance": ("Resistance", "sum of the resistance measure beyond its drift"),
+    "slip_slope_drop": ("Slip-slope drop", "loss of slip slope"),
+    "tie_rod": ("Tie-rod force", "loss of tie-rod force"),
+    "joint_criteria": ("Joint criteria", "wheel criteria met while the resistance gate is open"),
+    "joint_cusum": ("Joint CUSUM", "weighted sum of the single detectors"),
+}
+_UNITS = {"m/s^2": "m/s²", "(m/s^2)^2": "(m/s²)²", "m^2/s^4": "m²/s⁴", "N*m": "N·m", "-": "–"}
+# stem of the key of evidence (lowest and highest value where it ends in _min and _max) -> label, factor, unit, decimals
+_EVIDENCE = {
+    "v_x": ("speed", _KMH, "km/h", 0),
+    "slip": ("slip", 100.0, "%", 1),
+    "a_w_delta": ("acceleration difference", 1.0, "m/s²", 1),
+    "variance": ("variance", 1.0, "(m/s²)²", 2),
+    "mu": ("traction coefficient", 1.0, "", 3),
+    "delta_a_x": ("resistance measure", 1.0, "m/s²", 2),
+}
+_CRITERIA = {1: "spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip slope", 5: "resistance"}
+
+
+def detector_name(detector: str) -> str:
+    """`minor_spin_down` -> `Minor spin-down`."""
+    return _DETECTORS[detector][0] if detector in _DETECTORS else detector.replace("_", " ")
+
+
+def caption(detector: str) -> str:
+    """What a detector's statistic means, in one phrase."""
+    return _DETECTORS[detector][1] if detector in _DETECTORS else "statistic"
+
+
+def place(wheel: str | None, side: str | None) -> str:
+    """`FR`, or the side, or nothing."""
+    return wheel.upper() if wheel else (side or "")
+
+
+def pretty_unit(unit: str) -> str:
+    """Unit with real exponents."""
+    return _UNITS.get(unit, unit)
+
+
+def number(x: float, decimals: int | None = None) -> str:
+    """A number for a table: fixed decimals, or three significant digits; a dash for what is no number."""
+    if not math.isfinite(x):
+        return "–"
+    if decimals is None and 999.5 <= abs(x) < 1e6:
+        decimals = 0
+    text = f"{x:.{decimals}f}" if decimals is not None else f"{x:.3g}"
+    return text.replace("-", "−") if "e" not in text else text
+
+
+def speed_kmh(event: Event) -> float:
+    """Speed at the beginning of an event [km/h], NaN if the evidence does not tell."""
+    v_x = event.evidence.get("v_x")
+    return _KMH * v_x if isinstance(v_x, float | int) else math.nan
+
+
+def evidence_parts(evidence: Mapping[str, Any]) -> list[str]:
+    """What else speaks for an event, as phrases; the speed at its beginning has its own column."""
+    parts = ["while braking"] if evidence.get("braking") is True else []
+    met = [name for n, name in _CRITERIA.items() if evidence.get(f"criterion_{n}") is True]
+    parts += [f"criteria: {' + '.join(met)}"] if met else []
+    stems: dict[str, dict[str, Any]] = {}
+    for key, value in evidence.items():
+        if key in ("v_x", "braking", "full") or key.startswith("criterion_"):
+            continue
+        stem, _, which = key.rpartition("_")
+        stem, which = (stem, which) if which in ("min", "max") else (key, "")
+        stems.setdefault(stem, {})[which] = value
+    return parts + [p for stem, values in stems.items() if (p := _part(stem, values))]
+
+
+def _part(stem: str, values: Mapping[str, Any]) -> str:
+    label, factor, unit, decimals = _EVIDENCE.get(stem, (stem.replace("_", " "), 1.0, "", None))
+    single = values.get("", 0.0)
+    if not isinstance(single, float | int) or isinstance(single, bool):
+        return (label if single else "") if isinstance(single, bool) else f"{label} {single}"
+    numbers = {
+        k: number(factor * v, decimals) for k, v in values.items() if isinstance(v, float | int) and math.isfinite(v)
+    }
+    if "min" in numbers and "max" in numbers:
+        return f"{label} {numbers['min']} … {numbers['max']} {unit}".rstrip()
+    words = {"min": "down to ", "max": "up to ", "": ""}
+    # the value at the beginning says little beside the lowest one
+    found = [k for k in ("min", "max", "") if k in numbers][:1]
+    return f"{label} {words[found[0]]}{numbers[found[0]]} {unit}".rstrip() if found else ""
+
+
+def plot_text(text: str, most: int = 80) -> str:
+    """Text for plotly, which reads `<b>`, entities and `%{...}` as markup: those characters become look-alikes.
+
+    Longer text than `most` characters is cut: plotly does not wrap.
+    """
+    text = text if len(text) <= most else f"{text[: most - 1]}…"
+    return text.replace("&", "＆").replace("<", "‹").replace(">", "›").replace("%{", "％{").replace("$", "＄")

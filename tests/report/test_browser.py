@@ -1,0 +1,283 @@
+"""The page in headless Chromium without a network: it draws, zooms, resets, and nothing in a name runs."""
+
+import json
+import os
+import shutil
+import time
+
+import fake_result as fake
+import pytest
+
+from aqualog.report.page import write_page
+
+pytestmark = pytest.mark.browser
+
+FLAGS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,2000",
+)  # fmt: skip
+PATIENCE = 60.0  # [s] a loaded machine draws slowly
+
+
+def absent():
+    """What stands in the way of opening a browser, or nothing."""
+    names = {"chromium": ("chromium", "chromium-browser", "google-chrome"), "chromedriver": ("chromedriver",)}
+    return [what for what, found in names.items() if not any(shutil.which(n) for n in found)]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    missing = absent()
+    if missing:
+        reason = f"{' and '.join(missing)} not found"
+        if os.environ.get("CI"):
+            pytest.fail(f"{reason}, and the browser tests must run in CI")
+        pytest.skip(reason)
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = next(
+        p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))
+    )
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    options.unhandled_prompt_behavior = "ignore"
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+    driver.execute_cdp_cmd("Network.enable", {})
+    offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
+    driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def show(browser, tmp_path):
+    """Write a result's page, open it, wait until it is drawn."""
+
+    def opened(result, title="run"):
+        path = tmp_path / "page.html"
+        write_page(result, path, title=title)
+        for kind in ("browser", "performance"):
+            browser.get_log(kind)
+        browser.get(path.as_uri())
+        wait_for(lambda: browser.execute_script("return document.getElementById('plots').dataset.ready === 'true'"))
+        return browser
+
+    return opened
+
+
+def wait_for(condition, seconds=PATIENCE):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return
+        time.sleep(0.05)
+    pytest.fail("the page did not get there in time")
+
+
+def x_range(browser):
+    return browser.execute_script("return document.getElementById('plots')._fullLayout.xaxis.range.slice()")
+
+
+def points(browser, row, name):
+    """Samples that a trace draws."""
+    script = """
+      const all = document.getElementById('plots')._fullData;
+      const t = all.find(t => t.yaxis === arguments[0] && t.name === arguments[1]);
+      return [Array.from(t.x), Array.from(t.y)];"""
+    return browser.execute_script(script, row, name)
+
+
+def click(browser, selector):
+    from selenium.webdriver.common.by import By
+
+    browser.find_element(By.CSS_SELECTOR, selector).click()
+
+
+def visible_groups(browser):
+    script = """return document.getElementById('plots')._fullData
+      .filter(t => t.visible === true && t.legendgroup).map(t => t.legendgroup)"""
+    return set(browser.execute_script(script))
+
+
+def requests(browser):
+    """Addresses that were asked for beside the page itself."""
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    urls = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    return [u for u in urls if not u.startswith(("file:", "data:", "blob:"))]
+
+
+def severe(browser):
+    return [e for e in browser.get_log("browser") if e["level"] == "SEVERE" or "Content Security" in e["message"]]
+
+
+@pytest.fixture(scope="module")
+def short():
+    return fake.make_result()
+
+
+def test_plots_are_drawn_without_errors_or_requests(show, short):
+    browser = show(short)
+    drawn = "return document.querySelectorAll('#plots .scatterlayer .trace path.js-line').length"
+    assert browser.execute_script(drawn) >= 20
+    assert browser.execute_script("return document.querySelectorAll('#plots .barlayer .point path').length") >= 15
+    assert x_range(browser) == [0, 30]
+    assert requests(browser) == []
+    assert severe(browser) == []
+
+
+def test_gap_breaks_the_line(show, short):
+    browser = show(short)
+    t, y = points(browser, "y3", "RL")
+    assert any(v is None for a, v in zip(t, y, strict=True) if 20.0 <= a < 21.2)
+    assert all(v is None for a, v in zip(t, y, strict=True) if 20.0 <= a < 21.19)
+
+
+def test_click_zooms_all_plots_and_show_all_resets(show, short):
+    browser = show(short)
+    click(browser, "#events tbody tr")
+    event = short.events[0]
+    wait_for(lambda: x_range(browser) != [0, 30])
+    begin, end = x_range(browser)
+    assert begin <= event.start_s < event.end_s <= end
+    assert end - begin < 60.0
+    assert browser.execute_script("return document.getElementById('plots')._fullLayout.xaxis2.range[0]") == begin
+    chosen = "return Array.from(document.querySelectorAll('#events tr[aria-selected=true]')).map(r => r.dataset.event)"
+    assert browser.execute_script(chosen) == ["0"]
+    click(browser, "#show-all")
+    wait_for(lambda: x_range(browser) == [0, 30])
+    assert browser.execute_script(chosen) == []
+    assert severe(browser) == []
+
+
+def test_enter_on_a_row_and_arrows_step(show, short):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    browser = show(short)
+    rows = browser.find_elements(By.CSS_SELECTOR, "#events tbody tr")
+    rows[2].send_keys(Keys.ENTER)
+    wait_for(lambda: x_range(browser) != [0, 30])
+    begin, end = x_range(browser)
+    assert begin <= short.events[2].start_s < short.events[2].end_s <= end
+    click(browser, "#next")
+    wait_for(lambda: rows[3].get_attribute("aria-selected") == "true")
+    assert x_range(browser)[0] <= short.events[3].start_s
+
+
+def test_dragging_zooms_and_double_click_resets(show, short):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+
+    browser = show(short)
+    area = browser.find_element(By.CSS_SELECTOR, "#plots .nsewdrag")
+    ActionChains(browser).move_to_element(area).click_and_hold().move_by_offset(200, 0).release().perform()
+    wait_for(lambda: x_range(browser) != [0, 30])
+    begin, end = x_range(browser)
+    assert 10.0 < begin < 16.0
+    assert end - begin < 10.0
+    ActionChains(browser).double_click(area).perform()
+    wait_for(lambda: x_range(browser) == [0, 30])
+
+
+def lanes_at(browser, t):
+    """What the hover text of the lanes says at a time."""
+    script = """
+      const t = document.getElementById('plots')._fullData.find(t => t.meta === 'lanes');
+      return [Array.from(t.x), Array.from(t.customdata)];"""
+    x, text = browser.execute_script(script)
+    return text[min(range(len(x)), key=lambda i: abs(x[i] - t))]
+
+
+def test_hover_over_the_lanes_tells_what_is_on(show, short):
+    browser = show(short)
+    assert lanes_at(browser, 2.0) == "all clear"
+    text = lanes_at(browser, 9.8)
+    spin = next(e for e in short.events if e.detector == "spin_down" and e.wheel == "fl")
+    assert f"Spin-down FL: {spin.start_s:.2f} – {spin.end_s:.2f} s" in text
+    assert "Resistance: " in text
+    assert "Spin-up" not in text
+    assert lanes_at(browser, 28.005) == "Spin-down RL: 28.00 – 28.01 s (0.01 s)"
+    click(browser, ".toggle[data-group=rl]")
+    wait_for(lambda: lanes_at(browser, 28.005) == "all clear")
+
+
+def test_a_wheel_is_hidden_in_all_rows(show, short):
+    browser = show(short)
+    assert visible_groups(browser) == {"fl", "fr", "rl", "rr", "vehicle"}
+    click(browser, ".toggle[data-group=fl]")
+    wait_for(lambda: visible_groups(browser) == {"fr", "rl", "rr", "vehicle"})
+    click(browser, "#events tbody tr")
+    wait_for(lambda: x_range(browser) != [0, 30])
+    assert "fl" not in visible_groups(browser)
+    click(browser, ".toggle[data-group=fl]")
+    wait_for(lambda: "fl" in visible_groups(browser))
+
+
+def test_sorting_keeps_rows_and_their_events_together(show, short):
+    from selenium.webdriver.common.by import By
+
+    browser = show(short)
+    click(browser, "#events th:nth-child(3)")
+    order = [int(r.get_attribute("data-event")) for r in browser.find_elements(By.CSS_SELECTOR, "#events tbody tr")]
+    starts = [short.events[i].start_s for i in order]
+    assert starts == sorted(starts)
+    click(browser, "#events tbody tr")
+    wait_for(lambda: x_range(browser) != [0, 30])
+    assert x_range(browser)[0] <= starts[0] <= x_range(browser)[1]
+
+
+def test_plots_take_the_width_of_paper_and_come_back(show, short):
+    browser = show(short)
+    width = "return document.querySelector('#plots .main-svg').getBoundingClientRect().width"
+    screen = browser.execute_script(width)
+    click(browser, "#events tbody tr")
+    wait_for(lambda: x_range(browser) != [0, 30])
+    zoomed = x_range(browser)
+    browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    wait_for(lambda: browser.execute_script(width) == 700)
+    browser.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    wait_for(lambda: browser.execute_script(width) == screen)
+    assert x_range(browser) == zoomed
+
+
+def test_hour_shows_the_spike_and_every_sample_of_an_event(show):
+    result = fake.make_result(3600.0)
+    begun = time.monotonic()
+    browser = show(result)
+    assert time.monotonic() - begun < PATIENCE
+    _, y = points(browser, "y4", "RL")
+    assert len(y) < 8000
+    assert max(v for v in y if v is not None) == pytest.approx(fake.SPIKE * 1000)
+    click(browser, "#events tbody tr")
+    wait_for(lambda: x_range(browser) != [0, 3600])
+    begin, end = x_range(browser)
+    t, _ = points(browser, "y4", "FL")
+    inside = [a for a in t if begin <= a <= end]
+    assert len(inside) == pytest.approx((end - begin) * 100, abs=2)
+    assert severe(browser) == []
+
+
+def test_hostile_names_do_nothing(show):
+    browser = show(fake.hostile_result(), title="".join(fake.HOSTILE))
+    from selenium.common.exceptions import NoAlertPresentException
+
+    def alert():
+        try:
+            return browser.switch_to.alert.text
+        except NoAlertPresentException:
+            return None
+
+    assert alert() is None
+    assert browser.execute_script("return document.images.length") == 0
+    assert browser.execute_script("return document.scripts.length") == 3
+    assert browser.title.startswith("".join(fake.HOSTILE))
+    click(browser, "#events tbody tr")
+    wait_for(lambda: x_range(browser) != [0, 30])
+    assert "‹img src=x" in browser.execute_script("return document.getElementById('plots').textContent")
+    assert alert() is None
+    assert requests(browser) == []
+    assert severe(browser) == []

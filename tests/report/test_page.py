@@ -1,0 +1,260 @@
+"""The page without a browser: what it says, what it escapes, what it must not hold."""
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import fake_result as fake
+import numpy as np
+import plotly.graph_objects as go
+import polars as pl
+import pytest
+
+import aqualog.report
+from aqualog.report.page import render_page, write_page
+from aqualog.report.reduce import POINTS
+from aqualog.types import Quality, Unavailable
+
+TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
+
+
+@pytest.fixture(scope="module")
+def short():
+    return fake.make_result()
+
+
+@pytest.fixture(scope="module")
+def page(short):
+    return render_page(short, title="run 12")
+
+
+@pytest.fixture(scope="module")
+def hour():
+    return fake.make_result(3600.0)
+
+
+class Reader(HTMLParser):
+    """Elements with attributes, and the text outside scripts and styles."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.elements, self.text, self.scripts, self._inside = [], [], [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag in ("script", "style"):
+            self._inside = tag
+
+    def handle_endtag(self, tag):
+        if tag == self._inside:
+            self._inside = ""
+
+    def handle_data(self, data):
+        if self._inside == "script":
+            self.scripts.append(data)
+        elif not self._inside:
+            self.text.append(data)
+
+    @property
+    def words(self):
+        return " ".join(" ".join(self.text).split())
+
+
+def data_of(text):
+    return json.loads(re.search(r'id="drive-data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def decode(line):
+    read = {"full": "<f4", "index": "<u4", "value": "<f4"}
+    return {k: np.frombuffer(base64.b64decode(line[k]), dtype=d) for k, d in read.items()}
+
+
+def without_plotly(text):
+    """The page without the library, which names addresses that it never opens here."""
+    return re.sub(r"<script>/\*\*\n\* plotly\.js.*?</script>", "", text, flags=re.DOTALL)
+
+
+def test_same_result_same_bytes(short, tmp_path):
+    write_page(short, tmp_path / "a.html", title="t")
+    write_page(fake.make_result(), tmp_path / "b.html", title="t")
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
+    assert [p.name for p in tmp_path.iterdir() if p.name not in ("a.html", "b.html")] == []
+
+
+def test_no_external_address(page):
+    assert len(without_plotly(page)) < 0.3 * len(page)
+    assert not re.search(r"(https?:)?//[a-z0-9-]+\.[a-z]", without_plotly(page).lower())
+    addresses = [v for _, a in Reader(page).elements for k, v in a.items() if k in ("src", "href", "action", "srcset")]
+    assert addresses == []
+
+
+def test_plotly_once_and_every_script_in_the_policy(page):
+    assert page.count("* plotly.js v") == 1
+    reader = Reader(page)
+    policy = next(a["content"] for t, a in reader.elements if t == "meta" and "http-equiv" in a)
+    assert "default-src 'none'" in policy
+    assert "unsafe-eval" not in policy
+    script_src = re.search(r"script-src ([^;]*);", policy)[1]
+    assert "unsafe-inline" not in script_src
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert len(scripts) == 2
+    for text in scripts:
+        assert base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() in script_src
+
+
+def test_templates_switch_no_escaping_off():
+    for path in TEMPLATES.glob("*.j2"):
+        text = path.read_text(encoding="utf-8")
+        assert "|safe" not in text.replace(" ", "")
+        assert "autoescape" not in text
+    assert "innerHTML" not in (TEMPLATES / "page.js").read_text(encoding="utf-8")
+
+
+def test_hostile_names_are_text_everywhere():
+    result = fake.hostile_result()
+    text = render_page(result, title="".join(fake.HOSTILE))
+    own = without_plotly(text)
+    assert "<script>alert" not in own
+    assert "<img" not in own
+    reader = Reader(own)
+    assert not [e for e in reader.elements if e[0] == "img" or any(k.startswith("on") for k in e[1])]
+    for name in fake.HOSTILE:
+        assert name in reader.words
+    raw = re.search(r'id="drive-data">(.*?)</script>', text, re.DOTALL)[1]
+    assert not set("<>&") & set(raw)
+    shown = json.dumps(data_of(text)["figure"], ensure_ascii=False)
+    assert "<img" not in shown
+    assert "<script" not in shown
+
+
+def test_verdict_comes_first_and_names_the_events(page, short):
+    words = Reader(page).words
+    assert f"{len(short.events)} events (2 full)" in words
+    assert words.index("events (2 full)") < 400
+    assert "Not judged: Slip-slope drop (needs torque_rl); Tie-rod force (needs tie_rod_fl, tie_rod_fr)" in words
+
+
+def test_few_events_are_named_one_by_one(short):
+    spin = [e for e in short.events if e.detector == "minor_spin_down" and e.wheel == "fr"][:1]
+    words = Reader(render_page(replace(short, events=tuple(spin)), title="t")).words
+    assert "1 event Minor spin-down FR 8.4–8.9 s at 104 km/h" in words
+
+
+def test_no_event_says_what_was_judged_and_what_was_not(short):
+    words = Reader(render_page(replace(short, events=()), title="t")).words
+    assert "No event Judged: Spin-down, Minor spin-down" in words
+    assert "Not judged:" in words
+    assert 'id="events"' not in render_page(replace(short, events=()), title="t")
+
+
+def test_braking_is_told(short):
+    event = replace(short.events[0], evidence={"braking": True, "v_x": 20.0})
+    words = Reader(render_page(replace(short, events=(event,)), title="t")).words
+    assert "1 event (1 while braking)" in words
+    assert "at 72 km/h (full) (while braking)" in words
+
+
+def test_problems_are_in_a_box(short):
+    words = Reader(render_page(short, title="t")).words
+    assert "5 samples were not used. The time jumps once. a_x: 3 samples out of range" in words
+    quality = Quality(truncated=True, dropped_samples=9, lost_in_files=4)
+    cut = replace(short, signals=replace(short.signals, quality=quality))
+    words = Reader(render_page(cut, title="t")).words
+    assert "The log is cut off" in words
+    assert "9 samples were not used, 4 of them lost in damaged files." in words
+    good = replace(short, signals=replace(short.signals, quality=Quality()))
+    assert 'id="problems"' not in render_page(good, title="t")
+
+
+def test_tables_of_detectors_signals_and_time_stamps(page):
+    words = Reader(page).words
+    assert "Spin-up limited RL, RR 1 judged without torque_rl, torque_rr" in words
+    assert "Tie-rod force unavailable – – needs tie_rod_fl, tie_rod_fr" in words
+    assert "a_x ESC accelerometer, forward" in words
+    assert "ESP_19.a_x drive.mf4 km/h 100 3000 4.00 3 out of range" in words
+    assert "a_x 2 0 0 0 1" in words
+    assert "slip −30.9" in words or "slip down to −30.9 %" in words
+
+
+def test_figure_is_valid_and_complete(page):
+    data = data_of(page)
+    figure = go.Figure(_plain(data["figure"]["data"]), _plain(data["figure"]["layout"]))
+    titles = [a.text for a in figure.layout.annotations if a.text.startswith("<b>")]
+    rows = [re.match(r"<b>(.*?)</b>", t)[1] for t in titles]
+    assert rows[:4] == ["Speed", "Detections", "Speed difference", "Acceleration difference"]
+    assert rows[4:] == [
+        "Spin-down", "Minor spin-down", "Spin-up", "Resistance", "Joint criteria", "Resistance measure", "Water depth",
+    ]  # fmt: skip
+    units = [figure.layout[r["axis"]].title.text for r in data["rows"] if r["has_lines"]]
+    assert units == ["km/h", "km/h", "m/s²", "m/s", "(m/s²)²", "m/s", "m/s", "–", "m/s²", "mm"]
+    colours = {}
+    for trace in figure.data:
+        colour = trace.line.color if trace.type == "scatter" else trace.marker.color
+        if trace.legendgroup:
+            colours.setdefault(trace.legendgroup, set()).add(colour)
+    assert all(len(colours[w]) == 1 for w in ("fl", "fr", "rl", "rr"))
+
+
+def _plain(figure):
+    """With a colour in place of the names of colours that the script replaces."""
+    return json.loads(re.sub(r'"@\w+"', '"#000"', json.dumps(figure)))
+
+
+def test_absent_signals_leave_no_row(short):
+    features = short.features.drop("delta_a_x").with_columns(a_w_delta_fl=pl.lit(None, dtype=pl.Float64))
+    bare = replace(
+        short, features=features.drop("a_w_delta_fr", "a_w_delta_rl", "a_w_delta_rr"), tracks=(), events=(),
+        signals=replace(short.signals, frame=short.signals.frame.drop("^water_.*$", "on_water")),
+    )  # fmt: skip
+    text = render_page(bare, title="t")
+    assert len(data_of(text)["rows"]) == 2
+    assert "Nothing could be judged" in text
+
+
+def test_empty_drive_is_still_a_page(short):
+    signals = replace(short.signals, frame=short.signals.frame.head(0), origins={})
+    result = replace(
+        short, signals=signals, features=short.features.head(0), tracks=(), events=(),
+        unavailable=(Unavailable("spin_down", ("omega_fl",)),),
+    )  # fmt: skip
+    assert "plotly.js v" not in render_page(result, title="t")
+
+
+def test_short_drive_holds_every_sample_and_its_gaps(page, short):
+    data = data_of(page)
+    assert data["windows"] == [[0, 3000]]
+    assert "Every sample is in this page" in page
+    index = next(i for i, t in enumerate(data["figure"]["data"]) if t["yaxis"] == "y3" and t["name"] == "RL")
+    values = decode(data["lines"][index])["full"]
+    expected = 3.6 * short.features["v_w_delta_rl"].to_numpy()
+    np.testing.assert_allclose(values, expected, rtol=1e-6)
+    assert np.isnan(values).sum() == 120
+
+
+def test_a_bit_of_one_sample_has_its_bar(page):
+    lane = next(t for t in data_of(page)["figure"]["data"] if t["type"] == "bar" and t["name"] == "Spin-down RL")
+    assert lane["base"] == [28.0]
+    assert lane["x"] == [0.01]
+    assert lane["customdata"] == ["28.00 – 28.01 s (0.01 s)"]
+
+
+def test_an_hour_is_reduced_said_so_and_small(hour):
+    text = render_page(hour, title="t")
+    assert len(text) < 15e6
+    data = data_of(text)
+    assert "Of the whole drive the page holds about 4000 minima and maxima per line" in text
+    assert f"Every sample is kept from 3 s before to 3 s after each of the {len(hour.events)} events" in text
+    index = next(i for i, t in enumerate(data["figure"]["data"]) if t["yaxis"] == "y4" and t["name"] == "RL")
+    line = decode(data["lines"][index])
+    assert line["index"].size <= POINTS + 200
+    assert line["full"].size == sum(b - a for a, b in data["windows"])
+    assert np.nanmax([np.nanmax(line["full"]), np.nanmax(line["value"])]) == pytest.approx(fake.SPIKE * 1000)
+    inside = np.zeros(data["n"], dtype=bool)
+    for a, b in data["windows"]:
+        inside[a:b] = True
+    assert not inside[line["index"]].any()
