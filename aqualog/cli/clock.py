@@ -232,7 +232,7 @@ def _write_map(path: Path, signal_map: Any, fits: dict[str, ClockFit]) -> None:
     from dataclasses import replace
 
     from aqualog.align.mapping import SourceClock
-    from aqualog.cli.files import write_whole
+    from aqualog.cli.files import write_text
     from aqualog.config.signal_map import map_text
 
     clocks = dict(signal_map.clocks)
@@ -240,8 +240,4 @@ def _write_map(path: Path, signal_map: Any, fits: dict[str, ClockFit]) -> None:
         drift = fit.drift_ppm if fit.drift_significant else 0.0
         clocks[file] = SourceClock(round(fit.offset_s, 6), round(drift, 3), round(fit.mid_ns * 1e-9, 3))
     text = map_text(replace(signal_map, clocks=clocks))
-    write_whole(path, lambda p: _put(p, text))
-
-
-def _put(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)

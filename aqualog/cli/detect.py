@@ -157,22 +157,18 @@ def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
 
 
 def _write_results(result: DriveResult, out: Path, name: str) -> None:
-    from aqualog.cli.files import write_whole
+    from aqualog.cli.files import write_text, write_whole
     from aqualog.io.write_log import write_log
     from aqualog.report.document import document, result_groups
     from aqualog.report.page import write_page
 
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document(result, log=name), indent=1, allow_nan=False) + "\n"
-    write_whole(out / "events.json", lambda p: _put(p, text))
+    write_text(out / "events.json", text)
     t_ns, start_ns = _times(result)
     groups = result_groups(result)
     write_whole(out / "signals.parquet", lambda p: write_log(p, t_ns, groups, suffix=".parquet", start_ns=start_ns))
     write_whole(out / "report.html", lambda p: write_page(result, p, title=name))
-
-
-def _put(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _times(result: DriveResult) -> tuple[Any, int | None]:

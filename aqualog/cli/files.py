@@ -11,7 +11,7 @@ from pathlib import Path
 from aqualog.errors import ConfigError, LogError
 from aqualog.io.sniff import sniff
 
-__all__ = ["expand", "refuse_existing", "write_whole"]
+__all__ = ["expand", "refuse_existing", "write_text", "write_whole"]
 
 
 def expand(names: Iterable[str]) -> list[Path]:
@@ -109,6 +109,15 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """A text file, there whole or not at all."""
+    write_whole(path, lambda temporary: _put(temporary, text))
+
+
+def _put(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 def _umask() -> int:

@@ -105,7 +105,7 @@ def _inspect(
 
 def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path]) -> None:
     from aqualog.align.mapping import SignalMap
-    from aqualog.cli.files import write_whole
+    from aqualog.cli.files import write_text
     from aqualog.config.signal_map import map_text
 
     text = map_text(
@@ -113,11 +113,7 @@ def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path]) ->
         comments=[f"proposed for {', '.join(p.name for p in paths)}: check every line"],
         remarks={s: p.reason for s, p in proposals.items()},
     )
-    write_whole(path, lambda p: _put(p, text))
-
-
-def _put(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _print(

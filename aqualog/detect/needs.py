@@ -8,14 +8,14 @@ from aqualog.notation import SIDES, WHEELS
 from aqualog.types import Unavailable
 from aqualog.vehicle import Vehicle
 
-__all__ = ["DETECTORS", "check_needs"]
+__all__ = ["DETECTORS", "MIN_RATE_MINOR", "NOT_YET", "check_needs"]
 
 DETECTORS = (
     "spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
     "joint_cusum",
 )  # fmt: skip
 
-_NOT_YET = "a later version of aqualog"
+NOT_YET = "a later version of aqualog"
 MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel speeds show kerbs and noise only
 
 
@@ -50,10 +50,10 @@ def check_needs(
         "minor_spin_down": [*(omega if all(sides.values()) else []), *slow],
         "spin_up": driven_omega if len(driven_omega) == len(vehicle.driven) else [],
         "resistance": resistance,
-        "slip_slope_drop": [*omega, *torque] or [_NOT_YET],
-        "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [_NOT_YET],
+        "slip_slope_drop": [*omega, *torque] or [NOT_YET],
+        "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [NOT_YET],
         "joint_criteria": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
-        "joint_cusum": [*omega, *resistance] or [_NOT_YET],
+        "joint_cusum": [*omega, *resistance] or [NOT_YET],
     }
     unavailable = [Unavailable(d, tuple(dict.fromkeys(missing[d]))) for d in DETECTORS if missing[d]]
     gone = {u.detector for u in unavailable}

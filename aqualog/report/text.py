@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from aqualog.detect.needs import NOT_YET
 from aqualog.types import DriveResult, Event
 
 __all__ = ["event_table", "table"]
@@ -22,11 +23,16 @@ def event_table(result: DriveResult) -> str:
     judged = [u for u in result.unavailable if u.missing]
     if judged:
         lines.append("\nnot judged:")
-        lines += [f"  {u.detector}: missing {', '.join(u.missing)}" for u in judged]
+        lines += [f"  {u.detector}: {_lack(u.missing)}" for u in judged]
     if result.limited:
         lines.append("\njudged in part:")
         lines += [f"  {u.detector}: without {', '.join(u.missing)}" for u in result.limited]
     return "\n".join(lines) + "\n"
+
+
+def _lack(missing: Sequence[str]) -> str:
+    signals = [m for m in missing if m != NOT_YET]
+    return f"missing {', '.join(signals)}" if signals else f"comes with {NOT_YET}"
 
 
 def _row(event: Event) -> tuple[str, ...]:
