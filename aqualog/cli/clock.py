@@ -103,10 +103,10 @@ def _align(
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     if quantity not in QUANTITIES:
         raise ConfigError(f'--quantity "{quantity}"', expected=" or ".join(QUANTITIES))
-    refuse_existing([write_map] if write_map else [], force=force)
+    paths = expand(logs)
+    refuse_existing([write_map] if write_map else [], force=force, sources=paths)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
-    paths = expand(logs)
     if len(paths) < 2:
         raise ConfigError("align compares files", expected="a reference and at least one source")
     names = _named(named, [p.name for p in paths])

@@ -86,10 +86,10 @@ def _convert(
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     suffix = check_suffix(out)
-    refuse_existing([out], force=force)
+    paths = expand(logs)
+    refuse_existing([out], force=force, sources=paths)
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
     signal_map = load_signal_map(map_file) if map_file else None
-    paths = expand(logs)
     with console.steps() as steps:
         import numpy as np
 

@@ -110,8 +110,8 @@ def _detect(
     if write is not None:
         check_suffix(write)
         targets.append(write)
-    refuse_existing(targets, force=force)
     paths = expand(logs)
+    refuse_existing(targets, force=force, sources=paths)
     signal_map = load_signal_map(map_file) if map_file else None
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
     with console.steps() as steps:

@@ -77,15 +77,18 @@ def _is_log(path: Path) -> bool:
     return True
 
 
-def refuse_existing(paths: Iterable[Path], *, force: bool) -> None:
-    """Stop before any work if a result would overwrite something.
+def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = ()) -> None:
+    """Stop before any work if a result would overwrite something; a source is not overwritten even by force.
 
     Raises
     ------
     ConfigError
         Naming the first file that exists.
     """
+    own = {os.path.realpath(s) for s in sources}
     for path in paths:
+        if os.path.realpath(path) in own:
+            raise ConfigError("is a source of this very run", where=str(path), hint="another name for the result")
         if path.is_dir():
             raise ConfigError("is a folder", where=str(path), expected="a file to write")
         if path.exists() and not force:

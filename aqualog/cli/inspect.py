@@ -78,9 +78,9 @@ def _inspect(
     from aqualog.io.open_log import DriveLog
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-    refuse_existing([write_map] if write_map else [], force=force)
-    signal_map = load_signal_map(map_file) if map_file else SignalMap()
     paths = expand(logs)
+    refuse_existing([write_map] if write_map else [], force=force, sources=paths)
+    signal_map = load_signal_map(map_file) if map_file else SignalMap()
     with console.steps() as steps, DriveLog(paths, read_options(signal_map, dbc)) as log:
         steps("reading")
         channels = list(log.read(log.channels()).values())

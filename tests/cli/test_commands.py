@@ -261,3 +261,13 @@ def test_time_column_of_the_map(tmp_path):
     result = run("detect", tmp_path / "x.csv", "--signals", tmp_path / "m.toml", "--json")
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["duration_s"] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("extra", [[], ["--force"]])
+def test_a_source_is_never_the_target(tmp_path, extra):
+    source = tmp_path / "drive.mf4"
+    source.write_bytes((SAMPLES / "lane_drive.mf4").read_bytes())
+    before = source.read_bytes()
+    assert run("detect", source, "--vehicle", CAR, "--write", source, *extra).returncode == 2
+    assert run("convert", source, "-o", source, *extra).returncode == 2
+    assert source.read_bytes() == before
