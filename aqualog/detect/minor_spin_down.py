@@ -25,7 +25,7 @@ class MinorParams(NamedTuple):
     v_abs: float  # [m/s] how much slower than the vehicle the wheel must be on average,
     v_scatter: float  # and in units of the scatter of its speed: bumps swing it both ways, water only down
     v_min: float  # [m/s]
-    quiet: float  # [s] ends after this time without a new deviation beyond sqrt(delta_min)
+    quiet: float  # [s] ends after this time without an acceleration difference beyond sqrt(delta_min)
     dt: float  # [s]
 
     @staticmethod
@@ -65,7 +65,7 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
         # a brake makes its own variance on the front wheels; what it leaves must not count after its release
         return _anew(), 0.0, 0.0, False
     still = s.still + p.dt
-    if (a - s.mean) * (a - s.mean) > p.delta_min:
+    if a * a > p.delta_min:
         still = 0.0
     mean, var = ewvar_step(p.ew, s.mean, s.var, a)
     mean_other, var_other = ewvar_step(p.ew, s.mean_other, s.var_other, a_other)
