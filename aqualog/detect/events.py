@@ -13,7 +13,7 @@ from aqualog.types import BoolArray, Event, FloatArray
 __all__ = ["EventBuilder", "Evidence"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
-"""Name -> (how, values): `first`, `min`, `max`, or `any` (a bit)."""
+"""Name -> (how, values): `first`, `min`, `max`; of a bit, `any` or `at_start`."""
 
 
 @dataclass(slots=True)
@@ -91,6 +91,9 @@ class EventBuilder:
             piece = array[part]
             if how == "any":
                 opened.evidence[name] = bool(opened.evidence.get(name, False) or piece.any())
+                continue
+            if how == "at_start":
+                opened.evidence.setdefault(name, bool(piece[0]))
                 continue
             piece = piece[~np.isnan(piece)]
             if piece.size == 0:

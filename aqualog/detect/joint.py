@@ -34,8 +34,7 @@ class WheelCriteria:
 
 
 def wheel_criteria(
-    tracks: Sequence[Track],
-    braking: Mapping[str, BoolArray],
+    tracks: Sequence[tuple[Track, BoolArray]],
     v_w: Mapping[str, FloatArray],
     mu: Mapping[str, FloatArray | None],
     v_x: FloatArray,
@@ -44,23 +43,24 @@ def wheel_criteria(
 
     Parameters
     ----------
-    tracks : sequence of Track
-        Of this piece of the drive; those that are no wheel criterion are left aside.
-    braking, v_w, mu : mapping wheel -> array (n,)
-        Where a negative force acts; centre-line wheel speed [m/s]; traction coefficient, None if not known [-].
+    tracks : sequence of (Track, bool array (n,))
+        Of this piece of the drive, with the detections that began without a braking force; those that are no wheel
+        criterion are left aside.
+    v_w, mu : mapping wheel -> array (n,)
+        Centre-line wheel speed [m/s]; traction coefficient, None if not known [-].
     v_x : array (n,)
         Velocity. [m/s]
 
-    Thesis: criteria 1, 2 and 3 of section 2.5 (C65-C67): none counts under a negative tyre force.
+    Thesis: criteria 1, 2 and 3 of section 2.5 (C65-C67): none counts under a negative tyre force. A criterion that
+    began without one stays when the driver brakes after it.
     """
     n = v_x.size
     met = {number: np.zeros(n, dtype=bool) for number in CRITERIA.values()}
     full = np.zeros(n, dtype=bool)
     slip_min = np.full(n, np.nan)
-    for track in tracks:
+    for track, bits in tracks:
         if track.detector not in CRITERIA or track.wheel is None:
             continue
-        bits = track.active & ~braking[track.wheel]
         met[CRITERIA[track.detector]] |= bits
         slip = slip_of_wheel_speed(v_w[track.wheel], v_x)
         traction = mu[track.wheel]

@@ -21,40 +21,45 @@ class MinorParams(NamedTuple):
     ew: EwvarParams
     var_min: float  # [(m/s^2)^2] of the watched wheel itself
     delta_min: float  # [(m/s^2)^2] of the difference to the other axle
-    off_share: float  # ends when the difference falls below this share of delta_min
-    v_abs: float  # [m/s] how much slower than the vehicle the wheel must be on average,
-    v_scatter: float  # and in units of the scatter of its speed: bumps swing it both ways, water only down
+    off_share: float  # ends when the difference or the one-sidedness falls below this share of its limit
+    one_sided: float  # mean square of the speed difference below zero over that above: bumps swing a wheel both ways
+    v_noise: float  # [m/s] added to the latter, so that noise alone is not one-sided
     v_min: float  # [m/s]
+    warm_up: float  # [s] after braking, until the moments mean something
     quiet: float  # [s] ends after this time without an acceleration difference beyond sqrt(delta_min)
     dt: float  # [s]
 
     @staticmethod
     def make(dt: float) -> MinorParams:
-        """Defaults: half a second of memory, 1.2 (m/s^2)^2 of the wheel and 1.0 of the difference."""
-        return MinorParams(from_seconds(0.5, 0.5, dt), 1.2, 1.0, 0.5, 0.08, 0.7, 8.0, 0.6, dt)
+        """Defaults: half a second of memory, 1.2 (m/s^2)^2 of the wheel, 1.0 of the difference, 8 to 1 below zero."""
+        return MinorParams(from_seconds(0.5, 0.5, dt), 1.2, 1.0, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt)
 
 
 class MinorState(NamedTuple):
-    """Moving moments of both wheels' accelerations and of the speed difference, time since a deviation, bit."""
+    """Moving moments of both wheels' accelerations, mean squares of the speed difference below and above zero, ages."""
 
     mean: float
     var: float
     mean_other: float
     var_other: float
-    v_mean: float
-    v_var: float
+    below: float
+    above: float
+    age: float
     still: float
     active: bool
 
 
+RADIUS_KNOWN = 2.5  # [s] more after the start: until the radius correction has found the wheels' offsets
+
+
 def initial_state() -> MinorState:
-    """No sample yet."""
-    return MinorState(math.nan, 0.0, math.nan, 0.0, math.nan, 0.0, math.inf, active=False)
+    """No sample yet; the age counts from below zero, because a constant offset of the speed is one-sided too."""
+    return MinorState(math.nan, 0.0, math.nan, 0.0, 0.0, 0.0, -RADIUS_KNOWN, math.inf, active=False)
 
 
 @njit(cache=True)
-def _anew():  # type: ignore[no-untyped-def]
-    return MinorState(math.nan, 0.0, math.nan, 0.0, math.nan, 0.0, math.inf, False)  # noqa: FBT003
+def _anew(age):  # type: ignore[no-untyped-def]
+    return MinorState(math.nan, 0.0, math.nan, 0.0, 0.0, 0.0, min(age, 0.0), math.inf, False)  # noqa: FBT003
 
 
 @njit(cache=True)
@@ -63,23 +68,26 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
         return s, math.nan, math.nan, False
     if not allowed or v < p.v_min:
         # a brake makes its own variance on the front wheels; what it leaves must not count after its release
-        return _anew(), 0.0, 0.0, False
-    still = s.still + p.dt
-    if a * a > p.delta_min:
-        still = 0.0
+        return _anew(s.age), 0.0, 0.0, False
+    still = 0.0 if a * a > p.delta_min else s.still + p.dt
     mean, var = ewvar_step(p.ew, s.mean, s.var, a)
     mean_other, var_other = ewvar_step(p.ew, s.mean_other, s.var_other, a_other)
-    v_mean, v_var = ewvar_step(p.ew, s.v_mean, s.v_var, dv)
+    beta = p.ew.beta
+    below = (1.0 - beta) * s.below + beta * min(dv, 0.0) ** 2
+    above = (1.0 - beta) * s.above + beta * max(dv, 0.0) ** 2
+    one_sided = below / (above + p.v_noise * p.v_noise)
     delta = var - var_other
-    if still > p.quiet:
-        # one large spin-down leaves a variance that takes seconds to fade; the wheel itself is calm again
-        active = False
-    elif s.active:
-        active = delta > p.off_share * p.delta_min
-    else:
-        is_slow = v_mean < -max(p.v_abs, p.v_scatter * math.sqrt(v_var))
-        active = var > p.var_min and delta > p.delta_min and is_slow
-    return MinorState(mean, var, mean_other, var_other, v_mean, v_var, still, active), delta, var, active
+    active = s.active
+    if active:
+        is_on = delta > p.off_share * p.delta_min and one_sided > p.off_share * p.one_sided
+        if not is_on or still > p.quiet:
+            # one large spin-down leaves moments that take seconds to fade; the wheel itself is calm again
+            active = False
+            mean, var, below, above = a, 0.0, 0.0, 0.0
+    elif s.age > p.warm_up and still < p.quiet:
+        active = var > p.var_min and delta > p.delta_min and one_sided > p.one_sided
+    state = MinorState(mean, var, mean_other, var_other, below, above, s.age + p.dt, still, active)
+    return state, delta, var, active
 
 
 @njit(cache=True)
@@ -110,7 +118,7 @@ def scan(
     a_w_delta, a_w_delta_other : array (n,)
         Acceleration differences of the watched (non-driven) wheel and of the other one on the same side. [m/s^2]
     v_w_delta : array (n,)
-        Speed difference of the watched wheel. [m/s]
+        Speed difference of the watched wheel, less the slow part that all wheels share. [m/s]
     v_x : array (n,)
         Velocity. [m/s]
     allowed : bool array (n,)
@@ -124,10 +132,11 @@ def scan(
     var : array (n,)
         Variance of the watched wheel. [(m/s^2)^2]
     active : bool array (n,)
-        Begins when variance and difference exceed their limits and the wheel is slower than the vehicle on average
-        over the same memory, by more than 0.7 of the scatter of its speed; ends when the difference falls below half
-        its limit, 0.6 s after the last deviation, or on braking, which also starts the moments anew. NaN in any
-        input: state held, statistic NaN, no detection.
+        Begins when variance and difference exceed their limits and the wheel's speed lies below the vehicle's eight times
+        more (in mean square, over the same memory) than above it; ends when the difference or that ratio falls below
+        half its limit, 0.6 s after the last acceleration difference beyond 1 m/s^2, or on braking. After
+        braking the moments are new and nothing begins for 0.5 s, after the start for 3 s. NaN in any input: state held, statistic NaN,
+        no detection.
     state : MinorState
 
     Thesis: Eq. (2.5), (2.6), (2.8) (C30-C33, E4); criterion 2 of section 2.5 (C66).

@@ -7,11 +7,11 @@ from numba import njit
 
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "hold_on", "is_braking"]
+__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "began_free", "hold_on", "is_braking"]
 
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
-TRACTION = -0.03  # [-] wheel torque over radius and load; engine braking stays above
+TRACTION = -0.10  # [-] wheel torque over radius and load; lifting off stays above: it is what a driver does on water
 HOLD = 0.3  # [s] brakes and wheels need this long to settle after release
 
 
@@ -32,16 +32,17 @@ def is_braking(
     Returns
     -------
     bool array (n,)
-        NaN compares as not braking.
+        By brake pressure where there is one; else by deceleration and torque. NaN compares as not braking.
 
     Thesis: "without negative tyre forces" of criteria 1 and 2 in section 2.5 (C65, C66).
     """
     with np.errstate(invalid="ignore"):
         braking = a_kin < A_BRAKING
-        if brake_pressure is not None:
-            braking |= brake_pressure > BRAKE_PRESSURE
         if torque_coefficient is not None:
             braking |= torque_coefficient < TRACTION
+        if brake_pressure is not None:
+            # the brake's own sensor decides where it speaks
+            braking = np.where(np.isnan(brake_pressure), braking, brake_pressure > BRAKE_PRESSURE)
     return braking
 
 
@@ -72,3 +73,32 @@ def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[Boo
     """
     y, left = _hold_on(max(1, round(seconds / dt)), state, x)
     return y, int(left)
+
+
+@njit(cache=True)
+def _began_free(was_active, free, active, braking):  # type: ignore[no-untyped-def]
+    out = np.zeros_like(active)
+    for i in range(active.size):
+        if active[i] and not was_active:
+            free = not braking[i]
+        was_active = active[i]
+        out[i] = was_active and free
+    return out, was_active, free
+
+
+def began_free(active: BoolArray, braking: BoolArray, state: tuple[bool, bool]) -> tuple[BoolArray, tuple[bool, bool]]:
+    """Detections that began without a braking force; a driver who brakes after that does not undo them.
+
+    Parameters
+    ----------
+    active, braking : bool array (n,)
+    state : (active before, began free)
+        (False, False), or what the call before returned.
+
+    Returns
+    -------
+    y : bool array (n,)
+    state : (bool, bool)
+    """
+    y, was_active, free = _began_free(*state, active, braking)
+    return y, (bool(was_active), bool(free))

@@ -11,6 +11,7 @@ __all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure"]
 
 THRESHOLD = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
 V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
+CLIP = 0.8  # [m/s^2] a gear change or a bump shows more for a moment than water ever does (C46)
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
@@ -44,8 +45,8 @@ def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_
     Returns
     -------
     x : array (n,)
-        NaN stays NaN. [m/s^2]
+        Within +-0.8; NaN stays NaN. [m/s^2]
     """
     with np.errstate(invalid="ignore"):
         trusted = (v_x > V_MIN) & (np.abs(a_y) < A_Y_MAX) & ~is_braking
-    return np.where(np.isnan(delta_a_x), np.nan, np.where(trusted, delta_a_x, 0.0))
+    return np.where(np.isnan(delta_a_x), np.nan, np.where(trusted, np.clip(delta_a_x, -CLIP, CLIP), 0.0))

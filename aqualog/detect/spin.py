@@ -28,54 +28,63 @@ class SpinParams(NamedTuple):
     v_abs: float  # [m/s]
     v_rel: float
     v_min: float  # [m/s] below this speed wheel speed sensors and slip mean little
+    slip_deep: float  # a wheel this far off begins an event without acceleration too, if it stays there
+    t_deep: float  # [s] for so long: the acceleration may have been in a gap
+    a_calm: float  # [m/s^2] a wheel that is but slightly off and does not accelerate for t_calm has a wrong radius
+    t_calm: float  # [s]
 
     @staticmethod
     def make(sign: float, dt: float) -> SpinParams:
         """Defaults: 3 m/s^2 drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
-        return SpinParams(CusumParams(3.0, 0.6, 3.0, dt), sign, 0.5, 0.03, 5.0)
+        return SpinParams(CusumParams(3.0, 0.6, 3.0, dt), sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
 
 
 class SpinState(NamedTuple):
-    """The sum [m/s] and the detection bit."""
+    """The sum [m/s], times of being far off and of being calm [s], and the detection bit."""
 
     g: float
+    deep: float
+    calm: float
     active: bool
 
 
 def initial_state() -> SpinState:
     """Nothing summed up."""
-    return SpinState(0.0, active=False)
+    return SpinState(0.0, 0.0, 0.0, active=False)
 
 
 @njit(cache=True)
-def _step(p, g, active, a, dv, v, allowed):  # type: ignore[no-untyped-def]
+def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     """One sample; `a` and `dv` positive in the direction that is looked for."""
     if math.isnan(a) or math.isnan(dv) or math.isnan(v):
-        return g, active, math.nan, False
+        return s, math.nan, False
     if v < p.v_min:
-        return 0.0, False, 0.0, False
+        return SpinState(0.0, 0.0, 0.0, False), 0.0, False  # noqa: FBT003
     limit = max(p.v_abs, p.v_rel * v)
-    g = cusum_step(p.cusum, g, a)
+    g = cusum_step(p.cusum, s.g, a)
     if dv < -0.25 * limit:
         # the wheel is on the other side of the vehicle's speed: this acceleration ends another event (thesis 2.4)
         g = 0.0
+    deep = s.deep + p.cusum.dt if dv > p.slip_deep * v else 0.0
+    calm = s.calm + p.cusum.dt if dv < 3.0 * limit and abs(a) < p.a_calm else 0.0
     statistic = g
+    active = s.active
     if active:
-        if dv < 0.5 * limit:
+        if dv < 0.5 * limit or calm > p.t_calm:
             active = False
             g = 0.0
-    elif allowed and g > p.cusum.h and dv > limit:
+    elif allowed and dv > limit and (g > p.cusum.h or deep > p.t_deep):
         active = True
-    return g, active, statistic, active
+    return SpinState(g, deep, calm, active), statistic, active
 
 
 @njit(cache=True)
-def _scan(p, g, active, a, dv, v, allowed):  # type: ignore[no-untyped-def]
+def _scan(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     out = np.empty_like(a)
     bits = np.zeros(a.size, dtype=np.bool_)
     for i in range(a.size):
-        g, active, out[i], bits[i] = _step(p, g, active, p.sign * a[i], p.sign * dv[i], v[i], allowed[i])
-    return out, bits, g, active
+        s, out[i], bits[i] = _step(p, s, p.sign * a[i], p.sign * dv[i], v[i], allowed[i])
+    return out, bits, s
 
 
 def scan(
@@ -102,11 +111,14 @@ def scan(
         Sum of the acceleration difference beyond the drift: the speed lost (or gained) faster than a healthy wheel
         can. [m/s]
     active : bool array (n,)
-        Begins when g > h and the speed difference exceeds its limit; ends when the speed difference has fallen to
-        half its limit; then the sum starts anew. NaN in any input: state held, statistic NaN, no detection.
+        Begins when g > h and the speed difference exceeds its limit, or when a quarter of the speed has been missing
+        for 0.1 s; ends when the speed difference has fallen to half its limit, or stays within three limits without
+        acceleration for 1 s (a wrong radius); then the sum starts anew. NaN in any input: state held, statistic NaN,
+        no detection.
     state : SpinState
 
     Thesis: Eq. (2.3), (2.4) and the text below them (C24-C27).
     """
-    g, bits, last, active = _scan(p, state.g, state.active, a_w_delta, v_w_delta, v_x, allowed)
-    return g, bits, SpinState(last, bool(active))
+    g, bits, last = _scan(p, state, a_w_delta, v_w_delta, v_x, allowed)
+    final: SpinState = last._replace(active=bool(last.active))
+    return g, bits, final

@@ -12,7 +12,7 @@ from aqualog.detect import cusum, joint, minor_spin_down, resistance, spin
 from aqualog.detect.events import EventBuilder, Evidence
 from aqualog.detect.needs import check_needs
 from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
-from aqualog.detect.negative_force import hold_on, is_braking
+from aqualog.detect.negative_force import began_free, hold_on, is_braking
 from aqualog.features.stream import Features, FeatureStream
 from aqualog.notation import SIDES, WHEELS, side_of
 from aqualog.physics.load import G
@@ -68,6 +68,7 @@ class DriveStream:
         self._minor_states = {s: minor_spin_down.initial_state() for s in SIDES}
         self._sums = {"resistance": cusum.initial_state(), "gate": cusum.initial_state()}
         self._holds: dict[str, int] = {}
+        self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
         self._builders: dict[tuple[str, str | None], EventBuilder] = {}
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
@@ -175,7 +176,7 @@ class DriveStream:
                 self._minor_states[side],
                 f[f"a_w_delta_{watched}"],
                 f[f"a_w_delta_{other}"],
-                f[f"v_w_delta_{watched}"],
+                f[f"v_w_delta_{watched}"] - f["v_w_delta_common"],
                 f["v_x_hat"],
                 ~braking[watched] & is_upright,
             )
@@ -210,8 +211,7 @@ class DriveStream:
         _, gate, self._sums["gate"] = cusum.scan(self._gate, self._sums["gate"], x)
         gate = self._hold("gate", gate, joint.GATE_HOLD)
         criteria = joint.wheel_criteria(
-            tracks,
-            braking,
+            [(t, self._began_free(t, braking)) for t in tracks if t.wheel is not None],
             {w: f[f"v_w_{w}"] for w in self._wheels(f)},
             {w: _traction(f, w) for w in WHEELS},
             f["v_x_hat"],
@@ -229,6 +229,12 @@ class DriveStream:
         }
         return track, self._events(track, evidence, _severity_joint)
 
+    def _began_free(self, track: Track, braking: Mapping[str, BoolArray]) -> BoolArray:
+        wheel = track.wheel or ""
+        key = (track.detector, wheel)
+        bits, self._free[key] = began_free(track.active, braking[wheel], self._free.get(key, (False, False)))
+        return bits
+
     # --- events ------------------------------------------------------------------------------------------------
 
     def _wheel_evidence(self, wheel: str, f: Features, braking: Mapping[str, BoolArray]) -> dict[str, Any]:
@@ -240,6 +246,7 @@ class DriveStream:
             "a_w_delta_min": ("min", f[f"a_w_delta_{wheel}"]),
             "a_w_delta_max": ("max", f[f"a_w_delta_{wheel}"]),
             "braking": ("any", braking[wheel]),
+            "braking_at_start": ("at_start", braking[wheel]),
         }
         mu = _traction(f, wheel)
         if mu is not None:

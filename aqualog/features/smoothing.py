@@ -12,7 +12,7 @@ from numba import njit
 
 from aqualog.types import FloatArray
 
-__all__ = ["UNSET", "derivative", "gain", "lowpass"]
+__all__ = ["UNSET", "derivative", "fading_lowpass", "gain", "lowpass"]
 
 UNSET = math.nan  # state before the first sample
 
@@ -30,6 +30,15 @@ def _lowpass(k, y, x):  # type: ignore[no-untyped-def]
             out[i] = math.nan
             continue
         y = x[i] if math.isnan(y) else y + k * (x[i] - y)
+        out[i] = y
+    return out, y
+
+
+@njit(cache=True)
+def _fading(k, keep, y, x):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    for i in range(x.size):
+        y = y * keep if math.isnan(x[i]) else y + k * (x[i] - y)
         out[i] = y
     return out, y
 
@@ -70,6 +79,31 @@ def lowpass(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[Floa
     state : float
     """
     y, last = _lowpass(gain(tau, dt), state, np.ascontiguousarray(x, dtype=np.float64))
+    return y, last
+
+
+def fading_lowpass(x: FloatArray, state: float, *, tau: float, fade: float, dt: float) -> tuple[FloatArray, float]:
+    """Low-pass that bridges gaps: the last value fades to zero.
+
+    Parameters
+    ----------
+    x : array (n,)
+        Input. NaN: the value held, fading with the time constant `fade`.
+    state : float
+        0, or what the call before returned.
+    tau, fade, dt : float
+        [s]
+
+    Returns
+    -------
+    y : array (n,)
+        Never NaN.
+    state : float
+
+    For corrections that must not take their object with them when they are missing: a lost yaw rate must not blind the
+    wheel detectors.
+    """
+    y, last = _fading(gain(tau, dt), math.exp(-dt / fade), state, np.ascontiguousarray(x, dtype=np.float64))
     return y, last
 
 

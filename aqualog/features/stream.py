@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from aqualog.features.smoothing import UNSET, derivative, lowpass
+from aqualog.features.smoothing import UNSET, derivative, fading_lowpass, lowpass
 from aqualog.features.velocity import initial_state, observe, params_from_seconds
 from aqualog.notation import WHEELS
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
@@ -30,6 +30,9 @@ INPUTS = (
 
 TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
 TAU_WHEEL = 0.03  # [s] wheel acceleration
+FADE = 0.5  # [s] a yaw rate that is missing fades out of the correction
+TAU_TRACTION = 0.10  # [s] traction coefficient of a spinning wheel: its noise is that of the wheel's acceleration
+TAU_COMMON = 0.3  # [s] what all wheels share is an error of the velocity (a late reference), and slow
 TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
 
 Features = Mapping[str, FloatArray]
@@ -76,13 +79,16 @@ class FeatureStream:
         Returns
         -------
         mapping name -> array (n,)
-            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`, `torque_sum`,
+            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`,
+            `mu_res_*`, `torque_sum`,
             `delta_a_x` (2.9), and low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`; only those whose signals are there.
         """
         n = next(iter(columns.values())).size
         get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}
         out: dict[str, FloatArray] = {}
-        yaw_rate = self._lowpass("yaw_rate", get["yaw_rate"], TAU_YAW)
+        yaw_rate, self._memory["yaw_rate"] = fading_lowpass(
+            get["yaw_rate"], self._memory.get("yaw_rate", 0.0), tau=TAU_YAW, fade=FADE, dt=self.dt
+        )
         omega = np.array([get[f"omega_{w}"] for w in WHEELS])
         v_w = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
         v_x, a_kin, v_w, self._velocity = observe(
@@ -114,9 +120,9 @@ class FeatureStream:
         if not self._correct_yaw or "yaw_rate" not in self.available:
             return v_rim
         vehicle = self.vehicle
-        if "steer_angle" not in self.available:
-            # the rear axle rolls straight ahead, so its mean is the speed; a spinning pair errs by its slip only
-            steer = kinematic_steer_angle(yaw_rate, 0.5 * (v_rim[2] + v_rim[3]), wheelbase=vehicle.wheelbase)
+        # the rear axle rolls straight ahead, so its mean is the speed; a spinning pair errs by its slip only
+        rolling = kinematic_steer_angle(yaw_rate, 0.5 * (v_rim[2] + v_rim[3]), wheelbase=vehicle.wheelbase)
+        steer = np.where(np.isnan(steer), np.where(np.isnan(rolling), 0.0, rolling), steer)
         straight = np.zeros_like(steer)
         half = 0.5 * vehicle.track
         return np.array(
@@ -131,6 +137,10 @@ class FeatureStream:
     def _differences(self, v_w: FloatArray, v_x: FloatArray, a_kin: FloatArray, out: dict[str, FloatArray]) -> None:
         # the wheel's derivative is of a low-passed speed, so the vehicle's acceleration gets the same lag
         a_ref = self._lowpass("a_kin", a_kin, TAU_WHEEL)
+        middle = np.sort(v_w - v_x, axis=0)[1:3].mean(axis=0)
+        out["v_w_delta_common"], self._memory["common"] = fading_lowpass(
+            middle, self._memory.get("common", 0.0), tau=TAU_COMMON, fade=FADE, dt=self.dt
+        )
         for i, wheel in enumerate(WHEELS):
             if f"omega_{wheel}" not in self.available:
                 continue
@@ -163,10 +173,14 @@ class FeatureStream:
                     torque[i], loads[i], omega_dot[i], r_l=float(self._r_l[i]), inertia=float(self._inertia[i]),
                     r_w=vehicle.rolling_resistance,
                 )  # fmt: skip
+        # a wheel that slows down faster than the car gives its momentum to the water, not to the car: only a wheel that
+        # spins up has taken torque from the road, else every spin-down would look like resistance
+        middle = np.sort(omega_dot, axis=0)[1:3].mean(axis=0)
+        spinning_up = np.fmax(omega_dot, middle)
         out["torque_sum"] = torque[0] + torque[1] + torque[2] + torque[3]
         if "a_x" in self.available:
             a_nom = nominal_acceleration(
-                torque, loads, out["v_x_hat"], omega_dot, r_l=self._r_l, inertia=self._inertia, mass=vehicle.mass,
+                torque, loads, out["v_x_hat"], spinning_up, r_l=self._r_l, inertia=self._inertia, mass=vehicle.mass,
                 r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
             )  # fmt: skip
             out["delta_a_x"] = a_nom - get["a_x"]

@@ -30,13 +30,16 @@ class VelocityParams(NamedTuple):
     gate_abs: float  # [m/s] innovations beyond gate_abs + gate_rel v are not believed
     gate_rel: float
     tau_radius: float  # [s] time constant of the radius correction
+    b_max: float  # [m/s^2] bound of the offset: mounting, drift and grade stay below
+    fade: float  # [s] how long the last acceleration lasts in a gap of the accelerometer
 
 
 class VelocityState(NamedTuple):
-    """What the observer carries from sample to sample: v [m/s], b [m/s^2], time without a believed measurement [s]."""
+    """What the observer carries: v [m/s], b [m/s^2], acceleration [m/s^2], time without a believed measurement [s]."""
 
     v: float
     b: float
+    a: float
     lost: float
     kappa: FloatArray  # (4,) share by which a wheel's effective radius is larger than the file says
     age: FloatArray  # (4,)
@@ -44,7 +47,7 @@ class VelocityState(NamedTuple):
 
 def initial_state() -> VelocityState:
     """Before the first sample."""
-    return VelocityState(math.nan, 0.0, 0.0, np.zeros(_N), np.ones(_N))
+    return VelocityState(math.nan, 0.0, 0.0, 0.0, np.zeros(_N), np.ones(_N))
 
 
 def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams:
@@ -55,46 +58,52 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
     """
     tau_v, tau_b = (0.25, 5.0) if has_accelerometer else (0.15, 0.3)
     k_v = gain(tau_v, dt)
-    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0)
+    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5)
 
 
 @njit(cache=True)
-def _step(p, v, b, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
     """One sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
     for i in range(_N):
         w[i] = w[i] * (1.0 + kappa[i])
-    accelerometer_gone = p.has_accelerometer and math.isnan(a_x)
-    a = -b if not p.has_accelerometer else (0.0 if accelerometer_gone else a_x - b)
+    if not p.has_accelerometer:
+        a = -b
+    elif not math.isnan(a_x):
+        a = a_x - b
+    else:
+        a = a * (1.0 - p.dt / p.fade)  # a gap: the last acceleration fades
 
     if math.isnan(v):
         v = v_ref if not math.isnan(v_ref) else _median(w)
         if math.isnan(v):
-            return math.nan, b, lost, math.nan, math.nan
+            return math.nan, b, a, lost, math.nan, math.nan
         lost = 0.0
     else:
         v = v + a * p.dt
 
     gate = p.gate_abs + p.gate_rel * abs(v)
+    middle = _median(w)
+    close = 0.5 * gate
+    agreeing = 0
+    known = 0.0
+    for i in range(_N):
+        if not math.isnan(w[i]):
+            known += weights[i]
+            if abs(w[i] - middle) <= close:
+                agreeing += 1
+    # a reference cannot spin, but it can fail: three wheels that agree outvote one that is far off
+    use_reference = not math.isnan(v_ref) and not (agreeing >= 3 and abs(v_ref - middle) > 4.0 * gate)
     total = 0.0
     error = 0.0
     far = 0.0
-    known = 0.0
-    if not math.isnan(v_ref):
-        # a reference may be late or coarse, but it cannot spin: it is believed, in bounded steps
+    if use_reference:
         error = min(max(v_ref - v, -4.0 * gate), 4.0 * gate)
         total = 1.0
     else:
-        middle = _median(w)
-        close = 0.5 * gate
-        agreeing = 0
-        for i in range(_N):
-            if abs(w[i] - middle) <= close:
-                agreeing += 1
         for i in range(_N):
             if math.isnan(w[i]):
                 continue
             e = w[i] - v
-            known += weights[i]
             far += weights[i] * min(max(e, -gate), gate)
             # three wheels that agree outvote a prediction that has gone astray; otherwise the prediction chooses
             if (agreeing >= 3 and abs(w[i] - middle) <= close) or (agreeing < 3 and abs(e) <= gate):
@@ -105,35 +114,42 @@ def _step(p, v, b, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type:
         lost = 0.0
         v += p.k_v * error
         b -= p.k_b * error
+        if p.has_accelerometer:
+            b = min(max(b, -p.b_max), p.b_max)
     else:
         lost += p.dt
         if known > 0.0:
             v += 0.3 * p.k_v * far / known
         if lost > 2.0:
-            v = _median(w)
+            v = middle
             lost = 0.0
             if math.isnan(v):
-                return math.nan, b, lost, math.nan, math.nan
+                return math.nan, b, a, lost, math.nan, math.nan
 
-    if v > 8.0 and abs(a) < 1.0 and not abs(yaw_rate) > 0.1:
-        mean = 0.0
-        count = 0
+    if v > 8.0 and abs(a) < 1.5 and not abs(yaw_rate) > 0.1:
+        _learn_radii(p, kappa, age, w, v, use_reference)
+    is_seen = known > 0.0 or use_reference
+    return v, b, a, lost, (v if is_seen else math.nan), (a if is_seen else math.nan)
+
+
+@njit(cache=True)
+def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped-def]
+    """Let the radius corrections follow while the car rolls steadily."""
+    mean = 0.0
+    count = 0
+    for i in range(_N):
+        e = w[i] - v
+        if abs(e) < 0.035 * v:
+            kappa[i] -= p.dt / age[i] * e / v
+            kappa[i] = min(max(kappa[i], -0.03), 0.03)
+            age[i] = min(age[i] + p.dt, p.tau_radius)
+        if not math.isnan(w[i]):
+            mean += kappa[i]
+            count += 1
+    if not has_reference and count > 0:
+        # without a reference only the ratios can be known: their mean must not wander
         for i in range(_N):
-            e = w[i] - v
-            if abs(e) < 0.02 * v:
-                kappa[i] -= p.dt / age[i] * e / v
-                kappa[i] = min(max(kappa[i], -0.03), 0.03)
-                age[i] = min(age[i] + p.dt, p.tau_radius)
-            if not math.isnan(w[i]):
-                mean += kappa[i]
-                count += 1
-        if math.isnan(v_ref) and count > 0:
-            # without a reference only the ratios can be known: their mean must not wander
-            for i in range(_N):
-                kappa[i] -= mean / count
-    is_seen = known > 0.0 or not math.isnan(v_ref)
-    a_out = math.nan if accelerometer_gone else (a_x - b if p.has_accelerometer else -b)
-    return v, b, lost, (v if is_seen else math.nan), (a_out if is_seen else math.nan)
+            kappa[i] -= mean / count
 
 
 @njit(cache=True)
@@ -143,7 +159,7 @@ def _median(w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scan(p, v, b, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+def _scan(p, v, b, a, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
     n = v_ref.size
     velocity = np.empty(n)
     acceleration = np.empty(n)
@@ -152,12 +168,12 @@ def _scan(p, v, b, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # typ
     for k in range(n):
         for i in range(_N):
             w[i] = v_w[i, k]
-        v, b, lost, velocity[k], acceleration[k] = _step(
-            p, v, b, lost, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k]
+        v, b, a, lost, velocity[k], acceleration[k] = _step(
+            p, v, b, a, lost, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k]
         )
         for i in range(_N):
             corrected[i, k] = w[i]
-    return velocity, acceleration, corrected, v, b, lost
+    return velocity, acceleration, corrected, v, b, a, lost
 
 
 def observe(
@@ -174,7 +190,8 @@ def observe(
 
     dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), where v_m is the reference velocity or,
     without one, the weighted mean of the wheels that agree: three or more with each other, else those that agree with
-    the prediction. A wheel that spins or locks leaves the gate and no longer counts. Where no wheel agrees for 2 s the
+    the prediction. A wheel that spins or locks leaves the gate and no longer counts; a reference that three agreeing
+    wheels contradict does not count either. Where no wheel agrees for 2 s the
     observer starts again.
 
     A slow correction per wheel (time constant 30 s, within 3 %, learnt only while rolling steadily) takes out radius
@@ -207,7 +224,7 @@ def observe(
     state : VelocityState
     """
     kappa, age = state.kappa.copy(), state.age.copy()
-    velocity, acceleration, corrected, v, b, lost = _scan(
-        p, state.v, state.b, state.lost, kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
+    velocity, acceleration, corrected, v, b, a, lost = _scan(
+        p, state.v, state.b, state.a, state.lost, kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
     )
-    return velocity, acceleration, corrected, VelocityState(v, b, lost, kappa, age)
+    return velocity, acceleration, corrected, VelocityState(v, b, a, lost, kappa, age)

@@ -6,7 +6,10 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["residual_traction", "traction_coefficient"]
+__all__ = ["DELTA_A_WATER", "residual_traction", "traction_coefficient"]
+
+
+DELTA_A_WATER = 0.2  # [m/s^2] thesis 2.2: less than that is no sign of water (snow, an offset, wind)
 
 
 def traction_coefficient(
@@ -55,13 +58,14 @@ def residual_traction(mu: FloatArray, delta_a_x: FloatArray, F_z: FloatArray, *,
     Returns
     -------
     mu : array (n,)
-        mu - m max(delta_a_x, 0) / F_z, NaN where the wheel carries less than 100 N. [-]
+        mu - m max(delta_a_x - 0.2, 0) / F_z, NaN where the wheel carries less than 100 N. [-]
 
     A wheel that spins on water works against the shifted wheel load as well as the road: with a shift of 0.06 m that
     alone looks like a traction coefficient of 0.2, and the thesis' limit of 0.07 would reject full aquaplaning. What
-    the torques should have done to the vehicle and did not, bounds what the road has taken: all of it is booked on
-    this wheel. On snow or ice nothing is missing, and the value is that of the torque.
+    the torques should have done to the vehicle and did not, bounds what the road has taken: what exceeds the threshold
+    of partial aquaplaning is booked on this wheel. On snow or ice less than that is missing (its rolling resistance, an
+    accelerometer's offset), and the value is that of the torque. A lower bound: the front wheels' share is in it too.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        reduced = mu - mass * np.maximum(delta_a_x, 0.0) / F_z
+        reduced = mu - mass * np.maximum(delta_a_x - DELTA_A_WATER, 0.0) / F_z
     return np.where(F_z > 100.0, reduced, np.nan)

@@ -63,7 +63,7 @@ def _evidence(event: Event) -> str:
     met = [n for n in (1, 2, 3, 5) if evidence.get(f"criterion_{n}")]
     if met:
         parts.append("criteria " + "+".join(str(n) for n in met))
-    if evidence.get("braking"):
+    if evidence.get("braking_at_start"):
         parts.append("while braking")
     return ", ".join(parts)
 

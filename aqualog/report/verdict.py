@@ -32,7 +32,7 @@ def by_importance(events: Sequence[Event]) -> list[Event]:
     return sorted(
         events,
         key=lambda e: (
-            bool(e.evidence.get("braking")),
+            bool(e.evidence.get("braking_at_start")),
             e.severity != "full",
             not e.detector.startswith("joint"),
             e.start_s,
@@ -45,8 +45,8 @@ def by_importance(events: Sequence[Event]) -> list[Event]:
 def verdict(result: DriveResult) -> Verdict:
     """What was found and what could not be judged."""
     events = by_importance(result.events)
-    braking = sum(bool(e.evidence.get("braking")) for e in events)
-    full = sum(e.severity == "full" for e in events if not e.evidence.get("braking"))
+    braking = sum(bool(e.evidence.get("braking_at_start")) for e in events)
+    full = sum(e.severity == "full" for e in events if not e.evidence.get("braking_at_start"))
     return Verdict(
         level=_level(result, full),
         headline=_headline(len(events), full, braking) if events or result.tracks else "Nothing could be judged",
@@ -83,7 +83,7 @@ def _sentence(event: Event) -> str:
     speed = speed_kmh(event)
     words += [f"at {number(speed, 0)} km/h"] if math.isfinite(speed) else []
     words += ["(full)"] if event.severity == "full" else []
-    words += ["(while braking)"] if event.evidence.get("braking") else []
+    words += ["(while braking)"] if event.evidence.get("braking_at_start") else []
     return " ".join(w for w in words if w)
 
 

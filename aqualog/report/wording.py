@@ -74,12 +74,12 @@ def speed_kmh(event: Event) -> float:
 
 def evidence_parts(evidence: Mapping[str, Any]) -> list[str]:
     """What else speaks for an event, as phrases; the speed at its beginning has its own column."""
-    parts = ["while braking"] if evidence.get("braking") is True else []
+    parts = ["while braking"] if evidence.get("braking_at_start") is True else []
     met = [name for n, name in _CRITERIA.items() if evidence.get(f"criterion_{n}") is True]
     parts += [f"criteria: {' + '.join(met)}"] if met else []
     stems: dict[str, dict[str, Any]] = {}
     for key, value in evidence.items():
-        if key in ("v_x", "braking", "full") or key.startswith("criterion_"):
+        if key in ("v_x", "braking", "braking_at_start", "full") or key.startswith("criterion_"):
             continue
         stem, _, which = key.rpartition("_")
         stem, which = (stem, which) if which in ("min", "max") else (key, "")

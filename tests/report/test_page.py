@@ -153,7 +153,7 @@ def test_no_event_says_what_was_judged_and_what_was_not(short):
 
 
 def test_braking_is_told(short):
-    event = replace(short.events[0], evidence={"braking": True, "v_x": 20.0})
+    event = replace(short.events[0], evidence={"braking": True, "braking_at_start": True, "v_x": 20.0})
     words = Reader(render_page(replace(short, events=(event,)), title="t")).words
     assert "1 event (1 while braking)" in words
     assert "at 72 km/h (full) (while braking)" in words

@@ -95,11 +95,12 @@ def test_traction_coefficient():
 
 
 def test_residual_traction():
-    """A wheel that only works against 240 N m of water resistance has no traction left; on snow nothing changes."""
+    """A wheel that only works against water has no traction left; what snow or an offset makes changes nothing."""
     F_z, mu = np.array([4000.0]), np.array([0.2])
-    missing = 0.2 * 4000.0 / 1600.0
+    missing = 0.2 + 0.2 * 4000.0 / 1600.0
     assert residual_traction(mu, np.array([missing]), F_z, mass=1600.0)[0] == pytest.approx(0.0)
     assert residual_traction(mu, np.zeros(1), F_z, mass=1600.0)[0] == 0.2
+    assert residual_traction(mu, np.array([0.2]), F_z, mass=1600.0)[0] == 0.2
     assert residual_traction(mu, np.array([-0.5]), F_z, mass=1600.0)[0] == 0.2
 
 
