@@ -130,9 +130,9 @@ def convert(values: NDArray[np.float64], source: str, target: str, *, where: str
     a, b = parse_unit(source, where=where), parse_unit(target, where=where)
     if a.dimension != b.dimension:
         raise SignalError(
-            f'unit "{source}" is a {a.dimension}',
+            f'unit "{source}" is one of {a.dimension.replace("_", " ")}',
             where=where,
-            expected=f'a {b.dimension} such as "{target}"',
+            expected=f'one of {b.dimension.replace("_", " ")} such as "{target}"',
             hint="correct the unit or the channel in the signal map",
         )
     return (values * (a.factor / b.factor)) + (a.offset - b.offset) / b.factor

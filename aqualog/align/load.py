@@ -58,9 +58,16 @@ def load_signals(
     signal_map = signal_map or SignalMap()
     with DriveLog(paths, read_options(signal_map, dbc)) as log:
         report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-        found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+        notes = [n for f in log.faults for n in f.notes]
+        try:
+            found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+        except SignalError as error:
+            frames = _frames(notes)
+            if not frames:
+                raise
+            raise SignalError(f"{error.what} ({frames})", where=error.where, hint=error.hint) from error
         if not found:
-            raise _nothing_mapped(paths, len(log.channels()), [n for f in log.faults for n in f.notes])
+            raise _nothing_mapped(paths, len(log.channels()), notes)
         report(f"reading {len(found)} channels")
         channels = log.read(info for _, info in found.values())
         faults = log.faults
@@ -70,7 +77,7 @@ def load_signals(
 
 
 def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:
-    frames = next((n for n in notes if "--dbc" in n), "")
+    frames = _frames(notes)
     return SignalError(
         f"none of {channels} channels is a signal that aqualog knows by name"
         + (f" ({frames})" if frames else "")
@@ -78,3 +85,8 @@ def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) 
         where=", ".join(p.name for p in paths),
         hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
     )
+
+
+def _frames(notes: Sequence[str]) -> str:
+    """What a reader said of raw CAN frames: without a database, or with the wrong one, they are no channels."""
+    return next((n for n in notes if "CAN frames" in n), "")

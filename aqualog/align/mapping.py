@@ -92,6 +92,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             faults.append(f"{symbol}: no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
         else:
             faults.append(f"{symbol}: channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
+    doubled = 0
     for symbol in (*SYMBOLS, *ACCEPTED):
         if symbol in signal_map.entries:
             continue
@@ -100,6 +101,15 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             found[symbol] = (Entry(symbol, (matches[0].path,)), matches[0])
         elif len(matches) > 1:
             faults.append(f"{symbol}: several channels bear this name: {_listed(matches)}")
+            doubled += len({m.file for m in matches}) > 1
+    if doubled >= 3:
+        files = ", ".join(dict.fromkeys(c.file for c in channels))
+        raise SignalError(
+            f"several channels bear the same {doubled} names: these look like separate drives",
+            where=files,
+            expected="the files of ONE drive",
+            hint="run them one by one",
+        )
     if faults:
         raise SignalError(
             "; ".join(faults),

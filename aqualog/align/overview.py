@@ -72,14 +72,14 @@ def _remark(channel: Channel, finite: FloatArray) -> str:
     if finite.size > 10 and finite.min() == finite.max():
         return "constant"
     top = finite.max()
-    is_code = top >= 255 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
+    is_code = top >= 511 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
     if is_code and finite.size > 10 and (finite == top).mean() < 0.2:
         return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
     if finite.size > 100:
         inner_low, inner_high = np.percentile(finite, (1.0, 99.0))
         reach = 3.0 * (inner_high - inner_low)
         for value, is_far in ((finite.min(), finite.min() < inner_low - reach), (top, top > inner_high + reach)):
-            if is_far and (finite == value).sum() >= 3:
+            if is_far and abs(value) > 3.0 and (finite == value).sum() >= 3:
                 return f"{value:g} stands apart, perhaps a code: invalid = [{value:g}] in the map"
     return ""
 

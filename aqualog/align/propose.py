@@ -163,7 +163,7 @@ def _address(channel: Channel, channels: Sequence[Channel]) -> str:
 def _proposal(symbol: str, channel: Channel, channels: Sequence[Channel], score: float, unit: str = "") -> Proposal:
     own = channel.info.unit
     entry = Entry(symbol, (_address(channel, channels),), own if own and is_unit(own) else (unit or None))
-    reason = "name and unit" if own else "name"
+    reason = "name and unit" if own else "name; THE FILE GIVES NO UNIT, add it"
     finite = channel.values[np.isfinite(channel.values)]
     if finite.size > 10 and finite.min() == finite.max():
         return Proposal(entry, f"{reason}, but it is constant", score - 5.0)

@@ -11,7 +11,7 @@ import polars as pl
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.timebase import ClockRepair
-from aqualog.errors import SignalError
+from aqualog.errors import ConfigError, SignalError
 from aqualog.notation import ACCEPTED, SYMBOLS, WHEELS, Symbol
 from aqualog.types import BoolArray, Channel, FileFaults, FloatArray, Origin, Quality, Signals, TimeArray, TimeFaults
 from aqualog.units import convert, parse_unit
@@ -115,7 +115,7 @@ def _clean(
         values = _to_si(symbol, channel.values, unit, vehicle, where)
     except SignalError as error:
         if is_explicit:
-            raise
+            raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
         notes.append(f"{error.line()}; the signal is left out")
         return None
     if not unit and is_explicit:
@@ -241,8 +241,16 @@ def _onto_grid(clean: _Clean, grid: TimeArray, dt_ns: int) -> tuple[FloatArray, 
         y, bridged = bin_mean(clean.t_ns, clean.x, grid, dt_ns=dt_ns, gap_ns=gap_ns)
     else:
         y, bridged = linear(clean.t_ns, clean.x, grid, gap_ns=gap_ns)
-    missing = float(np.mean(np.isnan(y) | bridged))
-    return y, missing
+    return y, max(float(np.mean(np.isnan(y))), _missing_samples(clean, grid, dt_ns) if bridged.any() else 0.0)
+
+
+def _missing_samples(clean: _Clean, grid: TimeArray, dt_ns: int) -> float:
+    """Share of the samples that a gapless channel of this rate would have: jittering stamps are not missing ones."""
+    period = _mean_period_ns(clean.t_ns)
+    if period == 0:
+        return 0.0
+    expected = (int(grid[-1]) - int(grid[0]) + dt_ns) / period
+    return min(max(0.0, 1.0 - clean.t_ns.size / expected), 1.0)
 
 
 def _columns(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[str, pl.Series]]:

@@ -135,6 +135,8 @@ def _align(
     if write_map is not None and good:
         _write_map(write_map, signal_map, good)
         console.note(f"clocks of {', '.join(good)} are in {write_map}")
+        if map_file is None:
+            console.note("it holds clocks only: give --signals map.toml to keep the signals of your map in it")
     for file, fit in fits.items():
         if isinstance(fit, AqualogError):
             sys.stderr.write(f"error: {clean(file)}: {clean(fit.line())}\n")

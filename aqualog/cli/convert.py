@@ -80,12 +80,14 @@ def _convert(
     from aqualog.cli.files import expand, refuse_existing, write_whole
     from aqualog.config.signal_map import load_signal_map
     from aqualog.config.vehicle import load_vehicle
-    from aqualog.errors import ExitCode
+    from aqualog.errors import ConfigError, ExitCode
     from aqualog.io.write_log import check_suffix, write_log
     from aqualog.vehicle import Vehicle as VehicleRecord
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     suffix = check_suffix(out)
+    if decimal_comma and suffix != ".csv":
+        raise ConfigError(f"--decimal-comma says nothing to {suffix}", where=str(out), expected="a .csv")
     paths = expand(logs)
     refuse_existing([out], force=force, sources=paths)
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()

@@ -120,12 +120,16 @@ def _detect(
 
         loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
         _something_to_do(loaded, vehicle, paths)
+        console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
+        for name, origin in loaded.origins.items():
+            console.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
         steps("detecting")
         result = detect_drive(loaded, vehicle)
         name = ", ".join(str(p) for p in paths)
+        title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")
         if out is not None:
-            _write_results(result, out, name)
+            _write_results(result, out, name, title)
         if write is not None:
             _write_log(result, write)
     _print(result, name, as_json=as_json)
@@ -156,7 +160,7 @@ def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
     )
 
 
-def _write_results(result: DriveResult, out: Path, name: str) -> None:
+def _write_results(result: DriveResult, out: Path, name: str, title: str) -> None:
     from aqualog.cli.files import write_text, write_whole
     from aqualog.io.write_log import write_log
     from aqualog.report.document import document, result_groups
@@ -168,7 +172,7 @@ def _write_results(result: DriveResult, out: Path, name: str) -> None:
     t_ns, start_ns = _times(result)
     groups = result_groups(result)
     write_whole(out / "signals.parquet", lambda p: write_log(p, t_ns, groups, suffix=".parquet", start_ns=start_ns))
-    write_whole(out / "report.html", lambda p: write_page(result, p, title=name))
+    write_whole(out / "report.html", lambda p: write_page(result, p, title=title))
 
 
 def _times(result: DriveResult) -> tuple[Any, int | None]:

@@ -132,11 +132,11 @@ def scan(
     var : array (n,)
         Variance of the watched wheel. [(m/s^2)^2]
     active : bool array (n,)
-        Begins when variance and difference exceed their limits and the wheel's speed lies below the vehicle's eight times
-        more (in mean square, over the same memory) than above it; ends when the difference or that ratio falls below
-        half its limit, 0.6 s after the last acceleration difference beyond 1 m/s^2, or on braking. After
-        braking the moments are new and nothing begins for 0.5 s, after the start for 3 s. NaN in any input: state held, statistic NaN,
-        no detection.
+        Begins when variance and difference exceed their limits and the wheel's speed lies eight times more below the
+        vehicle's than above it (mean squares over the same memory); ends when the difference or that ratio falls
+        below half its limit, 0.6 s after the last acceleration difference beyond 1 m/s^2, or on braking. After braking
+        the moments are new and nothing begins for 0.5 s, after the start for 3 s. NaN in any input: state held,
+        statistic NaN, no detection.
     state : MinorState
 
     Thesis: Eq. (2.5), (2.6), (2.8) (C30-C33, E4); criterion 2 of section 2.5 (C66).

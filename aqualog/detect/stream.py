@@ -13,6 +13,7 @@ from aqualog.detect.events import EventBuilder, Evidence
 from aqualog.detect.needs import check_needs
 from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
 from aqualog.detect.negative_force import began_free, hold_on, is_braking
+from aqualog.detect.plausibility import implausible
 from aqualog.features.stream import Features, FeatureStream
 from aqualog.notation import SIDES, WHEELS, side_of
 from aqualog.physics.load import G
@@ -191,6 +192,7 @@ class DriveStream:
             return [], []
         x = self._resistance_input(f, braking)
         g, bits, self._sums["resistance"] = cusum.scan(self._resistance, self._sums["resistance"], x)
+        f = {**f, "delta_a_x": x}  # evidence is what was summed, not what braking shows
         track = Track("resistance", None, None, "m/s", g, self._resistance.h, bits)
         evidence: Evidence = {
             "v_x": ("first", f["v_x_hat"]),
@@ -321,4 +323,5 @@ def detect_drive(signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True
         unavailable=stream.unavailable,
         limited=stream.limited,
         vehicle_name=vehicle.name,
+        notes=implausible(signals, piece.features, vehicle),
     )

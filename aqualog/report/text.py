@@ -32,7 +32,10 @@ def event_table(result: DriveResult) -> str:
 
 def _lack(missing: Sequence[str]) -> str:
     signals = [m for m in missing if m != NOT_YET]
-    return f"missing {', '.join(signals)}" if signals else f"comes with {NOT_YET}"
+    text = ", ".join(signals)
+    for axle in "fr":  # an axle's torque will do
+        text = text.replace(f"torque_{axle}l, torque_{axle}r", f"torque_{axle}l, torque_{axle}r (or torque_{axle})")
+    return f"missing {text}" if signals else f"comes with {NOT_YET}"
 
 
 def _row(event: Event) -> tuple[str, ...]:

@@ -3,7 +3,7 @@ import pytest
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock, resolve
 from aqualog.align.table import build_signals
-from aqualog.errors import SignalError
+from aqualog.errors import ConfigError, SignalError
 from aqualog.types import Channel, ChannelInfo, FileFaults
 from aqualog.vehicle import Vehicle
 
@@ -107,7 +107,7 @@ def test_absolute_start_is_kept():
 
 
 def test_unknown_unit_of_a_mapped_channel_is_an_error_and_of_another_a_note():
-    with pytest.raises(SignalError, match="unknown unit"):
+    with pytest.raises(ConfigError, match="unknown unit"):
         build(channel("x", np.ones(9), "furlong"), entries={"v_x": Entry("v_x", ("x",))})
     s = build(channel("v_x", np.ones(9), "furlong"), channel("omega_fl", np.ones(9), "rad/s"))
     assert s.symbols == ("omega_fl",)

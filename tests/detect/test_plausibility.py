@@ -1,0 +1,44 @@
+"""Wrong units and signs are told."""
+
+import polars as pl
+import pytest
+from drives import CAR, drive
+
+from aqualog.detect.stream import detect_drive
+
+SPEEDS = {"speed_kmh": ((0.0, 70.0), (10, 110.0), (20, 70.0), (30, 120.0), (40, 80.0)), "duration_s": 40.0}
+CURVES = {"yaw_rate": ((0, 0), (6, 0), (8, 0.2), (14, -0.2), (20, 0.2), (30, -0.2), (40, 0))}
+
+
+def notes(**changes):
+    signals, _ = drive(CAR, **SPEEDS, **CURVES)
+    frame = signals.frame.with_columns(**{n: f(signals.frame) for n, f in changes.items()})
+    return detect_drive(type(signals)(frame, signals.dt_ns, None, {}, signals.quality, ()), CAR).notes
+
+
+def test_a_sound_drive_has_no_note():
+    assert notes() == ()
+
+
+@pytest.mark.parametrize("factor", [3.6, 1 / 3.6])
+def test_unit_of_the_wheel_speeds(factor):
+    found = notes(**{f"omega_{w}": lambda f, w=w: f[f"omega_{w}"] * factor for w in ("fl", "fr", "rl", "rr")})
+    assert any("wheel speeds change" in n for n in found)
+
+
+def test_sign_of_the_accelerometer():
+    assert any("a_x has the opposite sign" in n for n in notes(a_x=lambda f: -f["a_x"]))
+
+
+def test_sign_of_the_yaw_rate():
+    assert any("yaw_rate has the opposite sign" in n for n in notes(yaw_rate=lambda f: -f["yaw_rate"]))
+
+
+def test_resistance_that_cannot_be():
+    found = notes(torque_rl=lambda f: f["torque_rl"] * 9.1, torque_rr=lambda f: f["torque_rr"] * 9.1)
+    assert any("resistance measure" in n for n in found)
+
+
+def test_without_an_accelerometer_nothing_is_said():
+    found = notes(a_x=lambda f: pl.Series([None] * f.height, dtype=pl.Float64))
+    assert not [n for n in found if "a_x" in n]
