@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aqualog.compiled import compiled
 from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 from aqualog.vehicle import Vehicle
@@ -65,7 +65,7 @@ class Drive:
     locks: tuple[tuple[float, float, str], ...] = field(default=())  # start, end, wheel: brake torque that locks it
 
 
-@njit(cache=True)
+@compiled
 def _brush(s, C, mu, F_z):  # type: ignore[no-untyped-def]
     limit = mu * F_z
     if limit <= 0.0:
@@ -75,7 +75,7 @@ def _brush(s, C, mu, F_z):  # type: ignore[no-untyped-def]
     return force if s > 0 else -force
 
 
-@njit(cache=True)
+@compiled
 def _integrate(  # type: ignore[no-untyped-def]
     n, dt, v, target, holds, extra, brake, lock, yaw, steer, grade, depth, mu_road, slope, rough, scatter,
     v_full_f, v_full_r, F_z, r_e, r_l, inertia, split, half_track, wheelbase, mass, r_w, c_air,
@@ -211,7 +211,7 @@ def _ou(rng: np.random.Generator, n: int, tau: float) -> Array:
     return _recursive(keep, noise)
 
 
-@njit(cache=True)
+@compiled
 def _recursive(keep, noise):  # type: ignore[no-untyped-def]
     y = np.empty_like(noise)
     last = 0.0

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["CusumParams", "CusumState", "initial_state", "scan", "step"]
@@ -38,7 +38,7 @@ def initial_state() -> CusumState:
     return CusumState(0.0, active=False)
 
 
-@njit(cache=True)
+@compiled
 def step(p, g, x):  # type: ignore[no-untyped-def]
     """g <- min(g_max, max(0, g + (x - nu) dt)); NaN holds the sum.
 
@@ -51,7 +51,7 @@ def step(p, g, x):  # type: ignore[no-untyped-def]
     return min(p.g_max, max(0.0, g + (x - p.nu) * p.dt))
 
 
-@njit(cache=True)
+@compiled
 def _scan(p, g, active, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     bits = np.zeros(x.size, dtype=np.bool_)

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.features.smoothing import gain
 from aqualog.types import FloatArray
 
@@ -38,7 +38,7 @@ def initial_state() -> EwvarState:
     return EwvarState(math.nan, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def step(p, mean, var, x):  # type: ignore[no-untyped-def]
     """Thesis 2.5 and 2.6 for one sample: the variance uses the mean before this sample."""
     if math.isnan(x):
@@ -51,7 +51,7 @@ def step(p, mean, var, x):  # type: ignore[no-untyped-def]
     return mean, var
 
 
-@njit(cache=True)
+@compiled
 def _scan(p, mean, var, x):  # type: ignore[no-untyped-def]
     means = np.empty_like(x)
     variances = np.empty_like(x)

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
 from aqualog.types import BoolArray, FloatArray
@@ -57,12 +57,12 @@ def initial_state() -> MinorState:
     return MinorState(math.nan, 0.0, math.nan, 0.0, 0.0, 0.0, -RADIUS_KNOWN, math.inf, active=False)
 
 
-@njit(cache=True)
+@compiled
 def _anew(age):  # type: ignore[no-untyped-def]
     return MinorState(math.nan, 0.0, math.nan, 0.0, 0.0, 0.0, min(age, 0.0), math.inf, False)  # noqa: FBT003
 
 
-@njit(cache=True)
+@compiled
 def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
     if math.isnan(a) or math.isnan(a_other) or math.isnan(dv) or math.isnan(v):
         return s, math.nan, math.nan, False
@@ -90,7 +90,7 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
     return state, delta, var, active
 
 
-@njit(cache=True)
+@compiled
 def _scan(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
     delta = np.empty_like(a)
     var = np.empty_like(a)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "began_free", "hold_on", "is_braking"]
@@ -46,7 +46,7 @@ def is_braking(
     return braking
 
 
-@njit(cache=True)
+@compiled
 def _hold_on(samples, left, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     for i in range(x.size):
@@ -75,7 +75,7 @@ def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[Boo
     return y, int(left)
 
 
-@njit(cache=True)
+@compiled
 def _began_free(was_active, free, active, braking):  # type: ignore[no-untyped-def]
     out = np.zeros_like(active)
     for i in range(active.size):

@@ -8,8 +8,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.types import BoolArray, FloatArray
@@ -53,7 +53,7 @@ def initial_state() -> SpinState:
     return SpinState(0.0, 0.0, 0.0, active=False)
 
 
-@njit(cache=True)
+@compiled
 def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     """One sample; `a` and `dv` positive in the direction that is looked for."""
     if math.isnan(a) or math.isnan(dv) or math.isnan(v):
@@ -78,7 +78,7 @@ def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     return SpinState(g, deep, calm, active), statistic, active
 
 
-@njit(cache=True)
+@compiled
 def _scan(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     out = np.empty_like(a)
     bits = np.zeros(a.size, dtype=np.bool_)

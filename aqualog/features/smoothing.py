@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.types import FloatArray
 
 __all__ = ["UNSET", "derivative", "fading_lowpass", "gain", "lowpass"]
@@ -22,7 +22,7 @@ def gain(tau: float, dt: float) -> float:
     return 1.0 if tau <= 0.0 else -math.expm1(-dt / tau)
 
 
-@njit(cache=True)
+@compiled
 def _lowpass(k, y, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     for i in range(x.size):
@@ -34,7 +34,7 @@ def _lowpass(k, y, x):  # type: ignore[no-untyped-def]
     return out, y
 
 
-@njit(cache=True)
+@compiled
 def _fading(k, keep, y, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     for i in range(x.size):
@@ -43,7 +43,7 @@ def _fading(k, keep, y, x):  # type: ignore[no-untyped-def]
     return out, y
 
 
-@njit(cache=True)
+@compiled
 def _derivative(k, dt, y, x):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     for i in range(x.size):

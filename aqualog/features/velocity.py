@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from aqualog.compiled import compiled
 from aqualog.features.smoothing import gain
 from aqualog.types import FloatArray
 
@@ -61,7 +61,7 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
     return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5)
 
 
-@njit(cache=True)
+@compiled
 def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
     """One sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
     for i in range(_N):
@@ -132,7 +132,7 @@ def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # ty
     return v, b, a, lost, (v if is_seen else math.nan), (a if is_seen else math.nan)
 
 
-@njit(cache=True)
+@compiled
 def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped-def]
     """Let the radius corrections follow while the car rolls steadily."""
     mean = 0.0
@@ -152,13 +152,13 @@ def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped
             kappa[i] -= mean / count
 
 
-@njit(cache=True)
+@compiled
 def _median(w):  # type: ignore[no-untyped-def]
     known = w[~np.isnan(w)]
     return math.nan if known.size == 0 else np.median(known)
 
 
-@njit(cache=True)
+@compiled
 def _scan(p, v, b, a, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
     n = v_ref.size
     velocity = np.empty(n)
