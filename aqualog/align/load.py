@@ -58,14 +58,14 @@ def load_signals(
     signal_map = signal_map or SignalMap()
     with DriveLog(paths, read_options(signal_map, dbc)) as log:
         report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-        notes = [n for f in log.faults for n in f.notes]
+        faults = log.faults
+        notes = [n for f in faults for n in f.notes if f.truncated or "CAN frames" in n]
         try:
             found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
         except SignalError as error:
-            frames = _frames(notes)
-            if not frames:
+            if not notes:
                 raise
-            raise SignalError(f"{error.what} ({frames})", where=error.where, hint=error.hint) from error
+            raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
         if not found:
             raise _nothing_mapped(paths, len(log.channels()), notes)
         report(f"reading {len(found)} channels")
@@ -77,16 +77,10 @@ def load_signals(
 
 
 def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:
-    frames = _frames(notes)
     return SignalError(
         f"none of {channels} channels is a signal that aqualog knows by name"
-        + (f" ({frames})" if frames else "")
+        + (f" ({notes[0]})" if notes else "")
         + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",
         where=", ".join(p.name for p in paths),
         hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
     )
-
-
-def _frames(notes: Sequence[str]) -> str:
-    """What a reader said of raw CAN frames: without a database, or with the wrong one, they are no channels."""
-    return next((n for n in notes if "CAN frames" in n), "")

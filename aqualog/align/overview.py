@@ -52,7 +52,7 @@ def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
         name=channel.info.name,
         unit=channel.info.unit,
         samples=channel.values.size,
-        rate_hz=1e9 / float(steps[steps <= 5 * period].mean()) if period else 0.0,
+        rate_hz=1e9 / float(steps[steps <= 5 * period].mean()) if period and (steps <= 5 * period).any() else 0.0,
         start_s=float(t_ns[0] - origin_ns) * 1e-9 if t_ns.size else np.nan,
         end_s=float(t_ns[-1] - origin_ns) * 1e-9 if t_ns.size else np.nan,
         low=float(finite.min()) if finite.size else np.nan,

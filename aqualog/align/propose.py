@@ -227,6 +227,7 @@ def _on_grid(channel: Channel, grid: TimeArray) -> FloatArray:
 
 
 _GRID_NS = 100_000_000
+_LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
 
 
 def _speed(found: dict[str, Proposal], channels: Sequence[Channel]) -> tuple[TimeArray, FloatArray] | None:
@@ -235,7 +236,7 @@ def _speed(found: dict[str, Proposal], channels: Sequence[Channel]) -> tuple[Tim
         if symbol in found:
             channel = _by_address(channels, found[symbol].entry.channel[0])
             t, _ = _clean(channel)
-            if t.size > 20:
+            if t.size > 20 and int(t[-1]) - int(t[0]) < _LONGEST_NS:
                 grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
                 return grid, _on_grid(channel, grid)
     return None
@@ -274,6 +275,8 @@ def _check_yaw(p: Proposal, channels: Sequence[Channel], found: dict[str, Propos
     left = _by_address(channels, found["omega_rl"].entry.channel[0])
     right = _by_address(channels, found["omega_rr"].entry.channel[0])
     t, _ = _clean(left)
+    if t.size < 2 or int(t[-1]) - int(t[0]) > _LONGEST_NS:
+        return p
     grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
     turn = _on_grid(right, grid) - _on_grid(left, grid)
     r = _correlation(_smooth(turn), _smooth(_on_grid(_by_address(channels, p.entry.channel[0]), grid)))

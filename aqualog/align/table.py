@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 
+from aqualog.align.glitches import sensor_glitches
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.timebase import ClockRepair
@@ -19,7 +20,8 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["build_signals"]
 
-_MAX_ROWS = 200_000_000
+_MAX_ROWS = 60_000_000
+_SPARSE_ROWS = 1_000_000  # beyond, a grid with one sample in 50 points is a jump of the time stamps, not a drive
 _NICE_HZ = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 80, 100, 125, 200, 250, 400, 500, 1000)
 
 
@@ -128,6 +130,16 @@ def _clean(
     is_bad = ~np.isfinite(values)
     is_out = ~is_bad & ~is_code & ((values < symbol.low) | (values > symbol.high))
     keep = ~(is_bad | is_code | is_out)
+    if name.startswith("omega_") and keep.any():
+        glitch = np.zeros(values.size, dtype=bool)
+        glitch[keep] = sensor_glitches(t_ns[keep], values[keep], r_e=vehicle.r_e(name[-2:]))
+        if glitch.any():
+            at = float(t_ns[np.argmax(glitch)] - t_ns[0]) * 1e-9
+            notes.append(
+                f"{where}: {int(glitch.sum())} samples (first at {at:.2f} s) step faster than a wheel can; sensor "
+                "dropouts or spikes, left out"
+            )
+            keep, is_out = keep & ~glitch, is_out | glitch
     if is_out.any():
         first = float(values[np.argmax(is_out)])
         notes.append(
@@ -221,11 +233,13 @@ def _grid(cleaned: Sequence[_Clean], dt_ns: int) -> TimeArray:
     anchor = int(anchor_of.t_ns[0])
     start = anchor - (anchor - first) // dt_ns * dt_ns
     rows = (last - start) // dt_ns + 1
-    if rows > _MAX_ROWS:
+    samples = max(c.t_ns.size for c in cleaned)
+    if rows > _MAX_ROWS or (rows > _SPARSE_ROWS and rows > 50 * samples):
         raise SignalError(
-            f"the signals span {(last - first) / 1e9:.0f} s, {rows:,} grid points",
-            expected="sources that share one clock",
-            hint="[sources] offset_s in the signal map, or a lower --rate",
+            f"the signals span {(last - first) / 1e9:.0f} s with {samples} samples: their time stamps jump",
+            where=", ".join(dict.fromkeys(c.origin.file for c in cleaned)),
+            expected="time stamps of one drive, and sources that share one clock",
+            hint="`aqualog inspect LOG`; [sources] offset_s in the signal map",
         )
     return start + np.arange(rows, dtype=np.int64) * dt_ns
 
@@ -266,6 +280,18 @@ def _columns(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[str,
     return [(symbol.name, pl.Series(y).fill_nan(None))]
 
 
+def _time_note(file: str, faults: TimeFaults) -> str:
+    words = {
+        "duplicates": "doubled",
+        "back_steps": "out of order",
+        "resets": "resets",
+        "wraps": "wraps",
+        "pauses": "pauses",
+    }
+    counts = ", ".join(f"{getattr(faults, n)} {word}" for n, word in words.items() if getattr(faults, n))
+    return f"{file}: time stamps: {counts}"
+
+
 def _quality(cleaned: Sequence[_Clean], file_faults: Sequence[FileFaults], notes: Sequence[str]) -> Quality:
     by_file: dict[str, TimeFaults] = {}
     for clean in cleaned:  # the channels of one file mostly share their stamps: the worst one speaks for the file
@@ -276,7 +302,11 @@ def _quality(cleaned: Sequence[_Clean], file_faults: Sequence[FileFaults], notes
         c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.faults.duplicates
         for c in cleaned
     )
-    lost = sum(f.lost_samples for f in file_faults)
+    doubled = max((c.origin.faults.duplicates for c in cleaned), default=0)
+    # a doubled stamp here and there is a logger's habit; many are samples lost to a wrong clock
+    is_lossy = any(c.origin.faults.duplicates > 0.01 * c.origin.samples for c in cleaned)
+    lost = sum(f.lost_samples for f in file_faults) + (doubled if is_lossy else 0)
+    notes = [*(_time_note(file, faults) for file, faults in by_file.items() if faults != TimeFaults()), *notes]
     return Quality(
         dropped_samples=own + lost,
         lost_in_files=lost,

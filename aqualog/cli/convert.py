@@ -89,7 +89,7 @@ def _convert(
     if decimal_comma and suffix != ".csv":
         raise ConfigError(f"--decimal-comma says nothing to {suffix}", where=str(out), expected="a .csv")
     paths = expand(logs)
-    refuse_existing([out], force=force, sources=paths)
+    refuse_existing([out], force=force, sources=[*paths, *dbc, *(p for p in (map_file, vehicle_file) if p)])
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
     signal_map = load_signal_map(map_file) if map_file else None
     with console.steps() as steps:

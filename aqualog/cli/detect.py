@@ -111,7 +111,7 @@ def _detect(
         check_suffix(write)
         targets.append(write)
     paths = expand(logs)
-    refuse_existing(targets, force=force, sources=paths)
+    refuse_existing(targets, force=force, sources=[*paths, *dbc, *(p for p in (map_file, vehicle_file) if p)])
     signal_map = load_signal_map(map_file) if map_file else None
     vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
     with console.steps() as steps:
@@ -151,7 +151,8 @@ def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
     notes = loaded.quality.notes
     if len(unavailable) < len(DETECTORS):
         return
-    missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(("omega_", "torque_", "a_x")))
+    asked = ("omega_", "torque_", "a_x", "wheel speeds", "signals at")
+    missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(asked))
     raise SignalError(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=", ".join(p.name for p in paths),

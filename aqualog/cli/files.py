@@ -52,6 +52,9 @@ def _from_list(path: Path) -> list[Path]:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"list of logs cannot be read ({error})", where=str(path)) from error
     names = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    odd = next((n for n in names if n.startswith("@") or "\0" in n), None)
+    if odd is not None:
+        raise ConfigError(f"names {odd[:60]!r}", where=str(path), expected="files, folders and globs, one a line")
     base = path.parent
     return [p for n in names for p in _one(n if Path(n).is_absolute() else str(base / n))]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 import typer
@@ -43,5 +44,15 @@ def _main(
 
 
 def run() -> None:
-    """Entry point of the installed command."""
+    """Entry point of the installed command.
+
+    A request to end leaves by the usual way, so that no half-written file stays.
+    """
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _leave)
     app()
+
+
+def _leave(number: int, _: object) -> None:
+    sys.exit(128 + number)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
-from aqualog.config.toml_file import Faults, load_toml
+from aqualog.config.toml_file import Faults, is_number, load_toml
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.units import is_unit
 
@@ -45,11 +45,14 @@ def load_signal_map(path: Path) -> SignalMap:
     for key in time:
         if key not in ("channel", "unit"):
             faults.unknown(key, ("channel", "unit"))
+    channel = time.get("channel")
+    if channel is not None and not isinstance(channel, str):
+        faults.add("channel", f"[time] channel = {str(channel)[:40]} is not a name")
     unit = time.get("unit")
     if unit is not None and not is_unit(str(unit)):
         faults.add("unit", f'[time] unit = "{unit}" is not known; use s, ms, us or ns')
     faults.raise_if_any()
-    return SignalMap(entries, clocks, time.get("channel"), unit, str(path))
+    return SignalMap(entries, clocks, channel, unit, str(path))
 
 
 def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any]:
@@ -82,8 +85,8 @@ def _entry(symbol: str, table: Any, faults: Faults) -> Entry | None:
     scale = faults.number({"scale": table.get("scale", 1.0)}, "scale", low=-big, high=big, unit="")
     offset = faults.number({"offset": table.get("offset", 0.0)}, "offset", low=-big, high=big, unit="")
     invalid = table.get("invalid", [])
-    if not isinstance(invalid, list) or any(isinstance(i, bool) or not isinstance(i, (int, float)) for i in invalid):
-        faults.add(symbol, f"{symbol}: invalid = {invalid!r} is not a list of numbers")
+    if not isinstance(invalid, list) or not all(is_number(i) for i in invalid):
+        faults.add(symbol, f"{symbol}: invalid = {str(invalid)[:40]} is not a list of numbers")
         return None
     if scale is None or offset is None:
         return None

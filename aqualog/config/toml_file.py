@@ -10,7 +10,7 @@ from typing import Any
 
 from aqualog.errors import ConfigError
 
-__all__ = ["Faults", "line_of", "load_toml"]
+__all__ = ["Faults", "is_number", "line_of", "load_toml"]
 
 
 def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
@@ -44,7 +44,7 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
         raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
     try:
         return tomllib.loads(text), text
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, lists of thousands of levels
         raise ConfigError(f"{what} is not valid TOML: {error}", where=str(path)) from error
 
 
@@ -55,6 +55,13 @@ def line_of(text: str, key: str) -> int | None:
         if stripped.startswith((key, f'"{key}"', f"[{key}", f"[[{key}")):
             return number
     return None
+
+
+def is_number(value: Any) -> bool:
+    """Whether a TOML value is a finite number that a float can hold."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) < 1e300 and value == value
 
 
 class Faults:
@@ -78,9 +85,9 @@ class Faults:
 
     def number(self, table: Mapping[str, Any], key: str, *, low: float, high: float, unit: str) -> float | None:
         """A number within its bounds, or None with the fault noted."""
-        value = table.get(key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.add(key, f"{key} = {value!r} is not a number")
+        value: Any = table.get(key)
+        if not is_number(value):
+            self.add(key, f"{key} = {str(value)[:40]} is not a number")
             return None
         if not low <= value <= high:
             self.add(key, f"{key} = {value:g} is outside {low:g} ... {high:g} {unit}".rstrip())

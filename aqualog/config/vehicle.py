@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from aqualog.config.toml_file import Faults, load_toml
+from aqualog.config.toml_file import Faults, is_number, load_toml
 from aqualog.vehicle import KEYS, Vehicle
 
 __all__ = ["load_vehicle"]
@@ -29,7 +29,7 @@ def load_vehicle(path: Path) -> Vehicle:
     values: dict[str, Any] = {"name": str(document.pop("name", path.stem))}
     drivetrain = document.pop("drivetrain", "rwd")
     given = {"name"}
-    if drivetrain not in _SPLIT:
+    if not isinstance(drivetrain, str) or drivetrain not in _SPLIT:
         faults.add("drivetrain", f'drivetrain = {drivetrain!r} is not one of "rwd", "fwd", "awd"')
         drivetrain = "rwd"
     values["drivetrain"] = drivetrain
@@ -78,7 +78,7 @@ def _tie_rod(table: Any, faults: Faults) -> dict[str, tuple[float, ...]]:
             faults.unknown(name, _TIE_ROD)
             continue
         numbers = value if isinstance(value, list) else [value]
-        if not numbers or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in numbers):
+        if not numbers or not all(is_number(n) for n in numbers):
             faults.add(name, f"{name} = {value!r} is not a number or a list of numbers")
             continue
         result[name] = tuple(float(n) for n in numbers)

@@ -16,6 +16,8 @@ DETECTORS = (
 )  # fmt: skip
 
 NOT_YET = "a later version of aqualog"
+MIN_RATE_SPIN = 5.0  # [Hz] a full spin-down lasts half a second and more
+MIN_RATE_RESISTANCE = 2.0  # [Hz]
 MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel speeds show kerbs and noise only
 
 
@@ -45,10 +47,13 @@ def check_needs(
     sides = {s: [f"omega_{w}" for w in ws if f"omega_{w}" in omega] for s, ws in SIDES.items()}
     driven_omega = [f"omega_{w}" for w in vehicle.driven if f"omega_{w}" in omega]
     slow = [f"wheel speeds at {MIN_RATE_MINOR:g} Hz or more"] if rate_hz < MIN_RATE_MINOR else []
+    too_slow = [f"wheel speeds at {MIN_RATE_SPIN:g} Hz or more"] if rate_hz < MIN_RATE_SPIN else []
+    if rate_hz < MIN_RATE_RESISTANCE:
+        resistance.append(f"signals at {MIN_RATE_RESISTANCE:g} Hz or more (check the unit of the time)")
     missing = {
-        "spin_down": omega if len(omega) == len(WHEELS) else _lone_wheel(have, omega),
+        "spin_down": [*(omega if len(omega) == len(WHEELS) else _lone_wheel(have, omega)), *too_slow],
         "minor_spin_down": [*(omega if all(sides.values()) else []), *slow],
-        "spin_up": driven_omega if len(driven_omega) == len(vehicle.driven) else [],
+        "spin_up": [*(driven_omega if len(driven_omega) == len(vehicle.driven) else []), *too_slow],
         "resistance": resistance,
         "slip_slope_drop": [*omega, *torque] or [NOT_YET],
         "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [NOT_YET],

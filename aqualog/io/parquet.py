@@ -51,7 +51,7 @@ class ParquetReader:
         self._path = path
         self._faults = FaultLog()
         self._stamps: Stamps | None = None
-        schema, metadata = self._wrapped(lambda: (pl.read_parquet_schema(path), pl.read_parquet_metadata(path)))
+        schema, metadata = self._wrapped(lambda: _head(path))
         about = _about(metadata)
         start = about.get("start_ns")
         self._start_ns = start if isinstance(start, int) else None
@@ -140,7 +140,7 @@ class ParquetReader:
         """Result of a call into the library, whose errors of all kinds become ours."""
         try:
             return action()
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError) as error:
             reason = (str(error).splitlines() or [type(error).__name__])[0]
             hint = "check whether it was written to its end: the index stands there"
             raise LogError(f"cannot be read as Parquet ({reason})", where=str(self._path), hint=hint) from error
@@ -207,3 +207,11 @@ def _stamps(column: pl.Series, day: pl.Series | None, unit: str, kind: FieldKind
 
 def _whole(t: pl.Series, *, absolute: bool) -> Stamps:
     return Stamps(t.fill_null(0).to_numpy().astype(np.int64), t.is_not_null().to_numpy().copy(), absolute)
+
+
+def _head(path: Path) -> tuple[dict[str, pl.DataType], dict[str, str]]:
+    """Columns and metadata; from an open file, because polars takes `[` and `*` in a name for a pattern."""
+    with path.open("rb") as file:
+        schema = pl.read_parquet_schema(file)
+        file.seek(0)
+        return dict(schema), pl.read_parquet_metadata(file)

@@ -24,6 +24,8 @@ def sniff(path: Path) -> str:
         if any(path.glob("*.db3")) or any(path.glob("*.mcap")) or (path / "metadata.yaml").exists():
             return "ros"
         raise LogError("is a folder without a ROS 2 bag", where=str(path), expected="a log file", hint="name the files")
+    if path.exists() and not path.is_file():
+        raise LogError("is no regular file", where=str(path), expected="a log file")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)

@@ -271,3 +271,34 @@ def test_a_source_is_never_the_target(tmp_path, extra):
     assert run("detect", source, "--vehicle", CAR, "--write", source, *extra).returncode == 2
     assert run("convert", source, "-o", source, *extra).returncode == 2
     assert source.read_bytes() == before
+
+
+def test_list_that_names_itself(tmp_path):
+    (tmp_path / "l.txt").write_text("@l.txt\n")
+    result = run("detect", f"@{tmp_path / 'l.txt'}")
+    assert result.returncode == 2
+    one_error_line(result)
+
+
+def test_names_that_look_like_patterns(tmp_path):
+    for name in ("a[b.parquet", "drive[1].parquet"):
+        path = tmp_path / name
+        path.write_bytes((SAMPLES / "lane_drive.parquet").read_bytes())
+        assert run("detect", path, "--vehicle", CAR).returncode == 0
+
+
+def test_a_pipe_is_no_log(tmp_path):
+    os.mkfifo(tmp_path / "p.mf4")
+    result = run("detect", tmp_path / "p.mf4")
+    assert result.returncode == 1
+    assert "no regular file" in one_error_line(result)
+
+
+def test_wrong_time_scale_is_refused(tmp_path):
+    t = np.arange(0, 500)
+    pl.DataFrame(
+        {"t [s]": t * 10.0, **{f"omega_{w} [rad/s]": 90.0 + 0 * t for w in ("fl", "fr", "rl", "rr")}}
+    ).write_csv(tmp_path / "slow.csv")
+    result = run("detect", tmp_path / "slow.csv")
+    assert result.returncode == 4
+    assert "Hz" in one_error_line(result)

@@ -134,3 +134,24 @@ def test_written_maps_read_back(tmp_path_factory, names, scale, offset, remark, 
     assert after.entries == before.entries
     assert after.clocks == before.clocks
     assert (after.time_channel, after.time_unit) == ("t_ms", "ms")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'drivetrain = ["rwd"]', "drivetrain = {}", f"mass = {'9' * 400}", f"mass = {'9' * 6000}",
+        "[tie_rod]\nc0 = nan", f"[tie_rod]\nc_y = [{'9' * 400}]", f"x = {'[' * 3000}{']' * 3000}",
+    ],
+)  # fmt: skip
+def test_absurd_vehicle_files_are_configuration_errors(tmp_path, text):
+    with pytest.raises(ConfigError):
+        load_vehicle(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[time]\nchannel = 3", "[time]\nchannel = []", f'[signals]\na_x = {{ channel = "x", invalid = [{"9" * 400}] }}'],
+)
+def test_absurd_maps_are_configuration_errors(tmp_path, text):
+    with pytest.raises(ConfigError):
+        load_signal_map(write(tmp_path, text))

@@ -143,3 +143,26 @@ def test_time_faults_reach_the_quality_record():
 def test_no_usable_signal():
     with pytest.raises(SignalError, match="no usable signal"):
         build()
+
+
+def test_jumping_time_stamps_do_not_fill_the_memory():
+    c = channel("omega_fl", np.full(1000, 90.0), "rad/s")
+    t = c.t_ns.copy()
+    t[500:] += 400_000 * 1_000_000_000
+    with pytest.raises(SignalError, match="time stamps jump"):
+        build(Channel(c.info, t, c.values, absolute=False))
+
+
+def test_many_doubled_stamps_are_a_loss_and_a_note():
+    c = channel("omega_fl", np.full(1000, 90.0), "rad/s")
+    s = build(Channel(c.info, np.sort(np.tile(c.t_ns[:500], 2)), c.values, absolute=False))
+    assert s.quality.lost_in_files == 500
+    assert any("500 doubled" in n for n in s.quality.notes)
+
+
+def test_sensor_dropouts_are_left_out_and_noted():
+    x = np.full(1000, 90.0)
+    x[400:420] = 0.0
+    s = build(channel("omega_fl", x, "rad/s"))
+    assert s.origins["omega_fl"].out_of_range == 20
+    assert any("step faster than a wheel can" in n for n in s.quality.notes)

@@ -1,0 +1,61 @@
+"""Samples that no wheel can have turned: dropouts and spikes of a wheel speed sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.types import BoolArray, FloatArray, TimeArray
+
+__all__ = ["RIM_LIMIT", "sensor_glitches"]
+
+RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
+_SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
+_RETURN_NS = 1_000_000_000
+
+
+def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
+    """Which samples of a wheel speed are not the wheel's.
+
+    Parameters
+    ----------
+    t_ns : int64 array (n,)
+        Strictly increasing stamps.
+    omega : array (n,)
+        Finite samples. [rad/s]
+    r_e : float
+        Effective radius. [m]
+
+    Returns
+    -------
+    bool array (n,)
+        From a step faster than `RIM_LIMIT` to the step back within 1 s; and, where nothing leads back, as long as the
+        signal stands at exactly zero (a dead sensor).
+    """
+    glitch = np.zeros(omega.size, dtype=bool)
+    if omega.size < 3:
+        return glitch
+    v = omega * r_e
+    allowed = RIM_LIMIT * np.diff(t_ns) * 1e-9 + _SLACK
+    jumps = np.flatnonzero(np.abs(np.diff(v)) > allowed)
+    done = -1
+    for position, i in enumerate(jumps.tolist()):
+        if i < done:
+            continue
+        back = next(
+            (
+                j
+                for j in jumps[position + 1 :].tolist()
+                if t_ns[j] - t_ns[i] <= _RETURN_NS
+                and abs(v[j + 1] - v[i]) <= RIM_LIMIT * 0.25 * float(t_ns[j + 1] - t_ns[i]) * 1e-9 + _SLACK
+            ),
+            None,
+        )
+        if back is not None:
+            glitch[i + 1 : back + 1] = True
+            done = back + 1
+        elif omega[i + 1] == 0.0:
+            moving = np.flatnonzero(omega[i + 1 :] != 0.0)
+            end = i + 1 + (int(moving[0]) if moving.size else omega.size)
+            glitch[i + 1 : end] = True
+            done = end
+    return glitch

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from aqualog.align.glitches import sensor_glitches
+
+R_E = 0.317
+T = (np.arange(3000) * 10_000_000).astype(np.int64)
+
+
+def wheel():
+    return 27.0 / R_E + np.random.default_rng(0).normal(0, 0.03, T.size)
+
+
+def test_a_sound_wheel_has_none():
+    assert not sensor_glitches(T, wheel(), r_e=R_E).any()
+
+
+@pytest.mark.parametrize("length", [1, 20, 80])
+@pytest.mark.parametrize("level", [0.0, 300.0])
+def test_dropouts_and_spikes(length, level):
+    x = wheel()
+    x[1000 : 1000 + length] = level
+    found = sensor_glitches(T, x, r_e=R_E)
+    assert np.flatnonzero(found).tolist() == list(range(1000, 1000 + length))
+
+
+def test_dead_sensor_until_it_turns_again():
+    x = wheel()
+    x[1000:2000] = 0.0
+    assert np.flatnonzero(sensor_glitches(T, x, r_e=R_E)).tolist() == list(range(1000, 2000))
+
+
+def test_real_spin_downs_and_lock_ups_stay():
+    share = np.interp(np.arange(T.size), [0, 1000, 1065, 1200, 1240, 3000], [1, 1, 0, 0, 1, 1])  # to a stop in 0.65 s
+    assert not sensor_glitches(T, wheel() * share, r_e=R_E).any()
+    locked = np.interp(np.arange(T.size), [0, 1000, 1015, 1050, 1060, 3000], [1, 1, 0, 0, 1, 1])  # 180 m/s^2
+    assert not sensor_glitches(T, wheel() * locked, r_e=R_E).any()
+
+
+def test_slow_logs_are_left_alone():
+    t = (np.arange(300) * 100_000_000).astype(np.int64)
+    x = np.full(300, 80.0)
+    x[100:102] = 10.0
+    assert not sensor_glitches(t, x, r_e=R_E).any()
