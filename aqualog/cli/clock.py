@@ -91,22 +91,18 @@ def _align(
     from aqualog.align.carrier import QUANTITIES, find_carrier
     from aqualog.align.clock import ClockFit
     from aqualog.align.load import read_options
-    from aqualog.align.mapping import SignalMap
-    from aqualog.cli.console import Console, clean
-    from aqualog.cli.files import expand, refuse_existing
-    from aqualog.config.signal_map import load_signal_map
-    from aqualog.config.vehicle import load_vehicle
+    from aqualog.cli.console import clean
+    from aqualog.cli.setup import prepare
     from aqualog.errors import AqualogError, ConfigError, ExitCode
     from aqualog.io.open_log import DriveLog
-    from aqualog.vehicle import Vehicle as VehicleRecord
 
-    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     if quantity not in QUANTITIES:
         raise ConfigError(f'--quantity "{quantity}"', expected=" or ".join(QUANTITIES))
-    paths = expand(logs)
-    refuse_existing([write_map] if write_map else [], force=force, sources=paths)
-    signal_map = load_signal_map(map_file) if map_file else SignalMap()
-    vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
+    setup = prepare(
+        logs, map_file=map_file, dbc=dbc, targets=[write_map] if write_map else [], force=force, quiet=quiet,
+        verbose=verbose, progress=progress, vehicle_file=vehicle_file,
+    )  # fmt: skip
+    console, paths, signal_map, vehicle = setup.console, setup.paths, setup.signal_map, setup.vehicle
     if len(paths) < 2:
         raise ConfigError("align compares files", expected="a reference and at least one source")
     names = _named(named, [p.name for p in paths])

@@ -76,29 +76,28 @@ def _convert(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.console import Console
-    from aqualog.cli.files import expand, refuse_existing, write_whole
-    from aqualog.config.signal_map import load_signal_map
-    from aqualog.config.vehicle import load_vehicle
+    from aqualog.cli.files import write_whole
+    from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
     from aqualog.io.write_log import check_suffix, write_log
-    from aqualog.vehicle import Vehicle as VehicleRecord
 
-    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     suffix = check_suffix(out)
     if decimal_comma and suffix != ".csv":
         raise ConfigError(f"--decimal-comma says nothing to {suffix}", where=str(out), expected="a .csv")
-    paths = expand(logs)
-    refuse_existing([out], force=force, sources=[*paths, *dbc, *(p for p in (map_file, vehicle_file) if p)])
-    vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
-    signal_map = load_signal_map(map_file) if map_file else None
+    setup = prepare(
+        logs, map_file=map_file, dbc=dbc, targets=[out], force=force, quiet=quiet, verbose=verbose,
+        progress=progress, vehicle_file=vehicle_file,
+    )  # fmt: skip
+    console, paths = setup.console, setup.paths
     with console.steps() as steps:
         import numpy as np
 
         from aqualog.align.load import load_signals
         from aqualog.report.document import signal_groups
 
-        loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
+        loaded = load_signals(
+            paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps
+        )
         steps("writing")
         t_ns = np.arange(loaded.frame.height, dtype=np.int64) * loaded.dt_ns
         groups = signal_groups(loaded)

@@ -98,27 +98,24 @@ def _detect(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.console import Console
-    from aqualog.cli.files import expand, refuse_existing
-    from aqualog.config.signal_map import load_signal_map
-    from aqualog.config.vehicle import load_vehicle
+    from aqualog.cli.setup import prepare
     from aqualog.io.write_log import check_suffix
-    from aqualog.vehicle import Vehicle as VehicleRecord
 
-    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     targets = [out / name for name in _RESULTS] if out else []
     if write is not None:
         check_suffix(write)
         targets.append(write)
-    paths = expand(logs)
-    refuse_existing(targets, force=force, sources=[*paths, *dbc, *(p for p in (map_file, vehicle_file) if p)])
-    signal_map = load_signal_map(map_file) if map_file else None
-    vehicle = load_vehicle(vehicle_file) if vehicle_file else VehicleRecord()
+    setup = prepare(
+        logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
+        progress=progress, vehicle_file=vehicle_file,
+    )  # fmt: skip
+    console, paths = setup.console, setup.paths
+    vehicle = setup.vehicle
     with console.steps() as steps:
         from aqualog.align.load import load_signals
         from aqualog.detect.stream import detect_drive
 
-        loaded = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, rate_hz=rate, report=steps)
+        loaded = load_signals(paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps)
         _something_to_do(loaded, vehicle, paths)
         console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
         for name, origin in loaded.origins.items():

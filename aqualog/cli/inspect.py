@@ -69,19 +69,17 @@ def _inspect(
     progress: str,
 ) -> int:
     from aqualog.align.load import read_options
-    from aqualog.align.mapping import SignalMap
     from aqualog.align.overview import find_mounting, overview, rotated_channels
     from aqualog.align.propose import propose_map
-    from aqualog.cli.console import Console
-    from aqualog.cli.files import expand, refuse_existing
-    from aqualog.config.signal_map import load_signal_map
+    from aqualog.cli.setup import prepare
     from aqualog.io.open_log import DriveLog
 
-    console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-    paths = expand(logs)
-    refuse_existing([write_map] if write_map else [], force=force, sources=paths)
-    signal_map = load_signal_map(map_file) if map_file else SignalMap()
-    with console.steps() as steps, DriveLog(paths, read_options(signal_map, dbc)) as log:
+    setup = prepare(
+        logs, map_file=map_file, dbc=dbc, targets=[write_map] if write_map else [], force=force, quiet=quiet,
+        verbose=verbose, progress=progress,
+    )  # fmt: skip
+    console, paths = setup.console, setup.paths
+    with console.steps() as steps, DriveLog(paths, read_options(setup.signal_map, dbc)) as log:
         steps("reading")
         channels = list(log.read(log.channels()).values())
         formats, faults = log.formats, log.faults

@@ -192,13 +192,12 @@ class DriveStream:
             return [], []
         x = self._resistance_input(f, braking)
         g, bits, self._sums["resistance"] = cusum.scan(self._resistance, self._sums["resistance"], x)
-        f = {**f, "delta_a_x": x}  # evidence is what was summed, not what braking shows
         track = Track("resistance", None, None, "m/s", g, self._resistance.h, bits)
         evidence: Evidence = {
             "v_x": ("first", f["v_x_hat"]),
             "v_x_min": ("min", f["v_x_hat"]),
             "v_x_max": ("max", f["v_x_hat"]),
-            "delta_a_x_max": ("max", f["delta_a_x"]),
+            "delta_a_x_max": ("max", x),  # what was summed, not what braking shows
         }
         return [track], self._events(track, evidence, _partial)
 
@@ -224,7 +223,7 @@ class DriveStream:
         evidence: Evidence = {
             "v_x": ("first", f["v_x_hat"]),
             "slip_min": ("min", criteria.slip_min),
-            "delta_a_x_max": ("max", f["delta_a_x"]),
+            "delta_a_x_max": ("max", x),
             **{f"criterion_{number}": ("any", bits & gate) for number, bits in criteria.met.items()},
             "criterion_5": ("any", next(t.active for t in tracks if t.detector == "resistance")),
             "full": ("any", criteria.is_full),
