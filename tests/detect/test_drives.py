@@ -251,3 +251,11 @@ def test_radius_correction_takes_a_scale_error_out(scale):
     for wheel in ("fl", "rr"):
         slip = features[f"v_w_delta_{wheel}"].to_numpy() / features["v_x_hat"].to_numpy()
         assert abs(np.nanmean(slip[-1000:])) < 0.002
+
+
+def test_a_left_turn_unloads_the_left_wheels():
+    """The same torque on both driven wheels is more of the load on the inner one."""
+    signals, _ = drive(CAR, speed_kmh=((0.0, 80.0),), yaw_rate=((0, 0), (5, 0), (7, 0.15), (20, 0.15)), ideal=True)
+    assert signals.array("a_y")[-1] > 3.0
+    features = detect_drive(signals, CAR).features
+    assert features["mu_rl"][-1] > 1.1 * features["mu_rr"][-1] > 0
