@@ -155,7 +155,9 @@ class DriveStream:
             )
             track = Track(detector, wheel, side_of(wheel), "m/s", g, params.cusum.h, bits)
             severity = _severity_down if detector == "spin_down" else _severity_up
-            events += self._events(track, self._wheel_evidence(wheel, f, braking), severity)
+            # only a spinning driven wheel has the water's resistance booked on it
+            mu = _traction(f, wheel) if detector == "spin_up" else f.get(f"mu_{wheel}")
+            events += self._events(track, self._wheel_evidence(wheel, f, braking, mu), severity)
             tracks.append(track)
         return tracks, events
 
@@ -182,7 +184,8 @@ class DriveStream:
                 ~braking[watched] & is_upright,
             )
             track = Track("minor_spin_down", watched, side, "(m/s^2)^2", delta, self._minor.delta_min, bits)
-            evidence = {**self._wheel_evidence(watched, f, braking), "variance_max": ("max", var)}
+            mu = f.get(f"mu_{watched}")
+            evidence = {**self._wheel_evidence(watched, f, braking, mu), "variance_max": ("max", var)}
             events += self._events(track, evidence, _partial)
             tracks.append(track)
         return tracks, events
@@ -197,13 +200,12 @@ class DriveStream:
             "v_x": ("first", f["v_x_hat"]),
             "v_x_min": ("min", f["v_x_hat"]),
             "v_x_max": ("max", f["v_x_hat"]),
-            "delta_a_x_max": ("max", x),  # what was summed, not what braking shows
+            "delta_a_x_max": ("max", _unbraked(f, braking)),
         }
         return [track], self._events(track, evidence, _partial)
 
     def _resistance_input(self, f: Features, braking: Mapping[str, BoolArray]) -> FloatArray:
-        any_braking = braking["fl"] | braking["fr"] | braking["rl"] | braking["rr"]
-        return resistance.trusted_measure(f["delta_a_x"], f["v_x_hat"], f["a_y_slow"], any_braking)
+        return resistance.trusted_measure(f["delta_a_x"], f["v_x_hat"], f["a_y_slow"], _any_wheel(braking))
 
     # --- joint detector ----------------------------------------------------------------------------------------
 
@@ -223,7 +225,7 @@ class DriveStream:
         evidence: Evidence = {
             "v_x": ("first", f["v_x_hat"]),
             "slip_min": ("min", criteria.slip_min),
-            "delta_a_x_max": ("max", x),
+            "delta_a_x_max": ("max", _unbraked(f, braking)),
             **{f"criterion_{number}": ("any", bits & gate) for number, bits in criteria.met.items()},
             "criterion_5": ("any", next(t.active for t in tracks if t.detector == "resistance")),
             "full": ("any", criteria.is_full),
@@ -238,7 +240,9 @@ class DriveStream:
 
     # --- events ------------------------------------------------------------------------------------------------
 
-    def _wheel_evidence(self, wheel: str, f: Features, braking: Mapping[str, BoolArray]) -> dict[str, Any]:
+    def _wheel_evidence(
+        self, wheel: str, f: Features, braking: Mapping[str, BoolArray], mu: FloatArray | None
+    ) -> dict[str, Any]:
         slip = slip_of_wheel_speed(f[f"v_w_{wheel}"], f["v_x_hat"])
         evidence: dict[str, Any] = {
             "v_x": ("first", f["v_x_hat"]),
@@ -249,7 +253,6 @@ class DriveStream:
             "braking": ("any", braking[wheel]),
             "braking_at_start": ("at_start", braking[wheel]),
         }
-        mu = _traction(f, wheel)
         if mu is not None:
             evidence["mu"] = ("first", mu)
             evidence["mu_min"] = ("min", mu)
@@ -272,6 +275,15 @@ class DriveStream:
 def _traction(f: Features, wheel: str) -> FloatArray | None:
     """Traction coefficient of a wheel without the water's resistance where that is known; None without torque."""
     return f.get(f"mu_res_{wheel}", f.get(f"mu_{wheel}"))
+
+
+def _any_wheel(braking: Mapping[str, BoolArray]) -> BoolArray:
+    return braking["fl"] | braking["fr"] | braking["rl"] | braking["rr"]
+
+
+def _unbraked(f: Features, braking: Mapping[str, BoolArray]) -> FloatArray:
+    """Resistance measure as evidence: what braking shows is not water's."""
+    return np.where(_any_wheel(braking), np.nan, f["delta_a_x"])
 
 
 def _partial(_: Mapping[str, Any]) -> str:

@@ -259,3 +259,20 @@ def test_a_left_turn_unloads_the_left_wheels():
     assert signals.array("a_y")[-1] > 3.0
     features = detect_drive(signals, CAR).features
     assert features["mu_rl"][-1] > 1.1 * features["mu_rr"][-1] > 0
+
+
+def test_traction_of_a_free_wheel_is_not_charged_with_the_cars_resistance():
+    for event in events("minor_spin_down", **WATER, **SPEED[98]):
+        assert event.evidence["mu_min"] > -0.25
+
+
+def test_evidence_of_resistance_leaves_braking_out():
+    columns = {"brake_torque": ((0, 0), (11, 0), (11.3, 3600), (12, 3600), (12.2, 0)), "holds_speed": True}
+    signals, _ = drive(CAR, **WATER, **SPEED[98], **columns)
+    drive_only = signals.frame.with_columns(
+        **{f"torque_{w}": signals.frame[f"torque_{w}"].clip(0.0) for w in ("fl", "fr", "rl", "rr")}
+    )
+    found = detect_drive(type(signals)(drive_only, signals.dt_ns, None, {}, signals.quality, ()), CAR).events
+    resistance = [e for e in found if e.detector == "resistance"]
+    assert resistance
+    assert all(e.evidence["delta_a_x_max"] < 3.0 for e in resistance)  # the brake alone makes 7
