@@ -1,13 +1,19 @@
-"""Compilation of recursions."""
+"""Compilation of recursions, and of the physics that they call."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from numba import njit
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "inlined"]
+
+_inlined: dict[FunctionType, Any] = {}
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -15,8 +21,40 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     A read-only installation without a home folder has no such place; there it is compiled in each process. No fast
     maths: results must not depend on how a drive is cut.
+
+    The kept code is thrown away when a module of `physics` or one beside the function changes: numba itself looks at
+    the file of the function alone and would go on with an old equation.
     """
     try:
-        return njit(cache=True)(function)
+        dispatcher = njit(cache=True)(function)
     except RuntimeError:
         return njit(function)
+    index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
+        index._source_stamp = (index._source_stamp, _stamp(Path(function.__code__.co_filename).parent))
+    return dispatcher
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A pure function of `physics` for use inside a compiled recursion, on scalars.
+
+    The one source serves arrays and the simulator. Keyword-only arguments become ordinary ones, which is all that
+    numba knows; physics functions that it calls are taken along.
+    """
+    assert isinstance(function, FunctionType)
+    if function not in _inlined:
+        code = function.__code__
+        code = code.replace(co_argcount=code.co_argcount + code.co_kwonlyargcount, co_kwonlyargcount=0)
+        names = {n: function.__globals__[n] for n in code.co_names if n in function.__globals__}
+        scope = function.__globals__ | {
+            n: inlined(f) for n, f in names.items() if isinstance(f, FunctionType) and "aqualog.physics" in f.__module__
+        }
+        _inlined[function] = njit(FunctionType(code, scope, function.__name__))
+    return _inlined[function]
+
+
+@cache
+def _stamp(folder: Path) -> str:
+    files = sorted({*folder.glob("*.py"), *(Path(__file__).resolve().parent / "physics").glob("*.py")})
+    state = [(f.name, f.stat().st_mtime_ns, f.stat().st_size) for f in files]
+    return hashlib.sha256(repr(state).encode()).hexdigest()

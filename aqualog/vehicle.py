@@ -12,7 +12,7 @@ from typing import Literal
 
 from aqualog.notation import WHEELS
 
-__all__ = ["KEYS", "Drivetrain", "Key", "Vehicle"]
+__all__ = ["KEYS", "Drivetrain", "Key", "Vehicle", "vehicle_toml"]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
 
@@ -129,3 +129,18 @@ class Vehicle:
         printed: front minus rear).
         """
         return "r" if self.drivetrain == "fwd" else "f"
+
+
+def vehicle_toml(vehicle: Vehicle) -> str:
+    """The vehicle as the text of a vehicle file, every key with unit and meaning."""
+    name = vehicle.name.replace("\\", "").replace('"', "")
+    lines = [f'name = "{name}"', f'drivetrain = "{vehicle.drivetrain}"']
+    section = ""
+    for key in KEYS.values():
+        if key.section != section:
+            section = key.section
+            lines += ["", f"[{section}]"]
+        lines.append(f"{key.name} = {getattr(vehicle, key.name)!r}  # [{key.unit}] {key.meaning}")
+    if vehicle.tie_rod:
+        lines += ["", "[tie_rod]", *(f"{n} = {list(c)!r}" for n, c in vehicle.tie_rod.items())]
+    return "\n".join(lines) + "\n"

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
-from small_model import Drive, Lane, simulate
 
+from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
-from aqualog.io.write_mdf import MdfGroup, write_mf4
 from aqualog.io.write_table import TableColumn, write_csv, write_parquet
+from aqualog.model.log import START_NS, table_of, write_simulation
+from aqualog.model.simulate import simulate
 from aqualog.notation import SYMBOLS, WHEELS
 
 HERE = Path(__file__).resolve().parent
-START_NS = 1_748_000_000_000_000_000  # a made-up moment, so that the logs have absolute time
 ROS_TYPES = {
     "/imu/data": "sensor_msgs/msg/Imu",
     "/wheels": "sensor_msgs/msg/JointState",
@@ -27,11 +27,12 @@ ROS_TYPES = {
 
 
 def sample_drive():
-    """The drive of all sample logs."""
-    lane = Lane(8.0, 16.0, depth_left=1.0e-3, depth_right=1.3e-3)
-    drive = Drive(load_vehicle(HERE / "vehicle.toml"), duration_s=24.0, seed=7, speed_kmh=((0.0, 98.0),), lanes=(lane,))
-    signals = {k: v for k, v in simulate(drive).items() if not k.startswith("true_")}
-    return signals.pop("t"), signals
+    """The drive of all sample logs on one time base, without the simulated truth: t [s], name -> samples."""
+    simulation = simulate(load_scenario(HERE / "scenario.toml"))
+    columns = {n: x for g in table_of(simulation) for n, (_, _, x) in g.columns.items()}
+    rate = simulation.setup.scenario.rate_hz
+    t = np.arange(next(iter(columns.values())).size) / rate
+    return t, {n: x for n, x in columns.items() if not n.startswith("true_")}
 
 
 def write_ros2(path, t, s):
@@ -99,9 +100,9 @@ def main(folder):
     """Write all four logs."""
     folder.mkdir(parents=True, exist_ok=True)
     t, s = sample_drive()
-    meta = {n: (SYMBOLS[n].unit, SYMBOLS[n].meaning, x) for n, x in s.items()}
-    write_mf4(
-        folder / "lane_drive.mf4", [MdfGroup("signals", t, meta)], START_NS, "simulated drive over a watered lane"
+    simulation = simulate(load_scenario(HERE / "scenario.toml"))
+    write_simulation(
+        folder / "lane_drive.mf4", simulation, suffix=".mf4", comment="simulated drive over a watered lane"
     )
     write_ros2(folder / "lane_drive.mcap", t, s)
     write_csv(folder / "lane_drive.csv", csv_columns(t, s, load_vehicle(HERE / "vehicle.toml").steering_ratio),

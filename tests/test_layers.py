@@ -11,7 +11,7 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "compiled", "notation", "units", "types", "vehicle", "physics", "io", "align", "features", "detect", "report",
+    "errors", "compiled", "notation", "units", "types", "vehicle", "physics", "io", "align", "features", "detect", "model", "report",
     "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records

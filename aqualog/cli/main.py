@@ -12,6 +12,7 @@ from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
 from aqualog.cli.detect import detect
 from aqualog.cli.inspect import inspect
+from aqualog.cli.simulate import simulate
 
 __all__ = ["app", "run"]
 
@@ -28,6 +29,7 @@ app.command(no_args_is_help=True)(detect)
 app.command(no_args_is_help=True)(inspect)
 app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
+app.command(no_args_is_help=True)(simulate)
 
 
 def _version(value: bool) -> None:

@@ -18,10 +18,14 @@ SUFFIXES = (".mf4", ".mcap", ".csv", ".parquet")
 
 @dataclass(frozen=True, slots=True)
 class LogGroup:
-    """Channels that share `t_ns` (n,), counted from the start; name -> (unit, meaning, samples (n,), NaN missing)."""
+    """Channels that share stamps (n,), counted from the start; name -> (unit, meaning, samples (n,), NaN missing).
+
+    `t_ns` are stamps of the group's own, for formats that have them (MDF, MCAP); None: those of the log.
+    """
 
     name: str
     columns: Mapping[str, tuple[str, str, FloatArray]]
+    t_ns: TimeArray | None = None
 
 
 def check_suffix(path: Path) -> str:
@@ -46,8 +50,10 @@ def write_log(
     suffix: str,
     start_ns: int | None,
     decimal_comma: bool = False,
+    comment: str = "written by aqualog",
+    written_ns: int | None = None,
 ) -> None:
-    """Write groups of channels on one time base.
+    """Write groups of channels, on one time base where the format is a table.
 
     Parameters
     ----------
@@ -63,18 +69,25 @@ def write_log(
         Absolute time of t = 0, since 1970 UTC.
     decimal_comma : bool
         CSV only: `,` as decimal sign and `;` between cells.
+    comment : str
+        About the log, for formats that have a place for it (MDF, MCAP).
+    written_ns : int, optional
+        Time of writing for formats that keep it (MDF), since 1970 UTC; default now.
     """
     if suffix == ".mf4":
         from aqualog.io.write_mdf import MdfGroup, write_mf4
 
-        t_s: FloatArray = t_ns.astype(np.float64) * 1e-9
-        write_mf4(path, [MdfGroup(g.name, t_s, g.columns) for g in groups], start_ns, "written by aqualog")
+        mdf_groups = [MdfGroup(g.name, _seconds(g, t_ns), g.columns) for g in groups]
+        write_mf4(path, mdf_groups, start_ns, comment, written_ns=written_ns)
         return
     if suffix == ".mcap":
         from aqualog.io.write_mcap import McapTopic, write_mcap
 
-        write_mcap(path, [McapTopic(f"/{g.name}", t_ns, g.columns) for g in groups], start_ns)
+        topics = [McapTopic(f"/{g.name}", t_ns if g.t_ns is None else g.t_ns, g.columns) for g in groups]
+        write_mcap(path, topics, start_ns, comment)
         return
+    if any(g.t_ns is not None for g in groups):
+        raise ValueError(f"{suffix} is one table: bring the groups onto one time base first")
     from aqualog.io.write_table import TableColumn, write_csv, write_parquet
 
     columns = [TableColumn("t", "s", np.asarray(t_ns * 1e-9))]
@@ -83,3 +96,7 @@ def write_log(
         write_csv(path, columns, decimal_comma=decimal_comma)
     else:
         write_parquet(path, columns, start_ns=start_ns)
+
+
+def _seconds(group: LogGroup, t_ns: TimeArray) -> FloatArray:
+    return (t_ns if group.t_ns is None else group.t_ns).astype(np.float64) * 1e-9

@@ -33,7 +33,9 @@ class McapTopic:
     columns: Mapping[str, tuple[str, str, FloatArray]]
 
 
-def write_mcap(path: Path, topics: Sequence[McapTopic], start_ns: int | None) -> None:
+def write_mcap(
+    path: Path, topics: Sequence[McapTopic], start_ns: int | None, comment: str = "written by aqualog"
+) -> None:
     """Write topics into one file, message by message in the order of time.
 
     Parameters
@@ -44,6 +46,8 @@ def write_mcap(path: Path, topics: Sequence[McapTopic], start_ns: int | None) ->
         One JSON message per topic and sample; a sample that is not finite is written as null.
     start_ns : int or None
         Added to all times; None leaves them as they are, counted from 0 or from 1970. [ns]
+    comment : str
+        Kept as metadata of the file.
 
     Raises
     ------
@@ -57,6 +61,7 @@ def write_mcap(path: Path, topics: Sequence[McapTopic], start_ns: int | None) ->
         with path.open("wb") as file:
             writer = Writer(file, compression=CompressionType.ZSTD)
             writer.start(profile="", library="aqualog")
+            writer.add_metadata("aqualog", {"comment": comment})
             channels = [_register(writer, topic) for topic in topics]
             rows = heapq.merge(*starmap(_rows, zip(channels, topics, strict=True)))
             for sequence, (t, channel, _, data) in enumerate(rows):

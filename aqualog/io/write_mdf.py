@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import asammdf
 import numpy as np
+from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from aqualog.errors import ConfigError
@@ -67,8 +68,9 @@ class CanMessage:
 
 
 def write_mf4(
-    path: Path, groups: Sequence[MdfGroup], start_ns: int | None, comment: str, *, compression: Compression = 2
-) -> None:
+    path: Path, groups: Sequence[MdfGroup], start_ns: int | None, comment: str,
+    *, compression: Compression = 2, written_ns: int | None = None,
+) -> None:  # fmt: skip
     """Write measured channels.
 
     Parameters
@@ -83,11 +85,14 @@ def write_mf4(
         Comment of the file.
     compression : 0 or 2
         None, or transposed deflate.
+    written_ns : int, optional
+        Time of writing for the file's history, since 1970 UTC; default now. With one the same channels give the same
+        bytes.
     """
     mdf = _new(start_ns, comment)
     try:
         _append_groups(mdf, groups)
-        _save(mdf, path, compression)
+        _save(mdf, path, compression, written_ns)
     finally:
         mdf.close()
 
@@ -142,9 +147,14 @@ def _new(start_ns: int | None, comment: str) -> Any:
     return mdf
 
 
-def _save(mdf: Any, path: Path, compression: Compression) -> None:
+def _save(mdf: Any, path: Path, compression: Compression, written_ns: int | None = None) -> None:
+    if written_ns is not None:
+        history = FileHistory()
+        history.comment = "<FHcomment><TX>created</TX><tool_id>aqualog</tool_id></FHcomment>"
+        history.abs_time, history.tz_offset, history.daylight_save_time, history.time_flags = written_ns, 0, 0, 0
+        mdf.file_history.append(history)
     with path.open("wb+") as file:  # given a name, asammdf would replace its suffix by .mf4
-        mdf.save(file, compression=compression)
+        mdf.save(file, compression=compression, add_history_block=written_ns is None)
 
 
 def _append_groups(mdf: Any, groups: Sequence[MdfGroup]) -> None:

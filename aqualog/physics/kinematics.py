@@ -6,7 +6,7 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["centre_line_speed", "kinematic_steer_angle"]
+__all__ = ["centre_line_speed", "kinematic_steer_angle", "wheel_velocity"]
 
 
 def kinematic_steer_angle(yaw_rate: FloatArray, v_x: FloatArray, *, wheelbase: float) -> FloatArray:
@@ -59,3 +59,33 @@ def centre_line_speed(
     Limits: yaw_rate = 0 and steer_angle = 0 give v_rim. ISO 8855 axes.
     """
     return (v_rim - yaw_rate * wheelbase * np.sin(steer_angle)) / np.cos(steer_angle) + yaw_rate * y
+
+
+def wheel_velocity(
+    v_x: FloatArray, v_y: FloatArray, yaw_rate: FloatArray, steer_angle: FloatArray, *, x: float, y: float
+) -> tuple[FloatArray, FloatArray]:
+    """Velocity of a wheel's centre in the wheel's own plane.
+
+    Parameters
+    ----------
+    v_x, v_y : array (n,)
+        Velocity of the centre of mass, forward and left. [m/s]
+    yaw_rate : array (n,)
+        Left positive. [rad/s]
+    steer_angle : array (n,)
+        Of this wheel, left positive. [rad]
+    x, y : float
+        Position of the wheel from the centre of mass, forward and left. [m]
+
+    Returns
+    -------
+    v_along, v_across : array (n,)
+        Along the wheel's plane and to its left. [m/s]
+
+    Limits: no yaw, no steering: v_x, v_y. The inverse of `centre_line_speed` for a car that rolls without side slip.
+    """
+    forward = v_x - yaw_rate * y
+    left = v_y + yaw_rate * x
+    c = np.cos(steer_angle)
+    s = np.sin(steer_angle)
+    return forward * c + left * s, left * c - forward * s

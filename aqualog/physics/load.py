@@ -6,9 +6,27 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["G", "wheel_loads"]
+__all__ = ["G", "loads_of_wheels", "wheel_loads"]
 
 G = 9.80665  # [m/s^2]
+
+
+def loads_of_wheels(
+    a_x: FloatArray, a_y: FloatArray, *, mass: float, l_f: float, l_r: float, h_cg: float, track: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Quasi-static loads of fl, fr, rl, rr; see `wheel_loads`, which stacks them."""
+    l = l_f + l_r  # noqa: E741 - the field's symbol of the wheelbase
+    axle_f = mass * (G * l_r - a_x * h_cg) / l
+    axle_r = mass * (G * l_f + a_x * h_cg) / l
+    lateral = mass * a_y * h_cg / track
+    lateral_f = lateral * (l_r / l)
+    lateral_r = lateral * (1.0 - l_r / l)
+    return (
+        np.maximum(0.5 * axle_f - lateral_f, 0.0),
+        np.maximum(0.5 * axle_f + lateral_f, 0.0),
+        np.maximum(0.5 * axle_r - lateral_r, 0.0),
+        np.maximum(0.5 * axle_r + lateral_r, 0.0),
+    )
 
 
 def wheel_loads(
@@ -32,18 +50,5 @@ def wheel_loads(
     Limits: a = 0 splits m g by l_r : l_f and left = right; the sum is m g as long as no wheel lifts. A left turn
     (a_y > 0) loads the right wheels. The lateral transfer is split by the static axle loads. Small grades: cos = 1.
     """
-    l = l_f + l_r  # noqa: E741 - the field's symbol of the wheelbase
-    axle_f = mass * (G * l_r - a_x * h_cg) / l
-    axle_r = mass * (G * l_f + a_x * h_cg) / l
-    lateral = mass * a_y * h_cg / track
-    share_f = l_r / l
-    loads = np.array(
-        [
-            0.5 * axle_f - lateral * share_f,
-            0.5 * axle_f + lateral * share_f,
-            0.5 * axle_r - lateral * (1.0 - share_f),
-            0.5 * axle_r + lateral * (1.0 - share_f),
-        ]
-    )
-    clipped: FloatArray = np.maximum(loads, 0.0)
-    return clipped
+    loads: FloatArray = np.array(loads_of_wheels(a_x, a_y, mass=mass, l_f=l_f, l_r=l_r, h_cg=h_cg, track=track))
+    return loads

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.physics.load import G
 from aqualog.types import FloatArray
 
-__all__ = ["air_drag", "nominal_acceleration", "rolling_resistance_force"]
+__all__ = ["air_drag", "cornering_drag", "grade_force", "nominal_acceleration", "rolling_resistance_force"]
 
 
 def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArray:
@@ -15,7 +16,7 @@ def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArr
     Parameters
     ----------
     v : array (n,)
-        Speed through the air. [m/s]
+        Speed through the air: the vehicle's plus a head wind's. [m/s]
     drag_area : float
         c_w A. [m^2]
     air_density : float
@@ -24,7 +25,7 @@ def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArr
     Returns
     -------
     F : array (n,)
-        Against the motion, positive. [N]
+        Against the motion, positive; negative where a tail wind is faster than the car. [N]
     """
     return 0.5 * drag_area * air_density * v * np.abs(v)
 
@@ -32,6 +33,22 @@ def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArr
 def rolling_resistance_force(F_z: FloatArray, *, r_w: float) -> FloatArray:
     """Rolling resistance r_w F_z. [N] Load [N], coefficient [-]; against the motion, positive."""
     return r_w * F_z
+
+
+def grade_force(theta: FloatArray, *, mass: float) -> FloatArray:
+    """Downhill force of a grade, m g sin(theta). [N]
+
+    Uphill positive, against the motion; theta in rad, a grade of 5 % is 0.05. An accelerometer does not feel it (E2).
+    """
+    return mass * G * np.sin(theta)
+
+
+def cornering_drag(a_y: FloatArray, *, mass: float, coefficient: float) -> FloatArray:
+    """Extra resistance of cornering beyond what the two-track model has, coefficient m a_y^2. [N]
+
+    `coefficient` [s^2/m]; scrub and toe make it; against the motion.
+    """
+    return coefficient * mass * a_y * a_y
 
 
 def nominal_acceleration(

@@ -6,7 +6,7 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["V_MIN", "slip_of_wheel_speed", "wheel_slip"]
+__all__ = ["V_MIN", "bounded_slip", "slip_of_wheel_speed", "wheel_slip"]
 
 V_MIN = 1.0  # [m/s] below this no slip is defined
 
@@ -55,3 +55,22 @@ def wheel_slip(omega: FloatArray, v_x: FloatArray, r_e: float) -> FloatArray:
     v_w = omega * r_e
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(v_w > V_MIN, (v_w - v_x) / v_w, np.nan)
+
+
+def bounded_slip(v_w: FloatArray, v_along: FloatArray) -> FloatArray:
+    """Slip of (3.13) that a simulation can use at any speed: (v_w - v) / max(|v_w|, 0.5 m/s).
+
+    Parameters
+    ----------
+    v_w : array
+        Speed at the rolling circumference, omega r_e. [m/s]
+    v_along : array
+        Velocity of the wheel's centre in its plane. [m/s]
+
+    Returns
+    -------
+    s_x : array
+        Driving positive. Equal to (3.13) while the rim runs faster than 0.5 m/s; large and negative, not infinite, for
+        a wheel that stands still in a moving car (E7), where the brush slides anyway. [-]
+    """
+    return (v_w - v_along) / np.maximum(np.abs(v_w), 0.5)

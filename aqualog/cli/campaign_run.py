@@ -1,0 +1,40 @@
+"""`aqualog simulate campaign NAME`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+from aqualog.cli.console import Console
+from aqualog.errors import ExitCode
+from aqualog.model.campaign import simulate_campaign
+
+__all__ = ["run_campaign"]
+
+
+def run_campaign(name: str, folder: Path, *, jobs: int | None, force: bool, console: Console) -> int:
+    """Simulate a programme; exit code. A run that fails is told and the others are made."""
+    began = time.monotonic()
+    first: list[int] = []
+    with console.steps() as steps:
+
+        def report(done: int, total: int) -> None:
+            if not first:
+                first.append(done)
+            made, seconds = done - first[0], time.monotonic() - began
+            left = f", {(total - done) * seconds / made:.0f} s left" if made > 0 and done < total else ""
+            steps(f"{done} of {total} drives{left}")
+
+        outcome = simulate_campaign(name, folder, jobs=jobs or os.cpu_count() or 1, force=force, report=report)
+    for run, reason in outcome.failed.items():
+        sys.stderr.write(f"error: {run}: {reason}\n")
+    kept = f", {outcome.kept} were there already" if outcome.kept else ""
+    console.note(
+        f"{outcome.made} drives simulated in {time.monotonic() - began:.0f} s{kept}"
+        f"{f', {len(outcome.failed)} failed' if outcome.failed else ''}; the campaign is {folder / 'campaign.toml'}"
+    )
+    if not outcome.failed:
+        return int(ExitCode.DONE)
+    return int(ExitCode.PARTIAL) if outcome.made or outcome.kept else int(ExitCode.FAILED)

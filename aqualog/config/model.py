@@ -1,0 +1,101 @@
+"""Model files: the base simulation and the effects on top of it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from aqualog.config.scenario import TableFaults
+from aqualog.config.toml_file import load_toml
+from aqualog.errors import ConfigError
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Effect, Model, Term
+
+__all__ = ["dump_model", "load_model"]
+
+
+def load_model(path: Path) -> Model:
+    """Read and check a model file: `[[term]]` tables with `effect`, where it sits (`where`) and its parameters, SI.
+
+    A parameter that is left out keeps its neutral value; a file without terms is the base model.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of the file in one message.
+    """
+    document, text = load_toml(path, what="model file")
+    faults = TableFaults(path, text)
+    for name in document:
+        if name != "term":
+            faults.unknown(name, ("term",))
+    tables = document.get("term", [])
+    if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
+        faults.add("term", "term is not a list of tables; write [[term]]")
+        tables = []
+    model = Model()
+    for index, table in enumerate(tables):
+        with faults.inside("term", index):
+            term = _term(table, faults)
+            if term is None:
+                continue
+            try:
+                model = model.with_term(term)
+            except ConfigError as error:
+                faults.add("effect", error.line())
+    faults.raise_if_any()
+    return model
+
+
+def _term(table: Mapping[str, Any], faults: TableFaults) -> Term | None:
+    effect = _effect(table, faults)
+    if effect is None:
+        return None
+    known = {p.name: p for p in effect.parameters}
+    values: dict[str, float] = {}
+    for name in table:
+        if name in ("effect", "where"):
+            continue
+        if name not in known:
+            faults.unknown(name, ["effect", "where", *known])
+            continue
+        p = known[name]
+        number = faults.number(table, name, low=p.low, high=p.high, unit=p.unit)
+        if number is not None:
+            values[name] = number
+    where = table.get("where")
+    if where is not None and (not isinstance(where, str) or where not in effect.places):
+        places = ", ".join(effect.places) or "no place: it acts on the whole car"
+        faults.add("where", f"{effect.name} cannot sit at {repr(where)[:40]}; expected {places}")
+        where = None
+    return Term(effect, values, where)
+
+
+def _effect(table: Mapping[str, Any], faults: TableFaults) -> Effect | None:
+    name = table.get("effect")
+    if name is None:
+        faults.add("term", "term names no effect")
+        return None
+    if isinstance(name, str) and name in EFFECTS:
+        return EFFECTS[name]
+    near = difflib.get_close_matches(str(name), list(EFFECTS), n=1, cutoff=0.5)
+    hint = f' (did you mean "{near[0]}"?)' if near else f"; known: {', '.join(EFFECTS)}"
+    faults.add("effect", f"unknown effect {repr(name)[:40]}{hint}")
+    return None
+
+
+def dump_model(model: Model) -> str:
+    """The TOML text of a model; `load_model` reads it back equal."""
+    return "\n".join(_term_text(t) for t in model.terms)
+
+
+def _term_text(term: Term) -> str:
+    units = {p.name: p.unit for p in term.effect.parameters}
+    lines = ["[[term]]", f"effect = {json.dumps(term.effect.name)}"]
+    if term.where is not None:
+        lines.append(f"where = {json.dumps(term.where)}")
+    lines += [f"{n} = {float(v)!r}  # {units[n]}" for n, v in term.values.items()]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,286 @@
+"""Effects that a model may have on top of the base simulation, one table.
+
+Each names what it acts on, its parameters with unit, prior and bounds, and a source. Neutral values leave a drive as it
+is to the last bit. Sizes follow published figures where there are any: V read in a source, D derived, K general
+knowledge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from aqualog.model.plant import Plant, with_mass_at
+from aqualog.model.sensors import Channel
+from aqualog.model.term import Effect, Parameter, Setup
+from aqualog.notation import AXLES, SIDES, WHEELS
+from aqualog.types import FloatArray
+
+__all__ = ["EFFECTS", "wheels_at"]
+
+Values = Mapping[str, float]
+
+_WHEEL_PLACES = (*WHEELS, *AXLES, *SIDES)
+_SIGNALS = (
+    "v_x", "a_x", "a_y", "yaw_rate", "steer_angle", *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS),
+    "omega", "torque",
+)  # fmt: skip
+
+
+def wheels_at(where: str | None) -> tuple[int, ...]:
+    """Wheel indices of a place: a wheel, an axle, a side, or all."""
+    names = WHEELS if where is None else AXLES.get(where) or SIDES.get(where) or (where,)
+    return tuple(WHEELS.index(w) for w in names)
+
+
+def _scaled(x: FloatArray, where: str | None, factor: float) -> FloatArray:
+    out = x.copy()
+    out[list(wheels_at(where))] *= factor
+    return out
+
+
+def _shifted(x: FloatArray, where: str | None, delta: float) -> FloatArray:
+    out = x.copy()
+    out[list(wheels_at(where))] += delta
+    return out
+
+
+def _on_plant(change: Callable[[Plant, Values, str | None], Plant]) -> Callable[[Setup, Values, str | None], Setup]:
+    return lambda setup, v, where: setup._replace(plant=change(setup.plant, v, where))
+
+
+def _on_channels(change: Callable[[Channel, Values], Channel]) -> Callable[[Setup, Values, str | None], Setup]:
+    """Change the channel of a signal, or of all four wheels' for `omega` and `torque`."""
+
+    def apply(setup: Setup, v: Values, where: str | None) -> Setup:
+        signals = [f"{where}_{w}" for w in WHEELS] if where in ("omega", "torque") else [str(where)]
+        sensors = setup.sensors
+        for signal in signals:
+            sensors = sensors.with_channel(signal, change(sensors.channels.get(signal, Channel()), v))
+        return setup._replace(sensors=sensors)
+
+    return apply
+
+
+def _road_grade(setup: Setup, v: Values, _: str | None) -> Setup:
+    scenario = setup.scenario
+    if scenario.grade:
+        grade = tuple((s, theta + v["grade"]) for s, theta in scenario.grade)
+    else:
+        grade = ((0.0, v["grade"]),) if v["grade"] != 0.0 else ()
+    return setup._replace(scenario=replace(scenario, grade=grade))
+
+
+def _tone_ring(setup: Setup, v: Values, where: str | None) -> Setup:
+    ring = list(setup.sensors.tone_ring)
+    for i in wheels_at(where):
+        ring[i] += v["amplitude"]
+    return setup._replace(sensors=replace(setup.sensors, tone_ring=(ring[0], ring[1], ring[2], ring[3])))
+
+
+def _clock_skew(setup: Setup, v: Values, where: str | None) -> Setup:
+    groups = tuple(
+        replace(g, skew_ppm=g.skew_ppm + v["skew"]) if where in g.signals else g for g in setup.sensors.groups
+    )
+    return setup._replace(sensors=replace(setup.sensors, groups=groups))
+
+
+def _uneven_water(setup: Setup, v: Values, where: str | None) -> Setup:
+    side = where or "left"
+    lanes = tuple(
+        replace(
+            lane,
+            **{
+                f"depth_{side}": getattr(lane, f"depth_{side}") * v["depth_gain"],
+                f"irregularity_{side}": getattr(lane, f"irregularity_{side}") + v["irregularity"],
+            },
+        )
+        for lane in setup.scenario.lanes
+    )
+    return setup._replace(scenario=replace(setup.scenario, lanes=lanes))
+
+
+def _payload(p: Plant, v: Values, where: str | None) -> Plant:
+    x = {"f": 0.0, "r": p.l_f + p.l_r}.get(where or "", p.l_f)
+    return with_mass_at(p, v["delta_mass"], x)
+
+
+_ALL = [
+    Effect(
+        "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
+        "motorways to 3-4 % (V, DMRB)",
+        (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
+        twins=("accelerometer_bias",),
+    ),
+    Effect(
+        "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "+-5 m/s (K)",
+        (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive"),),
+        _on_plant(lambda p, v, _: p._replace(head_wind=p.head_wind + v["speed"])), twins=("aero_drag",),
+    ),
+    Effect(
+        "aero_drag", "drag area c_w A [m^2]", "The drag area is {delta_drag_area:+.2f} m^2 off.", "roof box +0.2 (K)",
+        (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's"),),
+        _on_plant(lambda p, v, _: p._replace(drag_area=p.drag_area + v["delta_drag_area"])), twins=("head_wind",),
+    ),
+    Effect(
+        "rolling_resistance", "rolling resistance coefficient [-]", "Rolling resistance is {delta_r_w:+.4f} off.",
+        "0.007-0.017 (V, TRB)",
+        (Parameter("delta_r_w", "-", 0.0, 0.002, -0.01, 0.05, 0.0005, "on top of the vehicle file's"),),
+        _on_plant(lambda p, v, w: p._replace(r_w=_shifted(p.r_w, w, v["delta_r_w"]))), _WHEEL_PLACES,
+        twins=("brake_drag",),
+    ),
+    Effect(
+        "tyre_warmup", "rolling resistance over time", "Cold tyres rolled {extra:.0%} harder at the start.",
+        "8 % per 10 degC (V, R117); cold up to +40 % (V)",
+        (
+            Parameter("extra", "-", 0.0, 0.2, -0.3, 1.0, 0.03, "relative, at the start"),
+            Parameter("time_constant", "s", 600.0, 300.0, 30.0, 5000.0, 60.0, "of the warm-up"),
+        ),
+        _on_plant(lambda p, v, _: p._replace(warmup_extra=p.warmup_extra + v["extra"], warmup_time=v["time_constant"])),
+    ),
+    Effect(
+        "water_drag", "drag of the water on the wheels", "The water drags {gain:.2f} times as much.",
+        "momentum estimate within a factor of two (D)",
+        (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.1, "on film and wave"),),
+        _on_plant(lambda p, v, w: p._replace(water_drag_gain=_scaled(p.water_drag_gain, w, v["gain"]))), _WHEEL_PLACES,
+    ),
+    Effect(
+        "brake_drag", "torque against a wheel [N m]", "The brake drags with {torque:.0f} N m.", "a few N m a wheel (K)",
+        (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel"),),
+        _on_plant(lambda p, v, w: p._replace(brake_drag=_shifted(p.brake_drag, w, v["torque"]))), _WHEEL_PLACES,
+        twins=("rolling_resistance",),
+    ),
+    Effect(
+        "cornering_drag", "resistance in curves [s^2/m]", "Curves cost more than the two-track model says.",
+        "scrub, toe (K)",
+        (Parameter("coefficient", "s^2/m", 0.0, 0.005, -0.02, 0.1, 0.001, "F = coefficient m a_y^2"),),
+        _on_plant(lambda p, v, _: p._replace(cornering_drag=p.cornering_drag + v["coefficient"])),
+    ),
+    Effect(
+        "payload_mass", "mass [kg]", "The car weighed {delta_mass:.0f} kg more than the vehicle file says.",
+        "passengers and load (K)",
+        (Parameter("delta_mass", "kg", 0.0, 100.0, -500.0, 3000.0, 20.0, "at the place"),), _on_plant(_payload),
+        ("f", "r"), twins=("torque_gain",),
+    ),
+    Effect(
+        "torque_gain", "torque at the wheels over the reported one [-]", "The wheels get {gain:.3f} of the torque.",
+        "axle efficiency 95-97 % (V)",
+        (Parameter("gain", "-", 1.0, 0.05, 0.3, 2.0, 0.01, "true over reported"),),
+        _on_plant(lambda p, v, _: p._replace(torque_gain=p.torque_gain * v["gain"])), twins=("payload_mass",),
+    ),
+    Effect(
+        "wheel_inertia", "inertia of the wheels [kg m^2]", "A wheel has {delta_inertia:+.2f} kg m^2 more inertia.",
+        "1.0-1.8 with the driveline (K)",
+        (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel"),),
+        _on_plant(lambda p, v, w: p._replace(inertia=np.maximum(_shifted(p.inertia, w, v["delta_inertia"]), 0.05))),
+        _WHEEL_PLACES, twins=("payload_mass",),
+    ),
+    Effect(
+        "accelerometer_bias", "accelerometer [m/s^2]", "The accelerometer is off by {bias:+.2f} m/s^2.",
+        "ESC sensors +-50-100 mg, 20 mg short term (V)",
+        (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
+        _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
+    ),
+    Effect(
+        "accelerometer_gain", "accelerometer [-]", "The accelerometer reads {gain:.3f} times the truth.", "1-3 % (K)",
+        (Parameter("gain", "-", 1.0, 0.02, 0.5, 1.5, 0.01, "on the true value"),),
+        _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
+    ),
+    Effect(
+        "accelerometer_drift", "accelerometer [m/s^3]", "The accelerometer drifts by {drift:.1e} m/s^2 a second.",
+        "20 mg short term (V)",
+        (Parameter("drift", "m/s^3", 0.0, 5e-4, -0.02, 0.02, 1e-4, "from the start"),),
+        _on_channels(lambda c, v: replace(c, drift=c.drift + v["drift"])), ("a_x", "a_y"), "a_x",
+    ),
+    Effect(
+        "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
+        (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
+        _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
+    ),
+    Effect(
+        "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
+        "6.8e-4 per tooth (V, Gustafsson)",
+        (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.0005, "once per turn, relative"),), _tone_ring,
+        _WHEEL_PLACES,
+    ),
+    Effect(
+        "velocity_scale", "reference velocity [-]", "The reference velocity reads {scale:.4f} times the truth.",
+        "mounting, Doppler optics: 1 % (K)",
+        (Parameter("scale", "-", 1.0, 0.01, 0.8, 1.2, 0.002, "on the true value"),),
+        _on_channels(lambda c, v: replace(c, gain=c.gain * v["scale"])), ("v_x",), "v_x", twins=("tyre_radius",),
+    ),
+    Effect(
+        "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
+        "15-50 over tyres (K); temperature, wear (V, Carlson/Gerdes)",
+        (Parameter("gain", "-", 1.0, 0.2, 0.1, 5.0, 0.05, "on the dry slope"),),
+        _on_plant(lambda p, v, w: p._replace(slip_slope=_scaled(p.slip_slope, w, v["gain"]))), _WHEEL_PLACES,
+    ),
+    Effect(
+        "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
+        "-0.4 to -1 %/K (K)",
+        (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, from the start"),),
+        _on_plant(lambda p, v, w: p._replace(slip_slope_drift=_shifted(p.slip_slope_drift, w, v["rate"]))),
+        _WHEEL_PLACES,
+    ),
+    Effect(
+        "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
+        "0.22 in MF6.1 (V)",
+        (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
+        _on_plant(lambda p, v, w: p._replace(load_sensitivity=_shifted(p.load_sensitivity, w, v["delta"]))),
+        _WHEEL_PLACES,
+    ),
+    Effect(
+        "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "+-0.3 % (D), wear 1 % (K)",
+        (Parameter("delta", "-", 0.0, 0.005, -0.1, 0.1, 0.001, "relative, effective and loaded"),),
+        _on_plant(
+            lambda p, v, w: p._replace(
+                r_e=_scaled(p.r_e, w, 1.0 + v["delta"]), r_l=_scaled(p.r_l, w, 1.0 + v["delta"])
+            )
+        ),
+        _WHEEL_PLACES, twins=("velocity_scale",),
+    ),
+    Effect(
+        "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
+        "2.9e-6 in MF6.1 (V, D)",
+        (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
+        _on_plant(lambda p, v, w: p._replace(radius_growth=_shifted(p.radius_growth, w, v["growth"]))), _WHEEL_PLACES,
+    ),
+    Effect(
+        "relaxation_length", "build-up of tyre forces [m]", "Tyre forces build up over {length:.2f} m.",
+        "0.12-0.45 m (V)",
+        (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
+        _on_plant(lambda p, v, w: p._replace(relaxation_length=_shifted(p.relaxation_length, w, v["length"]))),
+        _WHEEL_PLACES, twins=("signal_delay",),
+    ),
+    Effect(
+        "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
+        "shape assumed (D)",
+        (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.1, "on the lost share"),),
+        _on_plant(lambda p, v, w: p._replace(contact_gain=_scaled(p.contact_gain, w, v["gain"]))), _WHEEL_PLACES,
+    ),
+    Effect(
+        "track_clearing", "film in the track of the front wheels [m]", "The front wheels leave another film.",
+        "below 0.6 mm (D)",
+        (Parameter("delta_film", "m", 0.0, 2e-4, -5e-4, 5e-3, 1e-4, "on the tyre's own"),),
+        _on_plant(lambda p, v, _: p._replace(h_track=np.maximum(p.h_track + v["delta_film"], 0.0))),
+    ),
+    Effect(
+        "uneven_water", "water of one side", "The {where} track has {depth_gain:.2f} of the water.",
+        "thesis 2.1: left lower and more irregular",
+        (
+            Parameter("depth_gain", "-", 1.0, 0.3, 0.0, 5.0, 0.1, "on the depth of that side"),
+            Parameter("irregularity", "-", 0.0, 0.2, 0.0, 2.0, 0.05, "added rms, relative to the depth"),
+        ),
+        _uneven_water, ("left", "right"), "left",
+    ),
+    Effect(
+        "clock_skew", "clock of a bus [ppm]", "The clock of the signal runs {skew:.0f} ppm off.",
+        "quartz 20-100 ppm (K)",
+        (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 20.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
+        twins=("signal_delay",),
+    ),
+]  # fmt: skip
+
+EFFECTS: dict[str, Effect] = {e.name: e for e in _ALL}

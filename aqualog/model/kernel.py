@@ -1,0 +1,428 @@
+"""The compiled four-wheel simulation: right-hand side and time stepping.
+
+States (index): speeds and attitude, low-passed specific forces, the driver, the wheels. The physics is that of
+`aqualog.physics`, called on scalars.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.compiled import compiled, inlined
+from aqualog.model import excitation
+from aqualog.physics import (
+    contact,
+    hydroplaning,
+    kinematics,
+    load,
+    resistance,
+    rolling,
+    slip,
+    surface,
+    tyre_brush,
+    water,
+)
+from aqualog.physics.load import G
+from aqualog.types import FloatArray
+
+__all__ = ["COLUMNS", "N_STATES", "Controls", "integrate"]
+
+# states
+V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = range(12)
+OMEGA, ANGLE, SLIP_X, SLIP_Y = 12, 16, 20, 24  # four each
+N_STATES = 28
+# the Jacobian: a diagonal, and behind it the coupling of v_x with the wheels, d(v_x')/d(omega) and d(omega')/d(v_x)
+_J_V, _J_W = N_STATES, N_STATES + 4
+
+# recorded columns; those of wheels take four places
+_SCALARS = (
+    "v_x", "v_y", "yaw_rate", "psi", "position", "y_lat", "a_x", "a_y", "steer_angle", "drive_torque", "brake_torque",
+    "grade", "lane_front", "lane_rear", "drag",
+)  # fmt: skip
+_WHEELS = (
+    "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
+    "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full",
+)  # fmt: skip
+COLUMNS = {name: i for i, name in enumerate(_SCALARS)} | {name: len(_SCALARS) + 4 * i for i, name in enumerate(_WHEELS)}
+_WIDTH = len(_SCALARS) + 4 * len(_WHEELS)
+
+# driver (K): gains of a calm driver
+K_SPEED = 0.8  # [1/s]
+K_INTEGRAL = 0.04  # [1/s^2]
+PEDAL_TIME = 0.25  # [s]
+ENGINE_BRAKING = 0.04  # of the weight, as force
+K_LATERAL = 0.004  # [rad/m]
+PREVIEW_TIME = 1.5  # [s]
+STEER_TIME = 0.2  # [s]
+MAX_DRIVE = 0.6  # of the weight, as force
+
+
+class Controls(NamedTuple):
+    """What driver and car do; arrays (n + 1,) at every time step."""
+
+    v_target: FloatArray
+    a_target: FloatArray
+    drive: FloatArray  # [N m] extra drive torque, or all of it without a driver
+    brake: FloatArray  # [N m] sum of all wheels
+    steer: FloatArray  # [rad]
+    exc: FloatArray  # unit excitation waveform
+    grade: FloatArray  # [rad] on top of the road's
+    has_driver: bool
+    keeps_lane: bool
+    exc_kind: int  # 0 force, 1 traction coefficient, 2 relative
+    exc_amplitude: float
+    scatter: float
+
+
+_loads = inlined(load.loads_of_wheels)
+_wheel_velocity = inlined(kinematics.wheel_velocity)
+_bounded_slip = inlined(slip.bounded_slip)
+_brush_forces = inlined(tyre_brush.brush_forces)
+_brush_slope = inlined(tyre_brush.brush_slope)
+_friction_ratio = inlined(contact.friction_ratio)
+_stiffness_ratio = inlined(contact.slip_stiffness_ratio)
+_lost_contact = inlined(contact.lost_contact)
+_half_length = inlined(contact.contact_half_length)
+_load_shift = inlined(contact.load_shift)
+_v_full = inlined(hydroplaning.full_aquaplaning_speed)
+_film_drag = inlined(water.film_drag)
+_wave_drag = inlined(water.wave_drag)
+_residual_film = inlined(water.residual_film)
+_series_slope = inlined(surface.series_slope)
+_air_drag = inlined(resistance.air_drag)
+_grade_force = inlined(resistance.grade_force)
+_cornering_drag = inlined(resistance.cornering_drag)
+_rolling_force = inlined(resistance.rolling_resistance_force)
+_effective_radius = inlined(rolling.effective_radius)
+_warm_up_factor = inlined(rolling.warm_up_factor)
+_load_factor = inlined(rolling.load_factor)
+_amplitude = inlined(excitation.excitation_force_amplitude)
+_H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0
+_P_HALF, _F_Z_HALF = 2.2e5, 4000.0
+_SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
+_FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
+
+
+@compiled
+def _at(field, column, position, ds):  # type: ignore[no-untyped-def]
+    """Linear interpolation of a field over the position; constant beyond its ends."""
+    x = position / ds
+    last = field.shape[0] - 1
+    if x <= 0.0:
+        return field[0, column]
+    if x >= last:
+        return field[last, column]
+    j = int(x)
+    return field[j, column] + (x - j) * (field[j + 1, column] - field[j, column])
+
+
+@compiled
+def _table(knots, x):  # type: ignore[no-untyped-def]
+    """Linear interpolation in a table of knots (k, 2); constant beyond its ends."""
+    if x <= knots[0, 0]:
+        return knots[0, 1]
+    for i in range(1, knots.shape[0]):
+        if x < knots[i, 0]:
+            w = (x - knots[i - 1, 0]) / (knots[i, 0] - knots[i - 1, 0])
+            return knots[i - 1, 1] + w * (knots[i, 1] - knots[i - 1, 1])
+    return knots[knots.shape[0] - 1, 1]
+
+
+@compiled
+def _lane(lanes, t, position):  # type: ignore[no-untyped-def]
+    """Index of the stretch under the front axle, -1 for dry asphalt."""
+    found = -1
+    for i in range(lanes.shape[0]):
+        x = position if lanes[i, 0] > 0.0 else t
+        if lanes[i, 1] <= x < lanes[i, 2]:
+            found = i
+    return found
+
+
+@compiled
+def _track(track, position, ds):  # type: ignore[no-untyped-def]
+    """Row of the memory of what the front axle met and left at a position; before the start: dry."""
+    j = int(position / ds)
+    if position < 0.0 or j >= track.shape[0]:
+        return -1
+    return j
+
+
+@compiled
+def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
+    """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is recorded.
+
+    `track` (m, 3) holds the stretch and the film left by the left and right front wheel.
+    """
+    v_x, v_y, yaw_rate, position = y[V_X], y[V_Y], y[YAW_RATE], y[S]
+    wheelbase = p.l_f + p.l_r
+    steer = c.steer[k] + y[STEER]
+    grade = c.grade[k] + _at(r.grade.reshape(-1, 1), 0, position, r.ds)
+    drag = _air_drag(v_x + p.head_wind, p.drag_area, p.air_density) + _table(p.drag_over_v, v_x)
+    drag += _cornering_drag(y[A_Y], p.mass, p.cornering_drag)
+    slope_down = _grade_force(grade, p.mass)
+    warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time)
+    loads = _loads(y[A_X], y[A_Y], p.mass, p.l_f, p.l_r, p.h_cg, p.track)
+
+    r_drive = 0.0  # mean loaded radius of the driven wheels, by their share
+    for i in range(4):
+        r_drive += p.drive_split[i] * p.r_l[i]
+    # the driver
+    brake_total = c.brake[k] + y[BRAKE]
+    if c.has_driver:
+        error = c.v_target[k] - v_x
+        wanted = p.mass * (c.a_target[k] + K_SPEED * error) + y[INTEGRAL] + drag + slope_down
+        for i in range(4):
+            wanted += _rolling_force(loads[i], p.r_w[i]) * warm
+        least = -ENGINE_BRAKING * p.mass * G
+        most = MAX_DRIVE * p.mass * G
+        f[DRIVE] = (min(max(wanted, least), most) * r_drive - y[DRIVE]) / PEDAL_TIME
+        f[INTEGRAL] = K_INTEGRAL * p.mass * error
+        f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
+        drive = y[DRIVE] + c.drive[k]
+    else:
+        f[DRIVE] = 0.0
+        f[INTEGRAL] = 0.0
+        f[BRAKE] = 0.0
+        drive = c.drive[k] * p.torque_gain
+    if c.keeps_lane:
+        f[STEER] = (-K_LATERAL * (y[Y_LAT] + PREVIEW_TIME * v_x * y[PSI]) - y[STEER]) / STEER_TIME
+    else:
+        f[STEER] = -y[STEER] / STEER_TIME
+
+    # active excitation: what one axle gains the other loses (3.26, 3.27)
+    split_rear = p.drive_split[2] + p.drive_split[3]
+    nominal = drive / r_drive
+    exc = c.exc[k] * _amplitude(
+        c.exc_kind, c.exc_amplitude, (1.0 - split_rear) * nominal, split_rear * nominal,
+        p.mass * G * p.l_r / wheelbase, p.mass * G * p.l_f / wheelbase,
+    )  # fmt: skip
+
+    lane_front = _lane(r.lanes, t, position)
+    behind = _track(track, position - wheelbase, r.ds)
+    lane_rear = int(track[behind, 0]) if behind >= 0 else -1
+
+    jac[V_X] = 0.0
+    jac[V_Y] = 0.0
+    jac[YAW_RATE] = 0.0
+    sum_x = 0.0
+    sum_y = 0.0
+    moment = 0.0
+    for i in range(4):
+        front = i < 2
+        side = i % 2
+        x = p.l_f if front else -p.l_r
+        y_i = 0.5 * p.track if side == 0 else -0.5 * p.track
+        angle = steer if front else 0.0
+        F_z = loads[i]
+        omega = y[OMEGA + i]
+        v_along, v_across = _wheel_velocity(v_x, v_y, yaw_rate, angle, x, y_i)
+        r_e = _effective_radius(p.r_e[i], v_along, p.radius_growth[i])
+        rim = omega * r_e
+
+        # the road under this wheel
+        where = position if front else position - wheelbase
+        lane = lane_front if front else lane_rear
+        mu = p.mu[i]
+        compliance = 0.0
+        r_w = p.r_w[i] * warm
+        bump = 0.0
+        film = 0.0
+        if lane >= 0:
+            if r.lane_mu[lane] >= 0.0:
+                mu = r.lane_mu[lane]
+            compliance = r.lane_compliance[lane]
+            r_w += r.lanes[lane, 7]
+            bump = r.lanes[lane, 8] * _at(r.bumps, side, where, r.ds)
+            if front:
+                uneven = 1.0 + r.lanes[lane, 5 + side] * _at(r.depth, side, where, r.ds)
+                film = r.lanes[lane, 3 + side] * max(uneven, 0.0)
+            else:
+                film = track[behind, 1 + side]
+
+        # what the water leaves of the contact, and what it costs
+        L = 1.0
+        film_force = 0.0
+        wave = 0.0
+        shift = 0.0
+        v_full = 1e6
+        if film > 0.0:
+            mu *= p.wet_friction[i]
+            v_full = _v_full(
+                film, F_z, p.p[i], p.tread_capacity[i], p.v_anchor[i], _H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR,
+                p.h_bulk[i], p.h_onset[i], p.contact_exponent[i],
+            )  # fmt: skip
+            noise = _FIELD_SHARE * (_at(r.contact_road, side, where, r.ds) + _at(r.contact_wheel, i, where, r.ds))
+            # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
+            turning = min(max(rim / max(abs(v_along), 0.5), 0.0), 1.0)
+            v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * turning
+            v_full *= max(1.0 + c.scatter * p.contact_scatter[i] * noise, 0.2)
+            lost = _lost_contact(v_along, v_full, p.contact_exponent[i]) * p.contact_gain[i]
+            L = 1.0 - min(max(lost, 0.0), 1.0)
+            a = _half_length(F_z, p.p[i], p.half_length[i], _F_Z_HALF, _P_HALF)
+            shift = _load_shift(L, a, p.wedge_peak[i]) * F_z
+            gain = p.water_drag_gain[i]
+            film_force = gain * _film_drag(film, rim, p.width[i], p.tread_capacity[i], p.h_film[i], p.groove_relief[i])
+            wave = gain * _wave_drag(film, v_along, p.width[i], p.h_wave[i])
+        mu_max = mu * _friction_ratio(L)
+        slope = p.slip_slope[i] * (1.0 + p.slip_slope_drift[i] * t)
+        slope *= _load_factor(F_z, p.F_z_ref[i], p.load_sensitivity[i])
+        slope = _series_slope(slope, compliance) * _stiffness_ratio(L)
+        C_x = slope * F_z
+        C_y = _series_slope(p.cornering_slope[i], compliance) * _stiffness_ratio(L) * F_z
+
+        # slip, with a first-order build-up where the tyre has a relaxation length
+        s_x = _bounded_slip(rim, v_along)
+        speed = max(abs(rim), 0.5)
+        s_y = -v_across / speed
+        sigma = p.relaxation_length[i]
+        ds_domega = 0.0
+        ds_dv = 0.0
+        if sigma > 0.0:
+            rate = speed / sigma
+            f[SLIP_X + i] = rate * (s_x - y[SLIP_X + i])
+            f[SLIP_Y + i] = rate * (s_y - y[SLIP_Y + i])
+            jac[SLIP_X + i] = -rate
+            jac[SLIP_Y + i] = -rate
+            s_x = y[SLIP_X + i]
+            s_y = y[SLIP_Y + i]
+        else:
+            f[SLIP_X + i] = 0.0
+            f[SLIP_Y + i] = 0.0
+            jac[SLIP_X + i] = 0.0
+            jac[SLIP_Y + i] = 0.0
+            ds_domega = max(v_along, 0.0) * r_e / (speed * speed) if abs(rim) > 0.5 else 2.0 * r_e
+            ds_dv = -1.0 / speed
+        F_x, F_y = _brush_forces(s_x, s_y, F_z, mu_max, C_x, C_y)
+
+        # the wheel's balance of torques
+        torque = p.drive_split[i] * drive + (0.5 if front else -0.5) * exc * p.r_l[i]
+        braking = p.brake_split[i] * brake_total
+        water_torque = film_force * p.r_l[i] + shift
+        resisting = _rolling_force(F_z, r_w) * p.r_l[i] + water_torque + p.brake_drag[i]
+        turn = min(max(omega, -1.0), 1.0)  # resistance fades out below 1 rad/s instead of jumping
+        f[OMEGA + i] = (torque - F_x * p.r_l[i] - (resisting + braking) * turn + bump) / p.inertia[i]
+        dF_dsx = _brush_slope(s_x, F_z, mu_max, C_x)
+        arm = p.r_l[i] / p.inertia[i]
+        jac[OMEGA + i] = -dF_dsx * ds_domega * arm
+        jac[_J_W + i] = -dF_dsx * ds_dv * arm
+        jac[_J_V + i] = dF_dsx * ds_domega / p.mass
+        jac[V_X] += dF_dsx * ds_dv / p.mass
+        across = C_y * ds_dv * (dF_dsx / max(C_x, 1.0))
+        jac[V_Y] += across / p.mass
+        jac[YAW_RATE] += across * x * x / p.I_zz
+        if abs(omega) < 1.0:
+            jac[OMEGA + i] -= (resisting + braking) / p.inertia[i]
+        f[ANGLE + i] = omega
+
+        # forces on the body, in its axes
+        cos, sin = np.cos(angle), np.sin(angle)
+        along = F_x - wave
+        body_x = along * cos - F_y * sin
+        body_y = along * sin + F_y * cos
+        sum_x += body_x
+        sum_y += body_y
+        moment += x * body_y - y_i * body_x
+
+        base = len(_SCALARS) + i
+        out[base] = omega
+        out[base + 4] = y[ANGLE + i]
+        out[base + 8] = torque - braking * turn
+        out[base + 12] = F_x
+        out[base + 16] = F_y
+        out[base + 20] = F_z
+        out[base + 24] = s_x
+        out[base + 28] = -np.arctan2(v_across, max(abs(v_along), 0.5))
+        out[base + 32] = L
+        out[base + 36] = slope
+        out[base + 40] = mu_max
+        out[base + 44] = film
+        out[base + 48] = water_torque
+        out[base + 52] = wave
+        out[base + 56] = resisting * turn
+        out[base + 60] = v_along
+        out[base + 64] = r_e
+        out[base + 68] = v_full
+
+    a_x = (sum_x - drag) / p.mass  # specific force: what an accelerometer shows
+    a_y = sum_y / p.mass
+    f[V_X] = a_x - slope_down / p.mass + yaw_rate * v_y
+    f[V_Y] = a_y - yaw_rate * v_x
+    f[YAW_RATE] = moment / p.I_zz
+    f[PSI] = yaw_rate
+    f[S] = v_x
+    f[Y_LAT] = v_y + v_x * np.sin(y[PSI])
+    f[A_X] = (a_x - y[A_X]) / p.roll_time
+    f[A_Y] = (a_y - y[A_Y]) / p.roll_time
+
+    out[0], out[1], out[2], out[3], out[4], out[5] = v_x, v_y, yaw_rate, y[PSI], position, y[Y_LAT]
+    out[6], out[7], out[8], out[9], out[10], out[11] = a_x, a_y, steer, drive, brake_total, grade
+    out[12], out[13], out[14] = lane_front, lane_rear, drag
+
+
+@compiled
+def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
+    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels, which pull at each other."""
+    for i in range(N_STATES):
+        k[i] = f[i] / (1.0 - h * jac[i])
+    right = f[V_X]
+    left = 1.0 - h * jac[V_X]
+    for i in range(4):
+        own = 1.0 - h * jac[OMEGA + i]
+        right += h * jac[_J_V + i] * f[OMEGA + i] / own
+        left -= h * h * jac[_J_V + i] * jac[_J_W + i] / own
+    k[V_X] = right / left
+    for i in range(4):
+        k[OMEGA + i] = (f[OMEGA + i] + h * jac[_J_W + i] * k[V_X]) / (1.0 - h * jac[OMEGA + i])
+
+
+@compiled
+def integrate(n, dt, every, y0, p, r, c):  # type: ignore[no-untyped-def]
+    """March `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
+
+    ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part that is given,
+    which is the stiff one: wheels and body on the tyres' slip.
+    """
+    h = (1.0 - np.sqrt(0.5)) * dt
+    y = y0.copy()
+    f = np.zeros(N_STATES)
+    k1 = np.zeros(N_STATES)
+    k2 = np.zeros(N_STATES)
+    rest = np.zeros(N_STATES)
+    jac = np.zeros(N_STATES + 8)
+    unused = np.zeros(N_STATES + 8)
+    row = np.zeros(_WIDTH)
+    scratch = np.zeros(_WIDTH)
+    rows = np.zeros((n // every + 1, _WIDTH))
+    cells = 2 + int((n * dt * 120.0 + 50.0) / r.ds) if r.lanes.shape[0] > 0 else 2
+    track = np.zeros((cells, 3))
+    track[:, 0] = -1.0
+    h_track_left, h_track_right = p.h_track[2], p.h_track[3]
+    film, contact_at = len(_SCALARS) + 44, len(_SCALARS) + 32
+    written = -1
+    for k in range(n + 1):
+        t = k * dt
+        _rhs(t, k, y, f, jac, row, p, r, c, track)
+        if k % every == 0:
+            rows[k // every] = row
+        if k == n:
+            break
+        # what the front axle leaves for the rear one
+        if r.lanes.shape[0] > 0:
+            here = min(int(max(y[S], 0.0) / r.ds), cells - 1)
+            for j in range(written + 1, here + 1):
+                track[j, 0] = row[12]
+                track[j, 1] = _residual_film(row[film], row[contact_at], h_track_left)
+                track[j, 2] = _residual_film(row[film + 1], row[contact_at + 1], h_track_right)
+            written = max(written, here)
+        _solve(f, jac, h, k1)
+        y1 = y + dt * k1
+        _rhs(t + dt, k + 1, y1, f, unused, scratch, p, r, c, track)
+        for i in range(N_STATES):
+            rest[i] = f[i] - 2.0 * k1[i]
+        _solve(rest, jac, h, k2)
+        for i in range(N_STATES):
+            y[i] += dt * (1.5 * k1[i] + 0.5 * k2[i])
+    return rows

@@ -1,0 +1,70 @@
+"""A simulated drive as a log file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
+from aqualog.io.write_log import LogGroup, write_log
+from aqualog.model.sensors import Measured
+from aqualog.model.simulate import TRUTH_SYMBOLS, Simulation
+from aqualog.notation import ACCEPTED, SYMBOLS
+from aqualog.types import FloatArray, TimeArray
+
+__all__ = ["START_NS", "groups_of", "table_of", "write_simulation"]
+
+START_NS = 1_748_000_000_000_000_000  # made up: a drive that never was must be the same whenever it is simulated
+_OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time stamps of its messages
+
+
+def write_simulation(path: Path, simulation: Simulation, *, suffix: str, comment: str) -> None:
+    """Write a drive in the format of a suffix; the same drive gives the same bytes."""
+    groups = groups_of(simulation) if suffix in _OWN_STAMPS else table_of(simulation)
+    write_log(path, _grid(simulation), groups, suffix=suffix, start_ns=START_NS, comment=comment, written_ns=START_NS)
+
+
+def groups_of(simulation: Simulation) -> list[LogGroup]:
+    """Groups with the time stamps that their bus messages bear."""
+    return [
+        LogGroup(g.name, {n: (*_about(n), x) for n, x in g.columns.items()}, _stamps(g)) for g in simulation.measured
+    ]
+
+
+def table_of(simulation: Simulation) -> list[LogGroup]:
+    """All groups on one grid at the scenario's rate, as a logger's table is made."""
+    grid = _grid(simulation)
+    return [
+        LogGroup(g.name, {n: (*_about(n), _onto(grid, _stamps(g), n, x)) for n, x in g.columns.items()})
+        for g in simulation.measured
+    ]
+
+
+def _grid(simulation: Simulation) -> TimeArray:
+    scenario = simulation.setup.scenario
+    dt_ns = round(1e9 / scenario.rate_hz)
+    return np.arange(max(round(scenario.duration_s * scenario.rate_hz), 2), dtype=np.int64) * dt_ns
+
+
+def _stamps(group: Measured) -> TimeArray:
+    return np.rint(group.t * 1e9).astype(np.int64)
+
+
+def _about(name: str) -> tuple[str, str]:
+    """Unit and meaning of a channel."""
+    symbol = SYMBOLS.get(name) or ACCEPTED.get(name)
+    return (symbol.unit, symbol.meaning) if symbol else TRUTH_SYMBOLS[name]
+
+
+def _onto(grid: TimeArray, t_ns: TimeArray, name: str, x: FloatArray) -> FloatArray:
+    """Linear; states held; means where a signal is much faster than the grid."""
+    symbol = SYMBOLS.get(name)
+    is_state = symbol is not None and symbol.kind == "state"
+    gap_ns = gap_limit_ns(t_ns, is_state=is_state)
+    if is_state:
+        return hold(t_ns, x, grid, gap_ns=gap_ns)
+    dt_ns = int(grid[1] - grid[0])
+    if 0 < median_period_ns(t_ns) < dt_ns / 2:
+        return bin_mean(t_ns, x, grid, dt_ns=dt_ns, gap_ns=gap_ns)[0]
+    return linear(t_ns, x, grid, gap_ns=gap_ns)[0]

@@ -1,0 +1,162 @@
+"""The vehicle on its tyres as numbers that the compiled simulation reads; terms of a model act on it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.model.tyre import P_REFERENCE, Tyre
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G
+from aqualog.physics.rolling import pressure_factor
+from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Plant", "build_plant", "with_mass_at"]
+
+P_NOMINAL = 2.2e5  # [Pa] nominal pressure of the MF6.1 pressure law
+P_HALF_LENGTH, F_Z_HALF_LENGTH = 2.2e5, 4000.0  # [Pa, N] reference of a tyre's half_length
+H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
+BRAKE_SHARE_FRONT = 0.64  # of the brake torque (K)
+
+
+class Plant(NamedTuple):
+    """SI floats, and arrays (4,) in the order fl, fr, rl, rr. Neutral values leave a drive as it is to the last bit."""
+
+    mass: float
+    l_f: float
+    l_r: float
+    h_cg: float
+    track: float
+    I_zz: float
+    drag_area: float
+    air_density: float
+    head_wind: float
+    cornering_drag: float
+    roll_time: float
+    drive_split: FloatArray
+    brake_split: FloatArray
+    torque_gain: float  # torque at the wheels over the torque that the car reports
+    r_e: FloatArray
+    r_l: FloatArray
+    radius_growth: FloatArray
+    inertia: FloatArray
+    r_w: FloatArray
+    warmup_extra: float
+    warmup_time: float
+    brake_drag: FloatArray
+    slip_slope: FloatArray
+    slip_slope_drift: FloatArray
+    cornering_slope: FloatArray
+    load_sensitivity: FloatArray
+    F_z_ref: FloatArray
+    mu: FloatArray
+    relaxation_length: FloatArray
+    wet_friction: FloatArray
+    p: FloatArray
+    tread_capacity: FloatArray
+    half_length: FloatArray
+    width: FloatArray
+    v_anchor: FloatArray
+    h_bulk: FloatArray
+    h_onset: FloatArray
+    contact_exponent: FloatArray
+    contact_gain: FloatArray  # multiplies the lost contact
+    wedge_peak: FloatArray
+    h_film: FloatArray
+    groove_relief: FloatArray
+    h_wave: FloatArray
+    water_drag_gain: FloatArray
+    h_track: FloatArray
+    contact_scatter: FloatArray
+    drag_over_v: FloatArray  # (k, 2) knots: v [m/s], extra force against the motion [N]
+
+
+def build_plant(
+    vehicle: Vehicle, front: Tyre, rear: Tyre, *, p_front: float = P_REFERENCE, p_rear: float = P_REFERENCE
+) -> Plant:
+    """A plant without extra load.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Car; its slip slope and friction hold for a worn summer tyre at `P_REFERENCE` and the static load.
+    front, rear : Tyre
+    p_front, p_rear : float
+        Inflation pressures. [Pa]
+    """
+    tyres = (front, front, rear, rear)
+    p = np.array([p_front, p_front, p_rear, p_rear])
+    slope = np.array([vehicle.slip_slope_f, vehicle.slip_slope_f, vehicle.slip_slope_r, vehicle.slip_slope_r])
+    split, brake_f = vehicle.torque_split_rear, BRAKE_SHARE_FRONT
+    front_axle = vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
+    rear_axle = vehicle.mass * G * vehicle.l_f / vehicle.wheelbase
+
+    def of(name: str) -> FloatArray:
+        return np.array([float(getattr(t, name)) for t in tyres])
+
+    return Plant(
+        mass=vehicle.mass,
+        l_f=vehicle.l_f,
+        l_r=vehicle.l_r,
+        h_cg=vehicle.h_cg,
+        track=vehicle.track,
+        I_zz=vehicle.mass * vehicle.l_f * vehicle.l_r,  # radius of gyration sqrt(l_f l_r) (K)
+        drag_area=vehicle.drag_area,
+        air_density=vehicle.air_density,
+        head_wind=0.0,
+        cornering_drag=0.0,
+        roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
+        drive_split=0.5 * np.array([1.0 - split, 1.0 - split, split, split]),
+        brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
+        torque_gain=1.0,
+        r_e=np.array([vehicle.r_e(w) for w in WHEELS]),
+        r_l=np.array([vehicle.r_l(w) for w in WHEELS]),
+        radius_growth=np.zeros(4),
+        inertia=np.array([vehicle.inertia(w) for w in WHEELS]),
+        r_w=np.full(4, vehicle.rolling_resistance),
+        warmup_extra=0.0,
+        warmup_time=600.0,
+        brake_drag=np.zeros(4),
+        slip_slope=slope * of("slip_slope_factor") * pressure_factor(p, p_ref=P_REFERENCE, p_nominal=P_NOMINAL),
+        slip_slope_drift=np.zeros(4),
+        cornering_slope=of("cornering_slope"),
+        load_sensitivity=of("load_sensitivity"),
+        F_z_ref=0.5 * np.array([front_axle, front_axle, rear_axle, rear_axle]),
+        mu=vehicle.mu_max * of("mu_factor"),
+        relaxation_length=np.zeros(4),
+        wet_friction=of("wet_friction"),
+        p=p,
+        tread_capacity=of("tread_capacity"),
+        half_length=of("half_length"),
+        width=of("width"),
+        v_anchor=of("v_anchor"),
+        h_bulk=of("h_bulk"),
+        h_onset=of("h_onset"),
+        contact_exponent=of("contact_exponent"),
+        contact_gain=np.ones(4),
+        wedge_peak=of("wedge_peak"),
+        h_film=of("h_film"),
+        groove_relief=of("groove_relief"),
+        h_wave=of("h_wave"),
+        water_drag_gain=np.ones(4),
+        h_track=of("h_track"),
+        contact_scatter=of("contact_scatter"),
+        drag_over_v=np.array([[0.0, 0.0], [100.0, 0.0]]),
+    )
+
+
+def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
+    """Add a mass at a distance from the front axle. [kg, m]
+
+    The centre of mass moves along; its height stays. No mass leaves every bit as it is.
+    """
+    moved = delta_mass * (x - plant.l_f) / (plant.mass + delta_mass)
+    inertia = delta_mass * (x - plant.l_f) * (x - plant.l_f) * plant.mass / (plant.mass + delta_mass)
+    return plant._replace(
+        mass=plant.mass + delta_mass,
+        l_f=plant.l_f + moved,
+        l_r=plant.l_r - moved,
+        I_zz=plant.I_zz + inertia,
+    )

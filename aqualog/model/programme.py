@@ -1,0 +1,157 @@
+"""Test programmes as data: the drives of the thesis' chapter 2."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from aqualog.model.scenario import Lane, Scenario, Steering
+from aqualog.model.tyre import TYRES
+from aqualog.vehicle import Vehicle
+
+__all__ = ["PROGRAMMES", "Run", "thesis"]
+
+KMH = 1.0 / 3.6  # [m/s]
+BAR = 1e5  # [Pa]
+PRESSURES = {"low": 1.9 * BAR, "medium": 2.3 * BAR, "high": 2.8 * BAR}  # the thesis gives names only (K)
+APPROACH_S = 4.0  # dry road before the lane
+LANE_M = 130.0  # about 4.5 s at 100 km/h (thesis Fig. 2.25)
+RUN_OUT_S = 3.0
+LEFT_SHARE = 0.6  # the left track has significantly less water, and less even (thesis 2.1; sizes K)
+LEFT_IRREGULARITY, RIGHT_IRREGULARITY = 0.5, 0.05
+
+SEDAN = Vehicle(
+    name="sedan RWD", drivetrain="rwd", torque_split_rear=1.0, mass=1680.0, l_f=1.32, l_r=1.48, h_cg=0.54, track=1.55,
+    drag_area=0.66, rolling_resistance=0.0105,
+)  # fmt: skip
+SUV = Vehicle(
+    name="SUV AWD", drivetrain="awd", torque_split_rear=0.6, mass=1950.0, l_f=1.40, l_r=1.41, h_cg=0.62, track=1.62,
+    drag_area=0.91, rolling_resistance=0.0105, r_e_f=0.355, r_e_r=0.355, r_l_f=0.346, r_l_r=0.346, inertia_f=1.8,
+    inertia_r=1.8,
+)  # fmt: skip
+SUV_REAR = replace(SUV, name="SUV AWD, drive to the rear", torque_split_rear=0.98)
+
+CONSTANT = (60, 70, 80, 89, 98, 106, 112, 118, 124)
+BINNED = (60, 70, 80, 90, 100, 110)
+WEAR = {"very_worn_summer": "very_worn", "worn_summer": "worn", "new_summer": "new", "new_winter": "new"}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One drive of a programme: its name (a file's stem), what is driven, and what its row in the campaign says."""
+
+    name: str
+    scenario: Scenario
+    manoeuvre: str
+    figures: str  # figures of the thesis that it serves
+    water_depth: float  # [m] nominal, right track; 0 for a dry run
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """A configuration of car, tyres and water."""
+
+    tyre: str = "worn_summer"
+    pressure: str = "low"
+    depth_mm: float = 1.3
+    load_front: float = 0.0
+    load_rear: float = 0.0
+    vehicle: Vehicle = SEDAN
+
+
+def thesis() -> tuple[Run, ...]:
+    """The test programme of chapter 2, figure by figure; drives that serve several figures stand once."""
+    runs: dict[str, Run] = {}
+    for number, (case, kmh, a, repeat, manoeuvre, figures) in enumerate(_drives()):
+        run = _run(case, kmh, a, repeat, manoeuvre, figures, seed=number + 1)
+        if run.name in runs:
+            old = runs[run.name]
+            merged = ",".join(dict.fromkeys([*old.figures.split(","), *figures.split(",")]))
+            runs[run.name] = replace(old, figures=merged)
+        else:
+            runs[run.name] = run
+    return tuple(runs.values())
+
+
+PROGRAMMES = {"thesis": thesis}
+
+_Drive = tuple[_Case, float, float, int, str, str]
+
+
+def _drives() -> Iterator[_Drive]:
+    """Case, speed over the lane [km/h], acceleration [m/s^2], number of the repeat, manoeuvre, figures."""
+    worn = _Case()
+
+    def constant(case: _Case, speeds: tuple[int, ...], repeats: int, figures: str) -> Iterator[_Drive]:
+        return ((case, v, 0.0, k, "constant", figures) for v in speeds for k in range(repeats))
+
+    def accelerated(case: _Case, speeds: tuple[int, ...], a: tuple[float, ...], figures: str) -> Iterator[_Drive]:
+        return ((case, v, x, 0, "acceleration", figures) for v in speeds for x in a)
+
+    yield from constant(worn, CONSTANT, 3, "2.3,2.4,2.10,2.14,2.17")
+    yield from accelerated(worn, (70, 80, 90, 100, 110, 120), (1.0,), "2.4")
+    high = _Case(pressure="high")
+    yield from constant(high, (80, 100, 120, 130), 2, "2.5,2.6")
+    yield from accelerated(high, (80, 90, 100, 110, 120, 130), (2.0, 3.0, 4.0), "2.5,2.6,2.7")
+    yield from constant(_Case(depth_mm=0.8), (60, 70, 80, 90, 100, 110, 120), 2, "2.8,2.9,2.17,2.25")
+    for depth in (0.6, 0.8, 1.1, 1.3, 2.0):
+        yield from constant(_Case("very_worn_summer", depth_mm=depth), BINNED, 2, "2.10,2.11,2.12,2.13,2.16")
+    for depth in (1.1, 2.0):
+        yield from constant(_Case("new_summer", depth_mm=depth), BINNED, 2, "2.12")
+    for depth in (1.3, 2.0):
+        yield from constant(_Case("new_winter", depth_mm=depth), BINNED, 2, "2.13")
+        yield from accelerated(_Case("new_winter", depth_mm=depth), BINNED, (0.5,), "2.19")
+        yield from accelerated(_Case(depth_mm=depth), BINNED, (0.5,), "2.17,2.19")
+    for pressure in ("medium", "high"):
+        yield from constant(_Case(pressure=pressure), BINNED, 2, "2.14")
+    for pressure in ("low", "medium"):
+        for front, rear in ((0.0, 0.0), (270.0, 0.0), (0.0, 270.0)):
+            case = _Case(pressure=pressure, depth_mm=1.2, load_front=front, load_rear=rear)
+            yield from constant(case, BINNED, 2, "2.15")
+            yield from accelerated(case, BINNED, (0.5,), "2.20")
+    for depth in (0.6, 0.8, 1.1):
+        yield from accelerated(_Case(depth_mm=depth), BINNED, (0.5,), "2.17")
+    for pressure in ("low", "medium", "high"):
+        yield from accelerated(_Case(pressure=pressure, depth_mm=1.2), BINNED, (0.5,), "2.18")
+    # dry references: moderate acceleration, for the slip slope and the calibration
+    for case in (
+        worn, _Case("very_worn_summer"), _Case("new_summer"), _Case("new_winter"), _Case(pressure="medium"), high,
+        _Case(load_front=270.0), _Case(load_rear=270.0), _Case(vehicle=SUV),
+    ):  # fmt: skip
+        yield (replace(case, depth_mm=0.0), 90, 1.0, 0, "acceleration", "2.16")
+    rear_drive = _Case(vehicle=SUV_REAR)
+    for k in range(3):
+        yield (rear_drive, 110, -0.4, k, "deceleration", "2.21")
+        yield (_Case(vehicle=SUV), 112, 1.5, k, "acceleration", "2.22")
+        yield (rear_drive, 104, 0.0, k, "slalom", "2.23")
+    yield from constant(_Case(vehicle=SUV), BINNED, 2, "2.10")
+
+
+def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures: str, seed: int) -> Run:
+    v = kmh * KMH
+    on_lane_s = LANE_M / v
+    duration = APPROACH_S + on_lane_s + RUN_OUT_S
+    depth = case.depth_mm * 1e-3
+    half = APPROACH_S + 0.5 * on_lane_s  # the speed of the name is reached in the middle of the lane
+    speed = ((0.0, v),) if a == 0.0 else ((0.0, v - a * half), (duration, v + a * (duration - half)))
+    start = APPROACH_S * (v - a * half) + 0.5 * a * APPROACH_S**2
+    lane = Lane(
+        start, start + LANE_M, in_metres=True, depth_left=LEFT_SHARE * depth, depth_right=depth,
+        irregularity_left=LEFT_IRREGULARITY, irregularity_right=RIGHT_IRREGULARITY,
+    )  # fmt: skip
+    steering = None
+    if manoeuvre == "slalom":  # 2 m/s^2 with a period of 4 s (thesis 2.4); kinematic gain
+        steering = Steering(2.0 * case.vehicle.wheelbase / (v * v), 4.0)
+    p = PRESSURES[case.pressure]
+    scenario = Scenario(
+        case.vehicle, TYRES[case.tyre], TYRES[case.tyre], p, p, case.load_front, case.load_rear,
+        duration_s=round(duration, 2), seed=seed, speed=speed, lanes=(lane,) if depth > 0 else (), steering=steering,
+    )  # fmt: skip
+    return Run(_name(case, kmh, a, repeat, manoeuvre), scenario, manoeuvre, figures, depth)
+
+
+def _name(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str) -> str:
+    car = {"sedan RWD": "rwd", "SUV AWD": "awd"}.get(case.vehicle.name, "awdr")
+    load = f"_front{case.load_front:.0f}" if case.load_front else f"_rear{case.load_rear:.0f}" if case.load_rear else ""
+    motion = {"constant": "const", "slalom": "slalom"}.get(manoeuvre, f"a{a:+.1f}")
+    return f"{car}_{case.tyre}_{case.pressure}_{case.depth_mm:.1f}mm{load}_{kmh:03.0f}kmh_{motion}_{repeat + 1}"

@@ -1,0 +1,111 @@
+"""The simulation driven by a measured torque: torque in, speed out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.errors import ConfigError
+from aqualog.model import kernel
+from aqualog.model.plant import Plant
+from aqualog.model.road import Road
+from aqualog.physics.resistance import air_drag
+from aqualog.types import FloatArray
+
+__all__ = ["Replay", "replay"]
+
+_DRY = Road(
+    ds=1.0,
+    lanes=np.zeros((0, 9)),
+    lane_mu=np.zeros(0),
+    lane_compliance=np.zeros(0),
+    contact_road=np.zeros((2, 2)),
+    contact_wheel=np.zeros((2, 4)),
+    depth=np.zeros((2, 2)),
+    bumps=np.zeros((2, 2)),
+    grade=np.zeros(2),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What becomes of a torque: `t` [s], `v_x` [m/s], specific force `a_x` [m/s^2], `omega` (4, n) [rad/s]."""
+
+    t: FloatArray
+    v_x: FloatArray
+    a_x: FloatArray
+    omega: FloatArray
+
+
+def replay(
+    plant: Plant, t: FloatArray, torque: FloatArray, *, v_0: float, grade: FloatArray | None = None, dt: float = 2e-3
+) -> Replay:
+    """Drive a dry straight road with a given torque, freely from the first speed on.
+
+    Parameters
+    ----------
+    plant : Plant
+        The car; its drive split shares the torque out, its `torque_gain` scales it.
+    t : array (n,)
+        Even time base of the inputs, from any start. [s]
+    torque : array (n,)
+        Sum of the net wheel torques, drive minus brake. [N m] Finite.
+    v_0 : float
+        Speed at the first sample, > 0. [m/s]
+    grade : array (n,), optional
+        Slope angle at each sample, uphill positive. [rad]
+    dt : float
+        Step of the integration. [s]
+
+    Returns
+    -------
+    replay : Replay
+        On the samples of `t`. Where the car has come to a standstill, resistance fades out below 1 rad/s and it stays
+        about there.
+
+    Raises
+    ------
+    ConfigError
+        If the inputs are not finite or not even in time.
+    """
+    step = float(t[1] - t[0])
+    every = round(step / dt)
+    if every < 1 or abs(every * dt - step) > 1e-6 or not np.allclose(np.diff(t), step, rtol=0.0, atol=1e-6):
+        raise ConfigError(f"a replay needs an even time base in steps of {dt:g} s")
+    if not (np.isfinite(torque).all() and np.isfinite(v_0)):
+        raise ConfigError("a replay needs finite torque and speed")
+    n = every * (t.size - 1)
+    fine = np.arange(n + 1) * dt
+    still = np.zeros(n + 1)
+    controls = kernel.Controls(
+        v_target=still,
+        a_target=still,
+        drive=np.interp(fine, t - t[0], torque),
+        brake=still,
+        steer=still,
+        exc=still,
+        grade=still if grade is None else np.interp(fine, t - t[0], grade),
+        has_driver=False,
+        keeps_lane=False,
+        exc_kind=0,
+        exc_amplitude=0.0,
+        scatter=0.0,
+    )
+    rows = kernel.integrate(n, dt, every, _rolling_state(plant, v_0, float(torque[0])), plant, _DRY, controls)
+    first = kernel.COLUMNS["omega"]
+    return Replay(
+        t,
+        rows[:, kernel.COLUMNS["v_x"]],
+        rows[:, kernel.COLUMNS["a_x"]],
+        np.ascontiguousarray(rows[:, first : first + 4].T),
+    )
+
+
+def _rolling_state(plant: Plant, v: float, torque: float) -> FloatArray:
+    y = np.zeros(kernel.N_STATES)
+    y[kernel.V_X] = v
+    drag = float(air_drag(np.array([v]), drag_area=plant.drag_area, air_density=plant.air_density)[0])
+    y[kernel.A_X] = (torque * plant.torque_gain / float(plant.r_l.mean()) - drag) / plant.mass
+    y[kernel.OMEGA : kernel.OMEGA + 4] = v / plant.r_e
+    return y

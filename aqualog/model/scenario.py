@@ -1,0 +1,83 @@
+"""What is driven, where, and how it is measured: records of a scenario file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aqualog.model.sensors import ESC, Sensors
+from aqualog.model.surface import SURFACES, Surface
+from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Excitation", "Lane", "Scenario", "Steering", "Waveform"]
+
+Waveform = Literal["triangle", "sine", "ramp", "step"]
+AmplitudeKind = Literal["force", "mu", "relative"]
+Profile = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A stretch of road that is not dry asphalt, between two times [s] or two positions [m] (`in_metres`).
+
+    `depth_left`, `depth_right`: mean water [m]; `irregularity_left`, `irregularity_right`: rms of the depth along the
+    lane, relative to its mean [-].
+    """
+
+    start: float
+    end: float
+    in_metres: bool = False
+    depth_left: float = 0.0
+    depth_right: float = 0.0
+    irregularity_left: float = 0.05
+    irregularity_right: float = 0.05
+    surface: Surface = SURFACES["asphalt"]
+
+
+@dataclass(frozen=True, slots=True)
+class Steering:
+    """Sinusoidal steering: amplitude of the mean road-wheel angle [rad], period [s], start [s]."""
+
+    amplitude: float
+    period_s: float
+    start_s: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """Active excitation of the axle forces (thesis 3.3).
+
+    `amplitude` is a force [N], a traction coefficient or a share of the nominal axle force [-], by `amplitude_kind`.
+    """
+
+    waveform: Waveform
+    amplitude: float
+    amplitude_kind: AmplitudeKind
+    period_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One drive, SI throughout. Profiles are (t [s], value) pairs, linear between and constant beyond."""
+
+    vehicle: Vehicle
+    tyre_front: Tyre = TYRES["worn_summer"]
+    tyre_rear: Tyre = TYRES["worn_summer"]
+    p_front: float = P_REFERENCE  # [Pa]
+    p_rear: float = P_REFERENCE
+    load_front: float = 0.0  # [kg] over the front axle
+    load_rear: float = 0.0
+    duration_s: float = 20.0
+    rate_hz: float = 100.0
+    seed: int = 1
+    speed: Profile = ((0.0, 98.0 / 3.6),)  # [m/s] what the driver wants
+    lanes: tuple[Lane, ...] = ()
+    steering: Steering | None = None
+    excitation: Excitation | None = None
+    brake_torque: Profile = ()  # [N m] sum of all wheels
+    extra_torque: Profile = ()  # [N m] drive torque on top of the driver's, sum of the driven wheels
+    grade: Profile = ()  # (s [m], slope angle [rad]) over the position
+    head_wind: float = 0.0  # [m/s]
+    water_scatter: float = 1.0  # scales the contact's fluctuation; 0 for an even contact
+    sensors: Sensors = field(default=ESC)

@@ -1,0 +1,242 @@
+"""A scenario and a model in, a simulated drive out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.errors import ConfigError
+from aqualog.model import kernel
+from aqualog.model.excitation import waveform
+from aqualog.model.plant import Plant, build_plant, with_mass_at
+from aqualog.model.road import build_road
+from aqualog.model.scenario import Profile, Scenario
+from aqualog.model.sensors import Measured, Truth, measure
+from aqualog.model.term import Model, Setup
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.steering import tie_rod_force
+from aqualog.types import FloatArray
+
+__all__ = ["STEP_S", "TRUTH_SYMBOLS", "Simulation", "assemble", "drive_truth", "run_kernel", "simulate"]
+
+BASE = Model()
+STEP_S = 1e-3
+FINE_RATE_HZ = 1000.0  # of the record that sensors sample
+FINE_LIMIT_S = 300.0  # longer drives are recorded more coarsely, to keep memory in bounds
+PRESSURE_PER_TORQUE = 1.5e3  # [Pa/(N m)] brake pressure over the sum of the brake torques (K)
+TIE_ROD = {"c0": (0.0,), "c_y": (0.11,), "c_x": (0.06,)}  # where the vehicle file has none (K)
+_EXC_KIND = {"force": 0, "mu": 1, "relative": 2}
+
+_WHEEL_TRUTH = {
+    "contact": ("contact", "-", "remaining share of the contact length L"),
+    "s_x": ("slip", "-", "longitudinal slip (omega r_e - v) / (omega r_e)"),
+    "F_x": ("force_x", "N", "longitudinal tyre force"),
+    "F_y": ("force_y", "N", "lateral tyre force"),
+    "F_z": ("load", "N", "wheel load"),
+    "slope": ("slip_slope", "-", "slip slope C_s / F_z of the remaining contact"),
+    "mu_max": ("mu_max", "-", "friction of the remaining contact over the wheel load"),
+    "film": ("film", "m", "water in front of the wheel"),
+    "v_full": ("full_speed", "m/s", "speed of full aquaplaning of this wheel, now"),
+    "torque": ("torque", "N*m", "net wheel torque"),
+}
+TRUTH_SYMBOLS: dict[str, tuple[str, str]] = {
+    **{
+        f"true_{name}_{w}": (unit, f"simulated truth: {meaning}, {w}")
+        for name, unit, meaning in _WHEEL_TRUTH.values()
+        for w in WHEELS
+    },
+    "true_grade": ("rad", "simulated truth: slope angle, uphill positive"),
+    "true_v_x": ("m/s", "simulated truth: longitudinal velocity"),
+    "true_v_y": ("m/s", "simulated truth: lateral velocity, left positive"),
+    "true_position": ("m", "simulated truth: way of the front axle"),
+    "true_resistance": ("N", "simulated truth: drag of the water on all wheels, as a force"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A simulated drive: what sensors saw, and the truth on a fine grid."""
+
+    measured: tuple[Measured, ...]
+    truth: Truth
+    setup: Setup
+    seed: int
+
+
+def simulate(scenario: Scenario, model: Model = BASE, *, dt: float = STEP_S) -> Simulation:
+    """Simulate a drive.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is driven and how it is measured.
+    model : Model
+        Terms on top of the base simulation.
+    dt : float
+        Step of the integration, at most 2 ms. [s]
+
+    Returns
+    -------
+    simulation : Simulation
+        The same scenario, model and step give the same bits.
+
+    Raises
+    ------
+    ConfigError
+        If the scenario or the model ask for what the car cannot do.
+    """
+    setup = assemble(scenario, model)
+    truth = drive_truth(setup, dt=dt)
+    measured = measure(truth, setup.sensors, rate_hz=setup.scenario.rate_hz, seed=setup.scenario.seed)
+    return Simulation(tuple(measured), truth, setup, setup.scenario.seed)
+
+
+def assemble(scenario: Scenario, model: Model = BASE) -> Setup:
+    """Plant, sensors and scenario with all terms of the model in them."""
+    plant = build_plant(
+        scenario.vehicle, scenario.tyre_front, scenario.tyre_rear, p_front=scenario.p_front, p_rear=scenario.p_rear
+    )
+    plant = plant._replace(head_wind=scenario.head_wind)
+    plant = with_mass_at(plant, scenario.load_front, 0.0)
+    plant = with_mass_at(plant, scenario.load_rear, scenario.vehicle.wheelbase)
+    return model.apply(Setup(plant, scenario.sensors, scenario))
+
+
+def drive_truth(setup: Setup, *, dt: float = STEP_S) -> Truth:
+    """The drive without sensors, on a fine grid; see `Truth` and `TRUTH_SYMBOLS`."""
+    scenario, plant = setup.scenario, setup.plant
+    rate = FINE_RATE_HZ if scenario.duration_s <= FINE_LIMIT_S else max(scenario.rate_hz, 200.0)
+    every = max(1, round(1.0 / (rate * dt)))
+    rows = run_kernel(setup, dt=dt, every=every)
+    t: FloatArray = np.arange(rows.shape[0], dtype=np.float64) * (every * dt)
+    return Truth(t, _columns(rows, t, plant, scenario))
+
+
+def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
+    """Raw record (n, columns of `kernel.COLUMNS`) of every `every`-th step."""
+    scenario, plant = setup.scenario, setup.plant
+    n = round(scenario.duration_s / dt)
+    controls = _controls(scenario, n, dt)
+    road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
+    rows: FloatArray = kernel.integrate(n, dt, every, _start(plant, controls), plant, road, controls)
+    if not np.isfinite(rows).all():
+        raise ConfigError("the simulation diverged", hint="a smaller step, or less extreme parameters")
+    return rows
+
+
+def _profile(pairs: Profile, t: FloatArray) -> FloatArray:
+    if not pairs:
+        return np.zeros_like(t)
+    return np.interp(t, [p[0] for p in pairs], [p[1] for p in pairs])
+
+
+def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
+    t: FloatArray = np.arange(n + 1, dtype=np.float64) * dt
+    steering, exc = scenario.steering, scenario.excitation
+    steer = np.zeros(n + 1)
+    if steering is not None:
+        phase = np.maximum(t - steering.start_s, 0.0) * (2.0 * np.pi / steering.period_s)
+        steer = steering.amplitude * np.sin(phase)
+    if exc is not None and not 0.0 < scenario.vehicle.torque_split_rear < 1.0:
+        raise ConfigError("excitation needs a car with both axles driven", where="drivetrain")
+    v_target = _profile(scenario.speed, t)
+    return kernel.Controls(
+        v_target=v_target,
+        a_target=np.gradient(v_target, dt) if v_target.size > 1 else np.zeros(1),
+        drive=_profile(scenario.extra_torque, t),
+        brake=_profile(scenario.brake_torque, t),
+        steer=steer,
+        exc=np.zeros(n + 1) if exc is None else np.asarray(waveform(exc.waveform, t, period=exc.period_s)),
+        grade=np.zeros(n + 1),
+        has_driver=True,
+        keeps_lane=steering is None,
+        exc_kind=0 if exc is None else _EXC_KIND[exc.amplitude_kind],
+        exc_amplitude=0.0 if exc is None else exc.amplitude,
+        scatter=scenario.water_scatter,
+    )
+
+
+def _start(plant: Plant, controls: kernel.Controls) -> FloatArray:
+    """Rolling in balance at the first speed and acceleration: no transient at the start."""
+    v, a = float(controls.v_target[0]), float(controls.a_target[0])
+    y = np.zeros(kernel.N_STATES)
+    y[kernel.V_X] = v
+    y[kernel.A_X] = a
+    loads = wheel_loads(
+        np.array([a]), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
+    )[:, 0]
+    rolling = plant.r_w * (1.0 + plant.warmup_extra) * loads
+    drag = 0.5 * plant.drag_area * plant.air_density * (v + plant.head_wind) * abs(v + plant.head_wind)
+    total = plant.mass * a + rolling.sum() + drag + plant.mass * G * np.sin(controls.grade[0])
+    y[kernel.DRIVE] = total * float(plant.drive_split @ plant.r_l) if controls.has_driver else controls.drive[0]
+    r_e = plant.r_e * (1.0 + plant.radius_growth * v * v)
+    force = plant.drive_split * y[kernel.DRIVE] / plant.r_l - rolling
+    slip = force / np.maximum(plant.slip_slope * loads, 1.0)
+    y[kernel.OMEGA : kernel.OMEGA + 4] = v / (r_e * (1.0 - np.clip(slip, -0.1, 0.1)))
+    y[kernel.SLIP_X : kernel.SLIP_X + 4] = slip
+    return y
+
+
+def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
+    def scalar(name: str) -> FloatArray:
+        return np.ascontiguousarray(rows[:, kernel.COLUMNS[name]])
+
+    def of_wheels(name: str) -> list[FloatArray]:
+        first = kernel.COLUMNS[name]
+        return [np.ascontiguousarray(rows[:, first + i]) for i in range(4)]
+
+    wheels = {name: of_wheels(name) for name in ("omega", "angle", "torque", *_WHEEL_TRUTH)}
+    columns = {
+        "v_x": scalar("v_x"),
+        "a_x": scalar("a_x"),
+        "a_y": scalar("a_y"),
+        "yaw_rate": scalar("yaw_rate"),
+        "steer_angle": scalar("steer_angle"),
+        "brake_pressure": scalar("brake_torque") * PRESSURE_PER_TORQUE,
+    }
+    for i, w in enumerate(WHEELS):
+        columns[f"omega_{w}"] = wheels["omega"][i]
+        columns[f"angle_{w}"] = wheels["angle"][i]
+        columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
+    columns |= _tie_rods(wheels, of_wheels("wave_drag"), scenario)
+    if scenario.lanes:
+        columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
+    for name, (label, _, _) in _WHEEL_TRUTH.items():
+        columns |= {f"true_{label}_{w}": wheels[name][i] for i, w in enumerate(WHEELS)}
+    drag = sum(of_wheels("wave_drag")) + sum(
+        m / r_l for m, r_l in zip(of_wheels("water_torque"), plant.r_l, strict=True)
+    )
+    return columns | {
+        "true_grade": scalar("grade"),
+        "true_v_x": scalar("v_x"),
+        "true_v_y": scalar("v_y"),
+        "true_position": scalar("position"),
+        "true_resistance": np.asarray(drag),
+    }
+
+
+def _tie_rods(
+    wheels: dict[str, list[FloatArray]], wave_drag: list[FloatArray], scenario: Scenario
+) -> dict[str, FloatArray]:
+    given = scenario.vehicle.tie_rod
+    c = {name: given.get(name, (0.0,)) for name in TIE_ROD} if given else TIE_ROD
+    return {
+        f"tie_rod_f{side}": tie_rod_force(
+            wheels["F_x"][i] - wave_drag[i], sign * wheels["F_y"][i], c0=c["c0"], c_y=c["c_y"], c_x=c["c_x"]
+        )
+        for i, (side, sign) in enumerate((("l", 1.0), ("r", -1.0)))
+    }
+
+
+def _labels(scenario: Scenario, front: FloatArray, rear: FloatArray) -> dict[str, FloatArray]:
+    """Water depths of the stretch that the front axle is on, and whether any axle is on water."""
+    left = np.array([0.0, *(lane.depth_left for lane in scenario.lanes)])
+    right = np.array([0.0, *(lane.depth_right for lane in scenario.lanes)])
+    wet = (left > 0.0) | (right > 0.0)
+    return {
+        "on_water": (wet[front + 1] | wet[rear + 1]).astype(np.float64),
+        "water_depth_left": left[front + 1],
+        "water_depth_right": right[front + 1],
+    }

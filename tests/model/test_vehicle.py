@@ -1,0 +1,358 @@
+"""The four-wheel simulation: balances, limits, symmetry, convergence, speed."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from thesis.passes import SEDAN, resistance, slip_and_traction
+
+from aqualog.model import kernel
+from aqualog.model.effects import EFFECTS
+from aqualog.model.scenario import Excitation, Lane, Scenario, Steering
+from aqualog.model.sensors import IDEAL
+from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
+from aqualog.model.surface import SURFACES
+from aqualog.model.term import Model, Term
+from aqualog.model.tyre import TYRES
+from aqualog.notation import WHEELS
+from aqualog.physics.hydroplaning import full_aquaplaning_speed
+from aqualog.physics.load import G
+from aqualog.vehicle import Vehicle
+
+FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
+AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"mass"}))
+CARS = {"rwd": SEDAN, "fwd": FWD, "awd": AWD}
+RAMP = ((0.0, 60 / 3.6), (20.0, 130 / 3.6))
+
+
+def scenario(vehicle=SEDAN, **kw):
+    return Scenario(vehicle, **{"sensors": IDEAL, **kw})
+
+
+def truth(sc, model=None, dt=1e-3):
+    t = drive_truth(assemble(sc, model or Model()), dt=dt)
+    return t.t, dict(t.columns)
+
+
+def raw(sc, dt=1e-3, every=1):
+    setup = assemble(sc)
+    return run_kernel(setup, dt=dt, every=every), setup.plant
+
+
+def col(rows, name, wheel=None):
+    return rows[:, kernel.COLUMNS[name] + (wheel or 0)]
+
+
+def lane(start=6.0, end=14.0, h=1.3e-3, **kw):
+    return Lane(start, end, depth_left=h, depth_right=h, **kw)
+
+
+@pytest.mark.parametrize("car", CARS)
+@pytest.mark.parametrize("speed", [((0.0, 27.0),), RAMP, ((0.0, 20.0), (5.0, 30.0), (10.0, 30.0), (16.0, 18.0))])
+def test_dry_resistance_measure_is_zero(car, speed):
+    """Torque in, speed out, as the features book it: nothing is left on a dry road."""
+    t, c = truth(scenario(CARS[car], speed=speed))
+    delta = resistance(t, c, scenario(CARS[car]))
+    assert np.abs(delta[5:-5]).max() < 0.01
+
+
+def test_dry_resistance_measure_does_not_see_a_grade():
+    t, c = truth(scenario(grade=((0.0, 0.0), (100.0, 0.04), (300.0, -0.03))))
+    assert np.abs(resistance(t, c, scenario())[5:-5]).max() < 0.01
+    assert np.abs(c["true_grade"]).max() > 0.03
+
+
+@pytest.mark.parametrize("car", CARS)
+def test_slip_slope_by_regression_is_the_parameter(car):
+    vehicle = CARS[car]
+    t = np.arange(0.0, 20.0, 0.05)
+    # small traction, driving and braking: the brush's own curvature, mu / (3 mu_max), stays below 1 %
+    torque = tuple((float(x), float(60.0 * np.sin(2 * np.pi * x / 4.0))) for x in t)
+    sc = scenario(vehicle, speed=((0.0, 8.0),), extra_torque=torque)
+    t, c = truth(sc)
+    for w in vehicle.driven:
+        s, mu = slip_and_traction(t, c, w, sc)
+        use = (t > 2.0) & (np.abs(mu) < 0.03)
+        assert use.sum() > 3000
+        A = np.column_stack([mu[use], mu[use] * np.abs(mu[use]), np.ones(use.sum())])
+        slope = 1.0 / np.linalg.lstsq(A, s[use], rcond=None)[0][0]
+        expected = vehicle.slip_slope_f if w[0] == "f" else vehicle.slip_slope_r
+        assert slope == pytest.approx(expected, rel=0.01)
+        straight = 1.0 / np.linalg.lstsq(A[:, [0, 2]], s[use], rcond=None)[0][0]
+        assert straight == pytest.approx(expected, rel=0.01)
+
+
+def energy_terms(rows, p, dt):
+    """Power of every sink and source at each step, and the energy stored."""
+    omega = np.array([col(rows, "omega", i) for i in range(4)])
+    F_x = np.array([col(rows, "F_x", i) for i in range(4)])
+    v = np.array([col(rows, "v_along", i) for i in range(4)])
+    torque = np.array([col(rows, "torque", i) for i in range(4)])
+    resisting = np.array([col(rows, "resisting_torque", i) for i in range(4)])
+    wave = np.array([col(rows, "wave_drag", i) for i in range(4)])
+    inertia = p.inertia[:, None]
+    F_y = np.array([col(rows, "F_y", i) for i in range(4)])
+    across = -np.tan(np.array([col(rows, "slip_angle", i) for i in range(4)])) * v
+    stored = 0.5 * p.mass * (col(rows, "v_x") ** 2 + col(rows, "v_y") ** 2) + 0.5 * (inertia * omega**2).sum(0)
+    stored += 0.5 * p.I_zz * col(rows, "yaw_rate") ** 2
+    stored += (
+        p.mass * G * np.concatenate([[0.0], np.cumsum(np.sin(col(rows, "grade"))[1:] * np.diff(col(rows, "position")))])
+    )
+    into = (torque * omega).sum(0)
+    out = (resisting * omega).sum(0) + col(rows, "drag") * col(rows, "v_x") + (wave * v).sum(0)
+    sliding = (F_x * (p.r_l[:, None] * omega - v) - F_y * across).sum(0)  # with the torque arm r_l, as (3.29) has it
+    return stored, into, out, sliding
+
+
+@pytest.mark.parametrize("car", CARS)
+def test_power_balance_over_a_run(car):
+    """What the engine gives is stored, or lost in air, rolling, water and sliding."""
+    sc = scenario(CARS[car], speed=((0.0, 22.0), (4.0, 27.0), (9.0, 33.0)), duration_s=10.0, lanes=(lane(3.0, 7.0),))
+    rows, p = raw(sc)
+    stored, into, out, sliding = energy_terms(rows, p, 1e-3)
+    integral = np.trapezoid(into - out - sliding, dx=1e-3)
+    assert integral == pytest.approx(stored[-1] - stored[0], abs=1e-6 * np.trapezoid(np.abs(into), dx=1e-3))
+    friction = np.array(
+        [col(rows, "F_x", i) * (p.r_e[i] * col(rows, "omega", i) - col(rows, "v_along", i)) for i in range(4)]
+    )
+    assert friction.min() > -1e-6  # sliding never gives energy
+
+
+@pytest.mark.parametrize("car", CARS)
+def test_mirrored_drive_is_the_mirror_image(car):
+    """Left and right swapped: the same numbers on the other wheel, lateral signs turned, to rounding."""
+    base = scenario(CARS[car], speed=((0.0, 25.0),), steering=Steering(0.012, 4.0), water_scatter=0.0, duration_s=12.0)
+    a = replace(
+        base,
+        lanes=(Lane(4.0, 9.0, depth_left=1.0e-3, depth_right=1.6e-3, irregularity_left=0.0, irregularity_right=0.0),),
+    )
+    b = replace(
+        base, steering=Steering(-0.012, 4.0),
+        lanes=(Lane(4.0, 9.0, depth_left=1.6e-3, depth_right=1.0e-3, irregularity_left=0.0, irregularity_right=0.0),),
+    )  # fmt: skip
+    _, x = truth(a)
+    _, y = truth(b)
+    swap = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
+    assert np.abs(x["a_y"]).max() > 1.0
+    for w in WHEELS:
+        for name in ("omega_{}", "true_contact_{}", "true_load_{}", "true_force_x_{}"):
+            np.testing.assert_allclose(x[name.format(w)], y[name.format(swap[w])], rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(x[f"true_force_y_{w}"], -y[f"true_force_y_{swap[w]}"], rtol=1e-6, atol=1e-4)
+    for name in ("a_y", "yaw_rate", "steer_angle", "true_v_y"):
+        np.testing.assert_allclose(x[name], -y[name], rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(x["tie_rod_fl"], y["tie_rod_fr"], rtol=1e-6, atol=1e-4)
+
+
+def errors_of_steps(sc, steps, finest, names):
+    reference, _ = raw(sc, finest, round(0.02 / finest))
+    out = []
+    for dt in steps:
+        rows, _ = raw(sc, dt, round(0.02 / dt))
+        out.append(max(float(np.abs(col(rows, n, i) - col(reference, n, i)).max()) for n, i in names))
+    return np.array(out)
+
+
+def test_step_halving_shows_second_order():
+    t = np.arange(0.0, 6.0, 0.01)
+    torque = tuple((float(x), float(300.0 * np.sin(2 * np.pi * x))) for x in t)
+    sc = scenario(AWD, speed=((0.0, 25.0),), extra_torque=torque, duration_s=5.0, steering=Steering(0.01, 3.0, 0.0))
+    e = errors_of_steps(sc, (2e-3, 1e-3, 5e-4), 1.25e-4, [("omega", i) for i in range(4)] + [("v_x", 0)])
+    assert np.all(e[:-1] / e[1:] > 3.0)
+    assert e[1] < 2e-3  # rad/s at 80 rad/s
+
+
+def test_step_halving_on_water():
+    """Spin-downs to a stop and up again: what 1 ms gives is what 0.25 ms gives."""
+    sc = scenario(speed=((0.0, 112 / 3.6),), lanes=(lane(2.0, 6.0),), duration_s=8.0, seed=3)
+    a, _ = raw(sc, 1e-3, 10)
+    b, _ = raw(sc, 2.5e-4, 40)
+    for i in range(4):
+        difference = np.abs(col(a, "omega", i) - col(b, "omega", i))
+        assert np.sqrt(np.mean(difference**2)) < 0.5  # rad/s of 100
+    assert col(a, "omega", 1).min() < 50.0
+    assert np.abs(col(a, "v_x") - col(b, "v_x")).max() < 0.02
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2e-3, 4e-3])
+def test_stable_at_low_speed_where_the_wheels_are_stiffest(dt):
+    sc = scenario(speed=((0.0, 15.0), (8.0, 0.6), (20.0, 0.6)), duration_s=20.0)
+    rows, _ = raw(sc, dt, 1)
+    tail = rows[-round(4.0 / dt) :]
+    assert np.abs(col(tail, "omega", 2) * SEDAN.r_e("rl") - col(tail, "v_x")).max() < 0.05
+    assert np.abs(np.diff(col(tail, "a_x"))).max() < 0.05
+
+
+def test_a_free_wheel_without_contact_stops_and_recovers():
+    sc = scenario(speed=((0.0, 145 / 3.6),), lanes=(lane(3.0, 6.0, h=2e-3),), water_scatter=0.0, duration_s=10.0)
+    t, c = truth(sc)
+    wet = (t > 3.1) & (t < 6.0)
+    assert c["true_contact_fl"][wet].max() < 0.05
+    stopped = t[c["omega_fl"] < 2.0]
+    assert 3.0 < stopped[0] < 4.0
+    assert c["omega_fl"].min() > -0.5
+    after = t > 7.0
+    np.testing.assert_allclose(c["omega_fl"][after] * SEDAN.r_e("fl"), c["v_x"][after], rtol=5e-3)
+
+
+def test_driven_wheels_spin_up_with_torque_beyond_what_the_contact_holds():
+    def peak(a):
+        sc = scenario(speed=((0.0, 26.0), (2.0, 26.0), (8.0, 26.0 + 6 * a)), lanes=(lane(3.0, 7.0),), duration_s=8.0)
+        t, c = truth(sc)
+        return (c["omega_rr"] * SEDAN.r_e("rr") / c["v_x"] - 1.0)[t > 3.0].max()
+
+    assert peak(0.0) < 0.02
+    assert peak(3.5) > 0.2
+
+
+def test_water_costs_nothing_when_there_is_none():
+    _, dry = truth(scenario(speed=((0.0, 27.0),)))
+    _, none = truth(scenario(speed=((0.0, 27.0),), lanes=(lane(h=0.0),)))
+    np.testing.assert_array_equal(dry["omega_fl"], none["omega_fl"])
+
+
+def test_rear_wheels_run_in_the_tracks_of_the_front_wheels():
+    sc = scenario(
+        speed=((0.0, 20.0),),
+        lanes=(lane(2.0, 4.0, h=1.3e-3, irregularity_left=0.0),),
+        water_scatter=0.0,
+        duration_s=6.0,
+    )
+    t, c = truth(sc)
+    assert c["true_film_fl"].max() == pytest.approx(1.3e-3, rel=0.3)
+    assert c["true_film_rl"].max() == pytest.approx(TYRES["worn_summer"].h_track, rel=1e-3)
+    front, rear = t[c["true_film_fl"] > 0][0], t[c["true_film_rl"] > 0][0]
+    assert rear - front == pytest.approx(SEDAN.wheelbase / 20.0, abs=0.01)
+
+
+def test_lane_in_metres_starts_where_it_says():
+    sc = scenario(
+        speed=((0.0, 20.0),),
+        lanes=(Lane(100.0, 140.0, in_metres=True, depth_left=1e-3, depth_right=1e-3),),
+        duration_s=9.0,
+    )
+    _, c = truth(sc)
+    inside = c["true_film_fl"] > 0
+    assert c["true_position"][inside][0] == pytest.approx(100.0, abs=0.1)
+    assert c["true_position"][inside][-1] == pytest.approx(140.0, abs=0.1)
+    assert c["on_water"][inside].all()
+
+
+def test_anchor_of_the_full_aquaplaning_speed():
+    tyre = TYRES["worn_summer"]
+    v = full_aquaplaning_speed(
+        1.3e-3, 4000.0, p=1.9e5, tread_capacity=tyre.tread_capacity, v_anchor=tyre.v_anchor, h_anchor=1.3e-3,
+        p_anchor=1.9e5, F_z_anchor=4000.0, h_bulk=tyre.h_bulk, h_onset=tyre.h_onset, exponent=tyre.contact_exponent,
+    )  # fmt: skip
+    assert v == pytest.approx(tyre.v_anchor)
+
+
+@pytest.mark.parametrize("name", ["snow", "ice", "wet_ice", "gravel", "rough", "damp"])
+def test_other_surfaces(name):
+    sc = scenario(speed=((0.0, 15.0),), lanes=(Lane(2.0, 8.0, surface=SURFACES[name]),), duration_s=8.0)
+    t, c = truth(sc)
+    inside = (t > 3.0) & (t < 7.5)
+    surface = SURFACES[name]
+    expected = 31.0 / (1.0 + 31.0 * surface.compliance)
+    assert c["true_slip_slope_rl"][inside].mean() == pytest.approx(expected, rel=0.02)
+    if surface.mu is not None:
+        assert c["true_mu_max_rl"][inside].max() == pytest.approx(surface.mu)
+    assert (c["true_contact_fl"] == 1.0).all()  # no water, no lost contact
+    assert c["on_water"].max() == 0.0
+
+
+def test_slalom_to_two_metres_per_second_squared():
+    """Steady gain of the two-track model at small steering: v^2 / l / (1 + K v^2); C_alpha / F_z alike, so K is 0."""
+    v = 70 / 3.6
+    sc = scenario(speed=((0.0, v),), steering=Steering(0.0145, 4.0), duration_s=14.0)
+    t, c = truth(sc)
+    late = t > 6.0
+    assert c["a_y"][late].max() == pytest.approx(2.0, rel=0.15)
+    assert (np.abs(c["yaw_rate"] * c["v_x"] - c["a_y"])[late]).max() < 0.6
+    left_turn = late & (c["a_y"] > 1.0)
+    assert (c["true_load_fr"] > c["true_load_fl"])[left_turn].all()
+
+
+def test_excitation_leaves_the_acceleration_alone():
+    _, c = truth(scenario(AWD, speed=((0.0, 25.0),), excitation=Excitation("sine", 250.0, "force", 4.0)))
+    _, plain = truth(scenario(AWD, speed=((0.0, 25.0),)))
+    assert np.ptp(c["torque_fl"]) == pytest.approx(250.0 * AWD.r_l("fl"), rel=0.02)  # +-125 N a wheel
+    assert np.abs(c["a_x"] - plain["a_x"]).max() < 0.01
+
+
+def test_driver_holds_speed_and_profile():
+    t, c = truth(scenario(speed=RAMP))
+    wanted = np.interp(t, [0, 20], [60 / 3.6, 130 / 3.6])
+    assert np.abs(c["v_x"] - wanted).max() < 0.3
+    _, w = truth(scenario(speed=((0.0, 27.0),), lanes=(lane(),)))
+    assert np.abs(w["v_x"] - 27.0).max() < 1.5
+
+
+def test_same_scenario_same_bits_other_seed_other_contact():
+    sc = scenario(lanes=(lane(),))
+    _, a = truth(sc)
+    _, b = truth(sc)
+    _, c = truth(replace(sc, seed=2))
+    np.testing.assert_array_equal(a["omega_fl"], b["omega_fl"])
+    assert not np.array_equal(a["omega_fl"], c["omega_fl"])
+
+
+def neutral(effect, where=None):
+    return Term(effect, {}, where)
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_neutral_terms_change_no_bit(name):
+    effect = EFFECTS[name]
+    sc = scenario(
+        AWD, speed=RAMP, lanes=(lane(2.0, 5.0),), steering=Steering(0.005, 3.0), duration_s=6.0, seed=4,
+        load_rear=100.0, grade=((0.0, 0.01),),
+    )  # fmt: skip
+    base = simulate(sc)
+    for where in (None, *effect.places):
+        with_term = simulate(sc, Model().with_term(neutral(effect, where)))
+        for a, b in zip(base.measured, with_term.measured, strict=True):
+            np.testing.assert_array_equal(a.t, b.t)
+            for column in a.columns:
+                np.testing.assert_array_equal(a.columns[column], b.columns[column], err_msg=f"{name} {where} {column}")
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_every_effect_does_something(name):
+    effect = EFFECTS[name]
+    p = effect.parameters[0]
+    value = p.neutral + (p.sigma if p.neutral + p.sigma <= p.high else -p.sigma)
+    # a lane, a curve, a grade and a changing speed: every effect has something to act on
+    sc = scenario(AWD, speed=RAMP, lanes=(lane(2.0, 5.0),), steering=Steering(0.01, 3.0), duration_s=6.0)
+    base = simulate(sc)
+    where = effect.places[0] if effect.default is None and effect.places else None
+    changed = simulate(sc, Model().with_term(Term(effect, {p.name: value}, where)))
+    different = any(
+        not np.array_equal(a.columns[c], b.columns[c]) or not np.array_equal(a.t, b.t)
+        for a, b in zip(base.measured, changed.measured, strict=True)
+        for c in a.columns
+    )
+    assert different or name == "tone_ring"  # ideal sensors have no tone ring
+
+
+def test_effects_carry_what_a_report_needs():
+    for effect in EFFECTS.values():
+        assert effect.source
+        assert effect.sentence
+        assert effect.target
+        for p in effect.parameters:
+            assert p.low <= p.neutral <= p.high
+            assert p.sigma > 0
+            assert p.smallest > 0
+
+
+def test_twenty_seconds_in_a_tenth_of_a_second():
+    sc = scenario(lanes=(lane(),))
+    drive_truth(assemble(sc))
+    times = []
+    for seed in range(7):
+        s = assemble(replace(sc, seed=seed))
+        start = time.perf_counter()
+        drive_truth(s)
+        times.append(time.perf_counter() - start)
+    assert min(times) < 0.1
