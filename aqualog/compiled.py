@@ -26,9 +26,9 @@ def compiled(function: Callable[..., Any]) -> Any:
     the file of the function alone and would go on with an old equation.
     """
     try:
-        dispatcher = njit(cache=True)(function)
+        dispatcher = njit(cache=True, error_model="numpy")(function)
     except RuntimeError:
-        return njit(function)
+        return njit(function, error_model="numpy")
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
         index._source_stamp = (index._source_stamp, _stamp(Path(function.__code__.co_filename).parent))
@@ -49,7 +49,7 @@ def inlined(function: Callable[..., Any]) -> Any:
         scope = function.__globals__ | {
             n: inlined(f) for n, f in names.items() if isinstance(f, FunctionType) and "aqualog.physics" in f.__module__
         }
-        _inlined[function] = njit(FunctionType(code, scope, function.__name__))
+        _inlined[function] = njit(FunctionType(code, scope, function.__name__), error_model="numpy")
     return _inlined[function]
 
 

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aqualog.config.scenario import TableFaults
-from aqualog.config.toml_file import load_toml
+from aqualog.config.toml_file import TableFaults, load_toml
 from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Effect, Model, Term

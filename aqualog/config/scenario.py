@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from aqualog.config.toml_file import Faults, is_number, load_toml
+from aqualog.config.toml_file import TableFaults, is_number, load_toml
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
 from aqualog.model.scenario import Excitation, Lane, Profile, Scenario, Steering
@@ -20,9 +18,10 @@ from aqualog.model.surface import SURFACES
 from aqualog.model.tyre import TYRE_KEYS, TYRES, Tyre
 from aqualog.vehicle import Vehicle
 
-__all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "ScenarioKey", "TableFaults", "load_scenario"]
+__all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "ScenarioKey", "load_scenario"]
 
 SAMPLE_RATES_HZ = (10, 20, 25, 40, 50, 100, 125, 200, 250, 500, 1000)  # whole milliseconds
+LONGEST_S = 7200.0  # an hour takes a gigabyte of memory
 LATERAL_LIMIT = 12.0  # [m/s^2] no tyre of a road car gives more
 _DAY, _FAR = 86400.0, 1e7  # [s], [m]
 _WAVEFORMS = ("triangle", "sine", "ramp", "step")
@@ -65,7 +64,7 @@ _ALL = [
     ScenarioKey("", "pressure_rear_bar", "bar", None, 0.5, 10.0, "of the rear axle, in place of `pressure_bar`"),
     ScenarioKey("", "load_front_kg", "kg", 0.0, 0.0, 20000.0, "load over the front axle, at most the car's own mass"),
     ScenarioKey("", "load_rear_kg", "kg", 0.0, 0.0, 20000.0, "load over the rear axle, at most the car's own mass"),
-    ScenarioKey("", "duration_s", "s", 20.0, 0.1, _DAY, "length of the drive"),
+    ScenarioKey("", "duration_s", "s", 20.0, 0.1, LONGEST_S, "length of the drive"),
     ScenarioKey("", "sample_rate_hz", "Hz", 100.0, 10.0, 1000.0, f"one of {', '.join(map(str, SAMPLE_RATES_HZ))}"),
     ScenarioKey("", "seed", "-", 1.0, 0.0, 2.0**63 - 1.0, "whole number: the same gives the same drive"),
     ScenarioKey("", "speed_kmh", "km/h", None, 0.0, 300.0, "constant speed; this or `profile` must be given"),
@@ -76,6 +75,7 @@ _ALL = [
     ScenarioKey("", "grade_profile", "m, %", None, -40.0, 40.0, "slope over the way, [[s, percent], ...]"),
     ScenarioKey("", "brake_profile", "s, N*m", None, 0.0, 50000.0, "brake torque of all wheels, [[t, M], ...]"),
     ScenarioKey("", "torque_profile", "s, N*m", None, -20000.0, 20000.0, "drive torque on top of the driver's"),
+    ScenarioKey("", "split_profile", "s, -", None, 0.0, 1.0, "rear share of the drive torque (awd), [[t, share], ...]"),
     ScenarioKey("", "water_scatter", "-", 1.0, 0.0, 3.0, "scales how the contact varies on water; 0: even"),
     ScenarioKey("lane", "start_s", "s", None, 0.0, _DAY, "time at which the lane begins; or `start_m`"),
     ScenarioKey("lane", "end_s", "s", None, 0.0, _DAY, "time at which it ends, also beyond the drive; or `end_m`"),
@@ -100,53 +100,6 @@ _ALL = [
 ]
 
 SCENARIO_KEYS: dict[str, ScenarioKey] = {k.path: k for k in _ALL}
-
-_HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
-
-
-class TableFaults(Faults):
-    """Faults of a file with several tables: the line of a key is looked for in the table that is being read."""
-
-    def __init__(self, path: Path, text: str) -> None:
-        super().__init__(path, text)
-        self._lines = text.splitlines()
-        self._table, self._index = "", 0
-
-    @contextmanager
-    def inside(self, table: str, index: int = 0) -> Iterator[None]:
-        """Faults within are those of the table, the `index`-th of that name."""
-        before = self._table, self._index
-        self._table, self._index = table, index
-        try:
-            yield
-        finally:
-            self._table, self._index = before
-
-    def add(self, key: str, message: str) -> None:
-        """Note a fault at a key of the table, or at a table."""
-        line = self._line(key)
-        self._found.append(f"line {line}: {message}" if line else message)
-
-    def _line(self, key: str) -> int | None:
-        headers = [(i, m[1]) for i, line in enumerate(self._lines) if (m := _HEADER.match(line))]
-        here = -1
-        if self._table:
-            own = [i for i, name in headers if name == self._table]
-            here = own[self._index] if self._index < len(own) else -1
-        end = next((i for i, _ in headers if i > here), len(self._lines))
-        if not self._table or here >= 0:
-            for i in range(here + 1, end):
-                if _names(self._lines[i], key):
-                    return i + 1
-        named = next((i for i, name in headers if name == key != self._table), here)
-        if named >= 0:
-            return named + 1
-        inline = (i for i, line in enumerate(self._lines) if self._table and _names(line, self._table))
-        return next((i + 1 for i in inline), None)
-
-
-def _names(line: str, key: str) -> bool:
-    return re.match(rf"""^\s*["']?{re.escape(key)}["']?\s*[=.]""", line) is not None
 
 
 def load_scenario(path: Path) -> Scenario:
@@ -198,6 +151,7 @@ class _Reader:
             excitation=self._excitation(vehicle),
             brake_torque=self._profile("brake_profile", "t [s]", _DAY),
             extra_torque=self._profile("torque_profile", "t [s]", _DAY),
+            split_rear=self._split(vehicle),
             grade=self._grade(),
             head_wind=self._number("", top, "head_wind_kmh") / 3.6,
             water_scatter=self._number("", top, "water_scatter"),
@@ -365,6 +319,13 @@ class _Reader:
             self._faults.add("speed_kmh", "speed_kmh is one number; a speed that changes is profile = [[t, km/h], ...]")
             return ()
         return ((0.0, self._number("", self._document, "speed_kmh") / 3.6),)
+
+    def _split(self, vehicle: Vehicle | None) -> Profile:
+        if "split_profile" in self._document and vehicle is not None and vehicle.drivetrain != "awd":
+            self._faults.add(
+                "split_profile", f'split_profile needs an "awd" car; the vehicle is "{vehicle.drivetrain}"'
+            )
+        return self._profile("split_profile", "t [s]", _DAY)
 
     def _grade(self) -> Profile:
         if "grade_percent" in self._document and "grade_profile" in self._document:

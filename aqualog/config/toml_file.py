@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from aqualog.errors import ConfigError
 
-__all__ = ["Faults", "is_number", "line_of", "load_toml"]
+__all__ = ["Faults", "TableFaults", "is_number", "line_of", "load_toml"]
+
+_HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
 
 
 def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
@@ -98,3 +102,48 @@ class Faults:
         """Raise one ConfigError with all faults."""
         if self._found:
             raise ConfigError("; ".join(self._found), where=str(self._path))
+
+
+class TableFaults(Faults):
+    """Faults of a file with several tables: the line of a key is looked for in the table that is being read."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        super().__init__(path, text)
+        self._lines = text.splitlines()
+        self._table, self._index = "", 0
+
+    @contextmanager
+    def inside(self, table: str, index: int = 0) -> Iterator[None]:
+        """Faults within are those of the table, the `index`-th of that name."""
+        before = self._table, self._index
+        self._table, self._index = table, index
+        try:
+            yield
+        finally:
+            self._table, self._index = before
+
+    def add(self, key: str, message: str) -> None:
+        """Note a fault at a key of the table, or at a table."""
+        line = self._line(key)
+        self._found.append(f"line {line}: {message}" if line else message)
+
+    def _line(self, key: str) -> int | None:
+        headers = [(i, m[1]) for i, line in enumerate(self._lines) if (m := _HEADER.match(line))]
+        here = -1
+        if self._table:
+            own = [i for i, name in headers if name == self._table]
+            here = own[self._index] if self._index < len(own) else -1
+        end = next((i for i, _ in headers if i > here), len(self._lines))
+        if not self._table or here >= 0:
+            for i in range(here + 1, end):
+                if _names(self._lines[i], key):
+                    return i + 1
+        named = next((i for i, name in headers if name == key != self._table), here)
+        if named >= 0:
+            return named + 1
+        inline = (i for i, line in enumerate(self._lines) if self._table and _names(line, self._table))
+        return next((i + 1 for i in inline), None)
+
+
+def _names(line: str, key: str) -> bool:
+    return re.match(rf"""^\s*["']?{re.escape(key)}["']?\s*[=.]""", line) is not None

@@ -12,6 +12,17 @@ import numpy as np
 
 from aqualog.compiled import compiled, inlined
 from aqualog.model import excitation
+from aqualog.model.plant import Plant, flat
+from aqualog.model.road import (
+    BUMPS,
+    CONTACT_ROAD,
+    CONTACT_WHEEL,
+    DEPTH,
+    GRADE,
+    LANE_COMPLIANCE,
+    LANE_MU,
+    Road,
+)
 from aqualog.physics import (
     contact,
     hydroplaning,
@@ -27,7 +38,7 @@ from aqualog.physics import (
 from aqualog.physics.load import G
 from aqualog.types import FloatArray
 
-__all__ = ["COLUMNS", "N_STATES", "Controls", "integrate"]
+__all__ = ["COLUMNS", "N_STATES", "Controls", "integrate", "run"]
 
 # states
 V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = range(12)
@@ -66,6 +77,7 @@ class Controls(NamedTuple):
     a_target: FloatArray
     drive: FloatArray  # [N m] extra drive torque, or all of it without a driver
     brake: FloatArray  # [N m] sum of all wheels
+    split_rear: FloatArray  # rear share of the drive torque
     steer: FloatArray  # [rad]
     exc: FloatArray  # unit excitation waveform
     grade: FloatArray  # [rad] on top of the road's
@@ -74,6 +86,20 @@ class Controls(NamedTuple):
     exc_kind: int  # 0 force, 1 traction coefficient, 2 relative
     exc_amplitude: float
     scatter: float
+
+
+def run(n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road, controls: Controls) -> FloatArray:
+    """`integrate` with its inputs packed: records are plain memory, tuples of arrays cost a count at every access."""
+    fields = controls._asdict()
+    settings = {name: float(x) for name, x in fields.items() if np.ndim(x) == 0}
+    setting = np.zeros(1, dtype=[(name, np.float64) for name in settings])
+    for name, x in settings.items():
+        setting[name] = x
+    series = np.zeros(n + 1, dtype=[(name, np.float64) for name, x in fields.items() if np.ndim(x) == 1])
+    for name in series.dtype.names or ():
+        series[name] = fields[name]
+    rows: FloatArray = integrate(n, float(dt), every, y0, *flat(plant), road, setting, series)
+    return rows
 
 
 _loads = inlined(load.loads_of_wheels)
@@ -151,52 +177,53 @@ def _track(track, position, ds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
-    """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is recorded.
+def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type: ignore[no-untyped-def]
+    """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is `recorded`.
 
     `track` (m, 3) holds the stretch and the film left by the left and right front wheel.
     """
     v_x, v_y, yaw_rate, position = y[V_X], y[V_Y], y[YAW_RATE], y[S]
     wheelbase = p.l_f + p.l_r
-    steer = c.steer[k] + y[STEER]
-    grade = c.grade[k] + _at(r.grade.reshape(-1, 1), 0, position, r.ds)
-    drag = _air_drag(v_x + p.head_wind, p.drag_area, p.air_density) + _table(p.drag_over_v, v_x)
+    steer = c.steer + y[STEER]
+    grade = c.grade + _at(r.fields, GRADE, position, r.ds)
+    drag = _air_drag(v_x + p.head_wind, p.drag_area, p.air_density) + _table(extra, v_x)
     drag += _cornering_drag(y[A_Y], p.mass, p.cornering_drag)
     slope_down = _grade_force(grade, p.mass)
     warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time)
     loads = _loads(y[A_X], y[A_Y], p.mass, p.l_f, p.l_r, p.h_cg, p.track)
 
-    r_drive = 0.0  # mean loaded radius of the driven wheels, by their share
-    for i in range(4):
-        r_drive += p.drive_split[i] * p.r_l[i]
+    split_rear = c.split_rear
+    # mean loaded radius of the driven wheels, by their share
+    r_drive = 0.5 * (
+        (1.0 - split_rear) * (wheels[0].r_l + wheels[1].r_l) + split_rear * (wheels[2].r_l + wheels[3].r_l)
+    )
     # the driver
-    brake_total = c.brake[k] + y[BRAKE]
-    if c.has_driver:
-        error = c.v_target[k] - v_x
-        wanted = p.mass * (c.a_target[k] + K_SPEED * error) + y[INTEGRAL] + drag + slope_down
+    brake_total = c.brake + y[BRAKE]
+    if s.has_driver > 0.0:
+        error = c.v_target - v_x
+        wanted = p.mass * (c.a_target + K_SPEED * error) + y[INTEGRAL] + drag + slope_down
         for i in range(4):
-            wanted += _rolling_force(loads[i], p.r_w[i]) * warm
+            wanted += _rolling_force(loads[i], wheels[i].r_w) * warm
         least = -ENGINE_BRAKING * p.mass * G
         most = MAX_DRIVE * p.mass * G
         f[DRIVE] = (min(max(wanted, least), most) * r_drive - y[DRIVE]) / PEDAL_TIME
         f[INTEGRAL] = K_INTEGRAL * p.mass * error
         f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
-        drive = y[DRIVE] + c.drive[k]
+        drive = y[DRIVE] + c.drive
     else:
         f[DRIVE] = 0.0
         f[INTEGRAL] = 0.0
         f[BRAKE] = 0.0
-        drive = c.drive[k] * p.torque_gain
-    if c.keeps_lane:
+        drive = c.drive * p.torque_gain
+    if s.keeps_lane > 0.0:
         f[STEER] = (-K_LATERAL * (y[Y_LAT] + PREVIEW_TIME * v_x * y[PSI]) - y[STEER]) / STEER_TIME
     else:
         f[STEER] = -y[STEER] / STEER_TIME
 
     # active excitation: what one axle gains the other loses (3.26, 3.27)
-    split_rear = p.drive_split[2] + p.drive_split[3]
     nominal = drive / r_drive
-    exc = c.exc[k] * _amplitude(
-        c.exc_kind, c.exc_amplitude, (1.0 - split_rear) * nominal, split_rear * nominal,
+    exc = c.exc * _amplitude(
+        int(s.exc_kind), s.exc_amplitude, (1.0 - split_rear) * nominal, split_rear * nominal,
         p.mass * G * p.l_r / wheelbase, p.mass * G * p.l_f / wheelbase,
     )  # fmt: skip
 
@@ -207,10 +234,12 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
     jac[V_X] = 0.0
     jac[V_Y] = 0.0
     jac[YAW_RATE] = 0.0
+    cos_steer, sin_steer = np.cos(steer), np.sin(steer)
     sum_x = 0.0
     sum_y = 0.0
     moment = 0.0
     for i in range(4):
+        q = wheels[i]
         front = i < 2
         side = i % 2
         x = p.l_f if front else -p.l_r
@@ -219,25 +248,25 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
         F_z = loads[i]
         omega = y[OMEGA + i]
         v_along, v_across = _wheel_velocity(v_x, v_y, yaw_rate, angle, x, y_i)
-        r_e = _effective_radius(p.r_e[i], v_along, p.radius_growth[i])
+        r_e = _effective_radius(q.r_e, v_along, q.radius_growth)
         rim = omega * r_e
 
         # the road under this wheel
         where = position if front else position - wheelbase
         lane = lane_front if front else lane_rear
-        mu = p.mu[i]
+        mu = q.mu
         compliance = 0.0
-        r_w = p.r_w[i] * warm
+        r_w = q.r_w * warm
         bump = 0.0
         film = 0.0
         if lane >= 0:
-            if r.lane_mu[lane] >= 0.0:
-                mu = r.lane_mu[lane]
-            compliance = r.lane_compliance[lane]
+            if r.lanes[lane, LANE_MU] >= 0.0:
+                mu = r.lanes[lane, LANE_MU]
+            compliance = r.lanes[lane, LANE_COMPLIANCE]
             r_w += r.lanes[lane, 7]
-            bump = r.lanes[lane, 8] * _at(r.bumps, side, where, r.ds)
+            bump = r.lanes[lane, 8] * _at(r.fields, BUMPS + side, where, r.ds)
             if front:
-                uneven = 1.0 + r.lanes[lane, 5 + side] * _at(r.depth, side, where, r.ds)
+                uneven = 1.0 + r.lanes[lane, 5 + side] * _at(r.fields, DEPTH + side, where, r.ds)
                 film = r.lanes[lane, 3 + side] * max(uneven, 0.0)
             else:
                 film = track[behind, 1 + side]
@@ -249,35 +278,37 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
         shift = 0.0
         v_full = 1e6
         if film > 0.0:
-            mu *= p.wet_friction[i]
+            mu *= q.wet_friction
             v_full = _v_full(
-                film, F_z, p.p[i], p.tread_capacity[i], p.v_anchor[i], _H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR,
-                p.h_bulk[i], p.h_onset[i], p.contact_exponent[i],
+                film, F_z, q.p, q.tread_capacity, q.v_anchor, _H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR,
+                q.h_bulk, q.h_onset, q.contact_exponent,
             )  # fmt: skip
-            noise = _FIELD_SHARE * (_at(r.contact_road, side, where, r.ds) + _at(r.contact_wheel, i, where, r.ds))
+            noise = _FIELD_SHARE * (
+                _at(r.fields, CONTACT_ROAD + side, where, r.ds) + _at(r.fields, CONTACT_WHEEL + i, where, r.ds)
+            )
             # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
             turning = min(max(rim / max(abs(v_along), 0.5), 0.0), 1.0)
             v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * turning
-            v_full *= max(1.0 + c.scatter * p.contact_scatter[i] * noise, 0.2)
-            lost = _lost_contact(v_along, v_full, p.contact_exponent[i]) * p.contact_gain[i]
+            v_full *= max(1.0 + s.scatter * q.contact_scatter * noise, 0.2)
+            lost = _lost_contact(v_along, v_full, q.contact_exponent) * q.contact_gain
             L = 1.0 - min(max(lost, 0.0), 1.0)
-            a = _half_length(F_z, p.p[i], p.half_length[i], _F_Z_HALF, _P_HALF)
-            shift = _load_shift(L, a, p.wedge_peak[i]) * F_z
-            gain = p.water_drag_gain[i]
-            film_force = gain * _film_drag(film, rim, p.width[i], p.tread_capacity[i], p.h_film[i], p.groove_relief[i])
-            wave = gain * _wave_drag(film, v_along, p.width[i], p.h_wave[i])
+            a = _half_length(F_z, q.p, q.half_length, _F_Z_HALF, _P_HALF)
+            shift = _load_shift(L, a, q.wedge_peak) * F_z
+            gain = q.water_drag_gain
+            film_force = gain * _film_drag(film, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+            wave = gain * _wave_drag(film, v_along, q.width, q.h_wave)
         mu_max = mu * _friction_ratio(L)
-        slope = p.slip_slope[i] * (1.0 + p.slip_slope_drift[i] * t)
-        slope *= _load_factor(F_z, p.F_z_ref[i], p.load_sensitivity[i])
+        slope = q.slip_slope * (1.0 + q.slip_slope_drift * t)
+        slope *= _load_factor(F_z, q.F_z_ref, q.load_sensitivity)
         slope = _series_slope(slope, compliance) * _stiffness_ratio(L)
         C_x = slope * F_z
-        C_y = _series_slope(p.cornering_slope[i], compliance) * _stiffness_ratio(L) * F_z
+        C_y = _series_slope(q.cornering_slope, compliance) * _stiffness_ratio(L) * F_z
 
         # slip, with a first-order build-up where the tyre has a relaxation length
         s_x = _bounded_slip(rim, v_along)
         speed = max(abs(rim), 0.5)
         s_y = -v_across / speed
-        sigma = p.relaxation_length[i]
+        sigma = q.relaxation_length
         ds_domega = 0.0
         ds_dv = 0.0
         if sigma > 0.0:
@@ -298,14 +329,14 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
         F_x, F_y = _brush_forces(s_x, s_y, F_z, mu_max, C_x, C_y)
 
         # the wheel's balance of torques
-        torque = p.drive_split[i] * drive + (0.5 if front else -0.5) * exc * p.r_l[i]
-        braking = p.brake_split[i] * brake_total
-        water_torque = film_force * p.r_l[i] + shift
-        resisting = _rolling_force(F_z, r_w) * p.r_l[i] + water_torque + p.brake_drag[i]
+        torque = 0.5 * (1.0 - split_rear if front else split_rear) * drive + (0.5 if front else -0.5) * exc * q.r_l
+        braking = q.brake_split * brake_total
+        water_torque = film_force * q.r_l + shift
+        resisting = _rolling_force(F_z, r_w) * q.r_l + water_torque + q.brake_drag
         turn = min(max(omega, -1.0), 1.0)  # resistance fades out below 1 rad/s instead of jumping
-        f[OMEGA + i] = (torque - F_x * p.r_l[i] - (resisting + braking) * turn + bump) / p.inertia[i]
+        f[OMEGA + i] = (torque - F_x * q.r_l - (resisting + braking) * turn + bump) / q.inertia
         dF_dsx = _brush_slope(s_x, F_z, mu_max, C_x)
-        arm = p.r_l[i] / p.inertia[i]
+        arm = q.r_l / q.inertia
         jac[OMEGA + i] = -dF_dsx * ds_domega * arm
         jac[_J_W + i] = -dF_dsx * ds_dv * arm
         jac[_J_V + i] = dF_dsx * ds_domega / p.mass
@@ -314,11 +345,11 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
         jac[V_Y] += across / p.mass
         jac[YAW_RATE] += across * x * x / p.I_zz
         if abs(omega) < 1.0:
-            jac[OMEGA + i] -= (resisting + braking) / p.inertia[i]
+            jac[OMEGA + i] -= (resisting + braking) / q.inertia
         f[ANGLE + i] = omega
 
         # forces on the body, in its axes
-        cos, sin = np.cos(angle), np.sin(angle)
+        cos, sin = (cos_steer, sin_steer) if front else (1.0, 0.0)
         along = F_x - wave
         body_x = along * cos - F_y * sin
         body_y = along * sin + F_y * cos
@@ -326,25 +357,26 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
         sum_y += body_y
         moment += x * body_y - y_i * body_x
 
-        base = len(_SCALARS) + i
-        out[base] = omega
-        out[base + 4] = y[ANGLE + i]
-        out[base + 8] = torque - braking * turn
-        out[base + 12] = F_x
-        out[base + 16] = F_y
-        out[base + 20] = F_z
-        out[base + 24] = s_x
-        out[base + 28] = -np.arctan2(v_across, max(abs(v_along), 0.5))
-        out[base + 32] = L
-        out[base + 36] = slope
-        out[base + 40] = mu_max
-        out[base + 44] = film
-        out[base + 48] = water_torque
-        out[base + 52] = wave
-        out[base + 56] = resisting * turn
-        out[base + 60] = v_along
-        out[base + 64] = r_e
-        out[base + 68] = v_full
+        if recorded:
+            base = len(_SCALARS) + i
+            out[base] = omega
+            out[base + 4] = y[ANGLE + i]
+            out[base + 8] = torque - braking * turn
+            out[base + 12] = F_x
+            out[base + 16] = F_y
+            out[base + 20] = F_z
+            out[base + 24] = s_x
+            out[base + 28] = -np.arctan2(v_across, max(abs(v_along), 0.5))
+            out[base + 32] = L
+            out[base + 36] = slope
+            out[base + 40] = mu_max
+            out[base + 44] = film
+            out[base + 48] = water_torque
+            out[base + 52] = wave
+            out[base + 56] = resisting * turn
+            out[base + 60] = v_along
+            out[base + 64] = r_e
+            out[base + 68] = v_full
 
     a_x = (sum_x - drag) / p.mass  # specific force: what an accelerometer shows
     a_y = sum_y / p.mass
@@ -357,9 +389,10 @@ def _rhs(t, k, y, f, jac, out, p, r, c, track):  # type: ignore[no-untyped-def]
     f[A_X] = (a_x - y[A_X]) / p.roll_time
     f[A_Y] = (a_y - y[A_Y]) / p.roll_time
 
-    out[0], out[1], out[2], out[3], out[4], out[5] = v_x, v_y, yaw_rate, y[PSI], position, y[Y_LAT]
-    out[6], out[7], out[8], out[9], out[10], out[11] = a_x, a_y, steer, drive, brake_total, grade
-    out[12], out[13], out[14] = lane_front, lane_rear, drag
+    if recorded:
+        out[0], out[1], out[2], out[3], out[4], out[5] = v_x, v_y, yaw_rate, y[PSI], position, y[Y_LAT]
+        out[6], out[7], out[8], out[9], out[10], out[11] = a_x, a_y, steer, drive, brake_total, grade
+        out[12], out[13], out[14] = lane_front, lane_rear, drag
 
 
 @compiled
@@ -379,7 +412,7 @@ def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def integrate(n, dt, every, y0, p, r, c):  # type: ignore[no-untyped-def]
+def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # type: ignore[no-untyped-def]
     """March `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
 
     ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part that is given,
@@ -394,17 +427,19 @@ def integrate(n, dt, every, y0, p, r, c):  # type: ignore[no-untyped-def]
     jac = np.zeros(N_STATES + 8)
     unused = np.zeros(N_STATES + 8)
     row = np.zeros(_WIDTH)
-    scratch = np.zeros(_WIDTH)
     rows = np.zeros((n // every + 1, _WIDTH))
     cells = 2 + int((n * dt * 120.0 + 50.0) / r.ds) if r.lanes.shape[0] > 0 else 2
     track = np.zeros((cells, 3))
     track[:, 0] = -1.0
-    h_track_left, h_track_right = p.h_track[2], p.h_track[3]
+    p = car[0]
+    s = settings[0]
+    recorded, silent = True, False
+    h_track_left, h_track_right = wheels[2].h_track, wheels[3].h_track
     film, contact_at = len(_SCALARS) + 44, len(_SCALARS) + 32
     written = -1
     for k in range(n + 1):
         t = k * dt
-        _rhs(t, k, y, f, jac, row, p, r, c, track)
+        _rhs(t, y, f, jac, row, recorded, p, wheels, extra, r, s, controls[k], track)
         if k % every == 0:
             rows[k // every] = row
         if k == n:
@@ -419,7 +454,7 @@ def integrate(n, dt, every, y0, p, r, c):  # type: ignore[no-untyped-def]
             written = max(written, here)
         _solve(f, jac, h, k1)
         y1 = y + dt * k1
-        _rhs(t + dt, k + 1, y1, f, unused, scratch, p, r, c, track)
+        _rhs(t + dt, y1, f, unused, row, silent, p, wheels, extra, r, s, controls[k + 1], track)
         for i in range(N_STATES):
             rest[i] = f[i] - 2.0 * k1[i]
         _solve(rest, jac, h, k2)

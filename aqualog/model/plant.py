@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from aqualog.physics.rolling import pressure_factor
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Plant", "build_plant", "with_mass_at"]
+__all__ = ["Plant", "build_plant", "flat", "with_mass_at"]
 
 P_NOMINAL = 2.2e5  # [Pa] nominal pressure of the MF6.1 pressure law
 P_HALF_LENGTH, F_Z_HALF_LENGTH = 2.2e5, 4000.0  # [Pa, N] reference of a tyre's half_length
@@ -35,7 +35,6 @@ class Plant(NamedTuple):
     head_wind: float
     cornering_drag: float
     roll_time: float
-    drive_split: FloatArray
     brake_split: FloatArray
     torque_gain: float  # torque at the wheels over the torque that the car reports
     r_e: FloatArray
@@ -89,7 +88,7 @@ def build_plant(
     tyres = (front, front, rear, rear)
     p = np.array([p_front, p_front, p_rear, p_rear])
     slope = np.array([vehicle.slip_slope_f, vehicle.slip_slope_f, vehicle.slip_slope_r, vehicle.slip_slope_r])
-    split, brake_f = vehicle.torque_split_rear, BRAKE_SHARE_FRONT
+    brake_f = BRAKE_SHARE_FRONT
     front_axle = vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
     rear_axle = vehicle.mass * G * vehicle.l_f / vehicle.wheelbase
 
@@ -108,7 +107,6 @@ def build_plant(
         head_wind=0.0,
         cornering_drag=0.0,
         roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
-        drive_split=0.5 * np.array([1.0 - split, 1.0 - split, split, split]),
         brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
         torque_gain=1.0,
         r_e=np.array([vehicle.r_e(w) for w in WHEELS]),
@@ -160,3 +158,20 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
         l_r=plant.l_r - moved,
         I_zz=plant.I_zz + inertia,
     )
+
+
+def flat(plant: Plant) -> tuple[Any, Any, FloatArray]:
+    """The plant as the compiled simulation reads it: one record of the car, four of the wheels, the table of drag.
+
+    Records are plain memory: a tuple of arrays would cost the counting of references at every access.
+    """
+    fields = plant._asdict()
+    wheels = {n: np.asarray(x, dtype=np.float64) for n, x in fields.items() if np.shape(x) == (4,)}
+    car = {n: float(x) for n, x in fields.items() if np.ndim(x) == 0}
+    car_record = np.zeros(1, dtype=[(n, np.float64) for n in car])
+    wheel_records = np.zeros(4, dtype=[(n, np.float64) for n in wheels])
+    for n, x in car.items():
+        car_record[n] = x
+    for n, w in wheels.items():
+        wheel_records[n] = w
+    return car_record, wheel_records, np.ascontiguousarray(plant.drag_over_v)

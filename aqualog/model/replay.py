@@ -9,23 +9,11 @@ import numpy as np
 from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
-from aqualog.model.road import Road
+from aqualog.model.road import DRY
 from aqualog.physics.resistance import air_drag
 from aqualog.types import FloatArray
 
 __all__ = ["Replay", "replay"]
-
-_DRY = Road(
-    ds=1.0,
-    lanes=np.zeros((0, 9)),
-    lane_mu=np.zeros(0),
-    lane_compliance=np.zeros(0),
-    contact_road=np.zeros((2, 2)),
-    contact_wheel=np.zeros((2, 4)),
-    depth=np.zeros((2, 2)),
-    bumps=np.zeros((2, 2)),
-    grade=np.zeros(2),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +27,27 @@ class Replay:
 
 
 def replay(
-    plant: Plant, t: FloatArray, torque: FloatArray, *, v_0: float, grade: FloatArray | None = None, dt: float = 2e-3
+    plant: Plant,
+    t: FloatArray,
+    torque: FloatArray,
+    *,
+    split_rear: float,
+    v_0: float,
+    grade: FloatArray | None = None,
+    dt: float = 2e-3,
 ) -> Replay:
     """Drive a dry straight road with a given torque, freely from the first speed on.
 
     Parameters
     ----------
     plant : Plant
-        The car; its drive split shares the torque out, its `torque_gain` scales it.
+        The car; its `torque_gain` scales the torque.
     t : array (n,)
         Even time base of the inputs, from any start. [s]
     torque : array (n,)
         Sum of the net wheel torques, drive minus brake. [N m] Finite.
+    split_rear : float
+        Rear share of the torque. [-]
     v_0 : float
         Speed at the first sample, > 0. [m/s]
     grade : array (n,), optional
@@ -83,6 +80,7 @@ def replay(
         a_target=still,
         drive=np.interp(fine, t - t[0], torque),
         brake=still,
+        split_rear=np.full(n + 1, split_rear),
         steer=still,
         exc=still,
         grade=still if grade is None else np.interp(fine, t - t[0], grade),
@@ -92,7 +90,7 @@ def replay(
         exc_amplitude=0.0,
         scatter=0.0,
     )
-    rows = kernel.integrate(n, dt, every, _rolling_state(plant, v_0, float(torque[0])), plant, _DRY, controls)
+    rows = kernel.run(n, dt, every, _rolling_state(plant, v_0, float(torque[0])), plant, DRY, controls)
     first = kernel.COLUMNS["omega"]
     return Replay(
         t,

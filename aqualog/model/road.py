@@ -10,27 +10,36 @@ from aqualog.compiled import compiled
 from aqualog.model.scenario import Scenario
 from aqualog.types import FloatArray
 
-__all__ = ["Road", "build_road"]
+__all__ = ["DRY", "Road", "build_road"]
 
 DS = 0.1  # [m] grid of the fields
 DS_LONG = 0.5  # [m] on drives beyond 20 km
+DEPTH_LENGTH, BUMP_LENGTH = 5.0, 0.3  # [m] correlation of the water's depth and of bumps (K)
+
+
+# columns of a stretch
+IN_METRES, START, END, DEPTH_LEFT, DEPTH_RIGHT, IRREGULARITY_LEFT, IRREGULARITY_RIGHT, ROLLING, ROUGHNESS = range(9)
+LANE_MU, LANE_COMPLIANCE = 9, 10  # friction of the tyre on it, negative: the tyre's own
+_LANE_WIDTH = 11
+# columns of the fields; of sides and wheels from the left, from fl
+CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE = 0, 2, 6, 8, 10
+_FIELD_WIDTH = 11
 
 
 class Road(NamedTuple):
-    """Stretches (k,) and fields (m,) over the position of the front axle, from 0, `ds` apart.
+    """Stretches (k, 11) and fields (m, 11) over the position of the front axle, from 0, `ds` apart.
 
-    The last stretch of `lanes` that holds a point rules; -1 is dry asphalt. Fields have unit variance.
+    The last stretch of `lanes` that holds a point rules; outside all is dry asphalt. The contact's, the depth's and
+    the bumps' fields have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`. The slope
+    angle is in rad, uphill positive.
     """
 
     ds: float
-    lanes: FloatArray  # (k, 9): in_metres, start, end, depth left, right, irregularity left, right, rolling, roughness
-    lane_mu: FloatArray  # (k,) friction of the tyre, negative: the tyre's own
-    lane_compliance: FloatArray  # (k,)
-    contact_road: FloatArray  # (m, 2) sides: what both axles meet at the same spot
-    contact_wheel: FloatArray  # (m, 4) what each wheel adds
-    depth: FloatArray  # (m, 2)
-    bumps: FloatArray  # (m, 2)
-    grade: FloatArray  # (m,) slope angle, uphill positive [rad]
+    lanes: FloatArray
+    fields: FloatArray
+
+
+DRY = Road(1.0, np.zeros((0, _LANE_WIDTH)), np.zeros((2, _FIELD_WIDTH)))
 
 
 def build_road(scenario: Scenario, length: float) -> Road:
@@ -45,50 +54,43 @@ def build_road(scenario: Scenario, length: float) -> Road:
     ds = DS if length < 20e3 else DS_LONG
     m = int(length / ds) + 2
     s = np.arange(m) * ds
-    lanes = scenario.lanes
     table = np.array(
         [
             [
                 float(lane.in_metres), lane.start, lane.end, lane.depth_left, lane.depth_right,
                 lane.irregularity_left, lane.irregularity_right, lane.surface.rolling, lane.surface.roughness,
+                -1.0 if lane.surface.mu is None else lane.surface.mu, lane.surface.compliance,
             ]
-            for lane in lanes
-        ]
-    ).reshape(len(lanes), 9)  # fmt: skip
+            for lane in scenario.lanes
+        ],
+        dtype=np.float64,
+    ).reshape(len(scenario.lanes), _LANE_WIDTH)  # fmt: skip
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence([scenario.seed, 1]).spawn(10)]
-    wet = any(lane.depth_left > 0 or lane.depth_right > 0 for lane in lanes)
-    rough = any(lane.surface.roughness > 0 for lane in lanes)
     front, rear = scenario.tyre_front.scatter_length, scenario.tyre_rear.scatter_length
-    none = np.zeros((2, 4))
-    return Road(
-        ds=ds,
-        lanes=table,
-        lane_mu=np.array([-1.0 if lane.surface.mu is None else lane.surface.mu for lane in lanes]),
-        lane_compliance=np.array([lane.surface.compliance for lane in lanes]),
-        contact_road=_fields(streams[:2], m, ds, [front, front]) if wet else none[:, :2],
-        contact_wheel=_fields(streams[2:6], m, ds, [front, front, rear, rear]) if wet else none,
-        depth=_fields(streams[6:8], m, ds, [5.0, 5.0]) if wet else none[:, :2],
-        bumps=_fields(streams[8:10], m, ds, [0.3, 0.3]) if rough else none[:, :2],
-        grade=np.interp(s, [p[0] for p in scenario.grade], [p[1] for p in scenario.grade])
-        if scenario.grade
-        else np.zeros(2),
-    )
+    fields = np.zeros((m, _FIELD_WIDTH))
+    if any(lane.depth_left > 0 or lane.depth_right > 0 for lane in scenario.lanes):
+        lengths = [front, front, front, front, rear, rear, DEPTH_LENGTH, DEPTH_LENGTH]
+        _fill(fields, CONTACT_ROAD, streams[:8], ds, lengths)
+    if any(lane.surface.roughness > 0 for lane in scenario.lanes):
+        _fill(fields, BUMPS, streams[8:10], ds, [BUMP_LENGTH, BUMP_LENGTH])
+    if scenario.grade:
+        fields[:, GRADE] = np.interp(s, [p[0] for p in scenario.grade], [p[1] for p in scenario.grade])
+    return Road(ds, table, fields)
 
 
-def _fields(streams: list[np.random.Generator], m: int, ds: float, lengths: list[float]) -> FloatArray:
-    """Ornstein-Uhlenbeck processes over the position, unit variance, one column each."""
-    columns = []
-    for rng, length in zip(streams, lengths, strict=True):
+def _fill(fields: FloatArray, first: int, streams: list[np.random.Generator], ds: float, lengths: list[float]) -> None:
+    """Ornstein-Uhlenbeck processes over the position, unit variance, one column each, into columns from `first` on."""
+    m = fields.shape[0]
+    for i, (rng, length) in enumerate(zip(streams, lengths, strict=True)):
         keep = float(np.exp(-ds / length))
-        noise = rng.normal(size=m)
+        noise = rng.standard_normal((m,))
         noise[1:] *= np.sqrt(1.0 - keep * keep)
-        columns.append(_recursive(keep, noise))
-    return np.column_stack(columns)
+        fields[:, first + i] = _recursive(keep, noise)
 
 
 @compiled
 def _recursive(keep, noise):  # type: ignore[no-untyped-def]
-    y = np.empty_like(noise)
+    y = np.empty(noise.size)
     y[0] = noise[0]
     for i in range(1, noise.size):
         y[i] = keep * y[i - 1] + noise[i]

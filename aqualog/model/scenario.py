@@ -77,6 +77,7 @@ class Scenario:
     excitation: Excitation | None = None
     brake_torque: Profile = ()  # [N m] sum of all wheels
     extra_torque: Profile = ()  # [N m] drive torque on top of the driver's, sum of the driven wheels
+    split_rear: Profile = ()  # rear share of the drive torque over time; empty: the vehicle's
     grade: Profile = ()  # (s [m], slope angle [rad]) over the position
     head_wind: float = 0.0  # [m/s]
     water_scatter: float = 1.0  # scales the contact's fluctuation; 0 for an even contact

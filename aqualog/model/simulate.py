@@ -120,7 +120,7 @@ def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
     n = round(scenario.duration_s / dt)
     controls = _controls(scenario, n, dt)
     road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
-    rows: FloatArray = kernel.integrate(n, dt, every, _start(plant, controls), plant, road, controls)
+    rows = kernel.run(n, dt, every, _start(plant, controls), plant, road, controls)
     if not np.isfinite(rows).all():
         raise ConfigError("the simulation diverged", hint="a smaller step, or less extreme parameters")
     return rows
@@ -139,7 +139,10 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
     if steering is not None:
         phase = np.maximum(t - steering.start_s, 0.0) * (2.0 * np.pi / steering.period_s)
         steer = steering.amplitude * np.sin(phase)
-    if exc is not None and not 0.0 < scenario.vehicle.torque_split_rear < 1.0:
+    split = (
+        _profile(scenario.split_rear, t) if scenario.split_rear else np.full(n + 1, scenario.vehicle.torque_split_rear)
+    )
+    if exc is not None and not (split.min() > 0.0 and split.max() < 1.0):
         raise ConfigError("excitation needs a car with both axles driven", where="drivetrain")
     v_target = _profile(scenario.speed, t)
     return kernel.Controls(
@@ -147,20 +150,22 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         a_target=np.gradient(v_target, dt) if v_target.size > 1 else np.zeros(1),
         drive=_profile(scenario.extra_torque, t),
         brake=_profile(scenario.brake_torque, t),
+        split_rear=split,
         steer=steer,
         exc=np.zeros(n + 1) if exc is None else np.asarray(waveform(exc.waveform, t, period=exc.period_s)),
         grade=np.zeros(n + 1),
         has_driver=True,
         keeps_lane=steering is None,
         exc_kind=0 if exc is None else _EXC_KIND[exc.amplitude_kind],
-        exc_amplitude=0.0 if exc is None else exc.amplitude,
-        scatter=scenario.water_scatter,
+        exc_amplitude=0.0 if exc is None else float(exc.amplitude),
+        scatter=float(scenario.water_scatter),
     )
 
 
 def _start(plant: Plant, controls: kernel.Controls) -> FloatArray:
     """Rolling in balance at the first speed and acceleration: no transient at the start."""
-    v, a = float(controls.v_target[0]), float(controls.a_target[0])
+    v, a, rear = float(controls.v_target[0]), float(controls.a_target[0]), float(controls.split_rear[0])
+    share = 0.5 * np.array([1.0 - rear, 1.0 - rear, rear, rear])
     y = np.zeros(kernel.N_STATES)
     y[kernel.V_X] = v
     y[kernel.A_X] = a
@@ -170,9 +175,9 @@ def _start(plant: Plant, controls: kernel.Controls) -> FloatArray:
     rolling = plant.r_w * (1.0 + plant.warmup_extra) * loads
     drag = 0.5 * plant.drag_area * plant.air_density * (v + plant.head_wind) * abs(v + plant.head_wind)
     total = plant.mass * a + rolling.sum() + drag + plant.mass * G * np.sin(controls.grade[0])
-    y[kernel.DRIVE] = total * float(plant.drive_split @ plant.r_l) if controls.has_driver else controls.drive[0]
+    y[kernel.DRIVE] = total * float(share @ plant.r_l) if controls.has_driver else controls.drive[0]
     r_e = plant.r_e * (1.0 + plant.radius_growth * v * v)
-    force = plant.drive_split * y[kernel.DRIVE] / plant.r_l - rolling
+    force = share * y[kernel.DRIVE] / plant.r_l - rolling
     slip = force / np.maximum(plant.slip_slope * loads, 1.0)
     y[kernel.OMEGA : kernel.OMEGA + 4] = v / (r_e * (1.0 - np.clip(slip, -0.1, 0.1)))
     y[kernel.SLIP_X : kernel.SLIP_X + 4] = slip

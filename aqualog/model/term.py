@@ -87,10 +87,15 @@ class Term:
                 expected=", ".join(self.effect.places) or "no place: it acts on the whole car",
             )
 
+    @property
+    def place(self) -> str | None:
+        """Where it sits: the place that is named, or else the effect's own; None: the whole car."""
+        return self.where or self.effect.default
+
     def apply(self, setup: Setup) -> Setup:
         """The setup with this effect in it."""
         values = {p.name: float(self.values.get(p.name, p.neutral)) for p in self.effect.parameters}
-        return self.effect.apply(setup, values, self.where or self.effect.default)
+        return self.effect.apply(setup, values, self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +112,8 @@ class Model:
         ConfigError
             If the same effect sits at the same place already.
         """
-        if any(t.effect is term.effect and t.where == term.where for t in self.terms):
-            place = f" at {term.where}" if term.where else ""
+        if any(t.effect is term.effect and t.place == term.place for t in self.terms):
+            place = f" at {term.place}" if term.place else ""
             raise ConfigError(f"{term.effect.name}{place} is in the model already", hint="one term with the sum")
         return Model((*self.terms, term))
 

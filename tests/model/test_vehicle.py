@@ -352,7 +352,25 @@ def test_twenty_seconds_in_a_tenth_of_a_second():
     times = []
     for seed in range(7):
         s = assemble(replace(sc, seed=seed))
-        start = time.perf_counter()
+        start = time.process_time()  # what others do on this machine does not count
         drive_truth(s)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     assert min(times) < 0.1
+
+
+def test_given_split_shares_the_torque_out():
+    sc = scenario(AWD, speed=((0.0, 25.0),), split_rear=((0.0, 0.2), (4.0, 0.2), (8.0, 0.9)), duration_s=10.0)
+    t, c = truth(sc)
+    rear = (c["torque_rl"] + c["torque_rr"]) / (c["torque_rl"] + c["torque_rr"] + c["torque_fl"] + c["torque_fr"])
+    np.testing.assert_allclose(rear, np.interp(t, [0, 4, 8], [0.2, 0.2, 0.9]), atol=1e-6)
+    assert np.abs(resistance(t, c, sc)[5:-5]).max() < 0.01
+
+
+def test_one_machine_code_serves_all_drives():
+    """Another layout of an array would compile the whole simulation again."""
+    drive_truth(assemble(scenario(duration_s=0.1)))
+    drive_truth(assemble(scenario(duration_s=0.1, lanes=(lane(0.0, 1.0),), steering=Steering(0.01, 1.0))))
+    drive_truth(assemble(scenario(AWD, duration_s=0.1, excitation=Excitation("sine", 100, "force", 1))))
+    term = Term(EFFECTS["payload_mass"], {"delta_mass": 100}, "f")
+    drive_truth(assemble(scenario(AWD, duration_s=0.1, grade=((0, 0),)), Model().with_term(term)))
+    assert len(kernel.integrate.signatures) == 1

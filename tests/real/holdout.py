@@ -4,7 +4,7 @@
 """
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,7 @@ class Holdout:
 
 
 def plant_of_trips():
-    car = replace(load_vehicle(HERE / "bmw_i3.toml"), torque_split_rear=1.0)
+    car = load_vehicle(HERE / "bmw_i3.toml")
     return build_plant(car, TYRES["worn_summer"], TYRES["worn_summer"])
 
 
@@ -68,7 +68,7 @@ def hold_out(folder, trip, plant):
         w = slice(i, i + n + 1)
         if v[w].min() < MIN_SPEED:
             continue
-        r = replay(plant, t[w], torque[w], v_0=float(v[i]), grade=theta[w])
+        r = replay(plant, t[w], torque[w], split_rear=1.0, v_0=float(v[i]), grade=theta[w])
         errors.append((r.v_x[n // 3] - v[i + n // 3], r.v_x[-1] - v[i + n]))
         acceleration.append(r.a_x - a[w])
         measured.append(a[w])

@@ -87,7 +87,8 @@ def passes(seeds, **kw):
 
 
 def mean(rows, key):
-    return float(np.nanmean([r[key] for r in rows]))
+    values = [r[key] for r in rows if np.isfinite(r[key])]
+    return float(np.mean(values)) if values else float("nan")
 
 
 def std(rows, key):

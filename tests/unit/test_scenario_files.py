@@ -518,3 +518,13 @@ def models(draw):
 @given(model=models())
 def test_written_models_read_back(tmp_path_factory, model):
     assert load_as_model(tmp_path_factory.mktemp("model"), dump_model(model)) == model
+
+
+def test_split_profile_needs_all_wheel_drive(tmp_path):
+    (tmp_path / "car.toml").write_text('drivetrain = "rwd"\n')
+    text = 'vehicle = "car.toml"\nspeed_kmh = 80.0\nsplit_profile = [[0.0, 0.5]]\n'
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(ConfigError, match="awd"):
+        load_scenario(tmp_path / "s.toml")
+    (tmp_path / "car.toml").write_text('drivetrain = "awd"\n')
+    assert load_scenario(tmp_path / "s.toml").split_rear == ((0.0, 0.5),)
