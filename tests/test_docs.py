@@ -5,6 +5,9 @@ import re
 import pytest
 from conftest import ROOT
 
+from aqualog.config.scenario import SCENARIO_KEYS
+from aqualog.model.effects import EFFECTS
+from aqualog.model.tyre import TYRE_KEYS
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.vehicle import KEYS
 
@@ -22,7 +25,7 @@ def test_signals(name):
     assert f"`{name}`" in README or f"`{stem}_fl ... rr`" in README
 
 
-@pytest.mark.parametrize("command", ["detect", "inspect", "convert", "align"])
+@pytest.mark.parametrize("command", ["detect", "inspect", "convert", "align", "simulate"])
 def test_commands(command):
     assert f"`{command} " in README
 
@@ -37,3 +40,21 @@ def test_detectors_of_the_contract_are_explained():
 
     for name in DETECTORS:
         assert f"`{name}`" in README
+
+
+@pytest.mark.parametrize("key", list(SCENARIO_KEYS.values()), ids=lambda k: k.path)
+def test_scenario_keys(key):
+    default = "" if key.default is None else f"`{key.default}`" if isinstance(key.default, str) else f"{key.default:g}"
+    assert f"| `{key.path}` | {key.unit} | {default} | {key.meaning} |" in README
+
+
+@pytest.mark.parametrize("key", list(TYRE_KEYS.values()), ids=lambda k: k.name)
+def test_tyre_keys(key):
+    assert f"| `{key.name}` | {key.unit} | {key.default:g} | {key.meaning} | {key.source} |" in README
+
+
+@pytest.mark.parametrize("effect", list(EFFECTS.values()), ids=lambda e: e.name)
+def test_effects(effect):
+    assert f"| `{effect.name}` | {effect.target} |" in README
+    for p in effect.parameters:
+        assert f"`{p.name}` [{p.unit}] ({p.neutral:g})" in README
