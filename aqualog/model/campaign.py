@@ -10,7 +10,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from aqualog.errors import AqualogError, ConfigError
 from aqualog.io.whole import write_text, write_whole
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import PROGRAMMES, WEAR, Run
+from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.vehicle import Vehicle, vehicle_toml
 
@@ -83,6 +84,8 @@ def simulate_campaign(
     stamp = _code_stamp()
     digests = {r.name: hashlib.sha256(f"{stamp}{r!r}".encode()).hexdigest() for r in runs}
     known = {} if force else _finished(folder, digests)
+    # a torn last line would swallow the next one
+    write_text(folder / STATE, "".join(_line(done) for done in known.values()))
     todo = [r for r in runs if r.name not in known]
     report(len(known), len(runs))
     failed: dict[str, str] = {}
@@ -91,7 +94,7 @@ def simulate_campaign(
         if isinstance(outcome, Done):
             made[name] = outcome
             with (folder / STATE).open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(outcome)) + "\n")
+                file.write(_line(outcome))
         else:
             failed[name] = outcome
         report(len(known) + len(made) + len(failed), len(runs))
@@ -122,6 +125,10 @@ def _finished(folder: Path, digests: dict[str, str]) -> dict[str, Done]:
     return done
 
 
+def _line(done: Done) -> str:
+    return json.dumps(asdict(done)) + "\n"
+
+
 def _log(folder: Path, name: str) -> Path:
     return folder / "logs" / f"{name}.mf4"
 
@@ -139,7 +146,7 @@ def _work(runs: Sequence[Run], folder: Path, digests: dict[str, str], *, jobs: i
     """Each run's outcome as it comes; a run that fails leaves the others alone."""
     if not runs:
         return
-    simulate(replace(runs[0].scenario, duration_s=0.2))  # compiles once, before several processes do
+    simulate(Scenario(Vehicle(), duration_s=0.2))  # compiles once, before several processes do
     context = multiprocessing.get_context("spawn")  # fork would copy the threads of polars and numba
     with ProcessPoolExecutor(min(jobs, len(runs)), mp_context=context, initializer=_quiet_worker) as pool:
         pending: dict[Future[Done | str], str] = {

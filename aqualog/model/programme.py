@@ -12,8 +12,7 @@ from aqualog.vehicle import Vehicle
 __all__ = ["PROGRAMMES", "Run", "thesis"]
 
 KMH = 1.0 / 3.6  # [m/s]
-BAR = 1e5  # [Pa]
-PRESSURES = {"low": 1.9 * BAR, "medium": 2.3 * BAR, "high": 2.8 * BAR}  # the thesis gives names only (K)
+PRESSURES = {"low": 1.9e5, "medium": 2.3e5, "high": 2.8e5}  # [Pa] the thesis gives names only (K)
 APPROACH_S = 4.0  # dry road before the lane
 LANE_M = 130.0  # about 4.5 s at 100 km/h (thesis Fig. 2.25)
 RUN_OUT_S = 3.0

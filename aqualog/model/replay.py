@@ -10,7 +10,7 @@ from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
 from aqualog.model.road import DRY
-from aqualog.physics.resistance import air_drag
+from aqualog.model.start import resistance_at, rolling_state
 from aqualog.types import FloatArray
 
 __all__ = ["Replay", "replay"]
@@ -90,7 +90,11 @@ def replay(
         exc_amplitude=0.0,
         scatter=0.0,
     )
-    rows = kernel.run(n, dt, every, _rolling_state(plant, v_0, float(torque[0])), plant, DRY, controls)
+    drive = float(torque[0]) * plant.torque_gain
+    drag, rolling = resistance_at(plant, v_0, 0.0)
+    a_0 = (drive / float(plant.r_l.mean()) - rolling.sum() - drag) / plant.mass
+    start = rolling_state(plant, v=v_0, a=a_0, drive=drive, split_rear=split_rear)
+    rows = kernel.run(n, dt, every, start, plant, DRY, controls)
     first = kernel.COLUMNS["omega"]
     return Replay(
         t,
@@ -98,12 +102,3 @@ def replay(
         rows[:, kernel.COLUMNS["a_x"]],
         np.ascontiguousarray(rows[:, first : first + 4].T),
     )
-
-
-def _rolling_state(plant: Plant, v: float, torque: float) -> FloatArray:
-    y = np.zeros(kernel.N_STATES)
-    y[kernel.V_X] = v
-    drag = float(air_drag(np.array([v]), drag_area=plant.drag_area, air_density=plant.air_density)[0])
-    y[kernel.A_X] = (torque * plant.torque_gain / float(plant.r_l.mean()) - drag) / plant.mass
-    y[kernel.OMEGA : kernel.OMEGA + 4] = v / plant.r_e
-    return y

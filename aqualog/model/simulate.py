@@ -13,9 +13,9 @@ from aqualog.model.plant import Plant, build_plant, with_mass_at
 from aqualog.model.road import build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
+from aqualog.model.start import resistance_at, rolling_state
 from aqualog.model.term import Model, Setup
 from aqualog.notation import WHEELS
-from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.steering import tie_rod_force
 from aqualog.types import FloatArray
 
@@ -165,23 +165,10 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
 def _start(plant: Plant, controls: kernel.Controls) -> FloatArray:
     """Rolling in balance at the first speed and acceleration: no transient at the start."""
     v, a, rear = float(controls.v_target[0]), float(controls.a_target[0]), float(controls.split_rear[0])
-    share = 0.5 * np.array([1.0 - rear, 1.0 - rear, rear, rear])
-    y = np.zeros(kernel.N_STATES)
-    y[kernel.V_X] = v
-    y[kernel.A_X] = a
-    loads = wheel_loads(
-        np.array([a]), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
-    )[:, 0]
-    rolling = plant.r_w * (1.0 + plant.warmup_extra) * loads
-    drag = 0.5 * plant.drag_area * plant.air_density * (v + plant.head_wind) * abs(v + plant.head_wind)
-    total = plant.mass * a + rolling.sum() + drag + plant.mass * G * np.sin(controls.grade[0])
-    y[kernel.DRIVE] = total * float(share @ plant.r_l) if controls.has_driver else controls.drive[0]
-    r_e = plant.r_e * (1.0 + plant.radius_growth * v * v)
-    force = share * y[kernel.DRIVE] / plant.r_l - rolling
-    slip = force / np.maximum(plant.slip_slope * loads, 1.0)
-    y[kernel.OMEGA : kernel.OMEGA + 4] = v / (r_e * (1.0 - np.clip(slip, -0.1, 0.1)))
-    y[kernel.SLIP_X : kernel.SLIP_X + 4] = slip
-    return y
+    drag, rolling = resistance_at(plant, v, a)
+    arm = 0.5 * ((1.0 - rear) * plant.r_l[:2].sum() + rear * plant.r_l[2:].sum())
+    drive = (plant.mass * a + rolling.sum() + drag) * arm
+    return rolling_state(plant, v=v, a=a, drive=float(drive), split_rear=rear)
 
 
 def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:

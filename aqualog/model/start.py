@@ -1,0 +1,45 @@
+"""States from which a simulation starts without a transient."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.model import kernel
+from aqualog.model.plant import Plant
+from aqualog.physics.load import wheel_loads
+from aqualog.physics.resistance import air_drag
+from aqualog.physics.rolling import effective_radius
+from aqualog.types import FloatArray
+
+__all__ = ["resistance_at", "rolling_state"]
+
+
+def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
+    """Air drag and rolling resistance of the four wheels at a speed and acceleration, dry and cold. [N]"""
+    through_air = np.array([v + plant.head_wind])
+    drag = float(air_drag(through_air, drag_area=plant.drag_area, air_density=plant.air_density)[0])
+    return drag, plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
+
+
+def _loads(plant: Plant, a: float) -> FloatArray:
+    return wheel_loads(
+        np.array([a]), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
+    )[:, 0]
+
+
+def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear: float) -> FloatArray:
+    """State of a car that rolls straight on dry road, each wheel on the slip that its torque needs.
+
+    `v` [m/s], `a` specific force forward [m/s^2], `drive` torque of all wheels [N m], its rear share.
+    """
+    y = np.zeros(kernel.N_STATES)
+    y[kernel.V_X], y[kernel.A_X], y[kernel.DRIVE] = v, a, drive
+    _, rolling = resistance_at(plant, v, a)
+    share = 0.5 * np.array([1.0 - split_rear, 1.0 - split_rear, split_rear, split_rear])
+    force = share * drive / plant.r_l - rolling
+    radii = zip(plant.r_e, plant.radius_growth, strict=True)
+    slip = np.clip(force / np.maximum(plant.slip_slope * _loads(plant, a), 1.0), -0.1, 0.1)
+    r_e = np.array([float(effective_radius(np.array([r]), np.array([v]), growth=g)[0]) for r, g in radii])
+    y[kernel.OMEGA : kernel.OMEGA + 4] = v / (r_e * (1.0 - slip))
+    y[kernel.SLIP_X : kernel.SLIP_X + 4] = slip
+    return y

@@ -1,0 +1,133 @@
+"""A programme into a folder: whole, resumable, and what the thesis' programme holds."""
+
+import csv
+import json
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from aqualog.config.vehicle import load_vehicle
+from aqualog.errors import ConfigError
+from aqualog.io.open_log import open_log
+from aqualog.model import campaign
+from aqualog.model.campaign import simulate_campaign
+from aqualog.model.programme import PROGRAMMES, thesis
+from aqualog.vehicle import Vehicle, vehicle_toml
+
+CONTRACT = {
+    "log", "tyre", "tread_depth_mm", "wear", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",
+    "water_depth_left_mm", "load_front_kg", "load_rear_kg", "manoeuvre", "vehicle", "lane_start_s", "lane_end_s", "labels",
+}  # fmt: skip
+
+
+def small():
+    runs = [r for r in thesis() if r.name.endswith("_1")][:3]
+    return tuple(replace(r, scenario=replace(r.scenario, duration_s=5.0)) for r in runs)
+
+
+@pytest.fixture
+def programme(monkeypatch):
+    monkeypatch.setitem(PROGRAMMES, "small", small)
+
+
+def run(folder, jobs=1, force=False, seen=None):
+    return simulate_campaign("small", folder, jobs=jobs, force=force, report=lambda *x: (seen or []).append(x))
+
+
+def test_programme_of_the_thesis():
+    runs = thesis()
+    assert len(runs) >= 300
+    assert len({r.name for r in runs}) == len(runs)
+    assert len({r.scenario.seed for r in runs}) == len(runs)
+    assert {r.scenario.tyre_front.name for r in runs} == {"very_worn_summer", "worn_summer", "new_summer", "new_winter"}
+    assert {r.scenario.p_front for r in runs} == {1.9e5, 2.3e5, 2.8e5}
+    assert {round(r.water_depth * 1e3, 1) for r in runs} >= {0.6, 0.8, 1.1, 1.2, 1.3, 2.0}
+    assert {(r.scenario.load_front, r.scenario.load_rear) for r in runs} == {(0, 0), (270, 0), (0, 270)}
+    assert {r.scenario.vehicle.drivetrain for r in runs} == {"rwd", "awd"}
+    assert {r.manoeuvre for r in runs} == {"constant", "acceleration", "deceleration", "slalom"}
+    shown = {f for r in runs for f in r.figures.split(",")}
+    # 2.1 is a sketch, 2.2 is analytic, 2.24 a diagram, 2.18 and 2.20 are regressions of the same drives
+    assert {f"2.{n}" for n in range(3, 26)} - {"2.24"} <= shown
+
+
+def test_campaign_is_what_the_contract_says(tmp_path, programme):
+    outcome = run(tmp_path / "c", jobs=2)
+    assert (outcome.made, outcome.kept, outcome.failed) == (3, 0, {})
+    document = tomllib.loads((tmp_path / "c/campaign.toml").read_text())
+    assert set(document) == {"name", "vehicle", "runs"}
+    rows = list(csv.DictReader((tmp_path / "c" / document["runs"]).open()))
+    assert len(rows) == 3
+    for row in rows:
+        assert {c for c in row if not c.startswith("x_")} <= CONTRACT
+        assert (tmp_path / "c" / row["log"]).is_file()
+        assert load_vehicle(tmp_path / "c" / row["vehicle"]).name == "sedan RWD"
+        assert 3.9 < float(row["lane_start_s"]) < 4.1
+    with open_log(tmp_path / "c" / rows[0]["log"]) as log:
+        names = {c.name for c in log.channels()}
+    assert {"omega_fl", "torque_rr", "on_water", "true_contact_fl"} <= names
+
+
+def test_a_broken_run_goes_on_where_it_stopped(tmp_path, programme):
+    folder = tmp_path / "c"
+    run(folder)
+    logs = sorted((folder / "logs").iterdir())
+    before = {p.name: p.stat().st_mtime_ns for p in logs}
+    logs[0].unlink()
+    with (folder / campaign.STATE).open("a") as file:
+        file.write('{"name": "torn')  # a line that a power cut left
+    seen = []
+    outcome = run(folder, seen=seen)
+    assert (outcome.made, outcome.kept) == (1, 2)
+    after = {p.name: p.stat().st_mtime_ns for p in (folder / "logs").iterdir()}
+    assert set(after) == set(before)
+    assert sorted(n for n in after if after[n] == before[n]) == [p.name for p in logs[1:]]
+    assert run(folder).kept == 3
+    assert run(folder, force=True).made == 3
+
+
+def test_another_scenario_is_made_again(tmp_path, programme, monkeypatch):
+    run(tmp_path / "c")
+    changed = tuple(
+        replace(r, scenario=replace(r.scenario, load_rear=50.0)) if i == 0 else r for i, r in enumerate(small())
+    )
+    monkeypatch.setitem(PROGRAMMES, "small", lambda: changed)
+    assert run(tmp_path / "c").made == 1
+
+
+def test_a_run_that_fails_leaves_the_others_alone(tmp_path, monkeypatch):
+    runs = small()
+    bad = replace(runs[0], scenario=replace(runs[0].scenario, extra_torque=((0.0, float("nan")),)))
+    monkeypatch.setitem(PROGRAMMES, "small", lambda: (bad, *runs[1:]))
+    outcome = run(tmp_path / "c", jobs=2)
+    assert outcome.made == 2
+    assert list(outcome.failed) == [bad.name]
+    assert "diverged" in outcome.failed[bad.name]
+    rows = (tmp_path / "c/runs.csv").read_text()
+    assert bad.name not in rows
+    assert runs[1].name in rows
+
+
+def test_foreign_folders_are_left_alone(tmp_path, programme):
+    (tmp_path / "mine.txt").write_text("x")
+    with pytest.raises(ConfigError, match="holds other files"):
+        run(tmp_path)
+    with pytest.raises(ConfigError, match="no programme"):
+        simulate_campaign("thesi", tmp_path / "c", jobs=1, force=False, report=lambda *x: None)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.txt"]
+
+
+def test_state_is_one_line_per_log(tmp_path, programme):
+    run(tmp_path / "c")
+    lines = [json.loads(x) for x in (tmp_path / "c" / campaign.STATE).read_text().splitlines()]
+    assert {x["name"] for x in lines} == {r.name for r in small()}
+
+
+def test_vehicle_file_comes_back(tmp_path):
+    car = Vehicle(name='the "car"', drivetrain="awd", torque_split_rear=0.6, mass=1900.0, tie_rod={"c_y": (0.1, 1e-5)})
+    (tmp_path / "v.toml").write_text(vehicle_toml(car))
+    back = load_vehicle(tmp_path / "v.toml")
+    assert back.name == "the car"
+    assert back.tie_rod == car.tie_rod
+    for name in ("mass", "l_f", "torque_split_rear", "r_l_r", "mu_max", "inertia_f"):
+        assert getattr(back, name) == getattr(car, name)
