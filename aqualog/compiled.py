@@ -49,7 +49,11 @@ def inlined(function: Callable[..., Any]) -> Any:
         scope = function.__globals__ | {
             n: inlined(f) for n, f in names.items() if isinstance(f, FunctionType) and "aqualog.physics" in f.__module__
         }
-        _inlined[function] = njit(FunctionType(code, scope, function.__name__), error_model="numpy")
+        defaults = (
+            *(function.__defaults__ or ()),
+            *(function.__kwdefaults__ or {}).values(),
+        )  # the last ones have them
+        _inlined[function] = njit(FunctionType(code, scope, function.__name__, defaults), error_model="numpy")
     return _inlined[function]
 
 

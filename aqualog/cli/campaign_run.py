@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 from aqualog.cli.console import Console
-from aqualog.errors import ExitCode
+from aqualog.errors import ConfigError, ExitCode
+from aqualog.io.write_log import SUFFIXES
 from aqualog.model.campaign import simulate_campaign
 
 __all__ = ["run_campaign"]
@@ -16,6 +17,8 @@ __all__ = ["run_campaign"]
 
 def run_campaign(name: str, folder: Path, *, jobs: int | None, force: bool, console: Console) -> int:
     """Simulate a programme; exit code. A run that fails is told and the others are made."""
+    if folder.suffix.lower() in SUFFIXES:
+        raise ConfigError("is the name of a log", where=str(folder), expected="a folder for the campaign")
     began = time.monotonic()
     first: list[int] = []
     with console.steps() as steps:
@@ -27,7 +30,12 @@ def run_campaign(name: str, folder: Path, *, jobs: int | None, force: bool, cons
             left = f", {(total - done) * seconds / made:.0f} s left" if made > 0 and done < total else ""
             steps(f"{done} of {total} drives{left}")
 
-        outcome = simulate_campaign(name, folder, jobs=jobs or os.cpu_count() or 1, force=force, report=report)
+        try:
+            outcome = simulate_campaign(name, folder, jobs=jobs or os.cpu_count() or 1, force=force, report=report)
+        except (KeyboardInterrupt, SystemExit):
+            steps.clear()
+            console.note("interrupted: the drives that are done stay, the same command goes on with the rest")
+            raise
     for run, reason in outcome.failed.items():
         sys.stderr.write(f"error: {run}: {reason}\n")
     kept = f", {outcome.kept} were there already" if outcome.kept else ""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["simulate"]
 
-SLOW_S = 1.0  # a first step that takes longer than this is compiling
+SLOW_S = 5.0  # a first step that takes longer than this is compiling
 
 
 def simulate(

@@ -7,7 +7,7 @@ import json
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
@@ -90,7 +90,8 @@ def simulate_campaign(
     report(len(known), len(runs))
     failed: dict[str, str] = {}
     made: dict[str, Done] = {}
-    for name, outcome in _work(todo, folder, digests, jobs=jobs):
+
+    def record(name: str, outcome: Done | str) -> None:
         if isinstance(outcome, Done):
             made[name] = outcome
             with (folder / STATE).open("a", encoding="utf-8") as file:
@@ -98,6 +99,8 @@ def simulate_campaign(
         else:
             failed[name] = outcome
         report(len(known) + len(made) + len(failed), len(runs))
+
+    _work(todo, folder, digests, jobs=jobs, record=record)
     _write_campaign(folder, programme, [r for r in runs if r.name not in failed], known | made)
     return CampaignOutcome(len(made), len(known), failed)
 
@@ -142,8 +145,10 @@ def _code_stamp() -> str:
     return content.hexdigest()
 
 
-def _work(runs: Sequence[Run], folder: Path, digests: dict[str, str], *, jobs: int) -> Iterator[tuple[str, Done | str]]:
-    """Each run's outcome as it comes; a run that fails leaves the others alone."""
+def _work(
+    runs: Sequence[Run], folder: Path, digests: dict[str, str], *, jobs: int, record: Callable[[str, Done | str], None]
+) -> None:
+    """Record each run's outcome as it comes; a run that fails leaves the others alone, an interrupt loses none."""
     if not runs:
         return
     simulate(Scenario(Vehicle(), duration_s=0.2))  # compiles once, before several processes do
@@ -156,14 +161,19 @@ def _work(runs: Sequence[Run], folder: Path, digests: dict[str, str], *, jobs: i
             while pending:
                 ready, _ = wait(pending, return_when=FIRST_COMPLETED)
                 for future in ready:
-                    name = pending.pop(future)
-                    try:
-                        yield name, future.result()
-                    except BrokenProcessPool:
-                        yield name, "its process ended: out of memory, or killed"
+                    record(pending.pop(future), _outcome(future))
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
+            for future in [f for f in pending if f.done() and not f.cancelled()]:
+                record(pending.pop(future), _outcome(future))
             raise
+
+
+def _outcome(future: Future[Done | str]) -> Done | str:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return "its process ended: out of memory, or killed"
 
 
 def _quiet_worker() -> None:

@@ -141,7 +141,7 @@ _ALL = [
         _on_plant(lambda p, v, _: p._replace(warmup_extra=p.warmup_extra + v["extra"], warmup_time=v["time_constant"])),
     ),
     Effect(
-        "water_drag", "drag of the water on the wheels", "The water drags {gain:.2f} times as much.",
+        "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
         "momentum estimate within a factor of two (D)",
         (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.1, "on film and wave"),),
         _on_plant(lambda p, v, w: p._replace(water_drag_gain=_scaled(p.water_drag_gain, w, v["gain"]))), _WHEEL_PLACES,
@@ -220,7 +220,7 @@ _ALL = [
     Effect(
         "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
         "-0.4 to -1 %/K (K)",
-        (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, from the start"),),
+        (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, exp(rate t)"),),
         _on_plant(lambda p, v, w: p._replace(slip_slope_drift=_shifted(p.slip_slope_drift, w, v["rate"]))),
         _WHEEL_PLACES,
     ),

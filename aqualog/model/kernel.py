@@ -68,6 +68,7 @@ K_LATERAL = 0.004  # [rad/m]
 PREVIEW_TIME = 1.5  # [s]
 STEER_TIME = 0.2  # [s]
 MAX_DRIVE = 0.6  # of the weight, as force
+RUN_AWAY = 1.5  # driven wheels this much faster than the car make a driver lift
 
 
 class Controls(NamedTuple):
@@ -200,16 +201,26 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
     # the driver
     brake_total = c.brake + y[BRAKE]
     if s.has_driver > 0.0:
+        # mean speed of the driven wheels
+        turning = 0.5 * (1.0 - split_rear) * (y[OMEGA] + y[OMEGA + 1])
+        turning += 0.5 * split_rear * (y[OMEGA + 2] + y[OMEGA + 3])
         error = c.v_target - v_x
         wanted = p.mass * (c.a_target + K_SPEED * error) + y[INTEGRAL] + drag + slope_down
         for i in range(4):
             wanted += _rolling_force(loads[i], wheels[i].r_w) * warm
         least = -ENGINE_BRAKING * p.mass * G
         most = MAX_DRIVE * p.mass * G
-        f[DRIVE] = (min(max(wanted, least), most) * r_drive - y[DRIVE]) / PEDAL_TIME
-        f[INTEGRAL] = K_INTEGRAL * p.mass * error
-        f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
+        runs_away = turning * r_drive > RUN_AWAY * max(v_x, 5.0)
+        if c.brake > 0.0 or runs_away:  # the foot is on the other pedal, or lifts
+            f[DRIVE] = -y[DRIVE] / PEDAL_TIME
+            f[INTEGRAL] = 0.0
+            f[BRAKE] = -y[BRAKE] / PEDAL_TIME
+        else:
+            f[DRIVE] = (min(max(wanted, least), most) * r_drive - y[DRIVE]) / PEDAL_TIME
+            f[INTEGRAL] = K_INTEGRAL * p.mass * error
+            f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
         drive = y[DRIVE] + c.drive
+        drive = min(drive, p.power / max(turning, 1.0))
     else:
         f[DRIVE] = 0.0
         f[INTEGRAL] = 0.0
@@ -295,14 +306,18 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             a = _half_length(F_z, q.p, q.half_length, _F_Z_HALF, _P_HALF)
             shift = _load_shift(L, a, q.wedge_peak) * F_z
             gain = q.water_drag_gain
-            film_force = gain * _film_drag(film, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
-            wave = gain * _wave_drag(film, v_along, q.width, q.h_wave)
-        mu_max = mu * _friction_ratio(L)
-        slope = q.slip_slope * (1.0 + q.slip_slope_drift * t)
-        slope *= _load_factor(F_z, q.F_z_ref, q.load_sensitivity)
-        slope = _series_slope(slope, compliance) * _stiffness_ratio(L)
+            film_force = gain * _film_drag(
+                film, v_along, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief
+            )  # fmt: skip
+            skid = max(v_along - rim, 0.0)  # a slower tread pushes what it no longer throws
+            wave = gain * (
+                _wave_drag(film, v_along, q.width, q.h_wave)
+                + _film_drag(film, v_along, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+            )
+        slope = q.slip_slope * np.exp(q.slip_slope_drift * t)
+        slope = _series_slope(slope * _load_factor(F_z, q.F_z_ref, q.load_sensitivity), compliance)
         C_x = slope * F_z
-        C_y = _series_slope(q.cornering_slope, compliance) * _stiffness_ratio(L) * F_z
+        C_y = _series_slope(q.cornering_slope, compliance) * F_z
 
         # slip, with a first-order build-up where the tyre has a relaxation length
         s_x = _bounded_slip(rim, v_along)
@@ -326,7 +341,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             jac[SLIP_Y + i] = 0.0
             ds_domega = max(v_along, 0.0) * r_e / (speed * speed) if abs(rim) > 0.5 else 2.0 * r_e
             ds_dv = -1.0 / speed
-        F_x, F_y = _brush_forces(s_x, s_y, F_z, mu_max, C_x, C_y)
+        F_x, F_y = _brush_forces(s_x, s_y, F_z, mu, C_x, C_y, L)
 
         # the wheel's balance of torques
         torque = 0.5 * (1.0 - split_rear if front else split_rear) * drive + (0.5 if front else -0.5) * exc * q.r_l
@@ -335,7 +350,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         resisting = _rolling_force(F_z, r_w) * q.r_l + water_torque + q.brake_drag
         turn = min(max(omega, -1.0), 1.0)  # resistance fades out below 1 rad/s instead of jumping
         f[OMEGA + i] = (torque - F_x * q.r_l - (resisting + braking) * turn + bump) / q.inertia
-        dF_dsx = _brush_slope(s_x, F_z, mu_max, C_x)
+        dF_dsx = _brush_slope(s_x, F_z, mu, C_x, L)
         arm = q.r_l / q.inertia
         jac[OMEGA + i] = -dF_dsx * ds_domega * arm
         jac[_J_W + i] = -dF_dsx * ds_dv * arm
@@ -368,15 +383,15 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             out[base + 24] = s_x
             out[base + 28] = -np.arctan2(v_across, max(abs(v_along), 0.5))
             out[base + 32] = L
-            out[base + 36] = slope
-            out[base + 40] = mu_max
+            out[base + 36] = slope * _stiffness_ratio(L)
+            out[base + 40] = mu * _friction_ratio(L)
             out[base + 44] = film
-            out[base + 48] = water_torque
+            out[base + 48] = water_torque * turn
             out[base + 52] = wave
             out[base + 56] = resisting * turn
             out[base + 60] = v_along
             out[base + 64] = r_e
-            out[base + 68] = v_full
+            out[base + 68] = v_full * max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
 
     a_x = (sum_x - drag) / p.mass  # specific force: what an accelerometer shows
     a_y = sum_y / p.mass

@@ -13,12 +13,14 @@ from aqualog.physics.rolling import pressure_factor
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Plant", "build_plant", "flat", "with_mass_at"]
+__all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "with_mass_at"]
 
 P_NOMINAL = 2.2e5  # [Pa] nominal pressure of the MF6.1 pressure law
 P_HALF_LENGTH, F_Z_HALF_LENGTH = 2.2e5, 4000.0  # [Pa, N] reference of a tyre's half_length
 H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
 BRAKE_SHARE_FRONT = 0.64  # of the brake torque (K)
+POWER_PER_MASS = 110.0  # [W/kg] a lively car (K)
+FRONT_COMPLIANCE = 0.8  # the steering yields: cornering slope of the front axle over the tyre's, understeer (K)
 
 
 class Plant(NamedTuple):
@@ -36,6 +38,7 @@ class Plant(NamedTuple):
     cornering_drag: float
     roll_time: float
     brake_split: FloatArray
+    power: float  # [W] of the engine, bounds the driver's torque
     torque_gain: float  # torque at the wheels over the torque that the car reports
     r_e: FloatArray
     r_l: FloatArray
@@ -108,6 +111,7 @@ def build_plant(
         cornering_drag=0.0,
         roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
         brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
+        power=POWER_PER_MASS * vehicle.mass,
         torque_gain=1.0,
         r_e=np.array([vehicle.r_e(w) for w in WHEELS]),
         r_l=np.array([vehicle.r_l(w) for w in WHEELS]),
@@ -119,7 +123,7 @@ def build_plant(
         brake_drag=np.zeros(4),
         slip_slope=slope * of("slip_slope_factor") * pressure_factor(p, p_ref=P_REFERENCE, p_nominal=P_NOMINAL),
         slip_slope_drift=np.zeros(4),
-        cornering_slope=of("cornering_slope"),
+        cornering_slope=of("cornering_slope") * np.array([FRONT_COMPLIANCE, FRONT_COMPLIANCE, 1.0, 1.0]),
         load_sensitivity=of("load_sensitivity"),
         F_z_ref=0.5 * np.array([front_axle, front_axle, rear_axle, rear_axle]),
         mu=vehicle.mu_max * of("mu_factor"),

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from aqualog.model.plant import FRONT_COMPLIANCE
 from aqualog.model.scenario import Lane, Scenario, Steering
 from aqualog.model.tyre import TYRES
+from aqualog.physics.load import G
 from aqualog.vehicle import Vehicle
 
 __all__ = ["PROGRAMMES", "Run", "thesis"]
@@ -139,8 +141,10 @@ def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures
         irregularity_left=LEFT_IRREGULARITY, irregularity_right=RIGHT_IRREGULARITY,
     )  # fmt: skip
     steering = None
-    if manoeuvre == "slalom":  # 2 m/s^2 with a period of 4 s (thesis 2.4); kinematic gain
-        steering = Steering(2.0 * case.vehicle.wheelbase / (v * v), 4.0)
+    if manoeuvre == "slalom":  # 2 m/s^2 with a period of 4 s (thesis 2.4), by the steady gain of the two-track model
+        slope = TYRES[case.tyre].cornering_slope
+        understeer = (1.0 / (FRONT_COMPLIANCE * slope) - 1.0 / slope) / G
+        steering = Steering(2.0 * (case.vehicle.wheelbase / (v * v) + understeer), 4.0)
     p = PRESSURES[case.pressure]
     scenario = Scenario(
         case.vehicle, TYRES[case.tyre], TYRES[case.tyre], p, p, case.load_front, case.load_rear,

@@ -10,12 +10,14 @@ from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.excitation import waveform
 from aqualog.model.plant import Plant, build_plant, with_mass_at
-from aqualog.model.road import build_road
+from aqualog.model.road import GRADE, build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
 from aqualog.model.start import resistance_at, rolling_state
 from aqualog.model.term import Model, Setup
 from aqualog.notation import WHEELS
+from aqualog.physics.load import G
+from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.physics.steering import tie_rod_force
 from aqualog.types import FloatArray
 
@@ -25,21 +27,27 @@ BASE = Model()
 STEP_S = 1e-3
 FINE_RATE_HZ = 1000.0  # of the record that sensors sample
 FINE_LIMIT_S = 300.0  # longer drives are recorded more coarsely, to keep memory in bounds
+NO_WEDGE = 1e4  # [m/s] from here on the physics means: no aquaplaning at any speed
 PRESSURE_PER_TORQUE = 1.5e3  # [Pa/(N m)] brake pressure over the sum of the brake torques (K)
 TIE_ROD = {"c0": (0.0,), "c_y": (0.11,), "c_x": (0.06,)}  # where the vehicle file has none (K)
 _EXC_KIND = {"force": 0, "mu": 1, "relative": 2}
 
 _WHEEL_TRUTH = {
     "contact": ("contact", "-", "remaining share of the contact length L"),
-    "s_x": ("slip", "-", "longitudinal slip (omega r_e - v) / (omega r_e)"),
+    "s_x": ("slip", "-", "longitudinal slip (omega r_e - v) / v, -1 for a wheel that stands"),
     "F_x": ("force_x", "N", "longitudinal tyre force"),
     "F_y": ("force_y", "N", "lateral tyre force"),
     "F_z": ("load", "N", "wheel load"),
     "slope": ("slip_slope", "-", "slip slope C_s / F_z of the remaining contact"),
     "mu_max": ("mu_max", "-", "friction of the remaining contact over the wheel load"),
     "film": ("film", "m", "water in front of the wheel"),
-    "v_full": ("full_speed", "m/s", "speed of full aquaplaning of this wheel, now"),
+    "v_full": (
+        "full_speed",
+        "m/s",
+        "speed at which this wheel would float here and now; none without a wedge",
+    ),
     "torque": ("torque", "N*m", "net wheel torque"),
+    "water_torque": ("water_torque", "N*m", "torque of the water against the wheel: shifted load and film"),
 }
 TRUTH_SYMBOLS: dict[str, tuple[str, str]] = {
     **{
@@ -51,7 +59,7 @@ TRUTH_SYMBOLS: dict[str, tuple[str, str]] = {
     "true_v_x": ("m/s", "simulated truth: longitudinal velocity"),
     "true_v_y": ("m/s", "simulated truth: lateral velocity, left positive"),
     "true_position": ("m", "simulated truth: way of the front axle"),
-    "true_resistance": ("N", "simulated truth: drag of the water on all wheels, as a force"),
+    "true_wave_drag": ("N", "simulated truth: force of the water on the wheels' centres, against the motion, sum"),
 }
 
 
@@ -120,7 +128,7 @@ def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
     n = round(scenario.duration_s / dt)
     controls = _controls(scenario, n, dt)
     road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
-    rows = kernel.run(n, dt, every, _start(plant, controls), plant, road, controls)
+    rows = kernel.run(n, dt, every, _start(plant, controls, float(road.fields[0, GRADE])), plant, road, controls)
     if not np.isfinite(rows).all():
         raise ConfigError("the simulation diverged", hint="a smaller step, or less extreme parameters")
     return rows
@@ -138,7 +146,8 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
     steer = np.zeros(n + 1)
     if steering is not None:
         phase = np.maximum(t - steering.start_s, 0.0) * (2.0 * np.pi / steering.period_s)
-        steer = steering.amplitude * np.sin(phase)
+        # half a lobe of half the height first, so that the heading swings about straight ahead
+        steer = steering.amplitude * np.sin(phase) * np.where(phase < np.pi, 0.5, 1.0)
     split = (
         _profile(scenario.split_rear, t) if scenario.split_rear else np.full(n + 1, scenario.vehicle.torque_split_rear)
     )
@@ -162,9 +171,10 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
     )
 
 
-def _start(plant: Plant, controls: kernel.Controls) -> FloatArray:
-    """Rolling in balance at the first speed and acceleration: no transient at the start."""
-    v, a, rear = float(controls.v_target[0]), float(controls.a_target[0]), float(controls.split_rear[0])
+def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
+    """Rolling in balance at the first speed, acceleration and slope angle: no transient at the start."""
+    v, rear = float(controls.v_target[0]), float(controls.split_rear[0])
+    a = float(controls.a_target[0]) + G * float(np.sin(theta))  # specific force
     drag, rolling = resistance_at(plant, v, a)
     arm = 0.5 * ((1.0 - rear) * plant.r_l[:2].sum() + rear * plant.r_l[2:].sum())
     drive = (plant.mass * a + rolling.sum() + drag) * arm
@@ -195,17 +205,17 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
     columns |= _tie_rods(wheels, of_wheels("wave_drag"), scenario)
     if scenario.lanes:
         columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
+    v_w = np.array(wheels["omega"]) * np.array(of_wheels("r_e"))
+    wheels["s_x"] = list(slip_of_wheel_speed(v_w, np.array(of_wheels("v_along"))))
+    wheels["v_full"] = [np.where(x < NO_WEDGE, x, np.nan) for x in wheels["v_full"]]
     for name, (label, _, _) in _WHEEL_TRUTH.items():
         columns |= {f"true_{label}_{w}": wheels[name][i] for i, w in enumerate(WHEELS)}
-    drag = sum(of_wheels("wave_drag")) + sum(
-        m / r_l for m, r_l in zip(of_wheels("water_torque"), plant.r_l, strict=True)
-    )
     return columns | {
         "true_grade": scalar("grade"),
         "true_v_x": scalar("v_x"),
         "true_v_y": scalar("v_y"),
         "true_position": scalar("position"),
-        "true_resistance": np.asarray(drag),
+        "true_wave_drag": np.sum(of_wheels("wave_drag"), axis=0),
     }
 
 

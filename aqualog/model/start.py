@@ -15,10 +15,12 @@ __all__ = ["resistance_at", "rolling_state"]
 
 
 def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
-    """Air drag and rolling resistance of the four wheels at a speed and acceleration, dry and cold. [N]"""
+    """Air drag, and what holds each of the four wheels back, at a speed and specific force on dry road. [N]"""
     through_air = np.array([v + plant.head_wind])
     drag = float(air_drag(through_air, drag_area=plant.drag_area, air_density=plant.air_density)[0])
-    return drag, plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
+    drag += float(np.interp(v, plant.drag_over_v[:, 0], plant.drag_over_v[:, 1]))
+    rolling = plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
+    return drag, rolling + plant.brake_drag / plant.r_l
 
 
 def _loads(plant: Plant, a: float) -> FloatArray:

@@ -33,7 +33,7 @@ _ALL = [
     _key("half_length", "m", 0.07, 0.02, 0.3,
          "half contact length at 4 kN and 2.2 bar", "QRA1, QRA2 of MF6.1 (V): 0.066-0.074 (D)"),
     _key("width", "m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16"),
-    _key("v_anchor", "m/s", 126.0 / 3.6, 5.0, 100.0,
+    _key("v_anchor", "m/s", 128.0 / 3.6, 5.0, 100.0,
          "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN",
          "A: fluctuating and turning slower, half of the front wheels stop within 0.5 s at 118 km/h"),
     _key("h_bulk", "m", 2.0e-3, 1e-4, 0.05,

@@ -17,16 +17,25 @@ def drained_share(h_w: FloatArray, *, tread_capacity: float) -> FloatArray:
 
 
 def film_drag(
-    h_w: FloatArray, v: FloatArray, *, width: float, tread_capacity: float, h_film: float, relief: float
+    h_w: FloatArray,
+    v: FloatArray,
+    v_tread: FloatArray,
+    *,
+    width: float,
+    tread_capacity: float,
+    h_film: float,
+    relief: float,
 ) -> FloatArray:
-    """Force that it costs to pick up and throw the film under the tread.
+    """Force that it costs to bring the film under the tread to a speed.
 
     Parameters
     ----------
     h_w : array
         Water in front of the wheel, >= 0. [m]
     v : array
-        Speed. [m/s]
+        Speed over the water. [m/s]
+    v_tread : array
+        Speed that the film is given: omega r_e by a tread that throws it, v - omega r_e by one that skids. [m/s]
     width : float
         Width of the contact. [m]
     tread_capacity : float
@@ -39,16 +48,17 @@ def film_drag(
     Returns
     -------
     F : array
-        At the wheel's circumference, against its rotation. [N]
+        Of a throwing tread at the wheel's circumference, against its rotation; of a skidding one against the motion of
+        the wheel's centre. [N]
 
-    rho b v^2 min(h, h_film) (1 - relief drained): momentum of the water flow, which grows with v^2 (NASA TN D-552:
-    parabolic). The film saturates at h_film: measured resistance hardly changes between 0.6 and 1.3 mm (thesis
-    Fig. 2.11), where momentum alone would double. Water in grooves stays behind at rest, so that a tread with 0.4 mm of
-    capacity and a relief of 0.7 still rises by 47 % in between, one without grooves not at all.
+    rho b v v_tread min(h, h_film) (1 - relief drained): momentum of the water flow, v^2 for a rolling wheel (NASA
+    TN D-552: parabolic). The film saturates at h_film, because measured resistance hardly changes between 0.6 and
+    1.3 mm (thesis Fig. 2.11), where momentum alone would double. Water in grooves stays behind at rest, so that a tread
+    with 0.4 mm of capacity and a relief of 0.7 still rises by 47 % in between, one without grooves not at all.
     Limits: 0 without water or speed.
     """
     film = np.minimum(h_w, h_film) * (1.0 - relief * drained_share(h_w, tread_capacity=tread_capacity))
-    return RHO_WATER * width * film * v * v
+    return RHO_WATER * width * film * v * v_tread
 
 
 def wave_drag(h_w: FloatArray, v: FloatArray, *, width: float, h_wave: float) -> FloatArray:

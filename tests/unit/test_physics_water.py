@@ -164,10 +164,41 @@ def test_local_slope_is_the_finite_difference():
     assert tyre_brush.brush_slope(s, one(F_Z), mu=MU, C_s=C_S) == pytest.approx(slope, abs=0.5)
 
 
-def test_utilisation():
+def test_parts_of_the_full_contact():
     theta = np.array([0.0, 1 - 0.5 ** (1 / 3), 1.0, 7.0])
-    assert tyre_brush.utilisation(theta) == pytest.approx([0.0, 0.5, 1.0, 1.0])
-    assert tyre_brush.utilisation(one(1e-7))[0] / 1e-7 == pytest.approx(3.0, rel=1e-6)
+    assert sum(tyre_brush.brush_parts(theta, 1.0)) == pytest.approx([0.0, 0.5, 1.0, 1.0])
+    assert sum(tyre_brush.brush_parts(one(1e-7), 1.0))[0] / 1e-7 == pytest.approx(3.0, rel=1e-6)
+    assert tyre_brush.sliding_edge(np.array([0.0, 0.5, 1.0, 4.0]), 1.0) == pytest.approx([-1.0, 0.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("L", [0.9, 0.6, 0.4, 0.1])
+def test_shortened_contact_by_its_bristles(L):
+    """The water has lifted the front: bristles enter at b under pressure and carry the less of stretch and friction."""
+    a, n = 0.06, 200_000
+    x = -a + (np.arange(n) + 0.5) / n * 2 * a * L
+    b = a * (2 * L - 1)
+    q = 0.75 * F_Z / a * (1 - (x / a) ** 2)
+    c_px = C_S / (2 * a**2)
+    for s in (0.002, 0.02, 0.05, 0.2, 2.0):
+        bristles = np.minimum(c_px * s * (b - x), MU * q).sum() * 2 * a * L / n
+        assert tyre_brush.brush_force(one(s), one(F_Z), mu=MU, C_s=C_S, L=L)[0] == pytest.approx(bristles, rel=1e-4)
+    small = tyre_brush.brush_force(one(1e-7), one(F_Z), mu=MU, C_s=C_S, L=L)[0] / 1e-7
+    assert small == pytest.approx(C_S * L**2, rel=1e-4)  # (2.2)
+    large = tyre_brush.brush_force(one(1e6), one(F_Z), mu=MU, C_s=C_S, L=L)[0]
+    assert large == pytest.approx(MU * F_Z * L**2 * (3 - 2 * L), rel=1e-4)  # (2.1)
+    s = np.array([0.003, 0.02, 0.1])
+    rise = tyre_brush.brush_force(s + 1e-7, one(F_Z), mu=MU, C_s=C_S, L=L)
+    rise = (rise - tyre_brush.brush_force(s - 1e-7, one(F_Z), mu=MU, C_s=C_S, L=L)) / 2e-7
+    assert tyre_brush.brush_slope(s, one(F_Z), mu=MU, C_s=C_S, L=L) == pytest.approx(rise, rel=1e-3)
+
+
+def test_no_contact_no_force():
+    assert tyre_brush.brush_force(one(0.1), one(F_Z), mu=MU, C_s=C_S, L=0.0)[0] == 0.0
+
+
+def test_full_sliding_works_against_the_sliding_velocity():
+    F_x, F_y = combined(3.0, 3.0)
+    assert np.arctan2(F_y, F_x)[()] == pytest.approx(np.pi / 4, abs=1e-6)
 
 
 def combined(s_x, s_y, C_x=C_S, C_y=80e3, mu=MU):
@@ -341,19 +372,23 @@ def test_drained_share():
 
 
 def test_film_drag_by_hand_and_in_its_limits():
-    assert water.film_drag(one(0.0), one(30.0), **FILM)[0] == 0.0
-    assert water.film_drag(one(1 * MM), one(0.0), **FILM)[0] == 0.0
+    assert water.film_drag(one(0.0), one(30.0), one(30.0), **FILM)[0] == 0.0
+    assert water.film_drag(one(1 * MM), one(0.0), one(0.0), **FILM)[0] == 0.0
     expected = 1000 * 0.2 * 0.6e-3 * (1 - 0.7 * 0.4) * 900
-    assert water.film_drag(one(1 * MM), one(30.0), **FILM)[0] == pytest.approx(expected)
-    ratio = water.film_drag(one(1 * MM), one(60.0), **FILM) / water.film_drag(one(1 * MM), one(30.0), **FILM)
+    assert water.film_drag(one(1 * MM), one(30.0), one(30.0), **FILM)[0] == pytest.approx(expected)
+    ratio = water.film_drag(one(1 * MM), one(60.0), one(60.0), **FILM) / water.film_drag(
+        one(1 * MM), one(30.0), one(30.0), **FILM
+    )
     assert ratio[0] == pytest.approx(4.0)  # parabolic
+    half = water.film_drag(one(1 * MM), one(30.0), one(15.0), **FILM)[0]
+    assert half == pytest.approx(0.5 * expected)  # a tread at half the speed throws half the momentum
 
 
 def test_film_drag_saturates_with_depth():
     """Fig. 2.11 (C38): little change from 0.6 to 1.3 mm, where momentum alone would double."""
-    F = water.film_drag(np.array([0.6, 1.3]) * MM, one(30.0), **(FILM | {"tread_capacity": 0.0}))
+    F = water.film_drag(np.array([0.6, 1.3]) * MM, one(30.0), one(30.0), **(FILM | {"tread_capacity": 0.0}))
     assert F[0] == F[1]
-    F = water.film_drag(np.array([0.6, 1.3]) * MM, one(30.0), **FILM)
+    F = water.film_drag(np.array([0.6, 1.3]) * MM, one(30.0), one(30.0), **FILM)
     assert 1.0 < F[1] / F[0] < 1.6
 
 
@@ -362,7 +397,7 @@ def test_momentum_of_two_wheels_is_that_of_the_table():
     v = np.array([60, 80, 100, 120]) * KMH
     kw = {"width": 0.245, "tread_capacity": 0.0, "h_film": 1.0, "relief": 0.0}
     for h, a in ((0.6, [0.05, 0.09, 0.14, 0.20]), (2.0, [0.16, 0.29, 0.46, 0.66])):
-        assert 2 * water.film_drag(one(h * MM), v, **kw) / 1650 == pytest.approx(a, abs=0.006)
+        assert 2 * water.film_drag(one(h * MM), v, v, **kw) / 1650 == pytest.approx(a, abs=0.006)
 
 
 def test_wave_drag():
