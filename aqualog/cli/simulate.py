@@ -120,6 +120,7 @@ def _drive(
     console: Console,
 ) -> int:
     from aqualog.cli.files import refuse_existing, write_whole
+    from aqualog.config.scenario import vehicle_of
     from aqualog.errors import ConfigError, ExitCode
     from aqualog.io.write_log import check_suffix
 
@@ -129,7 +130,7 @@ def _drive(
     if jobs is not None:
         raise ConfigError("--jobs says nothing to one drive", expected="aqualog simulate campaign NAME --jobs N")
     path = Path(names[0])
-    refuse_existing([out], force=force, sources=[path, *([model_file] if model_file else [])])
+    refuse_existing([out], force=force, sources=[path, *vehicle_of(path), *([model_file] if model_file else [])])
     with console.steps() as steps:
         steps("reading")
         scenario, model = _read(path, model_file, seed)

@@ -18,7 +18,7 @@ from aqualog.model.surface import SURFACES
 from aqualog.model.tyre import TYRE_KEYS, TYRES, Tyre
 from aqualog.vehicle import Vehicle
 
-__all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "ScenarioKey", "load_scenario"]
+__all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "ScenarioKey", "load_scenario", "vehicle_of"]
 
 SAMPLE_RATES_HZ = (10, 20, 25, 40, 50, 100, 125, 200, 250, 500, 1000)  # whole milliseconds
 LONGEST_S = 7200.0  # an hour takes a gigabyte of memory
@@ -101,8 +101,8 @@ _ALL = [
     ScenarioKey("steering", "period_s", "s", None, 0.2, 3600.0, "period; must be given"),
     ScenarioKey("steering", "start_s", "s", 1.0, 0.0, _DAY, "begin"),
     _text("excitation", "kind", None, f"{', '.join(_WAVEFORMS)}; all-wheel drive only; must be given"),
-    ScenarioKey("excitation", "amplitude_n", "N", None, 1.0, 30000.0, "force from axle to axle"),
-    ScenarioKey("excitation", "amplitude_mu", "-", None, 0.001, 1.5, "as traction coefficient; one of the three"),
+    ScenarioKey("excitation", "amplitude_n", "N", None, 1.0, 5000.0, "force from axle to axle"),
+    ScenarioKey("excitation", "amplitude_mu", "-", None, 0.001, 0.4, "as traction coefficient; one of the three"),
     ScenarioKey("excitation", "amplitude_relative", "-", None, 0.001, 1.0, "as share of the nominal axle force"),
     ScenarioKey("excitation", "period_s", "s", None, 0.05, 3600.0, "period; must be given"),
 ]
@@ -122,6 +122,12 @@ def load_scenario(path: Path) -> Scenario:
     """
     document, text = load_toml(path, what="scenario file")
     return _Reader(path, document, TableFaults(path, text)).read()
+
+
+def vehicle_of(path: Path) -> list[Path]:
+    """The vehicle file that a scenario names, if it does; so that a result is not written over it."""
+    named = load_toml(path, what="scenario file")[0].get("vehicle")
+    return [path.parent / named] if isinstance(named, str) and "\0" not in named else []
 
 
 class _Reader:

@@ -14,6 +14,7 @@ from aqualog.errors import ConfigError
 
 __all__ = ["Faults", "TableFaults", "is_number", "line_of", "load_toml"]
 
+LARGEST = 16 * 2**20  # [byte]
 _HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
 
 
@@ -37,6 +38,10 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
         If the file is missing, not UTF-8 or not TOML.
     """
     try:
+        if path.exists() and not path.is_dir() and not path.is_file():
+            raise ConfigError(f"{what} is a device or a pipe", where=str(path), expected="a TOML file")
+        if path.is_file() and path.stat().st_size > LARGEST:
+            raise ConfigError(f"{what} is larger than {LARGEST // 2**20} MiB", where=str(path), expected="a TOML file")
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
@@ -47,9 +52,21 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
     except OSError as error:
         raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
     try:
-        return tomllib.loads(text), text
+        document = tomllib.loads(text)
+        if _has_endless_number(document):
+            raise ValueError("an integer beyond 64 bits")
+        return document, text
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, lists of thousands of levels
         raise ConfigError(f"{what} is not valid TOML: {error}", where=str(path)) from error
+
+
+def _has_endless_number(value: Any) -> bool:
+    """Whether an integer is in it that TOML does not allow, and Python would refuse to print."""
+    if isinstance(value, dict):
+        return any(_has_endless_number(v) for v in value.values())
+    if isinstance(value, list):
+        return any(_has_endless_number(v) for v in value)
+    return isinstance(value, int) and not -(2**63) <= value < 2**63
 
 
 def line_of(text: str, key: str) -> int | None:

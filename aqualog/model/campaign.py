@@ -39,6 +39,7 @@ class Done:
 
     name: str
     digest: str
+    size: int  # [byte] of the log
     lane_start_s: float
     lane_end_s: float
 
@@ -116,14 +117,22 @@ def _own(folder: Path) -> None:
 
 
 def _finished(folder: Path, digests: dict[str, str]) -> dict[str, Done]:
-    """Logs that are there and made from the same scenario by the same code; a torn last line counts as not made."""
+    """Logs that are there whole, of the same scenario by the same code; a damaged line counts as not made."""
     done: dict[str, Done] = {}
-    for line in (folder / STATE).read_text(encoding="utf-8").splitlines():
+    for line in (folder / STATE).read_text(encoding="utf-8", errors="replace").splitlines():
         try:
-            entry = Done(**json.loads(line))
-        except (ValueError, TypeError):
+            raw = json.loads(line)
+            entry = Done(
+                str(raw["name"]),
+                str(raw["digest"]),
+                int(raw["size"]),
+                float(raw["lane_start_s"]),
+                float(raw["lane_end_s"]),
+            )
+        except (ValueError, TypeError, KeyError, RecursionError):
             continue
-        if digests.get(entry.name) == entry.digest and _log(folder, entry.name).is_file():
+        log = _log(folder, entry.name)
+        if digests.get(entry.name) == entry.digest and log.is_file() and log.stat().st_size == entry.size:
             done[entry.name] = entry
     return done
 
@@ -189,11 +198,12 @@ def _one(run: Run, path: str, digest: str) -> Done | str:
         write_whole(Path(path), lambda p: write_simulation(p, simulation, suffix=".mf4", comment=comment))
     except (AqualogError, OSError) as error:
         return str(error)
+    size = Path(path).stat().st_size
     on_water = simulation.truth.columns.get("on_water")
     if on_water is None or not on_water.any():
-        return Done(run.name, digest, float("nan"), float("nan"))
+        return Done(run.name, digest, size, float("nan"), float("nan"))
     wet = simulation.truth.t[on_water > 0.5]
-    return Done(run.name, digest, round(float(wet[0]), 3), round(float(wet[-1]), 3))
+    return Done(run.name, digest, size, round(float(wet[0]), 3), round(float(wet[-1]), 3))
 
 
 def _write_campaign(folder: Path, programme: str, runs: Sequence[Run], done: dict[str, Done]) -> None:

@@ -68,6 +68,7 @@ K_LATERAL = 0.004  # [rad/m]
 PREVIEW_TIME = 1.5  # [s]
 STEER_TIME = 0.2  # [s]
 MAX_DRIVE = 0.6  # of the weight, as force
+MAX_INTEGRAL = 0.2  # of the weight, as force
 RUN_AWAY = 1.5  # driven wheels this much faster than the car make a driver lift
 
 
@@ -92,7 +93,7 @@ class Controls(NamedTuple):
 def run(n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road, controls: Controls) -> FloatArray:
     """`integrate` with its inputs packed: records are plain memory, tuples of arrays cost a count at every access."""
     fields = controls._asdict()
-    settings = {name: float(x) for name, x in fields.items() if np.ndim(x) == 0}
+    settings = {name: float(x) for name, x in fields.items() if np.ndim(x) == 0} | {"dt": float(dt)}
     setting = np.zeros(1, dtype=[(name, np.float64) for name in settings])
     for name, x in settings.items():
         setting[name] = x
@@ -107,7 +108,6 @@ _loads = inlined(load.loads_of_wheels)
 _wheel_velocity = inlined(kinematics.wheel_velocity)
 _bounded_slip = inlined(slip.bounded_slip)
 _brush_forces = inlined(tyre_brush.brush_forces)
-_brush_slope = inlined(tyre_brush.brush_slope)
 _friction_ratio = inlined(contact.friction_ratio)
 _stiffness_ratio = inlined(contact.slip_stiffness_ratio)
 _lost_contact = inlined(contact.lost_contact)
@@ -137,7 +137,7 @@ def _at(field, column, position, ds):  # type: ignore[no-untyped-def]
     """Linear interpolation of a field over the position; constant beyond its ends."""
     x = position / ds
     last = field.shape[0] - 1
-    if x <= 0.0:
+    if not x > 0.0:  # also a position that is no number
         return field[0, column]
     if x >= last:
         return field[last, column]
@@ -171,10 +171,9 @@ def _lane(lanes, t, position):  # type: ignore[no-untyped-def]
 @compiled
 def _track(track, position, ds):  # type: ignore[no-untyped-def]
     """Row of the memory of what the front axle met and left at a position; before the start: dry."""
-    j = int(position / ds)
-    if position < 0.0 or j >= track.shape[0]:
+    if not 0.0 <= position < ds * track.shape[0]:
         return -1
-    return j
+    return min(int(position / ds), track.shape[0] - 1)
 
 
 @compiled
@@ -218,9 +217,13 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         else:
             f[DRIVE] = (min(max(wanted, least), most) * r_drive - y[DRIVE]) / PEDAL_TIME
             f[INTEGRAL] = K_INTEGRAL * p.mass * error
+            if abs(y[INTEGRAL]) > MAX_INTEGRAL * p.mass * G and y[INTEGRAL] * error > 0.0:
+                f[INTEGRAL] = 0.0
             f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
         drive = y[DRIVE] + c.drive
         drive = min(drive, p.power / max(turning, 1.0))
+        if drive < 0.0:  # an engine brakes, it does not drive backwards
+            drive *= min(max(turning, 0.0), 1.0)
     else:
         f[DRIVE] = 0.0
         f[INTEGRAL] = 0.0
@@ -310,11 +313,12 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
                 film, v_along, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief
             )  # fmt: skip
             skid = max(v_along - rim, 0.0)  # a slower tread pushes what it no longer throws
+            ahead = max(v_along, 0.0)
             wave = gain * (
-                _wave_drag(film, v_along, q.width, q.h_wave)
-                + _film_drag(film, v_along, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+                _wave_drag(film, ahead, q.width, q.h_wave)
+                + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
             )
-        slope = q.slip_slope * np.exp(q.slip_slope_drift * t)
+        slope = q.slip_slope * np.exp(min(max(q.slip_slope_drift * t, -3.0), 3.0))
         slope = _series_slope(slope * _load_factor(F_z, q.F_z_ref, q.load_sensitivity), compliance)
         C_x = slope * F_z
         C_y = _series_slope(q.cornering_slope, compliance) * F_z
@@ -348,9 +352,12 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         braking = q.brake_split * brake_total
         water_torque = film_force * q.r_l + shift
         resisting = _rolling_force(F_z, r_w) * q.r_l + water_torque + q.brake_drag
-        turn = min(max(omega, -1.0), 1.0)  # resistance fades out below 1 rad/s instead of jumping
+        # resistance fades out near standstill instead of jumping, over what one step of it can change
+        standstill = max(1.0, s.dt * (resisting + braking) / q.inertia)
+        turn = min(max(omega / standstill, -1.0), 1.0)
         f[OMEGA + i] = (torque - F_x * q.r_l - (resisting + braking) * turn + bump) / q.inertia
-        dF_dsx = _brush_slope(s_x, F_z, mu, C_x, L)
+        # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
+        dF_dsx = abs(F_x) / abs(s_x) if abs(s_x) > 1e-9 else C_x * _stiffness_ratio(L)
         arm = q.r_l / q.inertia
         jac[OMEGA + i] = -dF_dsx * ds_domega * arm
         jac[_J_W + i] = -dF_dsx * ds_dv * arm
@@ -359,8 +366,8 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         across = C_y * ds_dv * (dF_dsx / max(C_x, 1.0))
         jac[V_Y] += across / p.mass
         jac[YAW_RATE] += across * x * x / p.I_zz
-        if abs(omega) < 1.0:
-            jac[OMEGA + i] -= (resisting + braking) / q.inertia
+        if abs(omega) < standstill:
+            jac[OMEGA + i] -= (resisting + braking) / (q.inertia * standstill)
         f[ANGLE + i] = omega
 
         # forces on the body, in its axes
@@ -473,6 +480,11 @@ def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # t
         for i in range(N_STATES):
             rest[i] = f[i] - 2.0 * k1[i]
         _solve(rest, jac, h, k2)
+        total = 0.0
         for i in range(N_STATES):
             y[i] += dt * (1.5 * k1[i] + 0.5 * k2[i])
+            total += y[i]
+        if not np.isfinite(total):
+            rows[:] = np.nan
+            return rows
     return rows

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from aqualog.errors import ConfigError
 from aqualog.model.tyre import P_REFERENCE, Tyre
 from aqualog.notation import WHEELS
 from aqualog.physics.load import G
@@ -153,9 +154,23 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
     """Add a mass at a distance from the front axle. [kg, m]
 
     The centre of mass moves along; its height stays. No mass leaves every bit as it is.
+
+    Raises
+    ------
+    ConfigError
+        If too little of the car would be left, or its centre of mass would leave the wheelbase.
     """
+    if plant.mass + delta_mass < 0.3 * plant.mass:
+        raise ConfigError(
+            f"a mass of {delta_mass:g} kg on a car of {plant.mass:g} kg", expected="at least 30 % of the car to be left"
+        )
     moved = delta_mass * (x - plant.l_f) / (plant.mass + delta_mass)
     inertia = delta_mass * (x - plant.l_f) * (x - plant.l_f) * plant.mass / (plant.mass + delta_mass)
+    if not (plant.l_f + moved > 0.05 and plant.l_r - moved > 0.05 and plant.I_zz + inertia > 0.0):
+        raise ConfigError(
+            f"a mass of {delta_mass:g} kg at {x:g} m moves the centre of mass out of the wheelbase",
+            expected="a smaller mass",
+        )
     return plant._replace(
         mass=plant.mass + delta_mass,
         l_f=plant.l_f + moved,

@@ -25,6 +25,7 @@ __all__ = ["STEP_S", "TRUTH_SYMBOLS", "Simulation", "assemble", "drive_truth", "
 
 BASE = Model()
 STEP_S = 1e-3
+LARGEST_RECORD = 4e9  # [byte] of memory while a drive is made
 FINE_RATE_HZ = 1000.0  # of the record that sensors sample
 FINE_LIMIT_S = 300.0  # longer drives are recorded more coarsely, to keep memory in bounds
 NO_WEDGE = 1e4  # [m/s] from here on the physics means: no aquaplaning at any speed
@@ -126,11 +127,17 @@ def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
     """Raw record (n, columns of `kernel.COLUMNS`) of every `every`-th step."""
     scenario, plant = setup.scenario, setup.plant
     n = round(scenario.duration_s / dt)
+    bytes_needed = 8.0 * (n / every) * 2.5 * len(kernel.COLUMNS) * 3.0
+    if bytes_needed > LARGEST_RECORD:
+        raise ConfigError(
+            f"{scenario.duration_s:g} s at {scenario.rate_hz:g} Hz would need {bytes_needed / 1e9:.0f} GB of memory",
+            hint="a shorter drive or a lower sample rate",
+        )
     controls = _controls(scenario, n, dt)
     road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
     rows = kernel.run(n, dt, every, _start(plant, controls, float(road.fields[0, GRADE])), plant, road, controls)
     if not np.isfinite(rows).all():
-        raise ConfigError("the simulation diverged", hint="a smaller step, or less extreme parameters")
+        raise ConfigError("the simulation diverged", hint="less extreme parameters of car, tyre, lane or model")
     return rows
 
 

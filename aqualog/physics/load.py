@@ -21,12 +21,13 @@ def loads_of_wheels(
     lateral = mass * a_y * h_cg / track
     lateral_f = lateral * (l_r / l)
     lateral_r = lateral * (1.0 - l_r / l)
-    return (
-        np.maximum(0.5 * axle_f - lateral_f, 0.0),
-        np.maximum(0.5 * axle_f + lateral_f, 0.0),
-        np.maximum(0.5 * axle_r - lateral_r, 0.0),
-        np.maximum(0.5 * axle_r + lateral_r, 0.0),
-    )
+    fl = np.maximum(0.5 * axle_f - lateral_f, 0.0)
+    fr = np.maximum(0.5 * axle_f + lateral_f, 0.0)
+    rl = np.maximum(0.5 * axle_r - lateral_r, 0.0)
+    rr = np.maximum(0.5 * axle_r + lateral_r, 0.0)
+    # where a wheel lifts, the others carry the weight, not more; otherwise the factor is 1 to the last bit
+    scale = np.minimum(mass * G * (1.0 + 1e-12) / np.maximum(fl + fr + rl + rr, 1e-9), 1.0)
+    return fl * scale, fr * scale, rl * scale, rr * scale
 
 
 def wheel_loads(
@@ -47,7 +48,7 @@ def wheel_loads(
     F_z : array (4, n)
         fl, fr, rl, rr; never negative. [N]
 
-    Limits: a = 0 splits m g by l_r : l_f and left = right; the sum is m g as long as no wheel lifts. A left turn
+    Limits: a = 0 splits m g by l_r : l_f and left = right; the sum is m g, also where a wheel lifts. A left turn
     (a_y > 0) loads the right wheels. The lateral transfer is split by the static axle loads. Small grades: cos = 1.
     """
     loads: FloatArray = np.array(loads_of_wheels(a_x, a_y, mass=mass, l_f=l_f, l_r=l_r, h_cg=h_cg, track=track))

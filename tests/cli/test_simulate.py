@@ -375,3 +375,19 @@ def test_help_has_examples_and_imports_nothing_heavy():
     assert "Examples:" in text
     assert "aqualog simulate scenario.toml -o drive.mf4" in text
     assert not {"numpy", "numba", "polars", "asammdf", "mcap"} & set(loaded.split())
+
+
+def test_the_vehicle_file_is_not_written_over(tmp_path):
+    car = tmp_path / "car.csv"
+    car.write_bytes(CAR.read_bytes())
+    (tmp_path / "s.toml").write_text('vehicle = "car.csv"\nspeed_kmh = 80.0\nduration_s = 1.0\n')
+    result = run("simulate", tmp_path / "s.toml", "--force", "-o", car)
+    assert result.returncode == 2
+    assert "source" in one_error_line(result)
+    assert car.read_bytes() == CAR.read_bytes()
+
+
+def test_a_campaign_is_no_log(tmp_path):
+    result = run("simulate", "campaign", "thesis", "-o", tmp_path / "c.mf4")
+    assert result.returncode == 2
+    assert not (tmp_path / "c.mf4").exists()

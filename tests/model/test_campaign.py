@@ -131,3 +131,15 @@ def test_vehicle_file_comes_back(tmp_path):
     assert back.tie_rod == car.tie_rod
     for name in ("mass", "l_f", "torque_split_rear", "r_l_r", "mu_max", "inertia_f"):
         assert getattr(back, name) == getattr(car, name)
+
+
+def test_a_damaged_log_or_state_is_made_again(tmp_path, programme):
+    folder = tmp_path / "c"
+    run(folder)
+    log = sorted((folder / "logs").iterdir())[0]
+    log.write_bytes(log.read_bytes()[:1000])
+    assert run(folder).made == 1
+    assert log.stat().st_size > 1000
+    with (folder / campaign.STATE).open("ab") as file:
+        file.write(b"\xff\xfe\n" + b"[" * 100_000 + b'\n{"name": 1}\n[]\n7\n')
+    assert run(folder).kept == 3

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from thesis.passes import SEDAN, resistance, slip_and_traction
 
+from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Excitation, Lane, Scenario, Steering
@@ -17,7 +18,7 @@ from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.notation import WHEELS
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
-from aqualog.physics.load import G
+from aqualog.physics.load import G, wheel_loads
 from aqualog.vehicle import Vehicle
 
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
@@ -403,3 +404,81 @@ def test_water_holds_a_floating_car_back():
     late = t > 4.5
     assert c["true_wave_drag"][late].mean() > 300.0
     assert c["a_x"][late].mean() < -0.3
+
+
+@pytest.mark.parametrize("torque", [2000.0, 8000.0, 50000.0])
+def test_a_hard_stop_ends_at_rest(torque):
+    sc = scenario(speed=((0.0, 27.0),), brake_torque=((0.0, 0.0), (2.0, 0.0), (2.1, torque)), duration_s=30.0)
+    t, c = truth(sc)
+    rest = t > 26.0
+    assert np.abs(c["v_x"][rest]).max() < 0.01
+    assert np.abs(c["a_x"][rest]).max() < 0.01
+    assert np.abs(c["omega_fl"][rest]).max() < 0.1
+
+
+@pytest.mark.parametrize("torque", [2000.0, 50000.0])
+def test_wheels_lock_on_ice(torque):
+    ice = Lane(1.0, 9.0, surface=SURFACES["wet_ice"])
+    sc = scenario(
+        speed=((0.0, 25.0),), brake_torque=((0.0, 0.0), (2.0, 0.0), (2.1, torque)), duration_s=8.0, lanes=(ice,)
+    )
+    t, c = truth(sc)
+    locked = t > 4.0
+    for w in WHEELS:
+        assert np.abs(c[f"omega_{w}"][locked]).max() < 0.3
+    assert c["a_x"][locked].mean() == pytest.approx(-0.06 * G, rel=0.3)
+
+
+def test_a_driver_does_not_wind_up_nor_run_away():
+    _, c = truth(
+        scenario(
+            speed=((0.0, 27.0),),
+            brake_torque=((0.0, 0.0), (2.0, 0.0), (2.1, 9000.0), (40.0, 9000.0), (40.1, 0.0)),
+            duration_s=80.0,
+        )
+    )
+    assert c["v_x"].max() < 1.2 * 27.0
+    ice = Lane(5.0, 40.0, surface=SURFACES["wet_ice"])
+    _, c = truth(scenario(speed=((0.0, 14.0), (5.0, 14.0), (10.0, 36.0)), lanes=(ice,), duration_s=40.0))
+    assert max(c[f"omega_{w}"].max() for w in WHEELS) < 300.0
+    _, c = truth(scenario(speed=((0.0, 14.0),), extra_torque=((0.0, -20000.0),), duration_s=20.0))
+    assert c["v_x"].min() > -0.1
+
+
+def test_absurd_water_ends_in_a_drive():
+    """It ended in a crash of the process: a position that is no number was used as an index."""
+    deep = Lane(3.0, 10.0, depth_left=0.02, depth_right=0.02, irregularity_left=1.0)
+    term = Term(EFFECTS["uneven_water"], {"depth_gain": 5.0, "irregularity": 2.0})
+    _, c = truth(scenario(Vehicle(), speed=((0.0, 83.0),), lanes=(deep,)), Model().with_term(term))
+    assert np.isfinite(c["v_x"]).all()
+    assert np.hypot(c["v_x"], c["true_v_y"]).max() < 1.05 * 83.0  # it may turn round, not gain speed
+
+
+def test_masses_that_leave_no_car_are_refused():
+    light = replace(SEDAN, mass=600.0)
+    for mass, where in ((-500.0, None), (-500.0, "r")):
+        with pytest.raises(ConfigError, match="mass"):
+            assemble(scenario(light), Model().with_term(Term(EFFECTS["payload_mass"], {"delta_mass": mass}, where)))
+
+
+def test_loads_carry_the_weight_where_a_wheel_lifts():
+    loads = wheel_loads(
+        np.array([-12.0, 0.0]), np.array([3.0, 0.0]), mass=1000.0, l_f=1.2, l_r=1.2, h_cg=1.5, track=1.4
+    )
+    assert loads[:, 0].min() == 0.0
+    np.testing.assert_allclose(loads.sum(axis=0), 1000.0 * G, rtol=1e-9)
+
+
+def test_a_drive_too_large_for_memory_is_refused():
+    with pytest.raises(ConfigError, match="GB"):
+        assemble_and_run(scenario(duration_s=7200.0, rate_hz=1000.0))
+
+
+def assemble_and_run(sc):
+    return drive_truth(assemble(sc))
+
+
+def test_the_same_effect_at_the_same_place_counts_once():
+    bias = EFFECTS["accelerometer_bias"]
+    with pytest.raises(ConfigError, match="already"):
+        Model().with_term(Term(bias, {"bias": 0.1})).with_term(Term(bias, {"bias": 0.1}, "a_x"))

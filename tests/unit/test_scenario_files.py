@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from dataclasses import fields, replace
 
 import pytest
@@ -367,7 +368,7 @@ def test_other_sample_rates_are_refused(folder, rate):
     assert "10, 20, 25, 40, 50, 100, 125, 200, 250, 500, 1000" in refused(folder, SHORT + f"sample_rate_hz = {rate}")
 
 
-@pytest.mark.parametrize("seed", ["-1", "1.0", "true", "'1'", str(2**63 - 1) + "0"])
+@pytest.mark.parametrize("seed", ["-1", "1.0", "true", "'1'"])
 def test_seeds_that_are_none(folder, seed):
     assert "whole number" in refused(folder, SHORT + f"seed = {seed}")
 
@@ -528,3 +529,19 @@ def test_split_profile_needs_all_wheel_drive(tmp_path):
         load_scenario(tmp_path / "s.toml")
     (tmp_path / "car.toml").write_text('drivetrain = "awd"\n')
     assert load_scenario(tmp_path / "s.toml").split_rear == ((0.0, 0.5),)
+
+
+@pytest.mark.parametrize(
+    "text", ["seed = 0x" + "f" * 5000, "speed_kmh = 92233720368547758070", "tyre = {a = [0x" + "f" * 9000 + "]}"]
+)
+def test_integers_beyond_64_bits_are_told(tmp_path, text):
+    (tmp_path / "s.toml").write_text(text + "\n")
+    with pytest.raises(ConfigError, match="64 bits"):
+        load_scenario(tmp_path / "s.toml")
+
+
+def test_a_pipe_is_no_vehicle_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "s.toml").write_text('vehicle = "pipe"\nspeed_kmh = 80.0\n')
+    with pytest.raises(ConfigError, match="pipe"):
+        load_scenario(tmp_path / "s.toml")
