@@ -178,7 +178,7 @@ def c16(seeds):
     return Outcome(
         "C16", "118 km/h: FR spins down at once, rear wheels spin up at the same time",
         "FR below half speed within 0.5 s, and a rear wheel over +5 % within 1 s of it before any rear spin-down: half of the runs each",
-        f"FR {full:.0%} (the anchor); rear up at once {at_once:.0%}, up at all {ever:.0%}, down first {down:.0%}",
+        f"FR {full:.0%} (the anchor, fitted on other seeds); rear up at once {at_once:.0%}, up at all {ever:.0%}, down first {down:.0%}",
         bool(full >= 0.5 and at_once >= 0.5),
     )  # fmt: skip
 
