@@ -90,6 +90,11 @@ def test_tables_hold_all_groups_on_the_grid_of_the_scenario(folder, expected, su
             channel = found[name]
             seconds = (channel.t_ns - (START_NS if channel.absolute else 0)) * 1e-9
             covered = grid[grid < group.t[-1] + 1e-9]  # a slower bus ends before the table does
+            if np.isnan(x).any():  # empty cells are read as no samples
+                there = np.isfinite(x)
+                np.testing.assert_allclose(seconds, group.t[there], atol=1e-9)
+                np.testing.assert_array_equal(channel.values, x[there], err_msg=name)
+                continue
             np.testing.assert_allclose(seconds, covered, atol=1e-9, err_msg=name)
             if group.t.size == grid.size:
                 np.testing.assert_array_equal(channel.values, x, err_msg=name)
