@@ -492,3 +492,48 @@ def test_the_same_effect_at_the_same_place_counts_once():
     bias = EFFECTS["accelerometer_bias"]
     with pytest.raises(ConfigError, match="already"):
         Model().with_term(Term(bias, {"bias": 0.1})).with_term(Term(bias, {"bias": 0.1}, "a_x"))
+
+
+def with_effect(name, values, where=None, **kw):
+    sc = scenario(**{"speed": RAMP, "duration_s": 6.0, **kw})
+    base, changed = simulate(sc), simulate(sc, Model().with_term(Term(EFFECTS[name], values, where)))
+    return base.measured[0].columns, changed.measured[0].columns, changed.truth.columns
+
+
+def test_torque_gain_is_true_over_reported():
+    base, seen, truth_ = with_effect("torque_gain", {"gain": 1.25})
+    np.testing.assert_allclose(truth_["true_torque_rl"][::10][: seen["torque_rl"].size], 1.25 * seen["torque_rl"])
+    np.testing.assert_allclose(seen["torque_rl"] * 1.25, base["torque_rl"], atol=1.0)  # the driver needs the same
+
+
+def test_signal_delay_is_late():
+    base, seen, _ = with_effect("signal_delay", {"delay": 0.1})
+    np.testing.assert_allclose(seen["v_x"][20:], base["v_x"][10:-10], atol=1e-9)
+
+
+@pytest.mark.parametrize(("where", "heavier", "same"), [("f", "fl", "rl"), ("r", "rr", "fr")])
+def test_payload_loads_its_axle(where, heavier, same):
+    sc = scenario(speed=((0.0, 25.0),), duration_s=4.0)
+    _, base = truth(sc)
+    _, loaded = truth(sc, Model().with_term(Term(EFFECTS["payload_mass"], {"delta_mass": 200.0}, where)))
+    assert (loaded[f"true_load_{heavier}"] - base[f"true_load_{heavier}"])[-1] == pytest.approx(100.0 * G, rel=0.02)
+    assert (loaded[f"true_load_{same}"] - base[f"true_load_{same}"])[-1] == pytest.approx(0.0, abs=20.0)
+
+
+def test_signs_of_the_other_effects():
+    base, seen, _ = with_effect("accelerometer_bias", {"bias": 0.3})
+    np.testing.assert_allclose(seen["a_x"] - base["a_x"], 0.3)
+    base, seen, _ = with_effect("velocity_scale", {"scale": 1.02})
+    np.testing.assert_allclose(seen["v_x"], 1.02 * base["v_x"])
+    base, seen, _ = with_effect("tyre_radius", {"delta": 0.01}, "fl")
+    assert (seen["omega_fl"] / base["omega_fl"])[100] == pytest.approx(1 / 1.01, rel=1e-4)
+    for name, values in (
+        ("head_wind", {"speed": 10.0}), ("aero_drag", {"delta_drag_area": 0.3}), ("rolling_resistance", {"delta_r_w": 0.01}),
+        ("brake_drag", {"torque": 50.0}), ("tyre_warmup", {"extra": 0.5}), ("road_grade", {"grade": 0.02}),
+    ):  # fmt: skip
+        base, seen, _ = with_effect(name, values)
+        more = seen["torque_rl"] - base["torque_rl"]
+        assert more[200:].min() > 5.0, name  # each costs drive torque
+    base, seen, _ = with_effect("slip_stiffness", {"gain": 0.5}, "r")
+    slip = [(c["omega_rl"] * SEDAN.r_e("rl") / c["v_x"] - 1.0)[300] for c in (base, seen)]
+    assert slip[1] == pytest.approx(2.0 * slip[0], rel=0.05)
