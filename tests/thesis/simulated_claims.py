@@ -1,7 +1,8 @@
 """Claims of the thesis' chapter 2 on simulated drives: figure, criterion and verdict of each.
 
 `python tests/thesis/simulated_claims.py --seeds 20` prints the table. The criteria were fixed before the figures were
-seen; where one fails, it fails here. One parameter set serves all (aqualog.model.tyre).
+seen, but for C16 and C20, which were sharpened, and C50, which got the thesis' own condition, after a first look; where
+one fails, it fails here. One parameter set serves all (aqualog.model.tyre).
 """
 
 import argparse
