@@ -12,15 +12,22 @@ import numpy as np
 
 from aqualog.compiled import compiled, inlined
 from aqualog.model import excitation
-from aqualog.model.plant import Plant, flat
+from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, Plant, flat
 from aqualog.model.road import (
     BUMPS,
     CONTACT_ROAD,
     CONTACT_WHEEL,
     DEPTH,
+    DEPTH_LEFT,
+    END,
     GRADE,
+    IN_METRES,
+    IRREGULARITY_LEFT,
     LANE_COMPLIANCE,
     LANE_MU,
+    ROLLING,
+    ROUGHNESS,
+    START,
     Road,
 )
 from aqualog.physics import (
@@ -126,8 +133,6 @@ _effective_radius = inlined(rolling.effective_radius)
 _warm_up_factor = inlined(rolling.warm_up_factor)
 _load_factor = inlined(rolling.load_factor)
 _amplitude = inlined(excitation.excitation_force_amplitude)
-_H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0
-_P_HALF, _F_Z_HALF = 2.2e5, 4000.0
 _SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
 _FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
 
@@ -162,8 +167,8 @@ def _lane(lanes, t, position):  # type: ignore[no-untyped-def]
     """Index of the stretch under the front axle, -1 for dry asphalt."""
     found = -1
     for i in range(lanes.shape[0]):
-        x = position if lanes[i, 0] > 0.0 else t
-        if lanes[i, 1] <= x < lanes[i, 2]:
+        x = position if lanes[i, IN_METRES] > 0.0 else t
+        if lanes[i, START] <= x < lanes[i, END]:
             found = i
     return found
 
@@ -277,11 +282,11 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             if r.lanes[lane, LANE_MU] >= 0.0:
                 mu = r.lanes[lane, LANE_MU]
             compliance = r.lanes[lane, LANE_COMPLIANCE]
-            r_w += r.lanes[lane, 7]
-            bump = r.lanes[lane, 8] * _at(r.fields, BUMPS + side, where, r.ds)
+            r_w += r.lanes[lane, ROLLING]
+            bump = r.lanes[lane, ROUGHNESS] * _at(r.fields, BUMPS + side, where, r.ds)
             if front:
-                uneven = 1.0 + r.lanes[lane, 5 + side] * _at(r.fields, DEPTH + side, where, r.ds)
-                film = r.lanes[lane, 3 + side] * max(uneven, 0.0)
+                uneven = 1.0 + r.lanes[lane, IRREGULARITY_LEFT + side] * _at(r.fields, DEPTH + side, where, r.ds)
+                film = r.lanes[lane, DEPTH_LEFT + side] * max(uneven, 0.0)
             else:
                 film = track[behind, 1 + side]
 
@@ -294,26 +299,26 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         if film > 0.0:
             mu *= q.wet_friction
             v_full = _v_full(
-                film, F_z, q.p, q.tread_capacity, q.v_anchor, _H_ANCHOR, _P_ANCHOR, _F_Z_ANCHOR,
+                film, F_z, q.p, q.tread_capacity, q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR,
                 q.h_bulk, q.h_onset, q.contact_exponent,
             )  # fmt: skip
             noise = _FIELD_SHARE * (
                 _at(r.fields, CONTACT_ROAD + side, where, r.ds) + _at(r.fields, CONTACT_WHEEL + i, where, r.ds)
             )
             # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
-            turning = min(max(rim / max(abs(v_along), 0.5), 0.0), 1.0)
-            v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * turning
+            rolling_share = min(max(rim / max(abs(v_along), 0.5), 0.0), 1.0)
+            v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share
             v_full *= max(1.0 + s.scatter * q.contact_scatter * noise, 0.2)
             lost = _lost_contact(v_along, v_full, q.contact_exponent) * q.contact_gain
             L = 1.0 - min(max(lost, 0.0), 1.0)
-            a = _half_length(F_z, q.p, q.half_length, _F_Z_HALF, _P_HALF)
+            a = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
             shift = _load_shift(L, a, q.wedge_peak) * F_z
             gain = q.water_drag_gain
+            ahead = max(v_along, 0.0)
             film_force = gain * _film_drag(
-                film, v_along, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief
+                film, ahead, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief
             )  # fmt: skip
             skid = max(v_along - rim, 0.0)  # a slower tread pushes what it no longer throws
-            ahead = max(v_along, 0.0)
             wave = gain * (
                 _wave_drag(film, ahead, q.width, q.h_wave)
                 + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)

@@ -283,6 +283,11 @@ def test_slalom_to_two_metres_per_second_squared():
     assert c["a_y"][late].max() == pytest.approx(expected, rel=0.15)
     assert expected == pytest.approx(1.6, rel=0.1)
     assert (np.abs(c["yaw_rate"] * c["v_x"] - c["a_y"])[late]).max() < 0.6
+    first = (t > 1.2) & (t < 2.5)  # the first lobe goes to the left: yaw and acceleration are positive
+    assert c["steer_angle"][first].min() > 0.0
+    assert c["yaw_rate"][first][-1] > 0.0
+    assert c["a_y"][first].mean() > 0.0
+    assert abs(np.degrees(np.cumsum(c["yaw_rate"])[late].mean() * 1e-3)) < 1.0  # and the car goes straight on average
     left_turn = late & (c["a_y"] > 1.0)
     assert (c["true_load_fr"] > c["true_load_fl"])[left_turn].all()
 
