@@ -12,7 +12,7 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
     "errors", "compiled", "notation", "units", "types", "vehicle", "physics", "io", "align", "features", "detect", "model", "report",
-    "config", "cli",
+    "figures", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")

@@ -54,7 +54,11 @@ class SurfaceChange:
 
 @dataclass(frozen=True, slots=True)
 class HalfCarRun:
-    """One drive: from `v0` [m/s] with the acceleration `a_x` [m/s^2], `nu` of the force on the REAR axle (E19)."""
+    """One drive: from `v0` [m/s] with the acceleration `a_x` [m/s^2], `nu` of the force on the REAR axle (E19).
+
+    Time runs from `t_start` [s]: excitation and surface changes are functions of it, so that a change can be at t = 0
+    whatever the period.
+    """
 
     duration: float
     dt: float = 1e-3
@@ -63,11 +67,12 @@ class HalfCarRun:
     nu: float = 0.5
     excitation: Excitation | None = None
     surface: tuple[SurfaceChange, ...] = ()
+    t_start: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class HalfCarResult:
-    """Arrays (n + 1,) at 0, dt, ... duration; SI.
+    """Arrays (n + 1,) at t_start, t_start + dt, ... t_start + duration; SI.
 
     `a_x` is dv_x/dt; `s_*` slip of (3.13); `mu_*` the traction coefficient F_x / F_z; `slope_*` the true C_s / F_z and
     `mu_max` the friction under the axles.
@@ -228,7 +233,7 @@ def _slip_of_force(F_x: FloatArray, F_z: FloatArray, *, mu: float, slope: float)
 
 def _inputs(car: HalfCar, run: HalfCarRun, t: FloatArray) -> tuple[_Inputs, float, float]:
     """Torques and surface over the drive, and the slips at its start."""
-    v = run.v0 + run.a_x * t
+    v = run.v0 + run.a_x * (t - run.t_start)
     F_sum = car.mass * run.a_x + resistance.air_drag(v, drag_area=car.drag_area, air_density=car.air_density)
     F_exc = np.zeros_like(t)
     if run.excitation is not None:
@@ -263,7 +268,7 @@ def simulate_half_car(car: HalfCar, run: HalfCarRun) -> HalfCarResult:
     ----------
     car : HalfCar
     run : HalfCarRun
-        The wanted speed v0 + a_x t must not become negative.
+        The wanted speed v0 + a_x (t - t_start) must not become negative.
 
     Returns
     -------
@@ -287,9 +292,11 @@ def simulate_half_car(car: HalfCar, run: HalfCarRun) -> HalfCarResult:
     if run.dt <= 0.0 or run.duration < run.dt:
         raise ConfigError(f"a run of {run.duration:g} s in steps of {run.dt:g} s", expected="0 < dt <= duration")
     if run.v0 <= 0.0 or run.v0 + run.a_x * run.duration < 0.0:
-        raise ConfigError("the half-car would stand still or drive backwards", expected="v0 > 0 and v0 + a_x t >= 0")
+        raise ConfigError(
+            "the half-car would stand still or drive backwards", expected="v0 > 0 and v0 + a_x duration >= 0"
+        )
     n = round(run.duration / run.dt)
-    t: FloatArray = np.arange(n + 1, dtype=np.float64) * run.dt
+    t: FloatArray = run.t_start + np.arange(n + 1, dtype=np.float64) * run.dt
     inputs, s_f, s_r = _inputs(car, run, t)
     front, rear = _axle_loads(car, 0.0)
     loads = _Loads(float(front[0]), float(rear[0]), float((front - _axle_loads(car, 1.0)[0])[0]))

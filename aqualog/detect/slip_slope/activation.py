@@ -1,0 +1,75 @@
+"""When the slip slope may be estimated at all: driving that a linear tyre on both axles describes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["LIMITS", "REASONS", "Limits", "inactive_reason"]
+
+REASONS = ("active", "signals missing", "too slow", "cornering", "accelerating hard", "braking", "a wheel spins")
+ACTIVE, MISSING, SLOW, CORNERING, HARD, BRAKING, SPINNING = range(len(REASONS))
+
+
+class Limits(NamedTuple):
+    """Bounds of the driving state; those of differential slip and traction are in the tuning of the estimator.
+
+    Thesis 3.2 names the criteria, not their values.
+    """
+
+    v_min: float = 8.0  # [m/s] below, a tooth of the pick-up is as much as the slip
+    a_x_max: float = 3.0  # [m/s^2] the load transfer and the tyres' curves are no longer small
+    a_y_max: float = 2.0  # [m/s^2] slip angles take from the longitudinal stiffness
+    yaw_rate_max: float = 0.25  # [rad/s] paths of front and rear wheels differ
+    a_w_delta_max: float = 8.0  # [m/s^2] a wheel that leaves the road's speed
+
+
+LIMITS = Limits()
+
+
+def inactive_reason(
+    *,
+    v_x: FloatArray,
+    a_x: FloatArray,
+    a_y: FloatArray,
+    yaw_rate: FloatArray,
+    a_w_delta: FloatArray,
+    is_braking: BoolArray,
+    limits: Limits = LIMITS,
+) -> FloatArray:
+    """Index into `REASONS` for every sample; 0 where the slope may be estimated.
+
+    Parameters
+    ----------
+    v_x : array (n,)
+        Velocity. [m/s]
+    a_x, a_y : array (n,)
+        Accelerations of the body, low-passed. [m/s^2]
+    yaw_rate : array (n,)
+        [rad/s]
+    a_w_delta : array (n,)
+        Largest wheel acceleration difference of the wheels that are compared, absolute. [m/s^2]
+    is_braking : bool array (n,)
+        A braking force acts on one of them.
+
+    Returns
+    -------
+    reason : array (n,)
+        NaN in velocity means missing; a yaw rate or acceleration that is missing does not stop anything.
+    """
+    reason = np.zeros(v_x.size)
+    with np.errstate(invalid="ignore"):
+        # the last one that holds is the one that is told
+        for code, bits in (
+            (SPINNING, a_w_delta > limits.a_w_delta_max),
+            (HARD, np.abs(a_x) > limits.a_x_max),
+            (CORNERING, (np.abs(a_y) > limits.a_y_max) | (np.abs(yaw_rate) > limits.yaw_rate_max)),
+            (BRAKING, is_braking),
+            (SLOW, v_x < limits.v_min),
+            (MISSING, np.isnan(v_x)),
+        ):
+            reason[bits] = code
+    return reason

@@ -1,0 +1,164 @@
+"""The estimator: filter, change detection, activation and observability as one recursion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.compiled import compiled
+from aqualog.detect import cusum
+from aqualog.detect.slip_slope import ekf, observability
+from aqualog.detect.slip_slope.change import cusum_input
+from aqualog.detect.slip_slope.ekf import Belief
+from aqualog.detect.slip_slope.observability import Window
+from aqualog.detect.slip_slope.tuning import Params, Tuning
+from aqualog.types import FloatArray
+
+__all__ = ["STATUS", "Estimate", "State", "initial_state", "scan"]
+
+STATUS = {
+    0: "estimating",
+    1: "slope frozen: the traction is too even to tell slope from offset",
+    2: "blind: both axles slip alike",
+    3: "differential traction too large",
+    4: "a wheel spins",
+    5: "not active",
+}
+"""What each sample was used for; 0 and 1 update the slope."""
+
+ESTIMATING, FROZEN, BLIND, TOO_LARGE, SPINNING, INACTIVE = range(6)
+K_MIN, K_MAX = 1.0 / 300.0, 1.0  # slopes from 1 to 300
+BETA_MIN, BETA_MAX = 0.2, 5.0
+
+
+class State(NamedTuple):
+    """Everything that is carried from sample to sample."""
+
+    belief: Belief
+    window: Window
+    g_drop: float
+    g_rise: float
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Estimates of a drive or a piece of one, arrays (n,).
+
+    `slope` = C_s / F_z of axle i, `slope_sd` its standard deviation by the filter; `beta` and `offset` as in `Belief`;
+    `innovation` and `innovation_sd` (NaN where not updated); `g_drop`, `g_rise` the two sums [s]; `alarm` 1 at the
+    sample at which a drop of the slope was found, -1 at a rise, else 0; `status` a key of `STATUS`; `beta_told` whether
+    the window tells the ratio.
+    """
+
+    slope: FloatArray
+    slope_sd: FloatArray
+    beta: FloatArray
+    offset: FloatArray
+    innovation: FloatArray
+    innovation_sd: FloatArray
+    g_drop: FloatArray
+    g_rise: FloatArray
+    alarm: FloatArray
+    status: FloatArray
+    beta_told: FloatArray
+
+
+def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
+    """Before the first sample: slope and ratio from the vehicle file, the offset unknown."""
+    k = 1.0 / slope
+    # the prior is relative to a slope of 33, so that a soft or a stiff tyre starts as well known
+    sd_k = tuning.sd_k * k * 33.0
+    belief = Belief(k, beta, 0.0, sd_k**2, 0.0, 0.0, tuning.sd_beta**2, 0.0, tuning.sd_delta**2)
+    return State(belief, observability.EMPTY, 0.0, 0.0)
+
+
+@compiled
+def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no-untyped-def]
+    b, window, g_drop, g_rise = state.belief, state.window, state.g_drop, state.g_rise
+    for i in range(y.size):
+        innovation, variance, alarm, status, beta_told = math.nan, math.nan, 0.0, INACTIVE, False
+        if is_active[i] and not (math.isnan(y[i]) or math.isnan(mu_i[i]) or math.isnan(rho_mu_j[i])):
+            mu_delta = mu_i[i] - b.beta * rho_mu_j[i]
+            if abs(mu_delta) > p.mu_max:
+                status = TOO_LARGE
+            elif abs(y[i] - b.delta) > p.s_max:
+                status = SPINNING
+            else:
+                window = observability.step(window, p.keep, p.dt, mu_i[i], rho_mu_j[i])
+                has_traction = abs(mu_delta) >= p.mu_min
+                k_told = observability.sd_slope(window, b.beta, p.r_density) < p.told_k * b.k
+                beta_told = observability.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
+                status = BLIND if not has_traction else (ESTIMATING if k_told else FROZEN)
+                b = ekf.predict(
+                    b,
+                    p.q_k if has_traction and k_told else 0.0,
+                    p.q_beta if has_traction and beta_told else 0.0,
+                    p.q_delta,
+                )
+                slip = y[i] - b.delta
+                b, innovation, variance = ekf.update(
+                    b, y[i], mu_i[i], rho_mu_j[i], p.r, has_traction, has_traction and beta_told
+                )
+                b = Belief(
+                    min(max(b.k, K_MIN), K_MAX), min(max(b.beta, BETA_MIN), BETA_MAX), b.delta,
+                    b.P_kk, b.P_kb, b.P_kd, b.P_bb, b.P_bd, b.P_dd,
+                )  # fmt: skip
+                if has_traction:
+                    nu = cusum_input(innovation, slip, p.adapted)
+                    g_drop = cusum.step(sums, g_drop, nu)
+                    g_rise = cusum.step(sums, g_rise, -nu)
+                    if g_drop > p.h or g_rise > p.h:
+                        alarm = 1.0 if g_drop > p.h else -1.0
+                        # the road has changed: the slope is unknown again, ratio and offset are the car's and stay
+                        b = Belief(b.k, b.beta, b.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, b.P_bd, b.P_dd)
+                        g_drop, g_rise = 0.0, 0.0
+        out[0, i] = 1.0 / b.k
+        out[1, i] = math.sqrt(b.P_kk) / (b.k * b.k)
+        out[2, i] = b.beta
+        out[3, i] = b.delta
+        out[4, i] = innovation
+        out[5, i] = math.sqrt(variance)
+        out[6, i] = g_drop
+        out[7, i] = g_rise
+        out[8, i] = alarm
+        out[9, i] = status
+        out[10, i] = beta_told
+    return State(b, window, g_drop, g_rise)
+
+
+def scan(
+    p: Params, state: State, s_delta: FloatArray, mu_i: FloatArray, rho_mu_j: FloatArray, is_active: FloatArray
+) -> tuple[Estimate, State]:
+    """Estimate the slip slope over a drive or a piece of one.
+
+    Parameters
+    ----------
+    p : Params
+    state : State
+        From `initial_state` or the piece before.
+    s_delta : array (n,)
+        Differential slip, or the slip of a driven axle where the other rolls freely. [-]
+    mu_i, rho_mu_j : array (n,)
+        Traction coefficients, see `physics.differential`; zeros for rho_mu_j give the direct method of a known
+        velocity. NaN in any: sample left out. [-]
+    is_active : bool array (n,)
+        From `activation.inactive_reason`.
+
+    Returns
+    -------
+    estimate : Estimate
+    state : State
+
+    Thesis: Eq. (3.20) to (3.25) with E8, E10 (what the data cannot tell is frozen), E11 (sums clamped at zero; after an
+    alarm they and what is known of the slope are reset) and E12.
+    """
+    out = np.empty((11, s_delta.size))
+    sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)
+    last = _scan(
+        p, sums, state, np.ascontiguousarray(s_delta, dtype=np.float64), np.ascontiguousarray(mu_i, dtype=np.float64),
+        np.ascontiguousarray(rho_mu_j, dtype=np.float64), np.ascontiguousarray(is_active, dtype=np.bool_), out,
+    )  # fmt: skip
+    return Estimate(*out), last

@@ -1,0 +1,72 @@
+"""The one tuning of the slip-slope estimator, in seconds and per second, so that it holds at any sample rate."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+__all__ = ["TUNING", "Params", "Tuning"]
+
+
+class Tuning(NamedTuple):
+    """Noise, prior knowledge and thresholds; k = 1 / C, beta slope ratio, delta offset of the differential slip."""
+
+    # spectral density of the slip's noise: 5e-4 rms at 5 Hz with a correlation of 0.48 from sample to sample, measured
+    # on a road (numbers (c)), is as much as white noise of this density
+    r: float = 1.4e-7  # [s]
+    # variance that a parameter's random walk gains per second
+    q_k: float = 1e-8  # [1/s] 2.3 % of a dry slope in a minute
+    q_beta: float = 1e-8  # [1/s] tyres warm up unevenly: 0.1 % in a minute
+    q_delta: float = 1e-10  # [1/s] radii: follows a drift with a lag of about 40 s
+    # standard deviations at the start
+    sd_k: float = 0.01  # slopes of 25 to 50 about 33
+    sd_beta: float = 0.05
+    sd_delta: float = 5e-3  # radii in a vehicle file are right within half a per cent
+    # standard deviation of k after an alarm: the step from a slope of 30 to one of 10 is 0.067
+    sd_k_reset: float = 0.05
+    # change detection: the prediction error beyond zeta, summed over time. zeta is half of what a step from a slope of
+    # 30 to one of 10 shows at a differential traction of 0.03; an error of 2 zeta is found after h / zeta = 4 s
+    zeta: float = 1.0e-3  # [-]
+    h: float = 4.0e-3  # [s]
+    adapted: bool = True  # (3.25) rather than (3.23)
+    # activation by the size of the differential traction and slip
+    mu_min: float = 0.01  # [-] below, only the offset is learnt
+    mu_max: float = 0.30  # [-]
+    s_max: float = 0.05  # [-] beyond, a wheel spins
+    # observability
+    tau_window: float = 20.0  # [s]
+    told_k: float = 0.2  # relative standard deviation of k in the window below which it may wander
+    told_beta: float = 0.1
+
+
+TUNING = Tuning()
+
+
+class Params(NamedTuple):
+    """Per-step numbers; made by `Params.make`."""
+
+    r: float
+    r_density: float
+    q_k: float
+    q_beta: float
+    q_delta: float
+    P_k_reset: float
+    zeta: float
+    h: float
+    adapted: bool
+    mu_min: float
+    mu_max: float
+    s_max: float
+    keep: float
+    told_k: float
+    told_beta: float
+    dt: float
+
+    @staticmethod
+    def make(tuning: Tuning, dt: float) -> Params:
+        """The tuning at a sample time [s]."""
+        t = tuning
+        return Params(
+            t.r / dt, t.r, t.q_k * dt, t.q_beta * dt, t.q_delta * dt, t.sd_k_reset**2, t.zeta, t.h, t.adapted,
+            t.mu_min, t.mu_max, t.s_max, math.exp(-dt / t.tau_window), t.told_k, t.told_beta, dt,
+        )  # fmt: skip
