@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BoolArray", "Channel", "ChannelInfo", "DriveResult", "Event", "FileFaults", "FloatArray", "Origin", "Quality",
-    "Signals", "TimeArray", "TimeFaults", "Track", "Unavailable",
+    "Signals", "SlopeSummary", "TimeArray", "TimeFaults", "Track", "Unavailable",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -183,12 +183,36 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
+class SlopeSummary:
+    """What the slip-slope estimator made of a drive at one place (`left`, `right`, `axle`).
+
+    `slope` C_s / F_z at the end, `slope_sd` its standard deviation by the filter, `reference` the dry slope that it was
+    compared with (NaN without one), `beta` the slope ratio (None with one driven axle), `offset` of the slip [-];
+    `seconds` by state of the estimator, `inactive` seconds by reason, `alarms` of its change detection; `periods` what
+    the drive adds to the history of the dry slope: largest, mean [-], length [s].
+    """
+
+    place: str
+    wheel: str | None
+    slope: float
+    slope_sd: float
+    reference: float
+    beta: float | None
+    offset: float
+    alarms: int
+    seconds: Mapping[str, float]
+    inactive: Mapping[str, float]
+    periods: tuple[tuple[float, float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class DriveResult:
     """Everything that `detect` found in one drive.
 
     `features` has the rows of `signals.frame` and no `t`: velocity estimate `v_x_hat` [m/s], centre-line wheel speeds
     `v_w_fl` ... [m/s], differences `v_w_delta_fl` [m/s] (thesis 2.4) and `a_w_delta_fl` [m/s^2] (2.3), traction
-    coefficients `mu_fl` [-], `delta_a_x` [m/s^2] (2.9); a column is there only if its signals are.
+    coefficients `mu_fl` [-], `delta_a_x` [m/s^2] (2.9), slip slopes `slip_slope_left` with `slip_slope_ref_left` [-];
+    a column is there only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
     """
 
@@ -200,3 +224,4 @@ class DriveResult:
     limited: tuple[Unavailable, ...]
     vehicle_name: str
     notes: tuple[str, ...] = ()
+    slopes: tuple[SlopeSummary, ...] = ()

@@ -11,6 +11,7 @@ from aqualog import __version__
 from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
 from aqualog.cli.detect import detect
+from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
 from aqualog.cli.simulate import simulate
 
@@ -30,6 +31,7 @@ app.command(no_args_is_help=True)(inspect)
 app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
 app.command(no_args_is_help=True)(simulate)
+app.command(no_args_is_help=True)(figures)
 
 
 def _version(value: bool) -> None:

@@ -55,7 +55,7 @@ def check_needs(
         "minor_spin_down": [*(omega if all(sides.values()) else []), *slow],
         "spin_up": [*(driven_omega if len(driven_omega) == len(vehicle.driven) else []), *too_slow],
         "resistance": resistance,
-        "slip_slope_drop": [*omega, *torque] or [NOT_YET],
+        "slip_slope_drop": [*omega, *torque, *too_slow],
         "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [NOT_YET],
         "joint_criteria": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
         "joint_cusum": [*omega, *resistance] or [NOT_YET],

@@ -14,6 +14,9 @@ from aqualog.detect.needs import check_needs
 from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
 from aqualog.detect.negative_force import began_free, hold_on, is_braking
 from aqualog.detect.plausibility import implausible
+from aqualog.detect.slip_slope.blindness import blindness
+from aqualog.detect.slip_slope.estimator import INACTIVE
+from aqualog.detect.slip_slope.watch import Memory, SlipSlopeWatch, pairs
 from aqualog.features.stream import Features, FeatureStream
 from aqualog.notation import SIDES, WHEELS, side_of
 from aqualog.physics.load import G
@@ -48,9 +51,19 @@ class DriveStream:
         Symbols that the drive has at all. What is missing decides which detectors run (`unavailable`, `limited`).
     correct_yaw : bool
         As in `FeatureStream`.
+    memory : Memory, optional
+        What is known of the dry slip slope.
     """
 
-    def __init__(self, vehicle: Vehicle, dt_ns: int, available: Collection[str], *, correct_yaw: bool = True) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        dt_ns: int,
+        available: Collection[str],
+        *,
+        correct_yaw: bool = True,
+        memory: Memory | None = None,
+    ) -> None:
         self.vehicle = vehicle
         self.dt_ns = dt_ns
         self.dt = dt_ns * 1e-9
@@ -70,7 +83,13 @@ class DriveStream:
         self._sums = {"resistance": cusum.initial_state(), "gate": cusum.initial_state()}
         self._holds: dict[str, int] = {}
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._builders: dict[tuple[str, str | None], EventBuilder] = {}
+        self._builders: dict[tuple[str, str | None, str | None], EventBuilder] = {}
+        self.memory = memory or Memory()
+        self.slope_watches = (
+            ()
+            if "slip_slope_drop" in self._off
+            else tuple(SlipSlopeWatch(vehicle, pair, self.dt, self.memory) for pair in pairs(vehicle))
+        )
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples, any number from one on.
@@ -87,6 +106,10 @@ class DriveStream:
         for run in (self._spin_downs, self._minor_spin_downs, self._spin_ups, self._resistances):
             new_tracks, new_events = run(f, braking)
             tracks += new_tracks
+            events += new_events
+        for watch in self.slope_watches:
+            track, new_events = self._slope_drop(watch, f, braking)
+            tracks.append(track)
             events += new_events
         if "joint_criteria" not in self._off:
             track, new_events = self._joint(f, braking, tracks)
@@ -190,6 +213,23 @@ class DriveStream:
             tracks.append(track)
         return tracks, events
 
+    def _slope_drop(
+        self, watch: SlipSlopeWatch, f: dict[str, FloatArray], braking: Mapping[str, BoolArray]
+    ) -> tuple[Track, list[Event]]:
+        seen = watch.push(f, braking, f["yaw_rate_slow"])
+        place, wheel = watch.pair.place, watch.pair.wheel
+        f[f"slip_slope_{place}"] = np.where(seen.estimate.status < INACTIVE, seen.estimate.slope, np.nan)
+        f[f"slip_slope_ref_{place}"] = seen.reference
+        track = Track("slip_slope_drop", wheel, place, "-", seen.loss, watch.drop_threshold, seen.active)
+        evidence: Evidence = {
+            "v_x": ("first", f["v_x_hat"]),
+            "slope_min": ("min", seen.estimate.slope),
+            "slope_ref": ("first", seen.reference),
+            "mu": ("first", seen.mu),
+            "slip_max": ("max", np.abs(seen.slip)),
+        }
+        return track, self._events(track, evidence, _partial)
+
     def _resistances(self, f: Features, braking: Mapping[str, BoolArray]) -> tuple[list[Track], list[Event]]:
         if "resistance" in self._off:
             return [], []
@@ -259,7 +299,7 @@ class DriveStream:
         return evidence
 
     def _events(self, track: Track, evidence: Evidence, severity: Callable[[Mapping[str, Any]], str]) -> list[Event]:
-        key = (track.detector, track.wheel)
+        key = (track.detector, track.wheel, track.side)
         if key not in self._builders:
             self._builders[key] = EventBuilder(
                 track.detector,
@@ -303,7 +343,9 @@ def _severity_joint(evidence: Mapping[str, Any]) -> str:
     return "full" if evidence.get("full", False) else "partial"
 
 
-def detect_drive(signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True) -> DriveResult:
+def detect_drive(
+    signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True, memory: Memory | None = None
+) -> DriveResult:
     """Run all detectors over one drive.
 
     Parameters
@@ -312,6 +354,8 @@ def detect_drive(signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True
     vehicle : Vehicle
     correct_yaw : bool
         As in `FeatureStream`.
+    memory : Memory, optional
+        What is known of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
 
     Returns
     -------
@@ -325,7 +369,10 @@ def detect_drive(signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True
     stream = DriveStream(vehicle, signals.dt_ns, present, correct_yaw=correct_yaw)
     columns = {s: signals.array(s) for s in (present or ["v_x"])}
     piece = stream.push(columns)
-    events = sorted((*piece.events, *stream.finish()), key=lambda e: (e.start_s, e.detector, e.wheel or ""))
+    events = sorted(
+        (*piece.events, *stream.finish()), key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")
+    )
+    slopes = tuple(w.summary() for w in stream.slope_watches)
     return DriveResult(
         signals=signals,
         features=pl.DataFrame(dict(piece.features)),
@@ -334,5 +381,6 @@ def detect_drive(signals: Signals, vehicle: Vehicle, *, correct_yaw: bool = True
         unavailable=stream.unavailable,
         limited=stream.limited,
         vehicle_name=vehicle.name,
-        notes=implausible(signals, piece.features, vehicle),
+        notes=(*implausible(signals, piece.features, vehicle), *blindness(slopes)),
+        slopes=slopes,
     )

@@ -79,7 +79,8 @@ class FeatureStream:
         Returns
         -------
         mapping name -> array (n,)
-            `v_x_hat`, `a_kin`, `v_w_*`, `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`,
+            `v_x_hat`, `a_kin`, `v_line_*` (wheel speeds on the centre line with the file's radii), `v_w_*` (the same
+            with radii learnt), `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`,
             `mu_res_*`, `torque_sum`,
             `delta_a_x` (2.9), and low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`; only those whose signals are there.
         """
@@ -90,11 +91,14 @@ class FeatureStream:
             get["yaw_rate"], self._memory.get("yaw_rate", 0.0), tau=TAU_YAW, fade=FADE, dt=self.dt
         )
         omega = np.array([get[f"omega_{w}"] for w in WHEELS])
-        v_w = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
+        v_line = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
         v_x, a_kin, v_w, self._velocity = observe(
-            self._velocity_params, self._velocity, get["v_x"], v_w, get["a_x"], yaw_rate, weights=self._weights
+            self._velocity_params, self._velocity, get["v_x"], v_line, get["a_x"], yaw_rate, weights=self._weights
         )
-        out["v_x_hat"], out["a_kin"] = v_x, a_kin
+        out["v_x_hat"], out["a_kin"], out["yaw_rate_slow"] = v_x, a_kin, yaw_rate
+        for i, wheel in enumerate(WHEELS):
+            if f"omega_{wheel}" in self.available:
+                out[f"v_line_{wheel}"] = v_line[i]
         if self._has_wheels:
             self._differences(v_w, v_x, a_kin, out)
         a_x = get["a_x"] if "a_x" in self.available else a_kin

@@ -12,7 +12,7 @@ import numpy as np
 from aqualog import __version__
 from aqualog.io.write_log import LogGroup
 from aqualog.notation import SYMBOLS
-from aqualog.types import DriveResult, Event, Signals, Track, Unavailable
+from aqualog.types import DriveResult, Event, Signals, SlopeSummary, Track, Unavailable
 
 __all__ = ["SCHEMA_VERSION", "document", "result_groups", "signal_groups", "track_name"]
 
@@ -37,6 +37,7 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
         "events": [_event(e) for e in result.events],
         "unavailable": [_lacking(u) for u in result.unavailable],
         "limited": [_lacking(u) for u in result.limited],
+        "slip_slope": [_slope(s) for s in result.slopes],
         "quality": {
             "dropped_samples": quality.dropped_samples,
             "time_jumps": quality.time_jumps,
@@ -102,6 +103,21 @@ def _lacking(item: Unavailable) -> dict[str, Any]:
     return {"detector": item.detector, "missing": list(item.missing)}
 
 
+def _slope(summary: SlopeSummary) -> dict[str, Any]:
+    return {
+        "place": summary.place,
+        "wheel": summary.wheel,
+        "slope": _number(summary.slope),
+        "slope_sd": _number(summary.slope_sd),
+        "reference": _number(summary.reference),
+        "beta": None if summary.beta is None else _number(summary.beta),
+        "offset": _number(summary.offset),
+        "changes": summary.alarms,
+        "seconds": {name: _number(s) for name, s in summary.seconds.items()},
+        "inactive": {name: _number(s) for name, s in summary.inactive.items()},
+    }
+
+
 def signal_groups(signals: Signals) -> list[LogGroup]:
     """The canonical signals as channels."""
     columns = {s: (SYMBOLS[s].unit, SYMBOLS[s].meaning, signals.array(s)) for s in signals.symbols}
@@ -123,8 +139,9 @@ def result_groups(result: DriveResult) -> list[LogGroup]:
 
 
 def track_name(track: Track) -> str:
-    """`minor_spin_down_fr`."""
-    return f"{track.detector}_{track.wheel}" if track.wheel else track.detector
+    """`minor_spin_down_fr`; where a side is judged, `slip_slope_drop_left`."""
+    place = track.wheel or track.side
+    return f"{track.detector}_{place}" if place else track.detector
 
 
 def _unit(track: Track) -> str:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from aqualog import __version__
@@ -22,6 +18,7 @@ from aqualog.report.figures.speeds import speeds
 from aqualog.report.figures.stack import groups, stack
 from aqualog.report.figures.statistics import statistics
 from aqualog.report.figures.water import water
+from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island, plotly_js
 from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.verdict import by_importance, verdict
@@ -29,7 +26,6 @@ from aqualog.types import DriveResult
 
 __all__ = ["render_page", "write_page"]
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, resistance, water)
 
 
@@ -58,11 +54,11 @@ def render_page(result: DriveResult, *, title: str) -> str:
     ranked = by_importance(result.events)
     plan = make_plan(ranked, result.signals.frame.height, result.signals.dt)
     rows = [row for figure in _FIGURES for row in figure(result)]
-    scripts = {"plotly": _plotly_js(), "page": _text("page.js")}
-    return _environment().get_template("page.html.j2").render(
+    scripts = {"plotly": plotly_js(), "page": _text("page.js")}
+    return environment(TEMPLATES).get_template("page.html.j2").render(
         title=title,
         version=__version__,
-        policy=_policy(scripts.values()),
+        policy=content_policy(scripts.values()),
         # Markup only for the package's own files, plotly.js and what _data has escaped
         css=Markup(_text("page.css")),
         scripts={name: Markup(text) for name, text in scripts.items()},
@@ -82,37 +78,8 @@ def render_page(result: DriveResult, *, title: str) -> str:
     )  # fmt: skip
 
 
-def _environment() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-
-
 def _text(name: str) -> str:
-    return (_TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def _plotly_js() -> str:
-    from plotly.offline import get_plotlyjs
-
-    # a browser reads CR LF as LF, and the hash in the policy is of what the browser reads
-    return str(get_plotlyjs()).replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _policy(scripts: Any) -> str:
-    """Content security policy: nothing is fetched, and only these very scripts run."""
-    digests = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
-    allowed = " ".join(f"'sha256-{d}'" for d in digests)
-    # plotly sets style attributes and style elements; data: and blob: are for its "save as picture"
-    return (
-        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "
-        "base-uri 'none'; form-action 'none'"
-    )
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _data(result: DriveResult, rows: list[Row], plan: Plan) -> Markup:
@@ -120,10 +87,7 @@ def _data(result: DriveResult, rows: list[Row], plan: Plan) -> Markup:
     document: dict[str, Any] = {"events": [[round(e.start_s, 6), round(e.end_s, 6)] for e in result.events]}
     if rows and plan.n:
         document |= stack(rows, result.events, plan, result.signals.dt)
-    text = json.dumps(document, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
-    for character, escaped in (("<", "\\u003c"), (">", "\\u003e"), ("&", "\\u0026")):
-        text = text.replace(character, escaped)
-    return Markup(text)
+    return json_island(document)
 
 
 def _toggles(rows: list[Row]) -> list[dict[str, str]]:

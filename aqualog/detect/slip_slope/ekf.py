@@ -39,7 +39,7 @@ def predict(b, q_k, q_beta, q_delta):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta):  # type: ignore[no-untyped-def]
+def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta, learn_delta):  # type: ignore[no-untyped-def]
     """Take one differential slip into the belief.
 
     Parameters
@@ -52,7 +52,7 @@ def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta):  # type: ignore[no-unt
         As in `physics.differential`. [-]
     r : float
         Variance of y. [-]
-    learn_k, learn_beta : bool
+    learn_k, learn_beta, learn_delta : bool
         False: the parameter keeps its value and its uncertainty still counts (Schmidt's form of the gain).
 
     Returns
@@ -73,7 +73,7 @@ def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta):  # type: ignore[no-unt
     S = H_k * c_k + H_b * c_b + c_d + r
     K_k = c_k / S if learn_k else 0.0
     K_b = c_b / S if learn_beta else 0.0
-    K_d = c_d / S
+    K_d = c_d / S if learn_delta else 0.0
     # rows of A = 1 - K H, then A P, then A P A' + K r K'
     a_kk, a_kb, a_kd = 1.0 - K_k * H_k, -K_k * H_b, -K_k
     a_bk, a_bb, a_bd = -K_b * H_k, 1.0 - K_b * H_b, -K_b

@@ -34,6 +34,13 @@ K_MIN, K_MAX = 1.0 / 300.0, 1.0  # slopes from 1 to 300
 BETA_MIN, BETA_MAX = 0.2, 5.0
 
 
+class Before(NamedTuple):
+    """Offset and its variance when a sum last was zero: before the change that the sum tells of began."""
+
+    delta: float
+    P_dd: float
+
+
 class State(NamedTuple):
     """Everything that is carried from sample to sample."""
 
@@ -41,6 +48,9 @@ class State(NamedTuple):
     window: Window
     g_drop: float
     g_rise: float
+    before_drop: Before
+    before_rise: Before
+    settling: int  # samples for which the offset is not learnt yet
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +82,13 @@ def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
     # the prior is relative to a slope of 33, so that a soft or a stiff tyre starts as well known
     sd_k = tuning.sd_k * k * 33.0
     belief = Belief(k, beta, 0.0, sd_k**2, 0.0, 0.0, tuning.sd_beta**2, 0.0, tuning.sd_delta**2)
-    return State(belief, observability.EMPTY, 0.0, 0.0)
+    before = Before(belief.delta, belief.P_dd)
+    return State(belief, observability.EMPTY, 0.0, 0.0, before, before, 0)
 
 
 @compiled
 def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no-untyped-def]
-    b, window, g_drop, g_rise = state.belief, state.window, state.g_drop, state.g_rise
+    b, window, g_drop, g_rise, before_drop, before_rise, settling = state
     for i in range(y.size):
         innovation, variance, alarm, status, beta_told = math.nan, math.nan, 0.0, INACTIVE, False
         if is_active[i] and not (math.isnan(y[i]) or math.isnan(mu_i[i]) or math.isnan(rho_mu_j[i])):
@@ -92,29 +103,41 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 k_told = observability.sd_slope(window, b.beta, p.r_density) < p.told_k * b.k
                 beta_told = observability.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
                 status = BLIND if not has_traction else (ESTIMATING if k_told else FROZEN)
+                # while evidence of a change gathers, and for a while after it, the offset rests
+                learn_delta = settling == 0 and max(g_drop, g_rise) < p.h_rest
                 b = ekf.predict(
                     b,
                     p.q_k if has_traction and k_told else 0.0,
                     p.q_beta if has_traction and beta_told else 0.0,
-                    p.q_delta,
+                    p.q_delta if learn_delta else 0.0,
                 )
                 slip = y[i] - b.delta
                 b, innovation, variance = ekf.update(
-                    b, y[i], mu_i[i], rho_mu_j[i], p.r, has_traction, has_traction and beta_told
+                    b, y[i], mu_i[i], rho_mu_j[i], p.r, has_traction, has_traction and beta_told, learn_delta
                 )
                 b = Belief(
                     min(max(b.k, K_MIN), K_MAX), min(max(b.beta, BETA_MIN), BETA_MAX), b.delta,
                     b.P_kk, b.P_kb, b.P_kd, b.P_bb, b.P_bd, b.P_dd,
                 )  # fmt: skip
+                settling = max(settling - 1, 0)
                 if has_traction:
                     nu = cusum_input(innovation, slip, p.adapted)
                     g_drop = cusum.step(sums, g_drop, nu)
                     g_rise = cusum.step(sums, g_rise, -nu)
+                    if g_drop == 0.0:
+                        before_drop = Before(b.delta, b.P_dd)
+                    if g_rise == 0.0:
+                        before_rise = Before(b.delta, b.P_dd)
                     if g_drop > p.h or g_rise > p.h:
                         alarm = 1.0 if g_drop > p.h else -1.0
-                        # the road has changed: the slope is unknown again, ratio and offset are the car's and stay
-                        b = Belief(b.k, b.beta, b.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, b.P_bd, b.P_dd)
+                        before = before_drop if g_drop > p.h else before_rise
+                        # the road has changed: the slope is unknown again; ratio and offset are the car's, and the
+                        # offset is what it was before the change began to pull at it
+                        b = Belief(
+                            b.k, b.beta, before.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, 0.0, before.P_dd
+                        )
                         g_drop, g_rise = 0.0, 0.0
+                        settling = p.settle if settling == 0 else settling
         out[0, i] = 1.0 / b.k
         out[1, i] = math.sqrt(b.P_kk) / (b.k * b.k)
         out[2, i] = b.beta
@@ -126,7 +149,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
         out[8, i] = alarm
         out[9, i] = status
         out[10, i] = beta_told
-    return State(b, window, g_drop, g_rise)
+    return State(b, window, g_drop, g_rise, before_drop, before_rise, settling)
 
 
 def scan(
@@ -153,7 +176,7 @@ def scan(
     state : State
 
     Thesis: Eq. (3.20) to (3.25) with E8, E10 (what the data cannot tell is frozen), E11 (sums clamped at zero; after an
-    alarm they and what is known of the slope are reset) and E12.
+    alarm they and what is known of the slope are reset, and the offset rests for half a minute) and E12.
     """
     out = np.empty((11, s_delta.size))
     sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)

@@ -29,6 +29,9 @@ class Tuning(NamedTuple):
     zeta: float = 1.0e-3  # [-]
     h: float = 4.0e-3  # [s]
     adapted: bool = True  # (3.25) rather than (3.23)
+    # after an alarm the offset, which is the car's, is not learnt for a while: what changed at once is the road
+    tau_settle: float = 30.0  # [s]
+    rest: float = 0.25  # nor while a sum stands above this share of its threshold
     # activation by the size of the differential traction and slip
     mu_min: float = 0.01  # [-] below, only the offset is learnt
     mu_max: float = 0.30  # [-]
@@ -54,6 +57,8 @@ class Params(NamedTuple):
     zeta: float
     h: float
     adapted: bool
+    settle: int
+    h_rest: float
     mu_min: float
     mu_max: float
     s_max: float
@@ -68,5 +73,5 @@ class Params(NamedTuple):
         t = tuning
         return Params(
             t.r / dt, t.r, t.q_k * dt, t.q_beta * dt, t.q_delta * dt, t.sd_k_reset**2, t.zeta, t.h, t.adapted,
-            t.mu_min, t.mu_max, t.s_max, math.exp(-dt / t.tau_window), t.told_k, t.told_beta, dt,
+            round(t.tau_settle / dt), t.rest * t.h,            t.mu_min, t.mu_max, t.s_max, math.exp(-dt / t.tau_window), t.told_k, t.told_beta, dt,
         )  # fmt: skip

@@ -1,0 +1,197 @@
+"""Slip slope of a whole drive: which wheels are compared, and the chain from features to detections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from aqualog.detect import ewvar
+from aqualog.detect.slip_slope import activation, drop, estimator
+from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
+from aqualog.detect.slip_slope.history import History, Rule
+from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
+from aqualog.notation import AXLES, SIDES
+from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
+from aqualog.types import BoolArray, FloatArray, SlopeSummary
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
+
+VARIANCE_MAX = 4.0  # [(m/s^2)^2] "variance of the wheel acceleration below a threshold" (C68); tooth noise is below 1
+TAU_VARIANCE = 0.3  # [s]
+
+Form = Literal["f", "r"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Wheels whose speeds are compared: `i` at the axle of the formulation, `j` opposite; means of several wheels."""
+
+    place: str  # left, right, or axle
+    wheel: str | None  # the one that is driven and judged, where it is one
+    i: tuple[str, ...]
+    j: tuple[str, ...]
+
+
+def pairs(vehicle: Vehicle, *, form: Form | None = None, per_axle: bool = False) -> tuple[Pair, ...]:
+    """Pairs of a car: one per side, or the two axles.
+
+    With one driven axle the formulation is at that axle, and the differential slip is its slip (C87). An all-wheel
+    drive is formulated at the front axle by default; the rear form is the same equation solved for the rear slope.
+    """
+    axle = {"fwd": "f", "rwd": "r", "awd": form or "f"}[vehicle.drivetrain]
+    other = "r" if axle == "f" else "f"
+    if per_axle:
+        return (Pair("axle", None, AXLES[axle], AXLES[other]),)
+    one = vehicle.drivetrain != "awd"
+    found = []
+    for side, wheels in SIDES.items():
+        i = next(w for w in wheels if w[0] == axle)
+        j = next(w for w in wheels if w[0] == other)
+        found.append(Pair(side, i if one else None, (i,), (j,)))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What is known of the dry slope before a drive, and how it is compared."""
+
+    history: History = field(default_factory=History)
+    configuration: str = ""
+    rule: Rule = "robust"
+
+    def name(self, vehicle: Vehicle) -> str:
+        """Configuration under which this drive is remembered."""
+        return self.configuration or vehicle.name
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """One piece of a drive at one pair, arrays (n,).
+
+    `loss` = 1 - C / C_ref, `active` the detection bit, `reference` the dry slope, `mu` the traction coefficient of the
+    wheels judged, `slip` their differential slip.
+    """
+
+    estimate: Estimate
+    loss: FloatArray
+    active: BoolArray
+    reference: FloatArray
+    mu: FloatArray
+    slip: FloatArray
+
+
+class SlipSlopeWatch:
+    """The estimator of one pair with its state.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    pair : Pair
+    dt : float
+        [s]
+    memory : Memory
+    tuning : Tuning
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, pair: Pair, dt: float, memory: Memory | None = None, tuning: Tuning = TUNING
+    ) -> None:
+        memory = memory or Memory()
+        self.pair = pair
+        self._two_driven = vehicle.drivetrain == "awd"
+        front = pair.i[0][0] == "f"
+        ratio = float(slope_ratio(np.array(vehicle.slip_slope_f), np.array(vehicle.slip_slope_r)))
+        slope = vehicle.slip_slope_f if front else vehicle.slip_slope_r
+        periods = memory.history.of(memory.name(vehicle), pair.place)
+        key = "tyre.slip_slope_f" if front else "tyre.slip_slope_r"
+        fallback = slope if key in vehicle.given else np.nan
+        self._params = Params.make(tuning, dt)
+        self._state = estimator.initial_state(tuning, slope=slope, beta=beta_of_ratio(ratio, front=front))
+        self._drop_params = drop.DropParams.make(dt, memory.rule)
+        self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
+        self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
+        self._variances = {w: ewvar.initial_state() for w in (*pair.i, *pair.j)}
+        self._dt = dt
+        self._counts = np.zeros(len(STATUS))
+        self._reasons = np.zeros(len(activation.REASONS))
+        self._last = (np.nan, np.nan, np.nan)
+        self._alarms = 0
+
+    def push(self, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], yaw_rate: FloatArray) -> Watched:
+        """Take the features of the next piece."""
+        i, j = self.pair.i, self.pair.j
+        s_delta = differential_slip(_mean(f, "v_line", i), _mean(f, "v_line", j))
+        mu_i = _mean(f, "mu", i)
+        # a free wheel's own rolling resistance is a slip that never changes: it goes to the offset
+        rho_mu_j = (1.0 - s_delta) * _mean(f, "mu", j) if self._two_driven else np.zeros_like(mu_i)
+        reason = activation.inactive_reason(
+            v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=yaw_rate,
+            a_w_delta=np.max([np.abs(f[f"a_w_delta_{w}"]) for w in (*i, *j)], axis=0),
+            is_braking=np.any([braking[w] for w in (*i, *j)], axis=0),
+        )  # fmt: skip
+        estimate, self._state = estimator.scan(self._params, self._state, s_delta, mu_i, rho_mu_j, reason == 0)
+        is_valid = (estimate.status == ESTIMATING) | (estimate.status == FROZEN)
+        is_valid &= self._calm(f)
+        loss, active, refs, self._drop = drop.scan(
+            self._drop_params, self._drop, estimate.slope, estimate.slope_sd, is_valid, estimate.alarm
+        )
+        self._count(estimate, reason, mu_i)
+        return Watched(estimate, loss, active, refs, mu_i, s_delta)
+
+    @property
+    def drop_threshold(self) -> float:
+        """Loss of slope from which a detection begins. [-]"""
+        return 1.0 - self._drop_params.drop
+
+    def summary(self) -> SlopeSummary:
+        """What became of the drive's samples, and the last estimate."""
+        seconds = self._counts * self._dt
+        slope, sd, offset = self._last
+        return SlopeSummary(
+            place=self.pair.place,
+            wheel=self.pair.wheel,
+            slope=slope,
+            slope_sd=sd,
+            reference=float(self._drop.reference),
+            beta=float(self._state.belief.beta) if self._two_driven else None,
+            offset=offset,
+            alarms=self._alarms,
+            seconds={name: float(s) for name, s in zip(_STATUS_NAMES, seconds, strict=True)},
+            inactive={
+                name: float(n * self._dt) for name, n in zip(activation.REASONS[1:], self._reasons[1:], strict=True)
+            },
+            periods=tuple((p.largest, p.mean, p.seconds) for p in drop.completed(self._drop)),
+        )
+
+    def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
+        calm = np.ones(f["v_x_hat"].size, dtype=bool)
+        for wheel, state in self._variances.items():
+            _, variance, self._variances[wheel] = ewvar.scan(self._variance, state, f[f"a_w_delta_{wheel}"])
+            with np.errstate(invalid="ignore"):
+                calm &= ~(variance > VARIANCE_MAX)
+        return calm
+
+    def _count(self, estimate: Estimate, reason: FloatArray, mu: FloatArray) -> None:
+        self._counts += np.bincount(estimate.status.astype(np.int64), minlength=len(STATUS))
+        missing = (reason == 0) & (estimate.status == INACTIVE)  # of the signals only the traction or a speed
+        told = np.where(missing, activation.MISSING, reason).astype(np.int64)
+        self._reasons += np.bincount(told, minlength=self._reasons.size)
+        self._alarms += int(np.count_nonzero(estimate.alarm))
+        used = np.flatnonzero(estimate.status <= BLIND)
+        if used.size:
+            k = used[-1]
+            self._last = (float(estimate.slope[k]), float(estimate.slope_sd[k]), float(estimate.offset[k]))
+
+
+_STATUS_NAMES = ("estimating", "slope_frozen", "blind", "traction_too_large", "spinning", "inactive")
+
+
+def _mean(f: Mapping[str, FloatArray], stem: str, wheels: tuple[str, ...]) -> FloatArray:
+    total = f[f"{stem}_{wheels[0]}"]
+    for wheel in wheels[1:]:
+        total = total + f[f"{stem}_{wheel}"]
+    return total / len(wheels)

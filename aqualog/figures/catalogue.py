@@ -1,0 +1,58 @@
+"""Which figures there are, and how one asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from aqualog.errors import ConfigError
+from aqualog.figures.record import Figure
+
+__all__ = ["NUMBERS", "chosen", "make", "stem"]
+
+NUMBERS = tuple(f"3.{n}" for n in range(1, 12))
+
+
+def stem(number: str) -> str:
+    """Name of a figure's files: figure_3_06 for 3.6."""
+    chapter, n = number.split(".")
+    return f"figure_{chapter}_{int(n):02d}"
+
+
+def make(number: str) -> Figure:
+    """Make a figure anew: its runs, panels and findings.
+
+    Parameters
+    ----------
+    number : str
+        One of `NUMBERS`.
+    """
+    module = import_module(f"aqualog.figures.{stem(number).replace('figure', 'fig')}")
+    figure: Figure = module.make()
+    return figure
+
+
+def chosen(asked: Sequence[str]) -> tuple[str, ...]:
+    """Numbers behind what was typed, in the order of the thesis, each once.
+
+    Parameters
+    ----------
+    asked : sequence of str
+        Numbers as "3.6", a chapter as "3", or "all".
+
+    Raises
+    ------
+    ConfigError
+        If a figure is not there.
+    """
+    found: set[str] = set()
+    for name in asked:
+        match = [n for n in NUMBERS if name in ("all", n, n.split(".")[0])]
+        if not match:
+            later = "; those of chapter 2 come in a later version" if name.split(".")[0] == "2" else ""
+            raise ConfigError(
+                f"there is no figure {name!r}{later}", expected=f"all, 3 or one of {' '.join(NUMBERS)}",
+                hint="aqualog figures 3.6 -o DIR",
+            )  # fmt: skip
+        found.update(match)
+    return tuple(n for n in NUMBERS if n in found)

@@ -1,0 +1,92 @@
+"""Figures as data: the table that is drawn, and findings as a document."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from aqualog import __version__
+from aqualog.figures.draw import rounded
+from aqualog.figures.record import Figure, Line, Panel
+from aqualog.types import FloatArray
+
+__all__ = ["document", "figure_csv"]
+
+Column = tuple[str, FloatArray]
+
+
+def figure_csv(figure: Figure) -> str:
+    """What is drawn, side by side: columns of x and, behind them, of the lines over it; units in the header.
+
+    Lines over the same x share its column. Columns end where their line ends; a cell is empty where a line is broken.
+    Columns of one of several panels begin with its letter.
+    """
+    columns: list[Column] = []
+    for i, panel in enumerate(figure.panels):
+        letter = f"({chr(ord('a') + i)}) " if len(figure.panels) > 1 else ""
+        columns += [(letter + name, values) for name, values in _columns(panel)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    cells = [["" if v is None else repr(v) for v in rounded(values)] for _, values in columns]
+    writer.writerows(zip_longest(*cells, fillvalue=""))
+    return text.getvalue()
+
+
+def _columns(panel: Panel) -> list[Column]:
+    columns: list[Column] = []
+    shown: FloatArray | None = None
+    for line in panel.lines:
+        if line.z is None and shown is not None and np.array_equal(line.x, shown):
+            columns.append((f"{line.name}: {panel.y.title}", line.y))
+            continue
+        shown = line.x if line.z is None else None
+        columns += _of_line(line, panel)
+    for sheet in panel.sheets:
+        x, y = np.meshgrid(sheet.x, sheet.y)
+        of = f"{sheet.name}: "
+        columns += [(of + panel.x.title, x.ravel()), (of + panel.y.title, y.ravel())]
+        if panel.z is not None:
+            columns.append((of + panel.z.title, sheet.z.ravel()))
+    return columns
+
+
+def _of_line(line: Line, panel: Panel) -> list[Column]:
+    if line.z is None:
+        columns = [(panel.x.title, line.x), (f"{line.name}: {panel.y.title}", line.y)]
+    else:
+        of = f"{line.name}: "
+        columns = [(of + panel.x.title, line.x), (of + panel.y.title, line.y)]
+        if panel.z is not None:
+            columns.append((of + panel.z.title, line.z))
+    if line.count is not None:
+        columns.append((f"{line.name}: samples [-]", line.count))
+    return columns
+
+
+def document(figures: Sequence[Figure], files: Sequence[str]) -> dict[str, Any]:
+    """Figures with their findings, and the files that were written."""
+    return {
+        "schema_version": 1,
+        "tool_version": __version__,
+        "figures": [
+            {
+                "figure": f.number,
+                "title": f.title,
+                "findings": [
+                    {
+                        "claim": c.claim, "thesis": c.thesis, "criterion": c.criterion, "found": c.found,
+                        "value": c.value, "verdict": c.verdict, "reason": c.reason,
+                    }
+                    for c in f.findings
+                ],
+            }
+            for f in figures
+        ],
+        "files": list(files),
+    }  # fmt: skip

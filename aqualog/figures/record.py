@@ -1,0 +1,137 @@
+"""What a figure is: panels of lines, the claims that it stands for, and what was found about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from aqualog.types import FloatArray
+
+__all__ = [
+    "BORNE_OUT", "IN_PART", "NOT_BORNE_OUT", "Axis", "Figure", "Finding", "Line", "Panel", "Sheet", "Table", "Verdict",
+    "judged", "seconds", "worst",
+]  # fmt: skip
+
+Verdict = Literal["borne out", "in part", "not borne out"]
+BORNE_OUT: Verdict = "borne out"
+IN_PART: Verdict = "in part"
+NOT_BORNE_OUT: Verdict = "not borne out"
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Label and unit of an axis; `limits` where not all data shall set the view, `is_log` for a logarithmic one."""
+
+    label: str
+    unit: str = "-"
+    limits: tuple[float, float] | None = None
+    is_log: bool = False
+
+    @property
+    def title(self) -> str:
+        """Label with unit, as in the header of a table."""
+        return f"{self.label} [{self.unit}]"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line or cloud of points, arrays (n,); NaN breaks it.
+
+    `z` in panels of three dimensions; `count` samples behind each point, which sets its size. `group` lines are shown
+    and hidden together, `in_legend` the one that is listed.
+    """
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray | None = None
+    count: FloatArray | None = None
+    colour: str = "@ink"
+    dash: str = "solid"
+    width: float = 2.0
+    opacity: float = 1.0
+    mode: Literal["lines", "markers", "lines+markers"] = "lines"
+    symbol: str = "circle"
+    size: float = 7.0
+    group: str = ""
+    in_legend: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A surface: `z` (m, n) over `y` (m,) and `x` (n,)."""
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One plot; of three dimensions if it has an axis `z`."""
+
+    title: str
+    x: Axis
+    y: Axis
+    lines: tuple[Line, ...]
+    z: Axis | None = None
+    sheets: tuple[Sheet, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Numbers that a verdict rests on."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A claim of the thesis, the criterion it is judged by, and what was found; `value` the number judged, if one."""
+
+    claim: str
+    thesis: str
+    criterion: str
+    found: str
+    verdict: Verdict
+    reason: str = ""
+    value: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of the thesis with its findings. `caption` tells settings, in aqualog's words."""
+
+    number: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    findings: tuple[Finding, ...]
+    tables: tuple[Table, ...] = ()
+
+    @property
+    def stem(self) -> str:
+        """Name of its files: figure_3_06 for 3.6."""
+        chapter, n = self.number.split(".")
+        return f"figure_{chapter}_{int(n):02d}"
+
+
+def judged(*, whole: bool, part: bool = False) -> Verdict:
+    """Verdict of a criterion and of its weaker form."""
+    return BORNE_OUT if whole else IN_PART if part else NOT_BORNE_OUT
+
+
+def worst(verdicts: Sequence[Verdict]) -> Verdict:
+    """The least favourable one."""
+    return max(verdicts, key=(BORNE_OUT, IN_PART, NOT_BORNE_OUT).index)
+
+
+def seconds(t: float) -> str:
+    """A detection time; a dash where nothing was found."""
+    return "–" if math.isnan(t) else f"{t:.2f}"
