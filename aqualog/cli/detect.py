@@ -24,6 +24,7 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
+    from aqualog.detect.slip_slope.watch import Memory
     from aqualog.types import DriveResult
 
 __all__ = ["detect"]
@@ -49,6 +50,30 @@ def detect(
         ),
     ] = None,
     rate: Rate = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            "--history",
+            help="Dry slip slopes of this car from earlier drives (JSON); read, and written back with this drive's.",
+            metavar="FILE",
+        ),
+    ] = None,
+    configuration: Annotated[
+        str,
+        typer.Option(
+            "--configuration",
+            help="What the dry slope belongs to: tyre, pressure, load, in any words; default the vehicle's name.",
+            metavar="TEXT",
+        ),
+    ] = "",
+    reference: Annotated[
+        str,
+        typer.Option(
+            "--reference",
+            help="Dry slope of the history: robust (upper quartile of the periods' means) or max (as the thesis).",
+            metavar="RULE",
+        ),
+    ] = "robust",
     fail_on_event: Annotated[
         bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
     ] = False,
@@ -70,12 +95,13 @@ def detect(
       aqualog detect wheels.csv imu.csv gps.csv --signals map.toml --vehicle car.toml
       aqualog detect can.mf4 --dbc car.dbc --signals map.toml --json
       aqualog detect drive.mcap --vehicle car.toml --write drive_detected.mf4
+      aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
     """
     from aqualog.cli.console import guarded
 
     with guarded(debug=debug):
         code = _detect(
-            logs, vehicle, signals, dbc or [], out, write, rate,
+            logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference,
             fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
@@ -90,6 +116,9 @@ def _detect(
     out: Path | None,
     write: Path | None,
     rate: float | None,
+    history_file: Path | None,
+    configuration: str,
+    reference: str,
     *,
     fail_on_event: bool,
     as_json: bool,
@@ -98,6 +127,7 @@ def _detect(
     verbose: bool,
     progress: str,
 ) -> int:
+    from aqualog.cli.files import refuse_existing
     from aqualog.cli.setup import prepare
     from aqualog.io.write_log import check_suffix
 
@@ -105,12 +135,15 @@ def _detect(
     if write is not None:
         check_suffix(write)
         targets.append(write)
+    memory = _memory(history_file, configuration, reference)
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
         progress=progress, vehicle_file=vehicle_file,
     )  # fmt: skip
     console, paths = setup.console, setup.paths
     vehicle = setup.vehicle
+    if history_file is not None:
+        refuse_existing([history_file], force=True, sources=[*paths, *targets])
     with console.steps() as steps:
         from aqualog.align.load import load_signals
         from aqualog.detect.stream import detect_drive
@@ -121,7 +154,7 @@ def _detect(
         for name, origin in loaded.origins.items():
             console.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
         steps("detecting")
-        result = detect_drive(loaded, vehicle)
+        result = detect_drive(loaded, vehicle, memory=memory)
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")
@@ -129,6 +162,8 @@ def _detect(
             _write_results(result, out, name, title)
         if write is not None:
             _write_log(result, write)
+        if history_file is not None:
+            _remember(history_file, memory, result, vehicle)
     _print(result, name, as_json=as_json)
     if vehicle_file is None:
         console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
@@ -137,6 +172,27 @@ def _detect(
     if out is not None:
         console.note(f"results are in {out}: {', '.join(_RESULTS)}")
     return _exit_code(result, fail_on_event=fail_on_event)
+
+
+def _memory(history_file: Path | None, configuration: str, reference: str) -> Memory:
+    """What is known of the dry slope before the drive."""
+    from aqualog.config.history import load_history
+    from aqualog.detect.slip_slope.history import History
+    from aqualog.detect.slip_slope.watch import Memory
+    from aqualog.errors import ConfigError
+
+    if reference not in ("robust", "max"):
+        raise ConfigError(f"--reference {reference}", expected="robust or max")
+    history = load_history(history_file) if history_file else History()
+    return Memory(history, configuration.strip()[:200], "max" if reference == "max" else "robust")
+
+
+def _remember(path: Path, memory: Memory, result: DriveResult, vehicle: Any) -> None:
+    """The history with this drive in it."""
+    from aqualog.config.history import save_history
+    from aqualog.detect.slip_slope.history import remembered
+
+    save_history(path, remembered(memory.history, memory.name(vehicle), result.slopes))
 
 
 def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:

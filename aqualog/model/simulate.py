@@ -158,7 +158,7 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
     split = (
         _profile(scenario.split_rear, t) if scenario.split_rear else np.full(n + 1, scenario.vehicle.torque_split_rear)
     )
-    if exc is not None and not (split.min() > 0.0 and split.max() < 1.0):
+    if exc is not None and scenario.vehicle.drivetrain != "awd":
         raise ConfigError("excitation needs a car with both axles driven", where="drivetrain")
     v_target = _profile(scenario.speed, t)
     return kernel.Controls(

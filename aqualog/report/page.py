@@ -13,6 +13,7 @@ from aqualog.report.figures.accelerations import accelerations
 from aqualog.report.figures.lanes import lanes
 from aqualog.report.figures.resistance import resistance
 from aqualog.report.figures.row import VEHICLE, Row
+from aqualog.report.figures.slip_slope import slip_slope
 from aqualog.report.figures.speed_differences import speed_differences
 from aqualog.report.figures.speeds import speeds
 from aqualog.report.figures.stack import groups, stack
@@ -26,7 +27,7 @@ from aqualog.types import DriveResult
 
 __all__ = ["render_page", "write_page"]
 
-_FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, resistance, water)
+_FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, slip_slope, resistance, water)
 
 
 def write_page(result: DriveResult, path: Path, *, title: str) -> None:

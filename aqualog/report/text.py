@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from aqualog.detect.needs import NOT_YET
-from aqualog.types import DriveResult, Event
+from aqualog.types import DriveResult, Event, SlopeSummary
 
 __all__ = ["event_table", "table"]
 
@@ -16,7 +17,7 @@ def event_table(result: DriveResult) -> str:
     duration = signals.frame.height * signals.dt
     lines = [f"{result.vehicle_name}: {duration:.1f} s at {1e9 / signals.dt_ns:g} Hz, {len(signals.symbols)} signals"]
     if result.events:
-        header = ("detector", "wheel", "from s", "to s", "severity", "peak", "limit", "v km/h", "evidence")
+        header = ("detector", "where", "from s", "to s", "severity", "peak", "limit", "v km/h", "evidence")
         lines.append(table(header, [_row(e) for e in result.events]))
     else:
         lines.append("no event")
@@ -27,7 +28,23 @@ def event_table(result: DriveResult) -> str:
     if result.limited:
         lines.append("\njudged in part:")
         lines += [f"  {u.detector}: without {', '.join(u.missing)}" for u in result.limited]
+    told = [s for s in (_slope(s) for s in result.slopes) if s]
+    if told:
+        lines.append("\nslip slope C_s/F_z at the end:")
+        lines += [f"  {s}" for s in told]
     return "\n".join(lines) + "\n"
+
+
+def _slope(summary: SlopeSummary) -> str:
+    """What the slip-slope estimator saw of one side, empty if it saw nothing."""
+    total = sum(summary.seconds.values())
+    if not math.isfinite(summary.slope) or total <= 0.0:
+        return ""
+    dry = f", dry {summary.reference:.1f}" if math.isfinite(summary.reference) else ", no dry value yet"
+    states = {"told": "estimating", "too even": "slope_frozen", "blind": "blind"}
+    shares = [f"{label} {summary.seconds[key] / total:.0%}" for label, key in states.items()]
+    name = summary.wheel or summary.place
+    return f"{name}: {summary.slope:.1f} +- {summary.slope_sd:.1f}{dry}; {', '.join(shares)} of the time"
 
 
 def _lack(missing: Sequence[str]) -> str:
@@ -42,7 +59,7 @@ def _row(event: Event) -> tuple[str, ...]:
     v_x = event.evidence.get("v_x")
     return (
         event.detector,
-        event.wheel or "-",
+        event.wheel or event.side or "-",
         f"{event.start_s:.2f}",
         f"{event.end_s:.2f}",
         event.severity,
@@ -61,6 +78,8 @@ def _evidence(event: Event) -> str:
         parts.append(f"slip {100 * slip:.1f} %")
     if event.detector == "spin_up" and "mu_min" in evidence:
         parts.append(f"mu {evidence['mu_min']:.3f}")
+    if "slope_min" in evidence:
+        parts.append(f"slope down to {evidence['slope_min']:.1f}, dry {evidence.get('slope_ref', math.nan):.1f}")
     if "delta_a_x_max" in evidence:
         parts.append(f"resistance up to {evidence['delta_a_x_max']:.2f} m/s^2")
     met = [n for n in (1, 2, 3, 5) if evidence.get(f"criterion_{n}")]

@@ -18,7 +18,7 @@ _DETECTORS = {
     "minor_spin_down": ("Minor spin-down", "variance of wheel acceleration, watched axle minus the other one"),
     "spin_up": ("Spin-up", "speed a driven wheel gained faster than the vehicle"),
     "resistance": ("Resistance", "sum of the resistance measure beyond its drift"),
-    "slip_slope_drop": ("Slip-slope drop", "loss of slip slope"),
+    "slip_slope_drop": ("Slip-slope drop", "share of the dry slip slope that is lost"),
     "tie_rod": ("Tie-rod force", "loss of tie-rod force"),
     "joint_criteria": ("Joint criteria", "wheel criteria met while the resistance gate is open"),
     "joint_cusum": ("Joint CUSUM", "weighted sum of the single detectors"),
@@ -30,6 +30,8 @@ _EVIDENCE = {
     "slip": ("slip", 100.0, "%", 1),
     "a_w_delta": ("acceleration difference", 1.0, "m/s²", 1),
     "variance": ("variance", 1.0, "(m/s²)²", 2),
+    "slope": ("slip slope", 1.0, "", 1),
+    "slope_ref": ("dry slip slope", 1.0, "", 1),
     "mu": ("traction coefficient", 1.0, "", 3),
     "delta_a_x": ("resistance measure", 1.0, "m/s²", 2),
 }

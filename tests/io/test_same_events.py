@@ -211,7 +211,7 @@ def found_in(source, signal_map, dbc):
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     _, events = found_in(*parquet(tmp_path_factory.mktemp("reference")))
-    assert {e.detector for e in events} == {"spin_down", "minor_spin_down", "resistance", "joint_criteria"}
+    assert {e.detector for e in events} == {"spin_down", "minor_spin_down", "resistance", "slip_slope_drop", "joint_criteria"}
     return events
 
 

@@ -15,7 +15,7 @@ from aqualog.detect.slip_slope.change import cusum_input
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.observability import Window
 from aqualog.detect.slip_slope.tuning import Params, Tuning
-from aqualog.types import FloatArray
+from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["STATUS", "Estimate", "State", "initial_state", "scan"]
 
@@ -153,7 +153,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
 
 
 def scan(
-    p: Params, state: State, s_delta: FloatArray, mu_i: FloatArray, rho_mu_j: FloatArray, is_active: FloatArray
+    p: Params, state: State, s_delta: FloatArray, mu_i: FloatArray, rho_mu_j: FloatArray, is_active: BoolArray
 ) -> tuple[Estimate, State]:
     """Estimate the slip slope over a drive or a piece of one.
 

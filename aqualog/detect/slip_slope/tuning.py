@@ -72,6 +72,22 @@ class Params(NamedTuple):
         """The tuning at a sample time [s]."""
         t = tuning
         return Params(
-            t.r / dt, t.r, t.q_k * dt, t.q_beta * dt, t.q_delta * dt, t.sd_k_reset**2, t.zeta, t.h, t.adapted,
-            round(t.tau_settle / dt), t.rest * t.h,            t.mu_min, t.mu_max, t.s_max, math.exp(-dt / t.tau_window), t.told_k, t.told_beta, dt,
-        )  # fmt: skip
+            r=t.r / dt,
+            r_density=t.r,
+            q_k=t.q_k * dt,
+            q_beta=t.q_beta * dt,
+            q_delta=t.q_delta * dt,
+            P_k_reset=t.sd_k_reset**2,
+            zeta=t.zeta,
+            h=t.h,
+            adapted=t.adapted,
+            settle=round(t.tau_settle / dt),
+            h_rest=t.rest * t.h,
+            mu_min=t.mu_min,
+            mu_max=t.mu_max,
+            s_max=t.s_max,
+            keep=math.exp(-dt / t.tau_window),
+            told_k=t.told_k,
+            told_beta=t.told_beta,
+            dt=dt,
+        )
