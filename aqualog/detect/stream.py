@@ -366,7 +366,7 @@ def detect_drive(
 
     # a column without a single value is a signal that the drive does not have
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
-    stream = DriveStream(vehicle, signals.dt_ns, present, correct_yaw=correct_yaw)
+    stream = DriveStream(vehicle, signals.dt_ns, present, correct_yaw=correct_yaw, memory=memory)
     columns = {s: signals.array(s) for s in (present or ["v_x"])}
     piece = stream.push(columns)
     events = sorted(

@@ -1,0 +1,266 @@
+"""Criterion 4: the slope against its history (C56, C68), on scripted estimates and on simulated drives."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aqualog.config.history import load_history, save_history
+from aqualog.detect.slip_slope import drop
+from aqualog.detect.slip_slope.blindness import blindness
+from aqualog.detect.slip_slope.history import History, Period, reference, remembered
+from aqualog.detect.slip_slope.watch import Memory, pairs
+from aqualog.detect.stream import DriveStream
+from aqualog.errors import ConfigError
+from aqualog.model.scenario import Excitation, Lane, Scenario
+from aqualog.model.simulate import simulate
+from aqualog.model.surface import SURFACES
+from aqualog.vehicle import Vehicle
+
+DT = 0.01
+RWD = Vehicle(name="rwd", given=frozenset({"mass", "tyre.slip_slope_r"}))
+AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.5, given=frozenset({"mass"}))
+
+
+def judge(slope, sd=0.5, valid=True, alarm=0.0, periods=(), rule="robust", fallback=np.nan):
+    slope = np.asarray(slope, dtype=float)
+    state = drop.initial_state(tuple(periods), rule=rule, fallback=fallback)
+    return drop.scan(
+        drop.DropParams.make(DT, rule), state, slope, np.broadcast_to(float(sd), slope.shape),
+        np.broadcast_to(valid, slope.shape), np.broadcast_to(alarm, slope.shape),
+    )  # fmt: skip
+
+
+def seconds(value, s):
+    return np.full(round(s / DT), float(value))
+
+
+def test_half_of_the_reference_and_back():
+    """C68: "the actual slip slope decreases below half of the maximum historic value"."""
+    slope = np.concatenate([seconds(30, 5), seconds(15.1, 1), seconds(14.9, 1), seconds(17.9, 1), seconds(18.1, 1)])
+    loss, active, refs, _ = judge(slope, fallback=30.0)
+    assert not active[:600].any()
+    assert active[600:800].all()
+    assert not active[800:].any()
+    assert loss[650] == pytest.approx(1 - 14.9 / 30)
+    assert refs == pytest.approx(30.0)
+
+
+def test_an_uncertain_estimate_is_not_judged_and_a_detection_outlasts_it_by_two_seconds():
+    slope = np.concatenate([seconds(30, 1), seconds(10, 1), seconds(10, 4)])
+    sd = np.where(np.arange(slope.size) >= 200, 3.0, 0.5)
+    state = drop.initial_state((), rule="robust", fallback=30.0)
+    args = (np.ones(slope.size, dtype=bool), np.zeros(slope.size))
+    loss, active, _, _ = drop.scan(drop.DropParams.make(DT, "robust"), state, slope, sd, *args)
+    assert np.isnan(loss[200:]).all()
+    assert np.flatnonzero(active)[[0, -1]].tolist() == [100, 398]
+    _, never, _, _ = judge(seconds(10, 3), valid=False, fallback=30.0)
+    assert not never.any()
+
+
+def test_a_drive_without_any_reference_makes_its_own_after_five_seconds():
+    slope = np.concatenate([seconds(28, 6), seconds(10, 1)])
+    _, active, refs, _ = judge(slope)
+    assert np.isnan(refs[:499]).all()
+    assert refs[550] == pytest.approx(28.0)
+    assert active[600:].all()
+
+
+def test_what_has_dropped_teaches_nothing():
+    """A long drive on snow after a dry one stays detected."""
+    slope = np.concatenate([seconds(30, 70), seconds(10, 200)])
+    _, active, refs, state = judge(slope)
+    assert active[-1]
+    assert refs[-1] == pytest.approx(30.0)
+    assert len(drop.completed(state)) == 3  # two full ones, and the ten seconds left
+
+
+def test_nothing_is_learnt_while_an_estimate_settles():
+    slope, alarm = seconds(30, 40), np.zeros(4000)
+    slope[1000:1400] = 55.0  # overshoot after an alarm
+    alarm[1000] = -1.0
+    *_, state = judge(slope, alarm=alarm)
+    assert max(p.largest for p in drop.completed(state)) == 30.0
+    *_, state = judge(slope)
+    assert max(p.largest for p in drop.completed(state)) == 55.0
+
+
+def test_largest_and_robust_reference():
+    """C56 with the thesis' maximum, and what one outlier does to both."""
+    periods = [Period(31.0, 29.0, 30.0), Period(33.0, 30.0, 30.0), Period(70.0, 30.5, 30.0), Period(31.0, 28.0, 30.0)]
+    assert reference(periods, rule="max") == 70.0
+    assert reference(periods) == pytest.approx(np.quantile([29, 30, 30.5, 28], 0.75))
+    assert np.isnan(reference([]))
+    for rule in ("max", "robust"):
+        _, active, refs, _ = judge(seconds(30, 1), periods=periods, rule=rule)
+        assert refs[0] == pytest.approx(reference(periods, rule=rule))
+        assert active.all() == (rule == "max")
+
+
+def test_kept_periods_are_the_newest_twenty_and_the_same_in_the_recursion():
+    slope = np.concatenate([seconds(20 + i, 30.005) for i in range(25)])
+    *_, refs, state = judge(slope, rule="max")
+    done = drop.completed(state)
+    history = History().with_periods("c", "left", done)
+    assert len(history.of("c", "left")) == 20
+    assert history.of("c", "left")[-1].mean == pytest.approx(44.0, abs=0.5)
+    assert refs[-1] == pytest.approx(reference(history.of("c", "left"), rule="max"), abs=1.0)
+
+
+@pytest.mark.parametrize("cut", [1, 17, 2999, 3000, 3001, 3777])
+def test_pieces_are_the_whole(cut):
+    rng = np.random.default_rng(3)
+    slope = np.repeat(rng.uniform(8, 35, 80), 100) + rng.normal(0, 1, 8000)
+    sd = rng.uniform(0, 8, 8000)
+    valid = rng.random(8000) < 0.9
+    alarm = np.where(rng.random(8000) < 0.001, 1.0, 0.0)
+    p, state = drop.DropParams.make(DT, "robust"), drop.initial_state((), rule="robust")
+    whole = drop.scan(p, state, slope, sd, valid, alarm)
+    *first, middle = drop.scan(p, state, slope[:cut], sd[:cut], valid[:cut], alarm[:cut])
+    *second, _ = drop.scan(p, middle, slope[cut:], sd[cut:], valid[cut:], alarm[cut:])
+    for a, b, c in zip(whole[:3], first, second, strict=True):
+        assert np.array_equal(a, np.concatenate([b, c]), equal_nan=True)
+
+
+def test_history_file_and_back(tmp_path):
+    history = History().with_periods("summer, 1.9 bar", "left", [Period(31.5, 30.2, 30.0)])
+    save_history(tmp_path / "h.json", history)
+    assert load_history(tmp_path / "h.json") == history
+    assert load_history(tmp_path / "none.json") == History()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "[]", "{}", '{"schema_version": 2, "slip_slope_history": {}}', '{"slip_slope_history": {}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": 3}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [3]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 3, "mean": "x", "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": NaN, "mean": 1, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": -3, "mean": 1, "seconds": 1}]}}}',
+    ],
+)  # fmt: skip
+def test_a_file_that_is_no_history(tmp_path, text):
+    path = tmp_path / "h.json"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"h\.json"):
+        load_history(path)
+
+
+# --- which wheels -----------------------------------------------------------------------------------------------------
+
+
+def test_pairs_of_each_drivetrain():
+    """C87: at the driven axle with one driven axle; per side, or the axles' means."""
+    assert [(p.place, p.wheel, p.i, p.j) for p in pairs(RWD)] == [
+        ("left", "rl", ("rl",), ("fl",)),
+        ("right", "rr", ("rr",), ("fr",)),
+    ]
+    fwd = Vehicle(drivetrain="fwd", torque_split_rear=0.0)
+    assert [(p.wheel, p.i, p.j) for p in pairs(fwd)] == [("fl", ("fl",), ("rl",)), ("fr", ("fr",), ("rr",))]
+    assert [(p.wheel, p.i, p.j) for p in pairs(AWD)] == [(None, ("fl",), ("rl",)), (None, ("fr",), ("rr",))]
+    assert [(p.i, p.j) for p in pairs(AWD, form="r")] == [(("rl",), ("fl",)), (("rr",), ("fr",))]
+    assert [(p.i, p.j) for p in pairs(AWD, per_axle=True)] == [(("fl", "fr"), ("rl", "rr"))]
+
+
+# --- simulated drives with series sensors -----------------------------------------------------------------------------
+
+
+def drive(vehicle, seed=5, memory=None, **kw):
+    base = {"duration_s": 40.0, "seed": seed, "speed": ((0.0, 25.0), (10.0, 28.0), (20.0, 25.0), (40.0, 28.0))}
+    scenario = Scenario(vehicle=vehicle, **(base | kw))
+    grid = np.arange(round(scenario.duration_s * 100)) / 100
+    columns = {
+        n: np.interp(grid, g.t, x)
+        for g in simulate(scenario).measured
+        if g.name != "truth"
+        for n, x in g.columns.items()
+    }
+    stream = DriveStream(vehicle, 10_000_000, [c for c in columns if c != "v_x"], memory=memory)
+    piece = stream.push(columns)
+    events = [e for e in (*piece.events, *stream.finish()) if e.detector == "slip_slope_drop"]
+    return events, stream
+
+
+SINE = Excitation("sine", 0.05, "mu", 8.0)
+SNOW = (Lane(20.0, 40.0, surface=SURFACES["snow"]),)
+
+
+def test_an_excited_all_wheel_drive_notices_snow_and_not_dry_road():
+    dry, stream = drive(AWD, excitation=SINE)
+    assert dry == []
+    for watch in stream.slope_watches:
+        assert watch.summary().slope == pytest.approx(31.0, rel=0.1)
+    events, _ = drive(AWD, excitation=SINE, lanes=SNOW)
+    assert {e.side for e in events} == {"left", "right"}
+    assert {e.wheel for e in events} == {None}
+    for event in events:
+        assert 20.0 < event.start_s < 26.0
+        assert event.end_s == pytest.approx(40.0)
+        assert event.evidence["slope_min"] < 0.5 * event.evidence["slope_ref"]
+        assert event.threshold == 0.5
+
+
+def test_at_the_load_share_it_is_blind_and_says_so():
+    """C95: equal slips on both axles; no alarm, and a reported blindness."""
+    even = replace(AWD, torque_split_rear=AWD.l_f / (AWD.l_f + AWD.l_r))
+    events, stream = drive(even, lanes=SNOW)
+    assert events == []
+    for watch in stream.slope_watches:
+        summary = watch.summary()
+        assert summary.seconds["blind"] > 0.95 * sum(summary.seconds.values())
+        assert summary.alarms == 0
+    (note,) = blindness([w.summary() for w in stream.slope_watches])
+    assert "left, right" in note
+    assert "both axles slip alike" in note
+
+
+def test_one_driven_axle_notices_snow_while_it_is_driven():
+    pulls = ((0.0, 22.0), (6.0, 26.0), (12.0, 22.0), (18.0, 26.0), (24.0, 23.0), (40.0, 30.0))
+    assert drive(RWD, speed=pulls)[0] == []
+    events, _ = drive(RWD, speed=pulls, lanes=SNOW)
+    assert {e.wheel for e in events} == {"rl", "rr"}
+    assert all(e.start_s > 20.0 for e in events)
+
+
+def test_history_goes_from_drive_to_drive():
+    """A car that starts on snow knows from the last drive what dry road is."""
+    _, stream = drive(AWD, excitation=SINE, duration_s=60.0)
+    slopes = [w.summary() for w in stream.slope_watches]
+    history = remembered(History(), "summer", slopes)
+    assert set(history.periods["summer"]) == {"left", "right"}
+    all_snow = (Lane(0.0, 40.0, surface=SURFACES["snow"]),)
+    without, _ = drive(AWD, excitation=SINE, lanes=all_snow)
+    assert without == []
+    events, _ = drive(AWD, excitation=SINE, lanes=all_snow, memory=Memory(history, "summer"))
+    assert {e.side for e in events} == {"left", "right"}
+    other, _ = drive(AWD, excitation=SINE, lanes=all_snow, memory=Memory(history, "winter"))
+    assert other == []
+
+
+def test_history_of_the_command(tmp_path):
+    samples = Path(__file__).parents[2] / "sample_logs"
+    path = tmp_path / "slopes.json"
+    save_history(path, History().with_periods("worn, 1.9 bar", "left", [Period(62.0, 60.0, 30.0)]))
+    args = ["--vehicle", samples / "vehicle.toml", "--history", path, "--configuration", "worn, 1.9 bar", "--json"]
+
+    def run(*more):
+        command = [sys.executable, "-m", "aqualog", "detect", samples / "lane_drive.mf4", *args, *more]
+        return subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+
+    result = run()
+    assert result.returncode == 0, result.stderr
+    left, right = json.loads(result.stdout)["slip_slope"]
+    assert left["reference"] == pytest.approx(60.0)
+    assert right["reference"] == pytest.approx(31.0)  # the vehicle file's
+    assert "worn, 1.9 bar" in json.loads(path.read_text())["slip_slope_history"]
+    assert run("--reference", "median").returncode == 2
+    path.write_text("{}")
+    failed = run()
+    assert failed.returncode == 2
+    assert "slopes.json" in failed.stderr
+    assert path.read_text() == "{}"
