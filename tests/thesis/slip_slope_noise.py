@@ -99,11 +99,13 @@ def outcome(seed: int, surface: str, split: float, *, excited: bool) -> Outcome:
     end = change if np.isfinite(change) else DURATION
     after = [e.start_s - change for e in events if change <= e.start_s < change + 20.0]
     t = np.arange(round(DURATION * RATE)) / RATE
-    slope = np.nanmean([piece.features["slip_slope_left"], piece.features["slip_slope_right"]], axis=0)
+    # both sides see the same; where one is NaN it tells nothing
+    slope = 0.5 * (piece.features["slip_slope_left"] + piece.features["slip_slope_right"])
     judged = blind = 0.0
     for summary in (w.summary() for w in stream.slope_watches):
         judged += sum(summary.seconds[k] for k in ("estimating", "slope_frozen", "blind"))
         blind += summary.seconds["blind"]
+
     def true_share(axle: str) -> float:
         names = [f"true_slip_slope_{axle}{side}" for side in "lr"]
         value = np.mean([simulation.truth.columns[n] for n in names], axis=0)

@@ -17,7 +17,7 @@ class Tuning(NamedTuple):
     # variance that a parameter's random walk gains per second
     q_k: float = 1e-8  # [1/s] 2.3 % of a dry slope in a minute
     q_beta: float = 1e-8  # [1/s] tyres warm up unevenly: 0.1 % in a minute
-    q_delta: float = 1e-10  # [1/s] radii: follows a drift with a lag of about 40 s
+    q_delta: float = 1e-9  # [1/s] radii: follows a drift with a lag of about 12 s
     # standard deviations at the start
     sd_k: float = 0.01  # slopes of 25 to 50 about 33
     sd_beta: float = 0.05

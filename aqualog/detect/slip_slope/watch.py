@@ -13,6 +13,7 @@ from aqualog.detect.slip_slope import activation, drop, estimator
 from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
 from aqualog.detect.slip_slope.history import History, Rule
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
+from aqualog.features.smoothing import UNSET, lowpass
 from aqualog.notation import AXLES, SIDES
 from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
 from aqualog.types import BoolArray, FloatArray, SlopeSummary
@@ -22,6 +23,8 @@ __all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
 
 VARIANCE_MAX = 4.0  # [(m/s^2)^2] "variance of the wheel acceleration below a threshold" (C68); tooth noise is below 1
 TAU_VARIANCE = 0.3  # [s]
+# slip and traction alike: noise of the traction (a wheel's acceleration is in it) would flatten slip over traction
+TAU_SMOOTH = 0.15  # [s]
 
 Form = Literal["f", "r"]
 
@@ -115,6 +118,7 @@ class SlipSlopeWatch:
         self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
         self._variances = {w: ewvar.initial_state() for w in (*pair.i, *pair.j)}
+        self._smoothed: dict[str, float] = {}
         self._dt = dt
         self._counts = np.zeros(len(STATUS))
         self._reasons = np.zeros(len(activation.REASONS))
@@ -124,10 +128,11 @@ class SlipSlopeWatch:
     def push(self, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], yaw_rate: FloatArray) -> Watched:
         """Take the features of the next piece."""
         i, j = self.pair.i, self.pair.j
-        s_delta = differential_slip(_mean(f, "v_line", i), _mean(f, "v_line", j))
-        mu_i = _mean(f, "mu", i)
+        slip = differential_slip(_mean(f, "v_line", i), _mean(f, "v_line", j))
+        s_delta = self._smooth("s_delta", slip)
+        mu_i = self._smooth("mu_i", _mean(f, "mu", i))
         # a free wheel's own rolling resistance is a slip that never changes: it goes to the offset
-        rho_mu_j = (1.0 - s_delta) * _mean(f, "mu", j) if self._two_driven else np.zeros_like(mu_i)
+        rho_mu_j = self._smooth("mu_j", (1.0 - slip) * _mean(f, "mu", j)) if self._two_driven else 0.0 * mu_i
         reason = activation.inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=yaw_rate,
             a_w_delta=np.max([np.abs(f[f"a_w_delta_{w}"]) for w in (*i, *j)], axis=0),
@@ -166,6 +171,10 @@ class SlipSlopeWatch:
             },
             periods=tuple((p.largest, p.mean, p.seconds) for p in drop.completed(self._drop)),
         )
+
+    def _smooth(self, name: str, x: FloatArray) -> FloatArray:
+        y, self._smoothed[name] = lowpass(x, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
+        return y
 
     def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
         calm = np.ones(f["v_x_hat"].size, dtype=bool)
