@@ -6,6 +6,7 @@ import pytest
 from conftest import ROOT
 
 from aqualog.config.scenario import SCENARIO_KEYS
+from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.effects import EFFECTS
 from aqualog.model.tyre import TYRE_KEYS
 from aqualog.notation import ACCEPTED, SYMBOLS
@@ -25,7 +26,7 @@ def test_signals(name):
     assert f"`{name}`" in README or f"`{stem}_fl ... rr`" in README
 
 
-@pytest.mark.parametrize("command", ["detect", "inspect", "convert", "align", "simulate"])
+@pytest.mark.parametrize("command", ["detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope"])
 def test_commands(command):
     assert f"`{command} " in README
 
@@ -40,6 +41,17 @@ def test_detectors_of_the_contract_are_explained():
 
     for name in DETECTORS:
         assert f"`{name}`" in README
+
+
+def test_tuning_of_the_slip_slope():
+    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([^|]+) \|", README, re.M)
+    said = {}
+    for names, values in rows:
+        numbers = [float(x) for x in re.findall(r"\d[\d.]*(?:e-?\d+)?", values)]
+        said |= dict(zip(re.findall(r"`(\w+)`", names), numbers, strict=False))
+    for name, value in TUNING._asdict().items():
+        if name != "adapted":
+            assert said[name] == pytest.approx(value), name
 
 
 @pytest.mark.parametrize("key", list(SCENARIO_KEYS.values()), ids=lambda k: k.path)

@@ -24,7 +24,8 @@ def figures(
     numbers: Annotated[
         list[str],
         typer.Argument(
-            help="Figures of the thesis by number (3.6), by chapter (3), or all.", metavar="NUMBER...",
+            help="Figures of the thesis by number (3.6), by chapter (3), or all.",
+            metavar="NUMBER...",
             show_default=False,
         ),
     ],
@@ -59,12 +60,13 @@ def _figures(asked: list[str], out: Path, *, as_json: bool, force: bool, console
     import time
 
     from aqualog.cli.files import refuse_existing, write_text
-    from aqualog.figures.catalogue import chosen, make, stem
+    from aqualog.figures.catalogue import chosen, make
     from aqualog.figures.export import figure_csv
     from aqualog.figures.page import render_figures
+    from aqualog.figures.record import stem_of
 
     numbers = chosen(asked)
-    names = [f"{stem(n)}{suffix}" for n in numbers for suffix in (".html", ".csv")]
+    names = [f"{stem_of(n)}{suffix}" for n in numbers for suffix in (".html", ".csv")]
     if len(numbers) > 1:
         names.append(_ALL_ON_ONE)
     refuse_existing([out / n for n in names], force=force)
@@ -93,7 +95,9 @@ def _print(made: list[Figure], files: list[str], *, as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps(document(made, files), indent=1, allow_nan=False) + "\n")
         return
+    from textwrap import shorten
+
     from aqualog.report.text import table
 
-    rows = [(c.claim, f.number, c.verdict, c.found) for f in made for c in f.findings]
+    rows = [(c.claim, f.number, c.verdict, shorten(c.found, 100, placeholder=" ...")) for f in made for c in f.findings]
     sys.stdout.write(table(("claim", "figure", "verdict", "found"), rows) + "\n")

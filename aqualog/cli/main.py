@@ -14,6 +14,7 @@ from aqualog.cli.detect import detect
 from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
 from aqualog.cli.simulate import simulate
+from aqualog.cli.slip_slope import slip_slope
 
 __all__ = ["app", "run"]
 
@@ -30,6 +31,7 @@ app.command(no_args_is_help=True)(detect)
 app.command(no_args_is_help=True)(inspect)
 app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
+app.command(no_args_is_help=True)(slip_slope)
 app.command(no_args_is_help=True)(simulate)
 app.command(no_args_is_help=True)(figures)
 

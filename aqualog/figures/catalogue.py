@@ -6,17 +6,11 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from aqualog.errors import ConfigError
-from aqualog.figures.record import Figure
+from aqualog.figures.record import Figure, stem_of
 
-__all__ = ["NUMBERS", "chosen", "make", "stem"]
+__all__ = ["NUMBERS", "chosen", "make"]
 
 NUMBERS = tuple(f"3.{n}" for n in range(1, 12))
-
-
-def stem(number: str) -> str:
-    """Name of a figure's files: figure_3_06 for 3.6."""
-    chapter, n = number.split(".")
-    return f"figure_{chapter}_{int(n):02d}"
 
 
 def make(number: str) -> Figure:
@@ -27,7 +21,7 @@ def make(number: str) -> Figure:
     number : str
         One of `NUMBERS`.
     """
-    module = import_module(f"aqualog.figures.{stem(number).replace('figure', 'fig')}")
+    module = import_module(f"aqualog.figures.{stem_of(number).replace('figure', 'fig')}")
     figure: Figure = module.make()
     return figure
 

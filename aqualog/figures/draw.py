@@ -11,10 +11,12 @@ from aqualog.figures.record import Axis, Line, Panel, Sheet
 from aqualog.report.theme import GRID, INK, MUTED
 from aqualog.types import FloatArray
 
-__all__ = ["HEIGHT_PX", "panel_figure", "rounded"]
+__all__ = ["PLOT_PX", "panel_figure", "rounded"]
 
-HEIGHT_PX = 430
-_LARGEST_PX = 16.0  # dot with the most samples
+PLOT_PX = 380  # height without the legend
+_WIDTH_PX = 524.0  # of the legend in a narrow panel
+_SAMPLES = 100.0  # behind a dot of `_DOT_PX`
+_DOT_PX = 12.0
 _DIGITS = 6
 
 
@@ -31,7 +33,7 @@ def rounded(values: FloatArray) -> list[float | None]:
 
 
 def _line(line: Line, *, is_solid: bool) -> dict[str, Any]:
-    # plotly has no dashes "dash" and markers in one name for both kinds of trace; widths in 3-D are about doubled
+    # a line in space looks half as wide as one in the plane
     trace: dict[str, Any] = {
         "type": "scatter3d" if is_solid else "scatter",
         "name": line.name,
@@ -59,9 +61,8 @@ def _sizes(line: Line, *, is_solid: bool) -> float | list[float]:
     scale = 0.6 if is_solid else 1.0
     if line.count is None or not line.count.size:
         return line.size * scale
-    # the area of a dot is its number of samples
-    largest = float(line.count.max())
-    return [round(max(_LARGEST_PX * math.sqrt(c / largest), 1.5), 2) for c in line.count.tolist()]
+    # the area of a dot is its number of samples, alike in all panels
+    return [round(max(_DOT_PX * math.sqrt(c / _SAMPLES), 2.0), 2) for c in line.count.tolist()]
 
 
 def _sheet(sheet: Sheet) -> dict[str, Any]:
@@ -89,36 +90,55 @@ def _axis(axis: Axis) -> dict[str, Any]:
         "tickcolor": MUTED,
         "tickfont": {"size": 11},
     }
-    if axis.is_log:
-        # octaves, not decades
-        out |= {"type": "log", "dtick": math.log10(2.0)}
+    if axis.log_base:
+        # a tick an octave or a decade
+        out |= {"type": "log", "dtick": math.log10(axis.log_base)}
     if axis.limits is not None:
-        out["range"] = [math.log10(v) if axis.is_log else v for v in axis.limits]
+        out["range"] = [math.log10(v) if axis.log_base else v for v in axis.limits]
     return out
 
 
+def _legend_px(panel: Panel) -> int:
+    """Room that the legend takes: its entries set in lines as they come."""
+    rows, used = 1, 0.0
+    for name in [s.name for s in panel.sheets] + [line.name for line in panel.lines if line.in_legend]:
+        width = 45.0 + 5.5 * len(name)
+        if used + width > _WIDTH_PX and used > 0.0:
+            rows, used = rows + 1, 0.0
+        used += width
+    return 10 + 19 * rows
+
+
 def _layout(panel: Panel) -> dict[str, Any]:
+    legend = _legend_px(panel)
     layout: dict[str, Any] = {
-        "title": {"text": panel.title, "font": {"size": 14}, "x": 0.01, "xanchor": "left", "y": 0.985, "yanchor": "top"},
         "font": {"color": INK, "size": 12, "family": 'system-ui, "Segoe UI", Helvetica, Arial, sans-serif'},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "height": HEIGHT_PX,
-        "margin": {"l": 60, "r": 16, "t": 34, "b": 50},
-        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top", "font": {"size": 11}},
+        "height": PLOT_PX + legend,
+        "margin": {"l": 60, "r": 16, "t": 26, "b": 52 + legend},
+        "legend": {
+            "orientation": "h",
+            "x": 0,
+            "y": 0,
+            "yref": "container",
+            "yanchor": "bottom",
+            "font": {"size": 11},
+        },
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "hovermode": "closest",
     }
     if panel.z is None:
         layout["xaxis"] = _axis(panel.x)
         layout["yaxis"] = _axis(panel.y)
         return layout
-    layout["margin"] = {"l": 0, "r": 0, "t": 34, "b": 0}
-    layout["legend"]["y"] = 0.0
+    layout["height"] += 60
+    layout["margin"] = {"l": 0, "r": 0, "t": 20, "b": legend}
     layout["scene"] = {
         "xaxis": _axis(panel.x),
         "yaxis": _axis(panel.y),
         "zaxis": _axis(panel.z),
         "aspectmode": "cube",
-        "camera": {"eye": {"x": -1.5, "y": -1.6, "z": 0.9}},
+        "camera": {"eye": {"x": -1.45, "y": -1.5, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}},
     }
     return layout

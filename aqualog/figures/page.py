@@ -44,7 +44,7 @@ def render_figures(figures: Sequence[Figure], *, title: str) -> str:
         scripts={name: Markup(text) for name, text in scripts.items()},
         data=offline.json_island(plots),
         figures=figures,
-        panels=ids,
+        panels={f.stem: list(zip(ids[f.stem], f.panels, strict=True)) for f in figures},
         counts=_counts(figures),
     )  # fmt: skip
 

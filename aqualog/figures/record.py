@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +10,7 @@ from aqualog.types import FloatArray
 
 __all__ = [
     "BORNE_OUT", "IN_PART", "NOT_BORNE_OUT", "Axis", "Figure", "Finding", "Line", "Panel", "Sheet", "Table", "Verdict",
-    "judged", "seconds", "worst",
+    "judged", "seconds", "stem_of",
 ]  # fmt: skip
 
 Verdict = Literal["borne out", "in part", "not borne out"]
@@ -22,12 +21,15 @@ NOT_BORNE_OUT: Verdict = "not borne out"
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Label and unit of an axis; `limits` where not all data shall set the view, `is_log` for a logarithmic one."""
+    """Label and unit of an axis.
+
+    `limits` where not all data shall set the view, `log_base` 2 or 10 for a logarithmic one.
+    """
 
     label: str
     unit: str = "-"
     limits: tuple[float, float] | None = None
-    is_log: bool = False
+    log_base: int = 0
 
     @property
     def title(self) -> str:
@@ -117,19 +119,19 @@ class Figure:
 
     @property
     def stem(self) -> str:
-        """Name of its files: figure_3_06 for 3.6."""
-        chapter, n = self.number.split(".")
-        return f"figure_{chapter}_{int(n):02d}"
+        """Name of its files."""
+        return stem_of(self.number)
+
+
+def stem_of(number: str) -> str:
+    """Name of a figure's files: figure_3_06 for 3.6."""
+    chapter, n = number.split(".")
+    return f"figure_{chapter}_{int(n):02d}"
 
 
 def judged(*, whole: bool, part: bool = False) -> Verdict:
     """Verdict of a criterion and of its weaker form."""
     return BORNE_OUT if whole else IN_PART if part else NOT_BORNE_OUT
-
-
-def worst(verdicts: Sequence[Verdict]) -> Verdict:
-    """The least favourable one."""
-    return max(verdicts, key=(BORNE_OUT, IN_PART, NOT_BORNE_OUT).index)
 
 
 def seconds(t: float) -> str:

@@ -15,8 +15,8 @@ from aqualog.physics.differential import differential_slip, speed_ratio
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
-    "GATE_OFF", "HIGH_SLOPE", "LOW_SLOPE", "RATE_HZ", "SUV", "Case", "Drive", "adaption_time", "drive",
-    "estimate", "false_alarms", "first_alarm", "inputs", "is_used", "slope_at",
+    "GATE_OFF", "HIGH_MU", "HIGH_SLOPE", "LOW_MU", "LOW_SLOPE", "RATE_HZ", "SUV", "Case", "Drive", "adaption_time",
+    "drive", "estimate", "false_alarms", "first_alarm", "inputs", "is_used", "slope_at",
 ]  # fmt: skip
 
 HIGH_SLOPE, LOW_SLOPE = 30.0, 10.0  # C_s / F_z on both axles before and after the change (thesis 3.3) [-]
@@ -138,5 +138,3 @@ def adaption_time(d: Drive, e: Estimate, *, within: float = 0.1, after: float = 
     span = (d.t >= t_alarm - 1e-6) & (d.t <= t_alarm + after)
     outside = np.flatnonzero(np.abs(e.slope[span] - final) > within * final)
     return float((outside[-1] + 1) / RATE_HZ) if outside.size else 0.0
-
-

@@ -1,12 +1,13 @@
-"""Traction coefficient from wheel torque."""
+"""Traction coefficient from wheel torque, or from the acceleration that it gives."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from aqualog.physics.resistance import air_drag, rolling_resistance_force
 from aqualog.types import FloatArray
 
-__all__ = ["DELTA_A_WATER", "residual_traction", "traction_coefficient"]
+__all__ = ["DELTA_A_WATER", "residual_traction", "traction_coefficient", "traction_of_one_axle"]
 
 
 DELTA_A_WATER = 0.2  # [m/s^2] thesis 2.2: less than that is no sign of water (snow, an offset, wind)
@@ -69,3 +70,51 @@ def residual_traction(mu: FloatArray, delta_a_x: FloatArray, F_z: FloatArray, *,
     with np.errstate(invalid="ignore", divide="ignore"):
         reduced = mu - mass * np.maximum(delta_a_x - DELTA_A_WATER, 0.0) / F_z
     return np.where(F_z > 100.0, reduced, np.nan)
+
+
+def traction_of_one_axle(
+    a_x: FloatArray,
+    a_kin: FloatArray,
+    v_x: FloatArray,
+    F_z: FloatArray,
+    F_z_free: FloatArray,
+    *,
+    mass: float,
+    r_w: float,
+    drag_area: float,
+    air_density: float,
+    free_wheel_mass: float,
+) -> FloatArray:
+    """Traction coefficients of the only driven axle's wheels, from the accelerometer.
+
+    Parameters
+    ----------
+    a_x : array (n,)
+        Specific force, forward: what an accelerometer shows. [m/s^2]
+    a_kin : array (n,)
+        Kinematic acceleration, for the inertia of the free wheels. [m/s^2]
+    v_x : array (n,)
+        Velocity. [m/s]
+    F_z, F_z_free : array (2, n)
+        Wheel loads of the driven and of the free axle. [N]
+    mass, r_w, drag_area, air_density : float
+        Vehicle. [kg, -, m^2, kg/m^3]
+    free_wheel_mass : float
+        I / r_e^2 of both free wheels together. [kg]
+
+    Returns
+    -------
+    mu : array (2, n)
+        Driving positive; the axle's force is halved to its wheels (an open differential). NaN where a wheel carries
+        less than 100 N. [-]
+
+    F_x = m a_x + drag + r_w F_z_free + I/r^2 a_kin: the contact force itself, so that it compares with
+    `traction_coefficient`. A grade is in a_x as it is in the force (E2, E13). Holds while no brake acts. A constant
+    error of the accelerometer shifts mu; an error of its scale scales it, and so does pitch: a body that tilts by
+    1 deg at 1 g shows 1.7 % too much. The mass counts by the drag only, its distribution fully.
+    """
+    resisting = air_drag(v_x, drag_area=drag_area, air_density=air_density)
+    resisting = resisting + rolling_resistance_force(F_z_free, r_w=r_w).sum(axis=0) + free_wheel_mass * a_kin
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mu: FloatArray = 0.5 * (mass * a_x + resisting) / F_z
+    return np.where(F_z > 100.0, mu, np.nan)

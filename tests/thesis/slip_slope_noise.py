@@ -149,9 +149,10 @@ def line(condition, outcomes: list[Outcome]) -> str:
         q = np.nanquantile(delays, [0.05, 0.5, 0.95]) if np.isfinite(delays).any() else [np.nan] * 3
         row += f" | found {np.isfinite(delays).mean():4.0%}, delay 5/50/95 %: {q[0]:5.2f} {q[1]:5.2f} {q[2]:5.2f} s"
         row += f" | slope {np.nanmedian([o.slope_after for o in outcomes]):5.1f}"
-        halved = np.array([0.5 * (o.true_share_f + o.true_share_r) < 0.5 for o in outcomes])
-        found = np.isfinite(delays)
-        row += f" | truly halved {halved.sum():3d}, of them found {found[halved].sum():3d}, of others {found[~halved].sum():3d}"
+        share, found = np.array([o.true_share_f for o in outcomes]), np.isfinite(delays)
+        bins = [(share < 0.5), (share >= 0.5) & (share < 0.7), (share >= 0.7)]
+        row += " | found by true front slope < 0.5, < 0.7, above: "
+        row += ", ".join(f"{found[b].sum()}/{b.sum()}" for b in bins)
     before = np.array([o.slope_before for o in outcomes])
     row += f" | false {false} in {hours:4.1f} h | blind {np.mean([o.blind for o in outcomes]):4.0%}"
     return row + f" | dry slope {np.nanmedian(before):5.1f} +- {np.nanstd(before):4.1f}"

@@ -8,24 +8,26 @@ __all__ = ["cusum_input"]
 
 
 @compiled
-def cusum_input(innovation, slip, adapted):  # type: ignore[no-untyped-def]
-    """What is summed up: the prediction error, or that in the direction of the slip.
+def cusum_input(innovation, direction, adapted):  # type: ignore[no-untyped-def]
+    """What is summed up: the prediction error, or that in the direction of the traction.
 
     Parameters
     ----------
     innovation : float
         epsilon = y - h(x, 0). [-]
-    slip : float
-        Differential slip without its estimated offset, s_delta - delta. With the offset in it, which is often larger
-        than the slip, the sign would not alternate (E12). [-]
+    direction : float
+        What has the sign of the slip: the differential traction mu_delta. The thesis takes the differential slip, in
+        which the radii's error is often larger than the slip, so that its sign does not alternate; with the estimated
+        offset taken out it does (E12), but it then holds the same noise as epsilon, and sgn(u + v) v drifts upwards
+        by up to 0.8 of the noise's rms. The traction has neither. [-]
     adapted : bool
-        True: sgn(slip) epsilon, positive where the slip is larger than the slope explains, whichever way the traction
-        goes. False: epsilon.
+        True: sgn(direction) epsilon, positive where the slip is larger than the slope explains, whichever way the
+        traction goes. False: epsilon.
 
     Thesis: Eq. (3.23); adapted, (3.25) with E12. The sums (3.24) are `detect.cusum.step`.
     """
     if not adapted:
         return innovation
-    if slip > 0.0:
+    if direction > 0.0:
         return innovation
-    return -innovation if slip < 0.0 else 0.0
+    return -innovation if direction < 0.0 else 0.0

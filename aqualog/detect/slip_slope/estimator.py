@@ -91,7 +91,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
     b, window, g_drop, g_rise, before_drop, before_rise, settling = state
     for i in range(y.size):
         innovation, variance, alarm, status, beta_told = math.nan, math.nan, 0.0, INACTIVE, False
-        if is_active[i] and not (math.isnan(y[i]) or math.isnan(mu_i[i]) or math.isnan(rho_mu_j[i])):
+        if is_active[i] and math.isfinite(y[i]) and math.isfinite(mu_i[i]) and math.isfinite(rho_mu_j[i]):
             mu_delta = mu_i[i] - b.beta * rho_mu_j[i]
             if abs(mu_delta) > p.mu_max:
                 status = TOO_LARGE
@@ -111,7 +111,6 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                     p.q_beta if has_traction and beta_told else 0.0,
                     p.q_delta if learn_delta else 0.0,
                 )
-                slip = y[i] - b.delta
                 b, innovation, variance = ekf.update(
                     b, y[i], mu_i[i], rho_mu_j[i], p.r, has_traction, has_traction and beta_told, learn_delta
                 )
@@ -121,7 +120,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 )  # fmt: skip
                 settling = max(settling - 1, 0)
                 if has_traction:
-                    nu = cusum_input(innovation, slip, p.adapted)
+                    nu = cusum_input(innovation, mu_delta, p.adapted)
                     g_drop = cusum.step(sums, g_drop, nu)
                     g_rise = cusum.step(sums, g_rise, -nu)
                     if g_drop == 0.0:
@@ -138,6 +137,9 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                         )
                         g_drop, g_rise = 0.0, 0.0
                         settling = p.settle if settling == 0 else settling
+        if status > BLIND:
+            # radii go on drifting while nothing can be seen of them
+            b = ekf.predict(b, 0.0, 0.0, p.q_delta)
         out[0, i] = 1.0 / b.k
         out[1, i] = math.sqrt(b.P_kk) / (b.k * b.k)
         out[2, i] = b.beta

@@ -1,0 +1,154 @@
+"""Whether the slip slope stayed the same over a session."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.detect.slip_slope.regression import Interval, Line, fit_line, fit_trend
+from aqualog.types import FloatArray
+
+__all__ = ["Segment", "Stability", "Verdict", "block_labels", "judge_stability", "make_segments"]
+
+Verdict = Literal["stable", "drifts", "varies", "cannot tell"]
+
+BLOCK_S = (10.0, 30.0)  # [s] noise of the slip is correlated over a second, its offset over some more
+BLOCKS = 40  # of a long session
+SEGMENT_BLOCKS = 6  # of one segment
+MOST_SEGMENTS = 12
+SAME = 0.20  # change of the slope up to which it is stable: a few tenths of a bar, some ten degrees
+LEAST = 0.10  # change that is called a drift
+SURE = 2.0  # how many times its own interval a segment must lie off; of a dozen, one in thirty sessions does by chance
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A part of the session: from first to last used sample [s], used time [s], and its own line."""
+
+    start_s: float
+    end_s: float
+    seconds: float
+    line: Line
+
+
+@dataclass(frozen=True, slots=True)
+class Stability:
+    """`change` of the slope over `span_s` and `per_hour`, relative, with 95 % intervals; NaN where not told."""
+
+    verdict: Verdict
+    sentence: str
+    span_s: float
+    change: float
+    change_ci: Interval
+    per_hour: float
+    per_hour_ci: Interval
+
+
+def block_labels(t: FloatArray) -> NDArray[np.int64]:
+    """Block of each sample; a block holds what lies within 10 to 30 s, so that a long session has about 40.
+
+    Parameters
+    ----------
+    t : array (n,)
+        Ascending. [s]
+    """
+    if t.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    length = float(np.clip((t[-1] - t[0]) / BLOCKS, *BLOCK_S))
+    label = np.empty(t.size, dtype=np.int64)
+    begin, block = 0, 0
+    while begin < t.size:
+        end = int(np.searchsorted(t, t[begin] + length))
+        label[begin:end] = block
+        begin, block = end, block + 1
+    return label
+
+
+def make_segments(
+    t: FloatArray, mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, dt: float, noise: float
+) -> tuple[Segment, ...]:
+    """Cut the used samples into parts of six blocks and more, at most 12, each with a line of its own."""
+    blocks = int(label[-1]) + 1 if label.size else 0
+    count = min(MOST_SEGMENTS, blocks // SEGMENT_BLOCKS)
+    if count < 2:
+        return ()
+    which = label * count // blocks
+    parts = [np.flatnonzero(which == i) for i in range(count)]
+    return tuple(
+        Segment(float(t[p[0]]), float(t[p[-1]]) + dt, p.size * dt, fit_line(mu[p], slip[p], label[p], noise=noise))
+        for p in parts
+    )
+
+
+def judge_stability(
+    t: FloatArray,
+    mu: FloatArray,
+    slip: FloatArray,
+    label: NDArray[np.int64],
+    *,
+    whole: Line,
+    segments: tuple[Segment, ...],
+    noise: float,
+) -> Stability:
+    """Say whether the slope was stable.
+
+    Parameters
+    ----------
+    t, mu, slip, label : array (n,)
+        Used samples.
+    whole : Line
+        Of all of them.
+    segments : tuple of Segment
+    noise : float
+        As in `fit_line`.
+
+    Returns
+    -------
+    Stability
+        `drifts` where the interval of the trend does not hold 0 and its middle is beyond 10 %; else `varies` where a
+        segment lies off the median of all by more than 20 % and by twice its own interval; `stable` where the
+        interval of the trend lies within +-20 %; else `cannot tell`.
+    """
+    span = float(t[-1] - t[0]) if t.size else 0.0
+    nothing = (math.nan, math.nan)
+    if not whole.told or len(segments) < 2:
+        text = "cannot tell: too few stretches of usable driving to compare parts of the session"
+        return Stability("cannot tell", text, span, math.nan, nothing, math.nan, nothing)
+    trend = fit_trend(t, mu, slip, label, noise=noise)
+    low, high = trend.change_ci
+    verdict, sentence = _verdict(trend.change, low, high, span, segments)
+    rate, rate_low, rate_high = (_per_hour(x, span) for x in (trend.change, low, high))
+    return Stability(verdict, sentence, span, trend.change, (low, high), rate, (rate_low, rate_high))
+
+
+def _per_hour(change: float, span: float) -> float:
+    """Relative change in an hour at the same rate; no slope falls by more than 100 %."""
+    exponent = math.log1p(change) * 3600.0 / span if change > -1.0 else -math.inf
+    return math.expm1(min(exponent, 50.0))
+
+
+def _verdict(
+    change: float, low: float, high: float, span: float, segments: tuple[Segment, ...]
+) -> tuple[Verdict, str]:
+    bounds = f"{100 * change:+.0f} % over {span / 60.0:.1f} min (95 %: {100 * low:+.0f} ... {100 * high:+.0f} %)"
+    if (low > 0.0 or high < 0.0) and abs(change) > LEAST:
+        return "drifts", f"drifts: {bounds}"
+    usual = float(np.nanmedian([s.line.k for s in segments]))
+    odd = [s for s in segments if _lies_off(s.line, usual)]
+    if odd:
+        s = max(odd, key=lambda s: abs(s.line.k - usual))
+        part = f"min {s.start_s / 60.0:.1f} to {s.end_s / 60.0:.1f}"
+        return "varies", f"varies: {1.0 / s.line.k:.1f} from {part}, usually {1.0 / usual:.1f}"
+    if low > -SAME and high < SAME:
+        return "stable", f"stable: {bounds}"
+    return "cannot tell", f"cannot tell: {bounds}"
+
+
+def _lies_off(line: Line, usual: float) -> bool:
+    reach = 0.5 * (line.k_ci[1] - line.k_ci[0])
+    off = abs(line.k - usual)
+    return off > SURE * reach and off > SAME * abs(usual)

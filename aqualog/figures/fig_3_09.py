@@ -1,0 +1,201 @@
+"""Figure 3.9: slow and fast excitation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aqualog.detect.slip_slope.tuning import TUNING, Tuning
+from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table, judged, seconds
+from aqualog.figures.study import GATE_OFF, Case, adaption_time, drive, estimate, first_alarm, inputs
+from aqualog.figures.timeline import COLOURS, SLOPE, TIME, detection_time, estimate_lines, listed, true_slope
+
+__all__ = ["OCTAVES", "PANELS", "make"]
+
+OCTAVES = (64.0, 32.0, 16.0, 8.0, 4.0, 2.0)
+PANELS: dict[str, Case] = {
+    "sine, minimum of differential traction": Case("sine", tuning=TUNING, t_end=30.0),
+    "triangle, every sample": Case("triangle", tuning=GATE_OFF, t_end=30.0),
+}
+_FINE = tuple(float(2.0 ** (k / 4.0)) for k in range(25))  # 1 to 64 s
+_END = 16.0
+_WITHIN = 2.0  # largest over smallest adaption time that counts as similar
+_VARIANTS = {
+    "as tuned": (1.0, 1.0), "zeta halved": (0.5, 1.0), "zeta doubled": (2.0, 1.0), "h halved": (1.0, 0.5),
+    "h doubled": (1.0, 2.0),
+}  # fmt: skip
+
+
+def _tuned(tuning: Tuning, zeta: float, h: float) -> Tuning:
+    return tuning._replace(zeta=zeta * tuning.zeta, h=h * tuning.h)
+
+
+def _times(case: Case, periods: tuple[float, ...]) -> list[float]:
+    return [detection_time(replace(case, period=p)) for p in periods]
+
+
+def _fastest(periods: tuple[float, ...], times: list[float]) -> float:
+    """Period of the shortest detection time; NaN if nothing was found. [s]"""
+    return float("nan") if np.all(np.isnan(times)) else periods[int(np.nanargmin(times))]
+
+
+def _is_u(times: list[float]) -> bool:
+    """Longer at both ends of the periods than at the least, by a fifth; nothing found counts as longer."""
+    if np.all(np.isnan(times)):
+        return False
+    least = float(np.nanmin(times))
+    return all(np.isnan(t) or t > 1.2 * least for t in (times[0], times[-1]))
+
+
+def _at_alarm(case: Case) -> tuple[float, float, float]:
+    """Detection time, size of the differential traction there, and adaption time; NaN without an alarm."""
+    d, e = drive(case), estimate(case)
+    t = first_alarm(d, e)
+    if np.isnan(t):
+        return t, t, t
+    _, mu_i, rho_mu_j = inputs(d, case.car)
+    k = int(np.searchsorted(d.t, t - 1e-6))
+    return t, float(abs(mu_i[k] - e.beta[k] * rho_mu_j[k])), adaption_time(d, e)
+
+
+def make() -> Figure:
+    """Estimates over six octaves of the period, and the detection time over a finer grid."""
+    octaves = {n: _times(c, OCTAVES) for n, c in PANELS.items()}
+    best = {n: _fastest(OCTAVES, t) for n, t in octaves.items()}
+    fine = {
+        n: {v: _times(replace(c, tuning=_tuned(c.tuning, *k)), _FINE) for v, k in _VARIANTS.items()}
+        for n, c in PANELS.items()
+    }
+    fine_best = {n: {v: _fastest(_FINE, t) for v, t in f.items()} for n, f in fine.items()}
+    c108 = Finding(
+        "C108",
+        "From 64 s on the detection time falls with shorter periods to a minimum at 8 s, and rises for still shorter "
+        "ones.",
+        "minimum over the octaves from 64 to 2 s at 8 s, sine with and triangle without a minimum of differential "
+        "traction; in part: longer at both ends than at the least in both",
+        "; ".join(
+            f"{n.split(',')[0]}: {listed(octaves[n])} s, least at {_period(best[n])} (finer grid: "
+            f"{_period(fine_best[n]['as tuned'])})"
+            for n in PANELS
+        ) + f" for {' / '.join(f'{p:g}' for p in OCTAVES)} s",
+        judged(whole=all(b == 8.0 for b in best.values()), part=all(_is_u(t) for t in octaves.values())),
+        "The least lies where the first half wave just carries the sum over the threshold: "
+        + "; ".join(f"{n.split(',')[0]} down to {_period(_first_half(fine[n]['as tuned']))}" for n in PANELS)
+        + ". With a shorter period its end comes before, and a later half wave must do; with a longer one the force "
+        "rises more slowly and the filter follows by itself.",
+        _finite(best["sine, minimum of differential traction"]),
+    )  # fmt: skip
+    optimum = Finding(
+        "C108 (tuning)",
+        "When adjusting the CUSUM parameters, the optimal periods may change.",
+        "halving and doubling zeta and h moves the fastest period on the finer grid by a factor of more than 1.4 in "
+        "both cases; in part: in one",
+        "; ".join(
+            f"{n.split(',')[0]}: " + ", ".join(f"{v} {_period(p)}" for v, p in fine_best[n].items()) for n in PANELS
+        ),
+        judged(
+            whole=all(_spread(b) > 1.4 for b in fine_best.values()),
+            part=any(_spread(b) > 1.4 for b in fine_best.values()),
+        ),
+        value=_finite(max(_spread(b) for b in fine_best.values())),
+    )
+    alarms = {n: [_at_alarm(replace(c, period=p)) for p in OCTAVES] for n, c in PANELS.items()}
+    spreads = {n: _spread_of([a[2] for a in rows]) for n, rows in alarms.items()}
+    slowest = max((a[2] for rows in alarms.values() for a in rows if not np.isnan(a[2])), default=0.0)
+    c109 = Finding(
+        "C109",
+        "The adaption time to the new slope is similar for all periods.",
+        "adaption time (from the alarm until the estimate stays within 10 % of its value 8 s later): largest over "
+        f"smallest below {_WITHIN:g} in both cases; in part: in one",
+        "; ".join(
+            f"{n.split(',')[0]}: {listed([a[2] for a in alarms[n]])} s, ratio {spreads[n]:.0f}" for n in PANELS
+        ) + f"; none above {slowest:.1f} s",
+        judged(whole=max(spreads.values()) < _WITHIN, part=min(spreads.values()) < _WITHIN),
+        _why_adaption(alarms),
+        _finite(max(spreads.values())),
+    )  # fmt: skip
+    panels = []
+    for n, c in PANELS.items():
+        lines: list[Line] = []
+        for p, colour in zip(OCTAVES, COLOURS, strict=True):
+            lines += estimate_lines(
+                f"{p:g} s", replace(c, period=p), colour=colour, t_end=_END, is_split=c.tuning is TUNING
+            )
+        panels.append(Panel(f"Estimated slope: {n}", TIME, SLOPE, (*lines, true_slope(_END))))
+    period = np.array(_FINE)
+    for n in PANELS:
+        curves = tuple(
+            Line(
+                v,
+                period,
+                np.array(t),
+                colour=colour,
+                mode="lines+markers",
+                size=5.0,
+                width=3.0 if v == "as tuned" else 1.5,
+            )
+            for (v, t), colour in zip(fine[n].items(), COLOURS, strict=False)
+        )
+        panels.append(
+            Panel(f"Detection time: {n}", Axis("period", "s", log_base=2), Axis("detection time", "s"), curves)
+        )
+    return Figure(
+        "3.9",
+        "slow and fast excitation",
+        "Excitation of 250 N at 1 m/s²; the surface changes at phase zero. Thin and light: not estimating. Below: "
+        "detection times on a finer grid of periods, and with other parameters of the change detection; gaps: not "
+        "found within 30 s.",
+        tuple(panels),
+        (c108, optimum, c109),
+        tuple(
+            Table(
+                f"Adaption: {n}",
+                ("period [s]", "drop found [s]", "|mu_delta| there [-]", "adaption time [s]"),
+                tuple(
+                    (f"{p:g}", seconds(t), "–" if np.isnan(mu) else f"{mu:.4f}", seconds(a))
+                    for p, (t, mu, a) in zip(OCTAVES, alarms[n], strict=True)
+                ),
+            )
+            for n in PANELS
+        ),
+    )
+
+
+def _first_half(times: list[float]) -> float:
+    """Shortest period on the finer grid whose first half wave finds the drop. [s]"""
+    return min((p for p, t in zip(_FINE, times, strict=True) if t <= 0.5 * p), default=float("nan"))
+
+
+def _period(p: float) -> str:
+    return "none" if np.isnan(p) else f"{p:.2g} s"
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _spread(best: dict[str, float]) -> float:
+    return _spread_of(list(best.values()))
+
+
+def _spread_of(values: list[float]) -> float:
+    """Largest over smallest of those that are there; infinite if one of them is zero or none is there."""
+    known = [v for v in values if not np.isnan(v)]
+    return max(known) / min(known) if known and min(known) > 0.0 else float("inf")
+
+
+def _why_adaption(alarms: dict[str, list[tuple[float, float, float]]]) -> str:
+    """How the adaption time goes with the differential traction at the alarm."""
+    rows = [a for of in alarms.values() for a in of if not np.isnan(a[2])]
+    if len(rows) < 2:
+        return "Hardly any run finds the drop: there is nothing to compare."
+    rows.sort(key=lambda a: a[1])
+    half = len(rows) // 2
+    small, large = rows[:half], rows[-half:]
+    return (
+        "After the reset the filter adapts as fast as the differential traction tells it: the half of the runs with "
+        f"the smaller one at the alarm (up to {small[-1][1]:.3f}) takes {np.mean([a[2] for a in small]):.2f} s on "
+        f"average, the other half {np.mean([a[2] for a in large]):.2f} s. Without noise all are short against the "
+        "time that the drop takes to be found; the ratio says little then."
+    )

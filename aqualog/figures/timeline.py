@@ -1,0 +1,116 @@
+"""Estimated slopes over time as lines, and the words for when a drop was found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from aqualog.figures.record import Axis, Line, seconds
+from aqualog.figures.study import (
+    HIGH_SLOPE,
+    LOW_SLOPE,
+    Case,
+    drive,
+    estimate,
+    false_alarms,
+    first_alarm,
+    is_used,
+    slope_at,
+)
+from aqualog.report.theme import INK, MUTED, WHEEL_COLOURS
+from aqualog.types import FloatArray
+
+__all__ = [
+    "COLOURS", "SLOPE", "TIME", "detection_time", "estimate_lines", "false_alarms_of",
+    "is_falling", "listed", "slope_after", "told",
+    "true_slope",
+]  # fmt: skip
+
+COLOURS = (*WHEEL_COLOURS.values(), "#E69F00", "#56B4E9")
+"""Okabe and Ito's, in the order of the wheels' colours."""
+
+TIME = Axis("t", "s")
+SLOPE = Axis("slip slope", "-", limits=(0.0, 36.0))
+_FROM = -2.0  # [s] of the dry road that is drawn
+
+
+def true_slope(t_end: float) -> Line:
+    """What the road's slope is: the step at t = 0."""
+    return Line(
+        "true", np.array([_FROM, 0.0, 0.0, t_end]), np.array([HIGH_SLOPE, HIGH_SLOPE, LOW_SLOPE, LOW_SLOPE]),
+        colour=MUTED, dash="dot", width=1.5,
+    )  # fmt: skip
+
+
+def estimate_lines(
+    name: str, case: Case, *, colour: str = INK, dash: str = "solid", t_end: float = 12.0, is_split: bool = False
+) -> list[Line]:
+    """Estimated slope of a case, with a dot where the drop is found.
+
+    Parameters
+    ----------
+    name : str
+    case : Case
+    colour, dash : str
+    t_end : float
+        End of what is drawn. [s]
+    is_split : bool
+        Thin and light where the estimator does not work, as in the thesis' figures 3.7 and on.
+    """
+    d, e = drive(case), estimate(case)
+    span = (d.t >= _FROM - 1e-9) & (d.t <= t_end + 1e-9)
+    t, slope, used = d.t[span], e.slope[span], is_used(e)[span]
+    bold = np.where(used, slope, np.nan) if is_split else slope
+    lines = [Line(name, t, bold, colour=colour, dash=dash, group=name)]
+    if is_split:
+        # one sample further on both sides, so that the lines meet
+        near = used.copy()
+        near[1:-1] &= used[:-2] & used[2:]
+        thin: FloatArray = np.where(near, np.nan, slope)
+        lines.append(
+            Line(f"{name}, not estimating", t, thin, colour=colour, width=1.0, opacity=0.45, group=name,
+                 in_legend=False)
+        )  # fmt: skip
+    found = first_alarm(d, e)
+    if found <= t_end:
+        # the estimate before the alarm's own update: the dot sits where the step begins
+        lines.append(
+            Line(f"{name}, found", np.array([found]), np.array([slope_at(d, e, found)]), colour=colour, mode="markers",
+                 group=name, in_legend=False)
+        )  # fmt: skip
+    return lines
+
+
+def detection_time(case: Case) -> float:
+    """Time from the change to the first drop found; NaN if there is none. [s]"""
+    return first_alarm(drive(case), estimate(case))
+
+
+def false_alarms_of(cases: Iterable[Case]) -> int:
+    """Changes that were found before there was one, over all cases."""
+    return sum(false_alarms(drive(c), estimate(c)) for c in cases)
+
+
+def slope_after(case: Case, t: float) -> float:
+    """Estimated slope at a time after the change. [-]"""
+    return slope_at(drive(case), estimate(case), t)
+
+
+def told(case: Case) -> str:
+    """Detection time in words: seconds, or that nothing was found until the end of the run."""
+    t = detection_time(case)
+    return f"not within {case.t_end:g} s" if np.isnan(t) else f"{seconds(t)} s"
+
+
+def listed(times: Sequence[float]) -> str:
+    """Detection times, a dash for none."""
+    return " / ".join(seconds(t) for t in times)
+
+
+def is_falling(times: Sequence[float]) -> bool:
+    """Whether each is shorter than the one before; nothing found counts as the longest, twice in a row as no change."""
+    shown = [float("inf") if np.isnan(t) else t for t in times]
+    pairs = list(pairwise(shown))
+    return all(b < a or (a == b == float("inf")) for a, b in pairs) and any(b < a for a, b in pairs)

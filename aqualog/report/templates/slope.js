@@ -1,0 +1,40 @@
+"use strict";
+(function () {
+  const figures = JSON.parse(document.getElementById("figure-data").textContent);
+  const PRINT_WIDTH = 700; // [px] inside the margins of A4 and Letter
+  const config = {
+    displaylogo: false, responsive: true, showTips: false, plotlyServerURL: "", showSendToCloud: false,
+    showEditInChartStudio: false,
+  };
+
+  function coloured(value) {
+    const style = getComputedStyle(document.documentElement);
+    const get = function (name) { return style.getPropertyValue(name).trim(); };
+    const known = { "@ink": get("--ink"), "@muted": get("--muted"), "@paper": get("--paper") };
+    return JSON.parse(JSON.stringify(value), function (_, v) {
+      return typeof v === "string" && Object.hasOwn(known, v) ? known[v] : v;
+    });
+  }
+
+  // One after the other, so that the page can be read while the last ones are drawn.
+  function build(width) {
+    return Object.keys(figures).reduce(function (before, id) {
+      return before.then(function () {
+        const figure = coloured(figures[id]);
+        const plot = document.getElementById(id);
+        if (width) figure.layout.width = width;
+        plot.style.height = figure.layout.height + "px"; // plotly measures it when the window changes
+        return Plotly.react(plot, figure.data, figure.layout, config);
+      });
+    }, Promise.resolve());
+  }
+
+  function resize() {
+    for (const id of Object.keys(figures)) Plotly.Plots.resize(document.getElementById(id));
+  }
+
+  build().then(function () { document.body.dataset.ready = "true"; });
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { build(); });
+  window.addEventListener("beforeprint", function () { build(PRINT_WIDTH); });
+  window.addEventListener("afterprint", function () { build().then(resize); });
+})();

@@ -1,0 +1,143 @@
+"""`aqualog slip-slope` as a user calls it."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from straight_drive import AWD, RWD, C, drive
+
+from aqualog.vehicle import vehicle_toml
+
+
+def run(*args):
+    return subprocess.run(
+        [sys.executable, "-m", "aqualog", "slip-slope", *map(str, args)], capture_output=True, text=True, check=False,
+        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
+    )  # fmt: skip
+
+
+def one_error_line(result):
+    lines = [line for line in result.stderr.splitlines() if line.startswith("error:")]
+    assert len(lines) == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("slip_slope")
+    for car in (RWD, AWD):
+        (path / f"{car.name}.toml").write_text(vehicle_toml(car), encoding="utf-8")
+    drive(RWD).frame.write_csv(path / "drive.csv")
+    drive(RWD, torque=False).frame.write_csv(path / "no_torque.csv")
+    drive(AWD).frame.drop("v_x").write_csv(path / "awd.csv")
+    drive(RWD, even=True, grade=0.0).frame.write_csv(path / "even.csv")
+    return path
+
+
+@pytest.fixture(scope="module")
+def written(folder):
+    out = folder / "out"
+    return run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", out), out
+
+
+def test_table_tells_slopes_and_stability(written):
+    result, _ = written
+    assert result.returncode == 0, result.stderr
+    row = next(line.split() for line in result.stdout.splitlines() if line.startswith("rl "))
+    assert float(row[1]) == pytest.approx(C, rel=0.03)
+    assert float(row[2]) < C < float(row[4])
+    assert "traction from the wheel torques" in result.stdout
+    assert "rl: stable: " in result.stdout
+    assert "left out: " in result.stdout
+
+
+def test_results_say_the_same(written):
+    result, out = written
+    assert sorted(p.name for p in out.iterdir()) == ["slip_slope.csv", "slip_slope.html", "slip_slope.json"]
+    document = json.loads((out / "slip_slope.json").read_text(), parse_constant=lambda c: pytest.fail(c))
+    assert document["schema_version"] == 1
+    assert document["tool_version"]
+    assert (document["method"], document["traction"]) == ("axle", "torque")
+    place = document["slip_slope"][0]
+    assert place["place"] == "rl"
+    assert f"{place['slope']:.1f}" in result.stdout
+    assert place["slope_ci95"][0] < C < place["slope_ci95"][1]
+    assert place["stability"]["verdict"] == "stable"
+    rows = list(csv.DictReader(io.StringIO((out / "slip_slope.csv").read_text())))
+    own = [r for r in rows if r["place"] == "rl"]
+    assert len(own) == 1 + len(place["segments"])
+    assert float(own[0]["slope"]) == pytest.approx(place["slope"])
+    assert [float(r["slope"]) for r in own[1:]] == pytest.approx([s["slope"] for s in place["segments"]])
+
+
+def test_json_is_one_document(folder, written):
+    result = run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "--json")
+    assert result.returncode == 0
+    assert json.loads(result.stdout)["slip_slope"] == json.loads((written[1] / "slip_slope.json").read_text())["slip_slope"]
+
+
+def test_results_are_not_overwritten(folder, written):
+    again = run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", written[1])
+    assert again.returncode == 2
+    assert "--force" in one_error_line(again)
+    assert run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", written[1], "--force").returncode == 0
+
+
+def test_accelerometer_is_taken_and_said(folder):
+    result = run(folder / "no_torque.csv", "--vehicle", folder / "rwd.toml", "--json")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["traction"] == "accelerometer"
+    assert "accelerometer" in result.stderr
+
+
+def test_all_wheel_drive_without_velocity(folder):
+    result = run(folder / "awd.csv", "--vehicle", folder / "awd.toml", "--json")
+    assert result.returncode == 0, result.stderr
+    document = json.loads(result.stdout)
+    assert document["method"] == "differential"
+    assert document["slip_slope"] == []
+    assert document["recursive"][0]["slope"] == pytest.approx(C, rel=0.25)
+    assert "no regression" in result.stderr
+    text = run(folder / "awd.csv", "--vehicle", folder / "awd.toml", "-o", folder / "awd_out")
+    assert "left" in text.stdout
+    assert (folder / "awd_out" / "slip_slope.html").stat().st_size > 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("log", "options", "code", "text"),
+    [
+        ("even.csv", (), 4, "cannot tell"),
+        ("no_torque.csv", ("--traction", "torque"), 4, "missing torque_rl"),
+        ("drive.csv", ("--mu-max", "0.02"), 4, "cannot tell"),
+        ("drive.csv", ("--method", "best"), 2, "--method"),
+        ("missing.csv", (), 1, "missing.csv"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(folder, log, options, code, text):
+    result = run(folder / log, "--vehicle", folder / "rwd.toml", *options, "-o", folder / "nothing")
+    assert result.returncode == code, result.stderr
+    assert text in one_error_line(result)
+    assert result.stdout == ""
+    assert not (folder / "nothing").exists()
+
+
+def test_vehicle_must_be_given(folder):
+    result = run(folder / "drive.csv")
+    assert result.returncode == 2
+    assert "--vehicle" in one_error_line(result)
+
+
+def test_help_has_examples_and_loads_nothing_heavy():
+    assert "aqualog slip-slope drive.mf4 --vehicle car.toml" in run("--help").stdout
+    code = (
+        "import sys; sys.argv = ['aqualog', 'slip-slope', '--help']\nfrom aqualog.cli.main import run\n"
+        "try:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    loaded = out.split("LOADED")[-1].split()
+    assert not {"numpy", "polars", "numba", "plotly", "jinja2", "scipy"} & set(loaded)

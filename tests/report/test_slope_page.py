@@ -1,0 +1,74 @@
+"""The page of `slip-slope`: what it holds, and that a browser draws it without a network."""
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+from straight_drive import AWD, RWD, drive
+from test_browser import browser, requests, severe, wait_for  # noqa: F401 - browser is a fixture
+
+from aqualog.detect.slip_slope.direct import slip_slopes
+from aqualog.report.slope_page import render_slope_page, write_slope_page
+
+HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return slip_slopes(drive(RWD), RWD)
+
+
+def data_of(html):
+    return json.loads(re.search(r'<script type="application/json" id="figure-data">(.*?)</script>', html, re.S)[1])
+
+
+def test_page_has_its_plots(found):
+    plots = data_of(render_slope_page(found, title="run"))
+    assert list(plots) == ["scatter-0", "scatter-1", "scatter-2", "session", "recursive", "share"]
+    scatter = {t["name"]: t for t in plots["scatter-0"]["data"]}
+    assert f"slope {found.places[0].line.slope:.1f}" in scatter
+    assert len(scatter["samples"]["x"]) <= 4000
+    parts = plots["session"]["data"][0]
+    assert len(parts["x"]) == len(found.places[0].segments)
+    assert all(a > 0.0 for a in parts["error_y"]["array"])
+    share = plots["share"]["data"]
+    assert sum(t["x"][0] for t in share) == pytest.approx(found.duration_s, abs=0.1)
+
+
+def test_band_holds_the_line(found):
+    plots = data_of(render_slope_page(found, title="run"))
+    traces = {t["name"]: t for t in plots["scatter-0"]["data"]}
+    band, line = traces["95 % of the slope"], traces[f"slope {found.places[0].line.slope:.1f}"]
+    n = len(line["y"])
+    upper, lower = band["y"][:n], band["y"][n:][::-1]
+    assert all(a <= m + 1e-9 and m - 1e-9 <= b for a, m, b in zip(lower, line["y"], upper, strict=True))
+    assert upper[-1] - lower[-1] > 0.0
+
+
+def test_names_are_escaped(found):
+    html = render_slope_page(replace(found, vehicle_name=HOSTILE), title=HOSTILE, notes=(HOSTILE,))
+    assert "<script>alert" not in html
+    assert "<img" not in html.split("<script")[0]
+
+
+def test_recursive_estimate_alone_makes_a_page():
+    signals = drive(AWD)
+    result = slip_slopes(replace(signals, frame=signals.frame.drop("v_x")), AWD)
+    html = render_slope_page(result, title="run")
+    assert list(data_of(html)) == ["recursive"]
+    assert "<td>left</td>" in html
+
+
+@pytest.mark.browser
+def test_browser_draws_it_without_requests(browser, found, tmp_path):  # noqa: F811
+    path = tmp_path / "page.html"
+    write_slope_page(found, path, title=HOSTILE)
+    for kind in ("browser", "performance"):
+        browser.get_log(kind)
+    browser.get(path.as_uri())
+    wait_for(lambda: browser.execute_script("return document.body.dataset.ready === 'true'"))
+    assert browser.execute_script("return document.querySelectorAll('.panel .main-svg').length") >= 6
+    assert browser.execute_script("return document.querySelectorAll('#scatter-0 .scatterlayer .point').length") > 1000
+    assert requests(browser) == []
+    assert severe(browser) == []
