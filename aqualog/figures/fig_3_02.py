@@ -9,6 +9,7 @@ from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table, judged
 from aqualog.figures.study import HIGH_SLOPE, LOW_SLOPE, RATE_HZ, SUV, Case, drive, inputs
 from aqualog.figures.timeline import COLOURS, TIME
+from aqualog.physics.differential import differential_traction
 from aqualog.report.theme import THRESHOLD
 from aqualog.types import FloatArray
 
@@ -31,8 +32,8 @@ def sums(nu: FloatArray, used: FloatArray) -> FloatArray:
     return out
 
 
-def _held_filter(error: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Time, prediction error, differential slip, its estimated offset and whether used, all (n,)."""
+def _held_filter(error: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Time, prediction error, differential slip, its estimated offset, differential traction, whether used; (n,)."""
     d = drive(_CASE)
     believed = SUV._replace(r_e_f=SUV.r_e_f * (1.0 + error))
     s_delta, mu_i, rho_mu_j = inputs(d, believed)
@@ -40,20 +41,24 @@ def _held_filter(error: float) -> tuple[FloatArray, FloatArray, FloatArray, Floa
     e, _ = scan(Params.make(_HELD, 1.0 / RATE_HZ), state, s_delta, mu_i, rho_mu_j, np.ones(d.t.size, dtype=np.bool_))
     # the offset before the sample's own update, as the estimator takes it
     offset = np.concatenate(([0.0], e.offset[:-1]))
-    return d.t, e.innovation, s_delta, offset, np.asarray(e.status <= 1.0, dtype=np.float64)
+    mu_delta = differential_traction(mu_i, rho_mu_j, rho=np.ones_like(mu_i), beta=e.beta)
+    return d.t, e.innovation, s_delta, offset, mu_delta, np.asarray(e.status <= 1.0, dtype=np.float64)
 
 
 def make() -> Figure:
     """Geometry of the prediction error, and the sums over a run with sign-alternating excitation."""
-    t, innovation, s_delta, offset, used = _held_filter(0.0)
+    t, innovation, s_delta, offset, mu_delta, used = _held_filter(0.0)
     g_plain = np.maximum(sums(innovation, used), sums(-innovation, used))
     g_adapted = sums(np.sign(s_delta - offset) * innovation, used)
-    _, innovation_e, s_delta_e, offset_e, used_e = _held_filter(_RADIUS_ERROR)
+    _, innovation_e, s_delta_e, offset_e, mu_delta_e, used_e = _held_filter(_RADIUS_ERROR)
     g_raw = sums(np.sign(s_delta_e) * innovation_e, used_e)
     g_corrected = sums(np.sign(s_delta_e - offset_e) * innovation_e, used_e)
+    g_traction = sums(np.sign(mu_delta_e) * innovation_e, used_e)
 
     k = int(np.searchsorted(t, _AFTER - 1e-6))
-    plain, adapted, raw, corrected = (float(g[k]) for g in (g_plain, g_adapted, g_raw, g_corrected))
+    plain, adapted, raw, corrected, by_traction = (
+        float(g[k]) for g in (g_plain, g_adapted, g_raw, g_corrected, g_traction)
+    )
     peak = float(g_plain[: k + 1].max())
     c90 = Finding(
         "C90",
@@ -71,11 +76,13 @@ def make() -> Figure:
         "Printed: the sign is that of the differential slip as measured.",
         f"with radii {100 * _RADIUS_ERROR:g} % wrong, the sum with sgn(s_delta) keeps at least 90 % of its value "
         "without an error; in part if it does once the estimated offset is taken out",
-        f"sgn(s_delta) {1e3 * raw:.1f}e-3 s, sgn(s_delta - delta_hat) {1e3 * corrected:.1f}e-3 s; without an error "
+        f"sgn(s_delta) {1e3 * raw:.1f}e-3 s, sgn(s_delta - delta_hat) {1e3 * corrected:.1f}e-3 s, sgn(mu_delta) "
+        f"{1e3 * by_traction:.1f}e-3 s; without an error "
         f"{1e3 * adapted:.1f}e-3 s",
         judged(whole=raw >= 0.9 * adapted, part=corrected >= 0.9 * adapted),
         "The offset of wrong radii is larger than the slip itself, so that its sign no longer alternates. With the "
-        "estimated offset taken out the sum is as without an error; aqualog does that.",
+        "estimated offset taken out, or with the sign of the differential traction, the sum is as without an error. "
+        "aqualog takes the traction: its noise is not the slip's, which would make the sum drift upwards.",
         raw / adapted,
     )
     past = t >= -2.0 - 1e-9
@@ -86,6 +93,7 @@ def make() -> Figure:
             ("sgn(s_delta - delta_hat) epsilon (3.25)", g_adapted, COLOURS[0], "solid"),
             ("radius 0.5 % wrong: sgn(s_delta) epsilon", g_raw, COLOURS[4], "dash"),
             ("radius 0.5 % wrong: sgn(s_delta - delta_hat) epsilon", g_corrected, COLOURS[2], "dot"),
+            ("radius 0.5 % wrong: sgn(mu_delta) epsilon", g_traction, COLOURS[3], "dashdot"),
         )
     )
     limit = Line(
@@ -112,6 +120,8 @@ def make() -> Figure:
                     ("sgn(s_delta) epsilon", f"{1e3 * float(sums(np.sign(s_delta) * innovation, used)[k]):.2f}",
                      f"{1e3 * raw:.2f}"),
                     ("sgn(s_delta - delta_hat) epsilon", f"{1e3 * adapted:.2f}", f"{1e3 * corrected:.2f}"),
+                    ("sgn(mu_delta) epsilon", f"{1e3 * float(sums(np.sign(mu_delta) * innovation, used)[k]):.2f}",
+                     f"{1e3 * by_traction:.2f}"),
                 ),
             ),
         ),
@@ -119,7 +129,7 @@ def make() -> Figure:
 
 
 def _plain_with_error() -> float:
-    t, innovation, _, _, used = _held_filter(_RADIUS_ERROR)
+    t, innovation, _, _, _, used = _held_filter(_RADIUS_ERROR)
     k = int(np.searchsorted(t, _AFTER - 1e-6))
     return float(np.maximum(sums(innovation, used), sums(-innovation, used))[k])
 

@@ -232,11 +232,11 @@ def test_sums_of_figure_3_2_are_those_of_the_estimator(adapted):
         rho_mu_j,
         np.ones(d.t.size, dtype=bool),
     )
-    _, innovation, slip, offset, used = fig_3_02._held_filter(0.0)
-    nu = np.sign(slip - offset) * innovation if adapted else innovation
+    _, innovation, _, _, mu_delta, used = fig_3_02._held_filter(0.0)
+    nu = np.sign(mu_delta) * innovation if adapted else innovation
     assert fig_3_02.sums(nu, used) == pytest.approx(e.g_drop, abs=1e-9)
     if adapted:
-        name = "sgn(s_delta - delta_hat) epsilon"
+        name = "sgn(mu_delta) epsilon"
         row = next(r for r in made("3.2").tables[0].rows if r[0] == name)
         k = np.argmin(np.abs(d.t - 8.0))
         assert float(row[1]) == pytest.approx(1e3 * e.g_drop[k], abs=0.006)
