@@ -48,7 +48,7 @@ class Outcome:
     true_share_r: float
 
 
-def drive(seed: int, surface: str, split: float, *, excited: bool) -> tuple[Scenario, float]:
+def drive(seed: int, surface: str, split: float, *, excited: bool, rate: int = RATE) -> tuple[Scenario, float]:
     """Scenario of a seed and the time at which the surface changes."""
     rng = np.random.default_rng([seed, 5])
     speed = [(0.0, float(rng.uniform(80.0, 110.0)) / 3.6)]
@@ -61,7 +61,7 @@ def drive(seed: int, surface: str, split: float, *, excited: bool) -> tuple[Scen
         "water": (Lane(change, change + 10.0, depth_left=1.3e-3, depth_right=1.3e-3),),
     }[surface]
     scenario = Scenario(
-        vehicle=replace(CAR, torque_split_rear=split), duration_s=DURATION, rate_hz=float(RATE), seed=seed,
+        vehicle=replace(CAR, torque_split_rear=split), duration_s=DURATION, rate_hz=float(rate), seed=seed,
         speed=tuple(speed), lanes=lanes, excitation=EXCITATION if excited else None,
     )  # fmt: skip
     return scenario, change if lanes else np.nan
@@ -76,9 +76,9 @@ def believed_car(seed: int, split: float) -> Vehicle:
     )
 
 
-def on_grid(simulation) -> dict[str, np.ndarray]:
+def on_grid(simulation, rate: int = RATE) -> dict[str, np.ndarray]:
     """Measured signals on the grid of the wheel speeds; slower ones are linear between their samples."""
-    grid = np.arange(round(simulation.setup.scenario.duration_s * RATE)) / RATE
+    grid = np.arange(round(simulation.setup.scenario.duration_s * rate)) / rate
     return {
         name: np.interp(grid, group.t, values)
         for group in simulation.measured
@@ -87,18 +87,18 @@ def on_grid(simulation) -> dict[str, np.ndarray]:
     }
 
 
-def outcome(seed: int, surface: str, split: float, *, excited: bool) -> Outcome:
+def outcome(seed: int, surface: str, split: float, *, excited: bool, rate: int = RATE) -> Outcome:
     """Simulate and detect one drive."""
-    scenario, change = drive(seed, surface, split, excited=excited)
+    scenario, change = drive(seed, surface, split, excited=excited, rate=rate)
     simulation = simulate(scenario)
-    columns = on_grid(simulation)
+    columns = on_grid(simulation, rate)
     columns.pop("v_x", None)  # no speed reference
-    stream = DriveStream(believed_car(seed, split), round(1e9 / RATE), list(columns))
+    stream = DriveStream(believed_car(seed, split), round(1e9 / rate), list(columns))
     piece = stream.push(columns)
     events = [e for e in (*piece.events, *stream.finish()) if e.detector == "slip_slope_drop"]
     end = change if np.isfinite(change) else DURATION
     after = [e.start_s - change for e in events if change <= e.start_s < change + 20.0]
-    t = np.arange(round(DURATION * RATE)) / RATE
+    t = np.arange(round(DURATION * rate)) / rate
     # both sides see the same; where one is NaN it tells nothing
     slope = 0.5 * (piece.features["slip_slope_left"] + piece.features["slip_slope_right"])
     judged = blind = 0.0

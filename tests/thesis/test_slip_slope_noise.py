@@ -32,6 +32,17 @@ def test_the_split_of_the_loads_is_blind_without_excitation():
     assert min(o.blind for o in blind) > 0.9
 
 
+def test_the_tuning_holds_at_50_and_500_hz():
+    """The same drives, sampled and measured at another rate: other noise, other delays of the sensors."""
+    base = [outcome(s, "snow", 0.5, excited=True) for s in SEEDS[:3]]
+    for rate in (50, 500):
+        other = [outcome(s, "snow", 0.5, excited=True, rate=rate) for s in SEEDS[:3]]
+        for a, b in zip(base, other, strict=True):
+            assert b.delay == pytest.approx(a.delay, abs=0.1)
+            assert b.slope_before == pytest.approx(a.slope_before, rel=0.02)
+            assert b.slope_after == pytest.approx(a.slope_after, rel=0.02)
+
+
 def hour(*, excited, split, seed, drift=DRIFT):
     """One dry hour; the front radii grow and the rear slopes rise at the rate of the drift."""
     rng = np.random.default_rng(seed)
