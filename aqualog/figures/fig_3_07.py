@@ -16,9 +16,9 @@ from aqualog.figures.record import (
 )
 from aqualog.figures.study import RATE_HZ, SUV, Case, drive, estimate, is_used
 from aqualog.figures.timeline import COLOURS, SLOPE, TIME, detection_time, estimate_lines, true_slope
-from aqualog.model.excitation import waveform
+from aqualog.model.excitation import force_rate, waveform
 
-__all__ = ["largest_rate", "make", "used_share"]
+__all__ = ["make", "used_share"]
 
 WAVES = ("triangle", "sine", "ramp", "step")
 _SMOOTH = WAVES[:3]
@@ -39,13 +39,8 @@ def used_share(case: Case) -> tuple[float, float]:
     return float(np.mean(is_used(e))), float(np.mean(e.status == 0.0))
 
 
-def largest_rate(wave: str) -> float:
-    """Largest change of force per time; of the step NaN, since it jumps. [N/s]
-
-    By hand: 4 A / tau (triangle), 2 pi A / tau (sine), 6 A / tau (ramp).
-    """
-    factors = {"triangle": 4.0, "sine": 2.0 * np.pi, "ramp": 6.0}
-    return factors[wave] * _AMPLITUDE / _PERIOD if wave in factors else float("nan")
+def _rate(wave: str) -> float:
+    return force_rate(wave, amplitude=_AMPLITUDE, period=_PERIOD)
 
 
 def _jump(wave: str) -> float:
@@ -144,7 +139,7 @@ def make() -> Figure:
         "over than by any of them; in part: the first only",
         f"step: jump of 2 A = {jumps['step']:.0f} N ({jumps['step'] * SUV.r_l_f:.0f} N m per axle) in one sample; "
         "others "
-        + ", ".join(f"{w} {largest_rate(w):.0f} N/s" for w in _SMOOTH)
+        + ", ".join(f"{w} {_rate(w):.0f} N/s" for w in _SMOOTH)
         + f"; acceleration left over {blip:.0f} times as large",
         judged(whole=ratio > 10.0 and blip > 1.0, part=ratio > 10.0),
         "Peak forces are the same under all waveforms, so that the step passes the friction only by the wheels' "
@@ -184,7 +179,7 @@ def make() -> Figure:
                 ("waveform", "largest rate [N/s]", "change in 10 ms [N]", "left in a_x, dry [1e-3 m/s^2]",
                  "largest traction [-]"),
                 tuple(
-                    (w, "jump" if np.isnan(r := largest_rate(w)) else f"{r:.0f}", f"{jumps[w]:.1f}",
+                    (w, "jump" if np.isinf(r := _rate(w)) else f"{r:.0f}", f"{jumps[w]:.1f}",
                      f"{1e3 * left[w][0]:.2f}", f"{most[w]:.3f}")
                     for w in WAVES
                 ),

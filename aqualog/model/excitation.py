@@ -22,6 +22,7 @@ __all__ = [
     "f_sine",
     "f_step",
     "f_triangle",
+    "force_rate",
     "waveform",
 ]
 
@@ -106,6 +107,31 @@ def waveform(name: str, t: FloatArray, *, period: float) -> FloatArray:
     if name not in WAVEFORMS:
         raise ConfigError(f"unknown waveform {name!r}", expected=", ".join(WAVEFORMS))
     return WAVEFORMS[name](t, period=period)
+
+
+_RATES = {"triangle": 4.0, "sine": 2.0 * np.pi, "ramp": 6.0, "step": np.inf}
+
+
+def force_rate(name: str, *, amplitude: float, period: float) -> float:
+    """Largest rate of change of the excitation force: with the jump of the step, what passengers feel.
+
+    Parameters
+    ----------
+    name : str
+        In `WAVEFORMS`.
+    amplitude, period : float
+        [N], [s]
+
+    Returns
+    -------
+    rate : float
+        4 A / tau (triangle), 2 pi A / tau (sine), 6 A / tau (ramp); infinite for the step, which jumps by 2 A. [N/s]
+
+    Thesis: derivatives of Eq. (3.35) to (3.38); section 3.3 asks for small change rates (C99, C107).
+    """
+    if name not in WAVEFORMS:
+        raise ConfigError(f"unknown waveform {name!r}", expected=", ".join(WAVEFORMS))
+    return _RATES[name] * amplitude / period
 
 
 def axle_forces(F_sum: FloatArray, F_exc: FloatArray, *, nu: float) -> tuple[FloatArray, FloatArray]:

@@ -253,9 +253,9 @@ def test_density_at_the_extremes_by_hand():
 
 
 def test_rates_and_availability():
-    assert fig_3_07.largest_rate("triangle") == pytest.approx(100.0)
-    assert fig_3_07.largest_rate("sine") == pytest.approx(50.0 * np.pi)
-    assert fig_3_07.largest_rate("ramp") == pytest.approx(150.0)
+    assert fig_3_07._rate("triangle") == pytest.approx(100.0)
+    assert fig_3_07._rate("sine") == pytest.approx(50.0 * np.pi)
+    assert fig_3_07._rate("ramp") == pytest.approx(150.0)
     table = next(t for t in made("3.7").tables if t.title == "Comfort")
     assert {r[0]: float(r[2]) for r in table.rows} == pytest.approx(
         {"triangle": 1.0, "sine": 1.57, "ramp": 1.5, "step": 500.0}, abs=0.1

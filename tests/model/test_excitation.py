@@ -15,6 +15,7 @@ from aqualog.model.excitation import (
     f_sine,
     f_step,
     f_triangle,
+    force_rate,
     waveform,
 )
 
@@ -164,3 +165,16 @@ def test_compiled_amplitude_and_forces():
             args = (float(rng.uniform(0, 1)), *(float(x) for x in rng.uniform(-2000, 9000, 4)))
             assert amplitude(number, *args) == excitation_amplitude(kind, *args)
             assert forces(args[1], args[2], args[0]) == axle_forces(args[1], args[2], nu=args[0])
+
+
+@pytest.mark.parametrize("name", ["triangle", "sine", "ramp"])
+def test_rate_of_the_force_is_the_steepest_part(name):
+    t = np.linspace(0.0, 8.0, 80_001)
+    steepest = np.abs(np.diff(250.0 * waveform(name, t, period=8.0))).max() / 1e-4
+    assert force_rate(name, amplitude=250.0, period=8.0) == pytest.approx(steepest, rel=1e-3)
+
+
+def test_a_step_has_no_rate():
+    assert force_rate("step", amplitude=250.0, period=8.0) == np.inf
+    with pytest.raises(ConfigError, match="square"):
+        force_rate("square", amplitude=1.0, period=1.0)
