@@ -361,3 +361,12 @@ def test_what_cannot_be_done_is_one_clear_line(car, kw, error, text):
         lacking(car, **kw)
     assert text in caught.value.line()
     assert "\n" not in caught.value.line()
+
+
+def test_recursion_is_told_the_noise_of_the_wheels():
+    """Ten times as coarse as good wheel speeds: with the tuning for those, it would find 30 changes of the road."""
+    found = slip_slopes(drive(RWD, seconds=400.0, noise=8e-3), RWD, traction="accelerometer")
+    for p in found.places:
+        assert p.recursion.alarms == 0
+        assert p.recursion.slope == pytest.approx(C, rel=0.1)
+    assert not any("sudden changes" in n for n in found.notes)

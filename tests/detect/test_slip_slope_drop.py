@@ -30,7 +30,7 @@ def judge(slope, sd=0.5, valid=True, alarm=0.0, periods=(), rule="robust", fallb
     slope = np.asarray(slope, dtype=float)
     state = drop.initial_state(tuple(periods), rule=rule, fallback=fallback)
     return drop.scan(
-        drop.DropParams.make(DT, rule), state, slope, np.broadcast_to(float(sd), slope.shape),
+        drop.DropParams.make(DT, rule), state, slope, np.broadcast_to(np.asarray(sd, dtype=float), slope.shape),
         np.broadcast_to(valid, slope.shape), np.broadcast_to(alarm, slope.shape),
     )  # fmt: skip
 
@@ -60,6 +60,15 @@ def test_an_uncertain_estimate_is_not_judged_and_a_detection_outlasts_it_by_two_
     assert np.flatnonzero(active)[[0, -1]].tolist() == [100, 398]
     _, never, _, _ = judge(seconds(10, 3), valid=False, fallback=30.0)
     assert not never.any()
+
+
+def test_a_rise_of_the_slope_ends_it_at_once():
+    slope, alarm = seconds(10, 3), np.zeros(300)
+    alarm[200] = -1.0
+    _, active, _, _ = judge(slope, sd=np.where(np.arange(300) >= 200, 5.0, 0.5), alarm=alarm, fallback=30.0)
+    assert np.flatnonzero(active)[[0, -1]].tolist() == [0, 199]
+    _, active, _, _ = judge(slope, alarm=alarm, fallback=30.0)
+    assert active.all()  # still low and known: it goes on
 
 
 def test_a_drive_without_any_reference_makes_its_own_after_five_seconds():

@@ -84,6 +84,8 @@ def _scan(p, s, slope, slope_sd, is_valid, alarm, rel, bits, refs):  # type: ign
     for i in range(slope.size):
         settling = p.settle if alarm[i] != 0.0 else max(settling - 1, 0)
         rel[i] = math.nan
+        if alarm[i] < 0.0:
+            active = False  # the slope has risen; if it is still low, the next valid estimate says so
         if is_valid[i] and slope_sd[i] < p.sd_max * slope[i]:
             share = slope[i] / reference  # NaN without a reference: never a drop
             rel[i] = 1.0 - share
@@ -135,7 +137,7 @@ def scan(
     loss : array (n,)
         1 - C / C_ref; NaN where not valid or without a reference. [-]
     active : bool array (n,)
-        From a loss above 0.5 until it is below 0.4, or 2 s after the last valid estimate.
+        From a loss above 0.5 until it is below 0.4, a rise of the slope is found, or 2 s after the last valid estimate.
     reference : array (n,)
         Dry slope that was compared with; NaN before there is one. [-]
     state : DropState
