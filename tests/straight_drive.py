@@ -16,9 +16,24 @@ WHEELS = ("fl", "fr", "rl", "rr")
 
 
 def drive(
-    car, *, seconds=240.0, rate=20.0, slope=C, seed=0, brakes=True, torque=True, grade=0.03, late=0.0, keep=(), even=False
+    car,
+    *,
+    seconds=240.0,
+    rate=20.0,
+    slope=C,
+    seed=0,
+    brakes=True,
+    torque=True,
+    grade=0.03,
+    late=0.0,
+    noise=5e-4,
+    keep=(),
+    even=False,
 ):
-    """A straight drive over rolling country with changing traction; every quantity follows from the traction."""
+    """A straight drive over rolling country with changing traction; every quantity follows from the traction.
+
+    `noise` is that of each wheel speed, rms, as a share of 22 m/s; `late` [s] by which the wheels follow the force.
+    """
     rng = np.random.default_rng(seed)
     dt = 1.0 / rate
     n = round(seconds * rate)
@@ -41,7 +56,7 @@ def drive(
         mu = share[i] * force / load[i] if i in driven else np.zeros(n)
         moved = np.interp(t - late, t, mu)
         slip = moved / slope + (0.002 if i in driven else 0.0)
-        columns[f"omega_{w}"] = v / (1.0 - slip) / car.r_e(w) + rng.normal(0.0, 2e-3 * 22.0 / car.r_e(w) / 4.0, n)
+        columns[f"omega_{w}"] = v / (1.0 - slip) / car.r_e(w) + rng.normal(0.0, noise * 22.0 / car.r_e(w), n)
         if i in driven and torque:
             columns[f"torque_{w}"] = (
                 (mu + car.rolling_resistance) * load[i] * car.r_l(w) + car.inertia(w) * a_kin / car.r_e(w)

@@ -67,8 +67,11 @@ def _listed(seconds: dict[str, float]) -> str:
     return ", ".join(f"{name} {s:.0f} s" for name, s in ranked if s >= 0.5) or "nothing"
 
 
-def _interval(ci: Interval, form: str = ".1f") -> str:
-    return f"{ci[0]:{form}} ... {ci[1]:{form}}" if math.isfinite(ci[0]) else "-"
+def _interval(ci: Interval) -> str:
+    """`29.7 ... 37.0`; an end beyond 999 is where 1 / slope is next to 0."""
+    if not math.isfinite(ci[0]):
+        return "-"
+    return " ... ".join("> 999" if x > 999.0 else f"{x:.1f}" for x in ci)
 
 
 def _row(p: PlaceSlope) -> tuple[str, ...]:

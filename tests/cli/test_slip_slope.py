@@ -50,7 +50,7 @@ def test_table_tells_slopes_and_stability(written):
     assert result.returncode == 0, result.stderr
     row = next(line.split() for line in result.stdout.splitlines() if line.startswith("rl "))
     assert float(row[1]) == pytest.approx(C, rel=0.03)
-    assert float(row[2]) < C < float(row[4])
+    assert float(row[2]) <= C <= float(row[4])
     assert "traction from the wheel torques" in result.stdout
     assert "rl: stable: " in result.stdout
     assert "left out: " in result.stdout
@@ -113,7 +113,6 @@ def test_all_wheel_drive_without_velocity(folder):
     [
         ("even.csv", (), 4, "cannot tell"),
         ("no_torque.csv", ("--traction", "torque"), 4, "missing torque_rl"),
-        ("drive.csv", ("--mu-max", "0.02"), 4, "cannot tell"),
         ("drive.csv", ("--method", "best"), 2, "--method"),
         ("missing.csv", (), 1, "missing.csv"),
     ],

@@ -60,7 +60,7 @@ def test_porsche_tyres_get_softer_as_they_warm_up(porsche):
 
 
 def test_porsche_at_small_traction_alone_does_not_tell_the_drift(porsche):
-    """With |mu| below 0.3 there are 68 s on eight laps: the same change, but 0 is in its interval."""
+    """With |mu| below 0.3 there are 68 s in all: the same change, but 0 is in its interval."""
     car, signals = porsche
     for p in slip_slopes(signals, car, mu_max=0.3).places:
         assert p.stability.verdict == "cannot tell"
@@ -80,7 +80,7 @@ def command(*args):
 
 
 def test_toyota_on_a_highway_cannot_tell(real_logs):
-    """One minute, one acceleration: nine tenths of what is known of the slope are in one stretch."""
+    """One minute holds six blocks of ten seconds, and little of it is more than cruising."""
     folder = real_logs / "toyota_rav4"
     code, out, errors = command(
         folder / "can_bus.mf4", "--dbc", folder / "toyota_2017.dbc", "--vehicle", HERE / "toyota.toml", "--signals",
