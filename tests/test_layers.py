@@ -11,8 +11,8 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "compiled", "notation", "units", "types", "vehicle", "physics", "io", "align", "features", "detect", "model", "report",
-    "figures", "config", "cli",
+    "errors", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "detect",
+    "model", "report", "figures", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
@@ -50,7 +50,8 @@ def test_detectors_read_no_truth_and_no_labels():
 
 
 @pytest.mark.parametrize(
-    "command", [["--help"], ["detect", "--help"], ["inspect", "--help"], ["align", "--help"], ["simulate", "--help"]]
+    "command",
+    [["--help"], *([c, "--help"] for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope"))],
 )
 def test_help_imports_nothing_heavy(command):
     code = f"import sys; sys.argv = ['aqualog', *{command!r}]\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.errors import FitError
+from aqualog.intervals import student_quantile
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
 __all__ = ["ClockFit", "estimate_clock"]
@@ -480,7 +481,7 @@ class _Estimate(NamedTuple):
     dof: FloatArray
 
     def interval(self, i: int, *, level: float = 0.95) -> Interval:
-        half = _student(0.5 + level / 2.0, float(self.dof[i])) * float(self.sigma[i])
+        half = student_quantile(0.5 + level / 2.0, float(self.dof[i])) * float(self.sigma[i])
         return float(self.value[i]) - half, float(self.value[i]) + half
 
 
@@ -597,14 +598,6 @@ def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
 
 def _unknown(value: FloatArray) -> _Estimate:
     return _Estimate(value, np.full(value.size, math.inf), np.ones(value.size))
-
-
-def _student(probability: float, dof: float) -> float:
-    """Quantile of Student's t: 0.5 < probability < 1, real dof >= 1."""
-    u = np.linspace(0.0, math.pi / 2.0, 20_001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
-    density = np.cos(u) ** (dof - 1.0)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
-    return math.sqrt(dof) * math.tan(float(np.interp(2.0 * probability - 1.0, area / area[-1], u)))
 
 
 def _fit(pair: _Pair, peak: _Peak, other: _Series, lead: float, o: _Options) -> ClockFit:

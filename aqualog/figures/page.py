@@ -33,7 +33,7 @@ def render_figures(figures: Sequence[Figure], *, title: str) -> str:
     """
     ids = {f.stem: panel_ids(f) for f in figures}
     plots = {i: panel_figure(p) for f in figures for i, p in zip(ids[f.stem], f.panels, strict=True)}
-    scripts = {"plotly": offline.plotly_js(), "page": (_TEMPLATES / "figures.js").read_text(encoding="utf-8")}
+    scripts = {"plotly": offline.plotly_js(), "page": (offline.TEMPLATES / "figures.js").read_text(encoding="utf-8")}
     css = [offline.TEMPLATES / "page.css", _TEMPLATES / "figures.css"]
     return offline.environment(_TEMPLATES).get_template("figures.html.j2").render(
         title=title,

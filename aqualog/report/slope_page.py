@@ -37,7 +37,7 @@ def render_slope_page(result: DirectResult, *, title: str, notes: tuple[str, ...
         On the files, beside those of the result; escaped too.
     """
     plots = _plots(result)
-    scripts = {"plotly": plotly_js(), "page": _text("slope.js")}
+    scripts = {"plotly": plotly_js(), "page": _text("figures.js")}
     return environment(TEMPLATES).get_template("slope.html.j2").render(
         title=title,
         version=__version__,

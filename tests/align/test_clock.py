@@ -11,8 +11,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.align.clock import _student, estimate_clock
+from aqualog.align.clock import estimate_clock
 from aqualog.errors import FitError
+from aqualog.intervals import student_quantile
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real_logs"
 real = [
@@ -277,7 +278,7 @@ def test_bad_arguments():
 
 def test_quantiles_of_student():
     for dof, quantile in ((1, 12.7062), (2, 4.3027), (5, 2.5706), (11, 2.2010), (100, 1.9840)):
-        assert _student(0.975, dof) == pytest.approx(quantile, rel=1e-4)
+        assert student_quantile(0.975, dof) == pytest.approx(quantile, rel=1e-4)
 
 
 @pytest.mark.parametrize(("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), (150.0, 0.3, 5.0)])

@@ -78,7 +78,10 @@ def test_results_say_the_same(written):
 def test_json_is_one_document(folder, written):
     result = run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "--json")
     assert result.returncode == 0
-    assert json.loads(result.stdout)["slip_slope"] == json.loads((written[1] / "slip_slope.json").read_text())["slip_slope"]
+    assert (
+        json.loads(result.stdout)["slip_slope"]
+        == json.loads((written[1] / "slip_slope.json").read_text())["slip_slope"]
+    )
 
 
 def test_results_are_not_overwritten(folder, written):

@@ -85,7 +85,7 @@ def test_interval_holds_the_slope_in_95_of_100_drives(drive, widest):
 
 def test_interval_does_not_trust_neighbouring_samples():
     """The same drive sampled ten times as often tells no more."""
-    few, many = fitted(3, keep=0.9), fitted(3, keep=0.9 ** 0.1, dt=0.01)
+    few, many = fitted(3, keep=0.9), fitted(3, keep=0.9**0.1, dt=0.01)
     width = [line.slope_ci[1] - line.slope_ci[0] for line in (few, many)]
     assert width[1] > 0.5 * width[0]
 
@@ -102,7 +102,9 @@ def test_noise_of_the_traction_is_seen_and_given_back():
     lines = [fitted(seed, noise_mu=0.03) for seed in range(20)]
     assert np.mean([line.attenuation for line in lines]) == pytest.approx(0.03**2 / (0.08**2 + 0.03**2), rel=0.2)
     assert all(line.is_corrected for line in lines)
-    plain = [fit_line(mu[u], s[u], block_labels(t[u])) for t, mu, s, u in (samples(i, noise_mu=0.03) for i in range(20))]
+    plain = [
+        fit_line(mu[u], s[u], block_labels(t[u])) for t, mu, s, u in (samples(i, noise_mu=0.03) for i in range(20))
+    ]
     assert np.median([line.slope for line in plain]) > 1.08 * C
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.intervals import student_quantile
 from aqualog.types import FloatArray
 
 __all__ = ["Interval", "Line", "Trend", "fit_line", "fit_trend", "noise_of_traction"]
@@ -224,13 +225,5 @@ def _jackknife(
     # information of a block about a parameter: what its samples weigh in the estimate
     inform = np.add.reduceat((x @ inverse) ** 2, first, axis=0)
     dof = np.maximum(inform.sum(axis=0) ** 2 / np.sum(inform**2, axis=0) - 1.0, 1.0)
-    half = np.array([_student(0.5 + LEVEL / 2.0, float(d)) for d in dof]) * sigma
+    half = np.array([student_quantile(0.5 + LEVEL / 2.0, float(d)) for d in dof]) * sigma
     return value / unit, half / unit
-
-
-def _student(probability: float, dof: float) -> float:
-    """Quantile of Student's t: 0.5 < probability < 1, real dof >= 1."""
-    u = np.linspace(0.0, math.pi / 2.0, 4001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
-    density = np.cos(u) ** (dof - 1.0)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
-    return math.sqrt(dof) * math.tan(float(np.interp(2.0 * probability - 1.0, area / area[-1], u)))

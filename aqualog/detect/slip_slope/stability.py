@@ -131,9 +131,7 @@ def _per_hour(change: float, span: float) -> float:
     return math.expm1(min(exponent, 50.0))
 
 
-def _verdict(
-    change: float, low: float, high: float, span: float, segments: tuple[Segment, ...]
-) -> tuple[Verdict, str]:
+def _verdict(change: float, low: float, high: float, span: float, segments: tuple[Segment, ...]) -> tuple[Verdict, str]:
     bounds = f"{100 * change:+.0f} % over {span / 60.0:.1f} min (95 %: {100 * low:+.0f} ... {100 * high:+.0f} %)"
     if (low > 0.0 or high < 0.0) and abs(change) > LEAST:
         return "drifts", f"drifts: {bounds}"

@@ -88,9 +88,7 @@ def _method(vehicle: Vehicle, have: set[str], method: str, where: str) -> Method
     return chosen
 
 
-def _traction(
-    vehicle: Vehicle, have: set[str], traction: str, where: str
-) -> tuple[TractionSource, tuple[str, ...]]:
+def _traction(vehicle: Vehicle, have: set[str], traction: str, where: str) -> tuple[TractionSource, tuple[str, ...]]:
     is_awd = vehicle.drivetrain == "awd"
     torque = [f"torque_{w}" for w in vehicle.driven if f"torque_{w}" not in have]
     if traction == "accelerometer" and is_awd:
