@@ -1,7 +1,7 @@
 """Speed of the slip-slope estimator beside the same filter in NumPy, plain Python and filterpy.
 
 `python -m tests.bench.ekf` from the checkout. First all must give the same slopes, then they are timed in turns, by
-process time. filterpy is no dependency: without `pip install filterpy` it is left out, and said so.
+process time. filterpy is no dependency: without the extra `bench` it is left out, and said so.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def main():
     if importlib.util.find_spec("filterpy"):
         others["filterpy"] = (filterpy_slopes, 10_000)
     else:
-        print("filterpy is not installed and is left out: pip install filterpy")
+        print("filterpy is not installed and is left out: pip install '.[bench]'")
     print("largest relative difference of the slopes to aqualog's, 10000 samples:")
     small = drive(10_000)
     own = aqualog_slopes(small)
