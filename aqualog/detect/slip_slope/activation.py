@@ -10,8 +10,11 @@ from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["LIMITS", "REASONS", "Limits", "inactive_reason"]
 
-REASONS = ("active", "signals missing", "too slow", "cornering", "accelerating hard", "braking", "a wheel spins")
-ACTIVE, MISSING, SLOW, CORNERING, HARD, BRAKING, SPINNING = range(len(REASONS))
+REASONS = (
+    "active", "signals missing", "too slow", "cornering", "accelerating hard", "braking", "a wheel spins",
+    "torque jumps",
+)  # fmt: skip
+ACTIVE, MISSING, SLOW, CORNERING, HARD, BRAKING, SPINNING, JUMPING = range(len(REASONS))
 
 
 class Limits(NamedTuple):
@@ -25,6 +28,7 @@ class Limits(NamedTuple):
     a_y_max: float = 2.0  # [m/s^2] slip angles take from the longitudinal stiffness
     yaw_rate_max: float = 0.25  # [rad/s] paths of front and rear wheels differ
     a_w_delta_max: float = 8.0  # [m/s^2] a wheel that leaves the road's speed
+    mu_rate_max: float = 0.4  # [1/s] a gear shift or a pedal that is let go: a torque that is late does not fit then
 
 
 LIMITS = Limits()
@@ -38,6 +42,7 @@ def inactive_reason(
     yaw_rate: FloatArray,
     a_w_delta: FloatArray,
     is_braking: BoolArray,
+    mu_rate: FloatArray | None = None,
     limits: Limits = LIMITS,
 ) -> FloatArray:
     """Index into `REASONS` for every sample; 0 where the slope may be estimated.
@@ -54,6 +59,8 @@ def inactive_reason(
         Largest wheel acceleration difference of the wheels that are compared, absolute. [m/s^2]
     is_braking : bool array (n,)
         A braking force acts on one of them.
+    mu_rate : array (n,), optional
+        Rate of the traction coefficients, absolute, the larger one. [1/s]
 
     Returns
     -------
@@ -61,9 +68,11 @@ def inactive_reason(
         NaN in velocity means missing; a yaw rate or acceleration that is missing does not stop anything.
     """
     reason = np.zeros(v_x.size)
+    jumps = np.zeros(v_x.size) if mu_rate is None else mu_rate
     with np.errstate(invalid="ignore"):
         # the last one that holds is the one that is told
         for code, bits in (
+            (JUMPING, jumps > limits.mu_rate_max),
             (SPINNING, a_w_delta > limits.a_w_delta_max),
             (HARD, np.abs(a_x) > limits.a_x_max),
             (CORNERING, (np.abs(a_y) > limits.a_y_max) | (np.abs(yaw_rate) > limits.yaw_rate_max)),

@@ -32,11 +32,13 @@ STATUS = {
 ESTIMATING, FROZEN, BLIND, TOO_LARGE, SPINNING, INACTIVE = range(6)
 K_MIN, K_MAX = 1.0 / 300.0, 1.0  # slopes from 1 to 300
 BETA_MIN, BETA_MAX = 0.2, 5.0
+K_USUAL = 1.0 / 33.0
 
 
 class Before(NamedTuple):
-    """Offset and its variance when a sum last was zero: before the change that the sum tells of began."""
+    """Inverse slope, offset and its variance when a sum last was zero: before the change that it tells of began."""
 
+    k: float
     delta: float
     P_dd: float
 
@@ -50,7 +52,8 @@ class State(NamedTuple):
     g_rise: float
     before_drop: Before
     before_rise: Before
-    settling: int  # samples for which the offset is not learnt yet
+    calm: Before  # before the alarm that the estimator settles from
+    settling: int  # samples for which the offset rests; below zero: in which slope and offset are sorted out anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +82,69 @@ class Estimate:
 def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
     """Before the first sample: slope and ratio from the vehicle file, the offset unknown."""
     k = 1.0 / slope
-    # the prior is relative to a slope of 33, so that a soft or a stiff tyre starts as well known
-    sd_k = tuning.sd_k * k * 33.0
+    # the prior is relative to the usual slope, so that a soft or a stiff tyre starts as well known
+    sd_k = tuning.sd_k * k / K_USUAL
     belief = Belief(k, beta, 0.0, sd_k**2, 0.0, 0.0, tuning.sd_beta**2, 0.0, tuning.sd_delta**2)
-    before = Before(belief.delta, belief.P_dd)
-    return State(belief, observability.EMPTY, 0.0, 0.0, before, before, 0)
+    before = Before(belief.k, belief.delta, belief.P_dd)
+    return State(belief, observability.EMPTY, 0.0, 0.0, before, before, before, 0)
+
+
+@compiled
+def _is_at_bound(k):  # type: ignore[no-untyped-def]
+    return k <= 1.01 * K_MIN or k >= 0.99 * K_MAX
+
+
+@compiled
+def _bounded(b, learn_delta):  # type: ignore[no-untyped-def]
+    """The belief with slope and ratio inside their bounds.
+
+    The offset goes along as it is correlated with the slope: held at its bound alone, the slope would leave an error
+    that pushes the offset further with every sample.
+    """
+    k = min(max(b.k, K_MIN), K_MAX)
+    delta = b.delta + b.P_kd / b.P_kk * (k - b.k) if learn_delta and k != b.k else b.delta
+    return Belief(
+        k, min(max(b.beta, BETA_MIN), BETA_MAX), delta, b.P_kk, b.P_kb, b.P_kd, b.P_bb, b.P_bd, b.P_dd,
+    )  # fmt: skip
+
+
+@compiled
+def _changed(p, b, before):  # type: ignore[no-untyped-def]
+    """After an alarm: the slope is unknown again; ratio and offset are the car's.
+
+    The offset is what it was before the change began to pull at it.
+    """
+    return Belief(b.k, b.beta, before.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, 0.0, before.P_dd)
+
+
+@compiled
+def _released(p, b, calm, window):  # type: ignore[no-untyped-def]
+    """Allow that what was booked on the road is the car's: a radius may have changed at once.
+
+    A slope that no tyre has goes back to the one before, and the offset is unknown. Otherwise slope and offset become
+    uncertain together, along the line on which they predict the same slip at the traction of the last seconds: only
+    traction that varies can tell them apart (E10).
+    """
+    if _is_at_bound(b.k):
+        P_kk = (p.sd_k * calm.k / K_USUAL) ** 2
+        return Belief(calm.k, b.beta, calm.delta, P_kk, 0.0, 0.0, b.P_bb, 0.0, p.P_delta_start)
+    mu = window.mean_i - b.beta * window.mean_j
+    along = -1.0 / mu if abs(mu) > p.mu_min else 0.0
+    P = p.P_delta_release
+    return Belief(
+        b.k, b.beta, b.delta, b.P_kk + along * along * P, b.P_kb, b.P_kd + along * P, b.P_bb, b.P_bd, b.P_dd + P,
+    )  # fmt: skip
+
+
+@compiled
+def _faded(p, g):  # type: ignore[no-untyped-def]
+    """A sum where nothing can be seen: old evidence fades; less than one sample of drift is none."""
+    return g * p.fade if g > p.g_trace else 0.0
 
 
 @compiled
 def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no-untyped-def]
-    b, window, g_drop, g_rise, before_drop, before_rise, settling = state
+    b, window, g_drop, g_rise, before_drop, before_rise, calm, settling = state
     for i in range(y.size):
         innovation, variance, alarm, status, beta_told = math.nan, math.nan, 0.0, INACTIVE, False
         if is_active[i] and math.isfinite(y[i]) and math.isfinite(mu_i[i]) and math.isfinite(rho_mu_j[i]):
@@ -104,7 +160,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 beta_told = observability.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
                 status = BLIND if not has_traction else (ESTIMATING if k_told else FROZEN)
                 # while evidence of a change gathers, and for a while after it, the offset rests
-                learn_delta = settling == 0 and max(g_drop, g_rise) < p.h_rest
+                learn_delta = settling < 0 or (settling == 0 and max(g_drop, g_rise) < p.h_rest)
                 b = ekf.predict(
                     b,
                     p.q_k if has_traction and k_told else 0.0,
@@ -114,32 +170,45 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 b, innovation, variance = ekf.update(
                     b, y[i], mu_i[i], rho_mu_j[i], p.r, has_traction, has_traction and beta_told, learn_delta
                 )
-                b = Belief(
-                    min(max(b.k, K_MIN), K_MAX), min(max(b.beta, BETA_MIN), BETA_MAX), b.delta,
-                    b.P_kk, b.P_kb, b.P_kd, b.P_bb, b.P_bd, b.P_dd,
-                )  # fmt: skip
-                settling = max(settling - 1, 0)
+                b = _bounded(b, learn_delta)
+                if settling > 0:
+                    # evidence of another change is let speak first
+                    settling -= 1 if settling > 1 or max(g_drop, g_rise) < p.h_rest else 0
+                    if settling == 0:
+                        b = _released(p, b, calm, window)
+                        settling = -p.sort
+                elif settling < 0:
+                    settling += 1
+                    g_drop, g_rise = 0.0, 0.0
                 if has_traction:
-                    nu = cusum_input(innovation, mu_delta, p.adapted)
-                    g_drop = cusum.step(sums, g_drop, nu)
-                    g_rise = cusum.step(sums, g_rise, -nu)
-                    if g_drop == 0.0:
-                        before_drop = Before(b.delta, b.P_dd)
-                    if g_rise == 0.0:
-                        before_rise = Before(b.delta, b.P_dd)
-                    if g_drop > p.h or g_rise > p.h:
-                        alarm = 1.0 if g_drop > p.h else -1.0
+                    if settling >= 0:
+                        nu = cusum_input(innovation, mu_delta, p.adapted)
+                        g_drop = cusum.step(sums, g_drop, nu)
+                        g_rise = cusum.step(sums, g_rise, -nu)
+                else:
+                    g_drop, g_rise = _faded(p, g_drop), _faded(p, g_rise)
+                if g_drop == 0.0:
+                    before_drop = Before(b.k, b.delta, b.P_dd)
+                if g_rise == 0.0:
+                    before_rise = Before(b.k, b.delta, b.P_dd)
+                if g_drop > p.h or g_rise > p.h:
+                    alarm = 1.0 if g_drop > p.h else -1.0
+                    if settling > 0 and _is_at_bound(b.k):
+                        # no slope explains it: not the road has changed, but a radius
+                        b = _released(p, b, calm, window)
+                        settling = -p.sort
+                    else:
                         before = before_drop if g_drop > p.h else before_rise
-                        # the road has changed: the slope is unknown again; ratio and offset are the car's, and the
-                        # offset is what it was before the change began to pull at it
-                        b = Belief(
-                            b.k, b.beta, before.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, 0.0, before.P_dd
-                        )
-                        g_drop, g_rise = 0.0, 0.0
-                        settling = p.settle if settling == 0 else settling
+                        if settling == 0:
+                            calm = before
+                            settling = p.settle
+                        b = _changed(p, b, before)
+                    g_drop, g_rise = 0.0, 0.0
         if status > BLIND:
             # radii go on drifting while nothing can be seen of them
             b = ekf.predict(b, 0.0, 0.0, p.q_delta)
+            window = observability.aged(window, p.keep)
+            g_drop, g_rise = _faded(p, g_drop), _faded(p, g_rise)
         out[0, i] = 1.0 / b.k
         out[1, i] = math.sqrt(b.P_kk) / (b.k * b.k)
         out[2, i] = b.beta
@@ -151,7 +220,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
         out[8, i] = alarm
         out[9, i] = status
         out[10, i] = beta_told
-    return State(b, window, g_drop, g_rise, before_drop, before_rise, settling)
+    return State(b, window, g_drop, g_rise, before_drop, before_rise, calm, settling)
 
 
 def scan(
@@ -178,7 +247,8 @@ def scan(
     state : State
 
     Thesis: Eq. (3.20) to (3.25) with E8, E10 (what the data cannot tell is frozen), E11 (sums clamped at zero; after an
-    alarm they and what is known of the slope are reset, and the offset rests for half a minute) and E12.
+    alarm they and what is known of the slope are reset, and the offset rests for half a minute; then slope and offset
+    are sorted out anew for 5 s, in which no change is looked for) and E12.
     """
     out = np.empty((11, s_delta.size))
     sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aqualog.compiled import compiled
 
-__all__ = ["EMPTY", "Window", "sd_beta", "sd_slope", "step"]
+__all__ = ["EMPTY", "Window", "aged", "sd_beta", "sd_slope", "step"]
 
 _TINY = 1e-12
 
@@ -44,6 +44,12 @@ def step(w, keep, dt, mu_i, rho_mu_j):  # type: ignore[no-untyped-def]
         rest * (w.cov + share * d_i * d_j),
         rest * (w.var_j + share * d_j * d_j),
     )
+
+
+@compiled
+def aged(w, keep):  # type: ignore[no-untyped-def]
+    """The window after a sample of which nothing was seen."""
+    return Window(w.seconds * keep, w.mean_i, w.mean_j, w.var_i, w.cov, w.var_j)
 
 
 @compiled

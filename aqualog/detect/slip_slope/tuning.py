@@ -31,7 +31,10 @@ class Tuning(NamedTuple):
     adapted: bool = True  # (3.25) rather than (3.23)
     # after an alarm the offset, which is the car's, is not learnt for a while: what changed at once is the road
     tau_settle: float = 30.0  # [s]
+    tau_sort: float = 5.0  # [s] then slope and offset are sorted out anew, in case it was a radius after all
+    sd_delta_release: float = 2e-3
     rest: float = 0.25  # nor while a sum stands above this share of its threshold
+    tau_fade: float = 10.0  # [s] evidence fades where nothing is seen
     # activation by the size of the differential traction and slip
     mu_min: float = 0.01  # [-] below, only the offset is learnt
     mu_max: float = 0.30  # [-]
@@ -58,6 +61,12 @@ class Params(NamedTuple):
     h: float
     adapted: bool
     settle: int
+    sort: int
+    fade: float
+    g_trace: float
+    sd_k: float
+    P_delta_start: float
+    P_delta_release: float
     h_rest: float
     mu_min: float
     mu_max: float
@@ -81,7 +90,13 @@ class Params(NamedTuple):
             zeta=t.zeta,
             h=t.h,
             adapted=t.adapted,
-            settle=round(t.tau_settle / dt),
+            settle=max(round(t.tau_settle / dt), 1),
+            sort=max(round(t.tau_sort / dt), 1),
+            fade=math.exp(-dt / t.tau_fade),
+            g_trace=t.zeta * dt,
+            sd_k=t.sd_k,
+            P_delta_start=t.sd_delta**2,
+            P_delta_release=t.sd_delta_release**2,
             h_rest=t.rest * t.h,
             mu_min=t.mu_min,
             mu_max=t.mu_max,

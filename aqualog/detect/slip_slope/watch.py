@@ -9,11 +9,12 @@ from typing import Literal
 import numpy as np
 
 from aqualog.detect import ewvar
+from aqualog.detect.negative_force import hold_on
 from aqualog.detect.slip_slope import activation, drop, estimator
 from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
 from aqualog.detect.slip_slope.history import History, Rule
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
-from aqualog.features.smoothing import UNSET, lowpass
+from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.notation import AXLES, SIDES
 from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
 from aqualog.types import BoolArray, FloatArray, SlopeSummary
@@ -25,6 +26,7 @@ VARIANCE_MAX = 4.0  # [(m/s^2)^2] "variance of the wheel acceleration below a th
 TAU_VARIANCE = 0.3  # [s]
 # slip and traction alike: noise of the traction (a wheel's acceleration is in it) would flatten slip over traction
 TAU_SMOOTH = 0.15  # [s]
+AFTER_JUMP = 0.5  # [s] a jump of the torque, late by up to 0.3 s, has passed the low-pass
 
 Form = Literal["f", "r"]
 
@@ -119,6 +121,7 @@ class SlipSlopeWatch:
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
         self._variances = {w: ewvar.initial_state() for w in (*pair.i, *pair.j)}
         self._smoothed: dict[str, float] = {}
+        self._after_jump = 0
         self._dt = dt
         self._counts = np.zeros(len(STATUS))
         self._reasons = np.zeros(len(activation.REASONS))
@@ -133,11 +136,16 @@ class SlipSlopeWatch:
         mu_i = self._smooth("mu_i", _mean(f, "mu", i))
         # a free wheel's own rolling resistance is a slip that never changes: it goes to the offset
         rho_mu_j = self._smooth("mu_j", (1.0 - slip) * _mean(f, "mu", j)) if self._two_driven else 0.0 * mu_i
+        rates = [self._rate(f"mu_rate_{w}", f[f"mu_{w}"]) for w in ((*i, *j) if self._two_driven else i)]
         reason = activation.inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=yaw_rate,
             a_w_delta=np.max([np.abs(f[f"a_w_delta_{w}"]) for w in (*i, *j)], axis=0),
-            is_braking=np.any([braking[w] for w in (*i, *j)], axis=0),
+            is_braking=np.any([braking[w] for w in (*i, *j)], axis=0), mu_rate=np.max(np.abs(rates), axis=0),
         )  # fmt: skip
+        jumping, self._after_jump = hold_on(
+            reason == activation.JUMPING, self._after_jump, seconds=AFTER_JUMP, dt=self._dt
+        )
+        reason = np.where(jumping & (reason == activation.ACTIVE), activation.JUMPING, reason)
         estimate, self._state = estimator.scan(self._params, self._state, s_delta, mu_i, rho_mu_j, reason == 0)
         is_valid = (estimate.status == ESTIMATING) | (estimate.status == FROZEN)
         is_valid &= self._calm(f)
@@ -175,6 +183,10 @@ class SlipSlopeWatch:
     def _smooth(self, name: str, x: FloatArray) -> FloatArray:
         y, self._smoothed[name] = lowpass(x, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
         return y
+
+    def _rate(self, name: str, mu: FloatArray) -> FloatArray:
+        rate, self._smoothed[name] = derivative(mu, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
+        return np.nan_to_num(rate)
 
     def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
         calm = np.ones(f["v_x_hat"].size, dtype=bool)
