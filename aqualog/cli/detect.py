@@ -127,15 +127,19 @@ def _detect(
     verbose: bool,
     progress: str,
 ) -> int:
+    from dataclasses import replace
+
     from aqualog.cli.files import refuse_existing
     from aqualog.cli.setup import prepare
+    from aqualog.config.history import update_history
+    from aqualog.detect.slip_slope.history import drive_key, remembered
     from aqualog.io.write_log import check_suffix
 
     targets = [out / name for name in _RESULTS] if out else []
     if write is not None:
         check_suffix(write)
         targets.append(write)
-    memory = _memory(history_file, configuration, reference)
+    memory = _memory(history_file, configuration, reference, out)
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
         progress=progress, vehicle_file=vehicle_file,
@@ -154,7 +158,9 @@ def _detect(
         for name, origin in loaded.origins.items():
             console.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
         steps("detecting")
-        result = detect_drive(loaded, vehicle, memory=memory)
+        # what an earlier look at this very drive has left is not what it is compared with
+        key = drive_key(loaded) if history_file else ""
+        result = detect_drive(loaded, vehicle, memory=replace(memory, history=memory.history.without(key)))
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")
@@ -163,10 +169,12 @@ def _detect(
         if write is not None:
             _write_log(result, write)
         if history_file is not None:
-            _remember(history_file, memory, result, vehicle)
+            update_history(history_file, lambda h: remembered(h, memory.name(vehicle), result.slopes, drive=key))
     _print(result, name, as_json=as_json)
     if vehicle_file is None:
         console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
+    if configuration and history_file is None:
+        console.note("--configuration names an entry of a history; without --history it does nothing")
     for text in (*loaded.quality.notes, *result.notes):
         console.note(text)
     if out is not None:
@@ -174,25 +182,23 @@ def _detect(
     return _exit_code(result, fail_on_event=fail_on_event)
 
 
-def _memory(history_file: Path | None, configuration: str, reference: str) -> Memory:
+def _memory(history_file: Path | None, configuration: str, reference: str, out: Path | None) -> Memory:
     """What is known of the dry slope before the drive."""
-    from aqualog.config.history import load_history
-    from aqualog.detect.slip_slope.history import History
+    from aqualog.config.history import check_history_file, load_history
+    from aqualog.detect.slip_slope.history import History, check_configuration
     from aqualog.detect.slip_slope.watch import Memory
     from aqualog.errors import ConfigError
 
     if reference not in ("robust", "max"):
-        raise ConfigError(f"--reference {reference}", expected="robust or max")
-    history = load_history(history_file) if history_file else History()
-    return Memory(history, configuration.strip()[:200], "max" if reference == "max" else "robust")
-
-
-def _remember(path: Path, memory: Memory, result: DriveResult, vehicle: Any) -> None:
-    """The history with this drive in it."""
-    from aqualog.config.history import save_history
-    from aqualog.detect.slip_slope.history import remembered
-
-    save_history(path, remembered(memory.history, memory.name(vehicle), result.slopes))
+        raise ConfigError(f"--reference {reference[:40]!r}", expected="robust or max")
+    check_configuration(configuration, where="--configuration")
+    history = History()
+    if history_file is not None:
+        if out is not None and out.absolute() == history_file.absolute():
+            raise ConfigError("is the folder of the results", where=str(history_file), expected="a file of its own")
+        check_history_file(history_file)
+        history = load_history(history_file)
+    return Memory(history, configuration.strip(), "max" if reference == "max" else "robust")
 
 
 def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 
@@ -54,6 +55,10 @@ def run() -> None:
 
     A request to end leaves by the usual way, so that no half-written file stays.
     """
+    for stream in (sys.stdout, sys.stderr):
+        # a name that the terminal's code page does not have must not cost the work
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)

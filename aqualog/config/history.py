@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
 from aqualog.errors import ConfigError
 from aqualog.io.whole import write_text
 
-__all__ = ["load_history", "save_history"]
+__all__ = ["check_history_file", "load_history", "save_history", "update_history"]
 
-MAX_BYTES = 5_000_000  # a thousand configurations
+MAX_BYTES = 50_000_000  # ten thousand configurations
+
+
+def check_history_file(path: Path) -> None:
+    """Refuse a file that could be read but not written back at the end of the work.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if path.exists() and not os.access(path, os.W_OK):
+        raise ConfigError("cannot be written", where=str(path), hint="its permissions")
 
 
 def load_history(path: Path) -> History:
@@ -24,8 +38,10 @@ def load_history(path: Path) -> History:
     """
     if not path.exists():
         return History()
-    if not path.is_file() or path.stat().st_size > MAX_BYTES:
+    if not path.is_file():
         raise ConfigError("is no slip-slope history", where=str(path), expected="a JSON file that aqualog wrote")
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigError(f"is larger than {MAX_BYTES // 10**6} MB", where=str(path), hint="a history per car")
     try:
         document = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
@@ -34,5 +50,37 @@ def load_history(path: Path) -> History:
 
 
 def save_history(path: Path, history: History) -> None:
-    """Write a history, whole or not at all."""
-    write_text(path, json.dumps(history_to_json(history), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+    """Write a history, whole or not at all; behind a link, to the file that it points to.
+
+    Raises
+    ------
+    ConfigError
+        If it has become larger than what can be read again; the file stays as it was.
+    """
+    text = json.dumps(history_to_json(history), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    if len(text.encode("utf-8")) > MAX_BYTES:
+        raise ConfigError(f"would grow beyond {MAX_BYTES // 10**6} MB", where=str(path), hint="a history per car")
+    write_text(path.resolve(), text)
+
+
+def update_history(path: Path, change: Callable[[History], History]) -> None:
+    """Read, change and write a history while no other run does: drives looked at side by side lose nothing."""
+    with _alone(path.resolve().parent):
+        save_history(path, change(load_history(path)))
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold the folder's lock, where the system has one; it leaves no file behind."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

@@ -27,6 +27,8 @@ def load_vehicle(path: Path) -> Vehicle:
     document, text = load_toml(path, what="vehicle file")
     faults = Faults(path, text)
     values: dict[str, Any] = {"name": str(document.pop("name", path.stem))}
+    if isinstance(values.get("name"), str) and not values["name"].isprintable():
+        faults.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
     drivetrain = document.pop("drivetrain", "rwd")
     given = {"name"}
     if not isinstance(drivetrain, str) or drivetrain not in _SPLIT:

@@ -262,7 +262,7 @@ def test_usage_and_configuration_errors(folder, tmp_path):
 def test_a_log_that_cannot_be_written_leaves_nothing(folder, tmp_path):
     (tmp_path / "file").write_text("")
     result = run("simulate", folder / "wet.toml", "-o", tmp_path / "file" / "x.csv")
-    assert result.returncode == 1
+    assert result.returncode == 2
     one_error_line(result)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 

@@ -19,6 +19,7 @@ from aqualog.errors import ConfigError
 from aqualog.model.scenario import Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.surface import SURFACES
+from aqualog.types import SlopeSummary
 from aqualog.vehicle import Vehicle
 
 DT = 0.01
@@ -151,6 +152,13 @@ def test_history_file_and_back(tmp_path):
         '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 3, "mean": "x", "seconds": 1}]}}}',
         '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": NaN, "mean": 1, "seconds": 1}]}}}',
         '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": -3, "mean": 1, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 30, "mean": 31, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 301, "mean": 30, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 30, "mean": 0.9, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"a": {"left": [{"max": 1%s, "mean": 9, "seconds": 1}]}}}' % (400 * "0"),
+        '{"schema_version": 1, "slip_slope_history": {"a": {"roof": [{"max": 30, "mean": 30, "seconds": 1}]}}}',
+        '{"schema_version": 1, "slip_slope_history": {"\\ud800": {"left": []}}}',
+        '{"schema_version": true, "slip_slope_history": {}}',
     ],
 )  # fmt: skip
 def test_a_file_that_is_no_history(tmp_path, text):
@@ -158,6 +166,45 @@ def test_a_file_that_is_no_history(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ConfigError, match=r"h\.json"):
         load_history(path)
+
+
+def test_a_drive_that_is_looked_at_again_counts_once():
+    first = History().with_periods("c", "left", [Period(31.0, 30.0, 30.0, "a"), Period(33.0, 32.0, 30.0, "b")])
+    summary = SlopeSummary("left", None, 30.0, 1.0, 30.0, None, 0.0, 0, {}, {}, periods=((29.5, 29.0, 30.0),))
+    again = remembered(first, "c", [summary], drive="a")
+    assert [p.drive for p in again.of("c", "left")] == ["b", "a"]
+    assert remembered(again, "c", [summary], drive="a") == again
+    assert [p.drive for p in again.without("a").of("c", "left")] == ["b"]
+    assert again.without("z") == again
+
+
+def test_a_history_behind_a_link_and_one_too_large(tmp_path, monkeypatch):
+    history = History().with_periods("c", "left", [Period(31.0, 30.0, 30.0)])
+    (tmp_path / "link.json").symlink_to(tmp_path / "real.json")
+    save_history(tmp_path / "link.json", history)
+    assert (tmp_path / "link.json").is_symlink()
+    assert load_history(tmp_path / "real.json") == history
+    before = (tmp_path / "real.json").read_bytes()
+    monkeypatch.setattr("aqualog.config.history.MAX_BYTES", 100)
+    with pytest.raises(ConfigError, match="grow beyond"):
+        save_history(tmp_path / "link.json", history)
+    with pytest.raises(ConfigError, match="larger than"):
+        load_history(tmp_path / "real.json")
+    assert (tmp_path / "real.json").read_bytes() == before
+
+
+def test_runs_side_by_side_lose_nothing(tmp_path):
+    """Four processes, each adding its configurations to the same file."""
+    path = tmp_path / "h.json"
+    code = (
+        "import sys; from pathlib import Path; from aqualog.config.history import update_history\n"
+        "from aqualog.detect.slip_slope.history import Period\n"
+        "for i in range(10): update_history(Path(sys.argv[1]), lambda h: h.with_periods("
+        "f'{sys.argv[2]}-{i}', 'left', [Period(30.0, 30.0, 30.0)]))"
+    )
+    runs = [subprocess.Popen([sys.executable, "-c", code, str(path), str(k)]) for k in range(4)]
+    assert [r.wait() for r in runs] == [0] * 4
+    assert len(load_history(path).periods) == 40
 
 
 # --- which wheels -----------------------------------------------------------------------------------------------------
@@ -267,7 +314,15 @@ def test_history_of_the_command(tmp_path):
     assert left["reference"] == pytest.approx(60.0)
     assert right["reference"] == pytest.approx(31.0)  # the vehicle file's
     assert "worn, 1.9 bar" in json.loads(path.read_text())["slip_slope_history"]
+    kept = json.loads(path.read_text())["slip_slope_history"]["worn, 1.9 bar"]
+    assert run().returncode == 0
+    assert json.loads(path.read_text())["slip_slope_history"]["worn, 1.9 bar"] == kept
     assert run("--reference", "median").returncode == 2
+    for bad in ("a\nb", 201 * "x"):
+        assert run("--configuration", bad).returncode == 2
+    failed = run("-o", path / "out")
+    assert failed.returncode == 2
+    assert "slopes.json" in failed.stderr
     path.write_text("{}")
     failed = run()
     assert failed.returncode == 2

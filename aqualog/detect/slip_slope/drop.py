@@ -61,7 +61,9 @@ def initial_state(periods: tuple[Period, ...], *, rule: Rule, fallback: float = 
 def completed(state: DropState) -> tuple[Period, ...]:
     """Periods that this drive added, the newest of them; a last one of 5 s or more counts."""
     new = min(state.new, state.n_kept)
-    periods = [Period(*(float(x) for x in row)) for row in state.kept[state.n_kept - new : state.n_kept]]
+    periods = [
+        Period(float(row[0]), float(row[1]), float(row[2])) for row in state.kept[state.n_kept - new : state.n_kept]
+    ]
     if state.seconds >= 5.0:
         periods.append(Period(state.largest, state.mean, state.seconds))
     return tuple(periods)
