@@ -19,7 +19,7 @@ _CASE = Case("sine", 250.0, "force", 4.0, a_x=0.0, t_end=10.0)
 _RADIUS_ERROR = 0.005  # of the front axle, as the estimator believes it
 _AFTER = 8.0  # [s] sums are compared this long after the change
 # a filter that does not learn the new road: slope and ratio are held, the offset is learnt as ever, no alarm resets
-_HELD = TUNING._replace(q_k=0.0, sd_k=0.0, q_beta=0.0, sd_beta=0.0, h=1e9)
+_HELD = TUNING._replace(q_k=0.0, sd_k=0.0, q_beta=0.0, sd_beta=0.0, h=1e9, tau_fade=np.inf)
 
 
 def sums(nu: FloatArray, used: FloatArray) -> FloatArray:

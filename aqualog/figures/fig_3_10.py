@@ -10,7 +10,6 @@ import numpy as np
 from aqualog.figures.record import (
     BORNE_OUT,
     IN_PART,
-    NOT_BORNE_OUT,
     Figure,
     Finding,
     Line,
@@ -51,16 +50,14 @@ def cases(wave: str, kind: str) -> dict[tuple[float, float], Case]:
     return {(A, a): Case(wave, A, kind, 8.0, a_x=a) for A in amplitudes for a in accelerations}
 
 
-def _better(verdicts: dict[str, Verdict]) -> tuple[str, Verdict]:
-    """The waveform that bears a claim out better: the thesis does not name that of this figure."""
-    order = (BORNE_OUT, IN_PART, NOT_BORNE_OUT)
-    # the sine where both come out alike
-    wave = min(reversed(WAVES), key=lambda w: order.index(verdicts[w]))
-    return wave, verdicts[wave]
+def _both(verdicts: dict[str, Verdict]) -> Verdict:
+    """Verdict over both waveforms, of which the thesis does not say which it shows: in part where they differ."""
+    found = set(verdicts.values())
+    return found.pop() if len(found) == 1 else IN_PART
 
 
-def _whose(wave: str, verdicts: dict[str, Verdict]) -> str:
-    return "both come out alike" if len(set(verdicts.values())) == 1 else f"the verdict is that of the {wave}"
+def _whose(verdicts: dict[str, Verdict]) -> str:
+    return "" if len(set(verdicts.values())) == 1 else "; " + ", ".join(f"{w} {v}" for w, v in verdicts.items())
 
 
 def _ratio(times: Sequence[float]) -> float:
@@ -151,7 +148,7 @@ def _c110(times: dict[str, dict[tuple[float, float], float]]) -> Finding:
 def _c111(times: dict[str, dict[tuple[float, float], float]], causes: dict[float, dict[str, list[float]]]) -> Finding:
     ratios = {w: {A: _ratio([times[w][A, a] for a in MU_A]) for A in (0.07, 0.03)} for w in WAVES}
     verdicts = {w: judged(whole=max(r.values()) < 1.3, part=max(r.values()) < 2.0) for w, r in ratios.items()}
-    wave, verdict = _better(verdicts)
+    verdict = _both(verdicts)
     left = {A: {n: _ratio(t) for n, t in c.items()} for A, c in causes.items()}
     least = min(min(float(d.F_x_f[d.t > -8.0].min()), float(d.F_x_r[d.t > -8.0].min()))
                 for c in cases("triangle", "mu").values() for d in (drive(c),))  # fmt: skip
@@ -165,31 +162,31 @@ def _c111(times: dict[str, dict[tuple[float, float], float]], causes: dict[float
             f"{w} of {A:g}: {listed([times[w][A, a] for a in MU_A])} s, ratio {_number(r)}"
             for w in WAVES
             for A, r in ratios[w].items()
-        ) + f"; smallest axle force {least:.0f} N; {_whose(wave, verdicts)}",
+        ) + f"; smallest axle force {least:.0f} N{_whose(verdicts)}",
         verdict,
         "Two causes, switched off one by one (sine; tables below): ratios for 0.07 / 0.03 are "
         + ", ".join(f"{n} {_number(left[0.07][n])} / {_number(left[0.03][n])}" for n in _CAUSES)
         + ". Under acceleration the tyre's curve is flatter, most on the low surface, and load transfer adds a "
         "differential traction to that of the excitation.",
-        _known(ratios[wave][0.07]),
+        _known(ratios["sine"][0.07]),
     )  # fmt: skip
 
 
 def _c112(times: dict[str, list[float]]) -> Finding:
     below = {w: [not np.isnan(t) and t < 2.0 for t in ts] for w, ts in times.items()}
     verdicts = {w: judged(whole=all(b), part=b[-1]) for w, b in below.items()}
-    wave, verdict = _better(verdicts)
+    verdict = _both(verdicts)
     return Finding(
         "C112",
         "Even a traction coefficient of 0.03 allows detection in less than 2 s.",
         "below 2 s at 0, 0.5 and 1 m/s^2; in part: at 1 m/s^2 only",
-        "; ".join(f"{w}: {listed(ts)} s" for w, ts in times.items()) + f"; {_whose(wave, verdicts)}",
+        "; ".join(f"{w}: {listed(ts)} s" for w, ts in times.items()) + f"{_whose(verdicts)}",
         verdict,
         "" if verdict == BORNE_OUT else
         "At 0.03 on both axles a step from slope 30 to 10 shows a prediction error of at most "
         f"{1e3 * _largest_error():.1f}e-3, of which the drift takes 1.0e-3. At constant speed the remaining sum needs "
         "more than one half wave; under acceleration the flatter curve makes the error larger.",
-        _known(times[wave][-1]),
+        _known(times["sine"][-1]),
     )  # fmt: skip
 
 
@@ -209,8 +206,8 @@ def _c113(times: dict[str, list[float]]) -> Finding:
         for w in WAVES
     }
     verdicts = {w: judged(whole=all(r), part=any(r)) for w, r in right.items()}
-    wave, verdict = _better(verdicts)
-    mu, tangent, estimated = settled_slopes(Case(wave, 0.07, "mu", a_x=1.0))
+    verdict = _both(verdicts)
+    mu, tangent, estimated = settled_slopes(Case("sine", 0.07, "mu", a_x=1.0))
     return Finding(
         "C113",
         "With 0.07 the detection time is already just 1 s, and the slope is almost right within 2 s.",
@@ -218,13 +215,13 @@ def _c113(times: dict[str, list[float]]) -> Finding:
         "and 1 m/s^2; in part: at some",
         "; ".join(
             f"{w}: {listed(times[w])} s, slope {' / '.join(f'{s:.1f}' for s in slopes[w])} after 2 s" for w in WAVES
-        ) + f"; {_whose(wave, verdicts)}",
+        ) + f"{_whose(verdicts)}",
         verdict,
         "" if verdict == BORNE_OUT else
         f"Under 1 m/s^2 the slope that can be seen is the tangent of the curve, {tangent:.1f} at a traction of "
         f"{mu:.2f} (the estimate settles at {estimated:.1f}): below {LOW_SLOPE:.0f} by more than 15 %, as the tyre is "
         "there. At constant speed the slope is right and the drop found a little later.",
-        _known(times[wave][-1]),
+        _known(times["sine"][-1]),
     )  # fmt: skip
 
 

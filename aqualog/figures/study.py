@@ -51,6 +51,7 @@ class Case:
     low_mu: float = LOW_MU
     nu: float = REAR_SHARE
     t_end: float = 20.0
+    phase: float = 0.0  # of the excitation at the change, as a share of its period
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,23 +74,24 @@ class Drive:
 def drive(case: Case) -> Drive:
     """Drive from -10 s to `t_end`; at t = 0 the surface changes under both axles and the car does 20 m/s."""
     return _drive(case.waveform, case.amplitude, case.kind, case.period, case.a_x, case.car, case.low_mu, case.nu,
-                  case.t_end)  # fmt: skip
+                  case.t_end, case.phase * case.period)  # fmt: skip
 
 
 @lru_cache(maxsize=256)
 def _drive(
     waveform: str, amplitude: float, kind: str, period: float, a_x: float, car: HalfCar, low_mu: float, nu: float,
-    t_end: float,
+    t_end: float, lag: float,
 ) -> Drive:  # fmt: skip
     # apart from the tuning, so that a sweep of it drives once
     excitation = Excitation(waveform, amplitude, kind, period) if waveform else None  # type: ignore[arg-type]
     run = HalfCarRun(
         t_end - T_START, dt=STEP_S, v0=V_CHANGE + a_x * T_START, a_x=a_x, nu=nu, excitation=excitation,
-        surface=(SurfaceChange(0.0, LOW_SLOPE, LOW_SLOPE, low_mu),), t_start=T_START,
+        surface=(SurfaceChange(lag, LOW_SLOPE, LOW_SLOPE, low_mu),), t_start=T_START + lag,
     )  # fmt: skip
     result = simulate_half_car(car, run)
     every = round(1.0 / (RATE_HZ * STEP_S))
-    return Drive(*(np.ascontiguousarray(getattr(result, name)[::every]) for name in Drive.__dataclass_fields__))
+    columns = {name: np.ascontiguousarray(getattr(result, name)[::every]) for name in Drive.__dataclass_fields__}
+    return Drive(**{**columns, "t": columns["t"] - lag})
 
 
 def inputs(d: Drive, car: HalfCar = SUV) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -37,7 +37,7 @@ CLAIMS = {
     "3.3": {"C92"},
     "3.4": {"C93"},
     "3.5": {"C94", "C95"},
-    "3.6": {"C104"},
+    "3.6": {"C104", "C104 (phase)"},
     "3.7": {"C105", "C96", "C97", "C99", "C107"},
     "3.8": {"C106"},
     "3.9": {"C108", "C108 (tuning)", "C109"},
@@ -234,7 +234,8 @@ def test_sums_of_figure_3_2_are_those_of_the_estimator(adapted):
     )
     _, innovation, _, _, mu_delta, used = fig_3_02._held_filter(0.0)
     nu = np.sign(mu_delta) * innovation if adapted else innovation
-    assert fig_3_02.sums(nu, used) == pytest.approx(e.g_drop, abs=1e-9)
+    # the estimator lets less than one sample of drift fade to nothing where it is blind
+    assert fig_3_02.sums(nu, used) == pytest.approx(e.g_drop, abs=1.1 * TUNING.zeta * 0.01)
     if adapted:
         name = "sgn(mu_delta) epsilon"
         row = next(r for r in made("3.2").tables[0].rows if r[0] == name)
@@ -296,18 +297,28 @@ def times_of(monkeypatch, module, times):
 
 def test_verdict_of_figure_3_6_follows_the_times(monkeypatch):
     good = {"step": 1.0, "ramp": 2.1, "sine": 2.3, "triangle": 2.6}
-    assert times_of(monkeypatch, fig_3_06, lambda c: good[c.waveform]) == {"C104": BORNE_OUT}
+    assert times_of(monkeypatch, fig_3_06, lambda c: good[c.waveform]) == dict.fromkeys(
+        ("C104", "C104 (phase)"), BORNE_OUT
+    )
     early = good | {"ramp": 1.9}
-    assert times_of(monkeypatch, fig_3_06, lambda c: early[c.waveform]) == {"C104": IN_PART}
+    assert times_of(monkeypatch, fig_3_06, lambda c: early[c.waveform]) == dict.fromkeys(
+        ("C104", "C104 (phase)"), IN_PART
+    )
     late = good | {"ramp": 2.4}
-    assert times_of(monkeypatch, fig_3_06, lambda c: late[c.waveform]) == {"C104": NOT_BORNE_OUT}
+    assert times_of(monkeypatch, fig_3_06, lambda c: late[c.waveform]) == dict.fromkeys(
+        ("C104", "C104 (phase)"), NOT_BORNE_OUT
+    )
     never = good | {"step": float("nan")}
-    assert times_of(monkeypatch, fig_3_06, lambda c: never[c.waveform]) == {"C104": NOT_BORNE_OUT}
+    assert times_of(monkeypatch, fig_3_06, lambda c: never[c.waveform]) == dict.fromkeys(
+        ("C104", "C104 (phase)"), NOT_BORNE_OUT
+    )
 
 
 def test_verdict_of_figure_3_9_follows_the_times(monkeypatch):
     assert times_of(monkeypatch, fig_3_09, lambda c: 1.0 + abs(np.log2(c.period / 8.0)))["C108"] == BORNE_OUT
-    assert times_of(monkeypatch, fig_3_09, lambda c: 1.0 + abs(np.log2(c.period / 4.0)))["C108"] == IN_PART
+    gap = {64.0: 4.0, 32.0: float("nan"), 16.0: 2.0, 8.0: 1.0, 4.0: 3.0, 2.0: 2.5}
+    assert times_of(monkeypatch, fig_3_09, lambda c: gap.get(c.period, 9.0))["C108"] == IN_PART
+    assert times_of(monkeypatch, fig_3_09, lambda c: 1.0 + abs(np.log2(c.period / 4.0)))["C108"] == NOT_BORNE_OUT
     assert times_of(monkeypatch, fig_3_09, lambda c: 0.1 * c.period)["C108"] == NOT_BORNE_OUT
 
 
@@ -332,6 +343,17 @@ def test_nothing_found_at_all_is_told_and_not_a_crash(monkeypatch, module):
     assert verdicts[first] == NOT_BORNE_OUT
     for c in module.make().findings:
         assert c.value is None or np.isfinite(c.value)
+
+
+def test_the_phase_moves_the_change_and_nothing_else():
+    case = study.Case("sine", period=8.0)
+    late = replace(case, phase=0.25)
+    d, q = study.drive(case), study.drive(late)
+    assert q.t == pytest.approx(d.t)
+    zero = np.searchsorted(d.t, 0.0)
+    assert d.v_x[zero] == pytest.approx(q.v_x[zero], abs=0.02)
+    # a quarter of a period later the excitation is at its peak when the road changes
+    assert d.F_x_f[zero - 1] - q.F_x_f[zero - 1] == pytest.approx(-250.0, abs=10.0)
 
 
 def test_gates():
