@@ -14,8 +14,8 @@ from aqualog.detect.needs import check_needs
 from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
 from aqualog.detect.negative_force import began_free, hold_on, is_braking
 from aqualog.detect.plausibility import implausible
-from aqualog.detect.slip_slope.blindness import blindness
 from aqualog.detect.slip_slope.estimator import INACTIVE
+from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory, SlipSlopeWatch, pairs
 from aqualog.features.stream import Features, FeatureStream
 from aqualog.notation import SIDES, WHEELS, side_of
@@ -381,6 +381,6 @@ def detect_drive(
         unavailable=stream.unavailable,
         limited=stream.limited,
         vehicle_name=vehicle.name,
-        notes=(*implausible(signals, piece.features, vehicle), *blindness(slopes)),
+        notes=(*implausible(signals, piece.features, vehicle), *remarks(slopes)),
         slopes=slopes,
     )

@@ -11,8 +11,8 @@ import pytest
 
 from aqualog.config.history import load_history, save_history
 from aqualog.detect.slip_slope import drop
-from aqualog.detect.slip_slope.blindness import blindness
 from aqualog.detect.slip_slope.history import History, Period, reference, remembered
+from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory, pairs
 from aqualog.detect.stream import DriveStream
 from aqualog.errors import ConfigError
@@ -270,7 +270,7 @@ def test_at_the_load_share_it_is_blind_and_says_so():
         summary = watch.summary()
         assert summary.seconds["blind"] > 0.95 * sum(summary.seconds.values())
         assert summary.alarms == 0
-    (note,) = blindness([w.summary() for w in stream.slope_watches])
+    (note,) = remarks([w.summary() for w in stream.slope_watches])
     assert "left, right" in note
     assert "both axles slip alike" in note
 

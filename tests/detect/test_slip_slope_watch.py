@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from aqualog.detect.slip_slope import estimator
+from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.detect.slip_slope.watch import TAU_SMOOTH, SlipSlopeWatch, pairs
 from aqualog.features.smoothing import UNSET, lowpass
 from aqualog.notation import WHEELS
+from aqualog.types import SlopeSummary
 from aqualog.vehicle import Vehicle
 
 DT = 0.01
@@ -119,3 +121,45 @@ def test_seconds_by_state_and_reason_add_up():
     assert s.inactive["too slow"] == pytest.approx(20.0)
     assert s.inactive["cornering"] == pytest.approx(5.0)
     assert s.inactive["signals missing"] == pytest.approx(2.0, abs=0.02)
+
+
+def summary(**changes):
+    values = {
+        "place": "left", "wheel": "rl", "slope": 30.0, "slope_sd": 1.0, "reference": 30.0, "beta": None, "offset": 0.0,
+        "alarms": 0, "seconds": {"estimating": 600.0, "slope_frozen": 0.0, "blind": 0.0}, "inactive": {},
+        "judged_s": 600.0, "dropped_s": 0.0,
+    }  # fmt: skip
+    return SlopeSummary(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({}, None),
+        ({"alarms": 12}, None),
+        ({"alarms": 13}, "more than a road has"),
+        ({"alarms": 3, "seconds": {"estimating": 20.0, "slope_frozen": 0.0, "blind": 0.0}}, None),
+        ({"dropped_s": 530.0}, None),
+        ({"dropped_s": 550.0}, "is this the tyre"),
+        ({"judged_s": 10.0, "dropped_s": 10.0}, None),
+        ({"seconds": {"estimating": 200.0, "slope_frozen": 0.0, "blind": 400.0}}, "hardly any traction"),
+        ({"seconds": {"estimating": 200.0, "slope_frozen": 0.0, "blind": 400.0}, "beta": 1.0}, "slip alike"),
+        ({"seconds": {"estimating": 200.0, "slope_frozen": 400.0, "blind": 0.0}}, "too even"),
+        ({"seconds": {"estimating": 2.0, "slope_frozen": 0.0, "blind": 7.0}}, None),
+    ],
+)
+def test_notes_on_a_drive(changes, word):
+    notes = remarks([summary(**changes), summary(place="right", wheel="rr", **changes)])
+    assert len(notes) == (0 if word is None else 1)
+    if word:
+        assert word in notes[0]
+        assert "left, right" in notes[0]
+
+
+def test_seconds_judged_and_dropped():
+    _, w = watch(RWD, features(RWD, 0.4))
+    s = w.summary()
+    assert 50.0 < s.judged_s < 60.0
+    assert s.dropped_s == pytest.approx(s.judged_s, abs=2.0)
+    _, w = watch(RWD, features(RWD))
+    assert w.summary().dropped_s == 0.0

@@ -1,4 +1,4 @@
-"""Sentences on what a drive could not tell about the slip slope."""
+"""Sentences on what a drive could not tell about the slip slope, and on what does not look like a road."""
 
 from __future__ import annotations
 
@@ -6,22 +6,24 @@ from collections.abc import Sequence
 
 from aqualog.types import SlopeSummary
 
-__all__ = ["blindness"]
+__all__ = ["remarks"]
 
 LEAST = 10.0  # [s] of driving before anything is said
 MOST = 0.5  # share of it
+RESTLESS = 12.0  # changes in ten minutes: roads change less often
+ALWAYS = 0.9  # share of the drive below half of the dry slope
 
 
-def blindness(slopes: Sequence[SlopeSummary]) -> tuple[str, ...]:
+def remarks(slopes: Sequence[SlopeSummary]) -> tuple[str, ...]:
     """Notes for places where the estimator saw little; one sentence for places alike.
 
     Thesis: section 3.2 on equal slips (C95) and 3.3 on constant driving (C96); E10.
     """
     said: dict[str, list[str]] = {}
     for slope in slopes:
-        text = _sentence(slope)
-        if text:
-            said.setdefault(text, []).append(slope.place)
+        for text in (_sentence(slope), _restless(slope), _always(slope)):
+            if text:
+                said.setdefault(text, []).append(slope.place)
     return tuple(f"slip slope ({', '.join(places)}): {text}" for text, places in said.items())
 
 
@@ -40,3 +42,24 @@ def _sentence(slope: SlopeSummary) -> str:
     if seconds["estimating"] < (1.0 - MOST) * judged:
         return "traction too even for most of the drive to tell slope from radius; sudden changes are still found"
     return ""
+
+
+def _restless(slope: SlopeSummary) -> str:
+    """More changes than a road has: something else is in the slip or in the torque."""
+    driven = sum(slope.seconds[k] for k in ("estimating", "slope_frozen"))
+    if slope.alarms < 4 or slope.alarms * 600.0 <= RESTLESS * driven:
+        return ""
+    return (
+        f"{slope.alarms} changes in {driven / 60.0:.0f} min of driving, more than a road has: brake torque that is "
+        "not in the log, late or wrongly shared torque, wheel speeds that are noisy or swapped?"
+    )
+
+
+def _always(slope: SlopeSummary) -> str:
+    """Low from end to end: then the reference is in doubt, not the road."""
+    if slope.judged_s < 2.0 * LEAST or slope.dropped_s < ALWAYS * slope.judged_s:
+        return ""
+    return (
+        f"below half of the dry slope of {slope.reference:.0f} for {slope.dropped_s / slope.judged_s:.0%} of the time "
+        "judged: is this the tyre that the vehicle file or the history means?"
+    )

@@ -127,6 +127,7 @@ class SlipSlopeWatch:
         self._reasons = np.zeros(len(activation.REASONS))
         self._last = (np.nan, np.nan, np.nan)
         self._alarms = 0
+        self._judged = self._dropped = 0
 
     def push(self, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], yaw_rate: FloatArray) -> Watched:
         """Take the features of the next piece."""
@@ -152,7 +153,7 @@ class SlipSlopeWatch:
         loss, active, refs, self._drop = drop.scan(
             self._drop_params, self._drop, estimate.slope, estimate.slope_sd, is_valid, estimate.alarm
         )
-        self._count(estimate, reason, mu_i)
+        self._count(estimate, reason, loss)
         return Watched(estimate, loss, active, refs, mu_i, s_delta)
 
     @property
@@ -177,6 +178,8 @@ class SlipSlopeWatch:
             inactive={
                 name: float(n * self._dt) for name, n in zip(activation.REASONS[1:], self._reasons[1:], strict=True)
             },
+            judged_s=self._judged * self._dt,
+            dropped_s=self._dropped * self._dt,
             periods=tuple((p.largest, p.mean, p.seconds) for p in drop.completed(self._drop)),
         )
 
@@ -196,7 +199,10 @@ class SlipSlopeWatch:
                 calm &= ~(variance > VARIANCE_MAX)
         return calm
 
-    def _count(self, estimate: Estimate, reason: FloatArray, mu: FloatArray) -> None:
+    def _count(self, estimate: Estimate, reason: FloatArray, loss: FloatArray) -> None:
+        judged = ~np.isnan(loss)
+        self._judged += int(np.count_nonzero(judged))
+        self._dropped += int(np.count_nonzero(loss[judged] > self.drop_threshold))
         self._counts += np.bincount(estimate.status.astype(np.int64), minlength=len(STATUS))
         missing = (reason == 0) & (estimate.status == INACTIVE)  # of the signals only the traction or a speed
         told = np.where(missing, activation.MISSING, reason).astype(np.int64)
