@@ -189,8 +189,9 @@ class SlopeSummary:
     `slope` C_s / F_z at the end, `slope_sd` its standard deviation by the filter, `reference` the dry slope that it was
     compared with (NaN without one), `beta` the slope ratio (None with one driven axle), `offset` of the slip [-];
     `seconds` by state of the estimator, `inactive` seconds by reason, `alarms` of its change detection; `periods` what
-    the drive adds to the history of the dry slope: largest, mean [-], length [s]; `judged_s` for how long the slope was
-    compared with the dry one, `dropped_s` for how long of that it was below half of it [s].
+    the drive adds to the history of the dry slope: largest, mean [-], length [s]; `reference_from` where the dry
+    slope comes from (`history`, `vehicle file`, `this drive`, or empty); `judged_s` for how long the slope was compared
+    with the dry one, `dropped_s` for how long of that it was below half of it [s].
     """
 
     place: str
@@ -204,6 +205,7 @@ class SlopeSummary:
     seconds: Mapping[str, float]
     inactive: Mapping[str, float]
     periods: tuple[tuple[float, float, float], ...] = ()
+    reference_from: str = ""
     judged_s: float = 0.0
     dropped_s: float = 0.0
 

@@ -29,10 +29,15 @@ def drive(
     noise=5e-4,
     keep=(),
     even=False,
+    late_v=0.0,
+    speeds=None,
+    noise_torque=0.0,
 ):
     """A straight drive over rolling country with changing traction; every quantity follows from the traction.
 
-    `noise` is that of each wheel speed, rms, as a share of 22 m/s; `late` [s] by which the wheels follow the force.
+    `noise` is that of each wheel speed, rms, as a share of 22 m/s; `late` [s] by which the wheels follow the force;
+    `late_v` [s] by which v_x is late; `speeds` (low, high) [m/s] between which it goes in two minutes; `noise_torque` of
+    each torque as a share of the wheel's load times radius.
     """
     rng = np.random.default_rng(seed)
     dt = 1.0 / rate
@@ -41,7 +46,9 @@ def drive(
     theta = grade * np.sin(2 * np.pi * t / 40.0)
     swing = 0.0 if even else 0.9 * np.sin(2 * np.pi * t / 17.0) + 0.5 * np.sin(2 * np.pi * t / 7.3)
     a_kin = swing + np.zeros(n)
-    v = 22.0 + np.cumsum(a_kin) * dt
+    if speeds is not None:
+        a_kin = a_kin + 0.5 * (speeds[1] - speeds[0]) * 2 * np.pi / 120.0 * np.cos(2 * np.pi * t / 120.0)
+    v = (22.0 if speeds is None else 0.5 * sum(speeds)) + np.cumsum(a_kin) * dt
     a_x = a_kin + G * theta
     axles = [G * car.l_r - a_x * car.h_cg, G * car.l_f + a_x * car.h_cg]
     load = np.repeat(0.5 * car.mass / (car.l_f + car.l_r) * np.array(axles), 2, axis=0)
@@ -62,7 +69,10 @@ def drive(
                 (mu + car.rolling_resistance) * load[i] * car.r_l(w) + car.inertia(w) * a_kin / car.r_e(w)
             )  # fmt: skip
     columns["a_x"] = a_x + rng.normal(0.0, 0.05, n)
-    columns["v_x"] = v + rng.normal(0.0, 0.005, n)
+    columns["v_x"] = np.interp(t - late_v, t, v) + rng.normal(0.0, 0.005, n)
+    for i in driven:
+        if noise_torque and torque:
+            columns[f"torque_{WHEELS[i]}"] += noise_torque * load[i] * car.r_l(WHEELS[i]) * rng.normal(size=n)
     if brakes:
         columns["brake_pressure"] = np.zeros(n)
     for name in keep and set(columns) - {"t", *keep}:

@@ -15,6 +15,7 @@ from aqualog.errors import AqualogError, ConfigError, ExitCode
 
 __all__ = ["Console", "clean", "guarded"]
 
+SLOW_S = 5.0  # a first step that takes longer than this is compiling
 PROGRESS_MODES = ("auto", "bar", "plain", "off")
 
 
@@ -47,6 +48,19 @@ class Console:
         """Something the user may want to know."""
         if self.verbose and not self.quiet:
             sys.stderr.write(f"{clean(text)}\n")
+
+    @contextmanager
+    def told_if_slow(self, what: str) -> Iterator[None]:
+        """Say that something is being compiled if its first run takes long."""
+        from threading import Timer
+
+        timer = Timer(SLOW_S, self.note, [f"compiling {what}; this takes a while, once after an installation"])
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
 
     @contextmanager
     def steps(self) -> Iterator[Steps]:

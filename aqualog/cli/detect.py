@@ -127,6 +127,7 @@ def _detect(
     verbose: bool,
     progress: str,
 ) -> int:
+    from contextlib import nullcontext
     from dataclasses import replace
 
     from aqualog.cli.files import refuse_existing
@@ -160,7 +161,9 @@ def _detect(
         steps("detecting")
         # what an earlier look at this very drive has left is not what it is compared with
         key = drive_key(loaded) if history_file else ""
-        result = detect_drive(loaded, vehicle, memory=replace(memory, history=memory.history.without(key)))
+        # what takes long of a short drive is the compiler; of a long one it is the drive
+        with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
+            result = detect_drive(loaded, vehicle, memory=replace(memory, history=memory.history.without(key)))
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")
@@ -173,6 +176,8 @@ def _detect(
     _print(result, name, as_json=as_json)
     if vehicle_file is None:
         console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
+    if history_file is not None:
+        console.note(_history_told(memory, vehicle, result, history_file))
     if configuration and history_file is None:
         console.note("--configuration names an entry of a history; without --history it does nothing")
     for text in (*loaded.quality.notes, *result.notes):
@@ -199,6 +204,19 @@ def _memory(history_file: Path | None, configuration: str, reference: str, out: 
         check_history_file(history_file)
         history = load_history(history_file)
     return Memory(history, configuration.strip(), "max" if reference == "max" else "robust")
+
+
+def _history_told(memory: Memory, vehicle: Any, result: DriveResult, path: Path) -> str:
+    """What of the history was used and what was added; a name that is new is told beside those that are known."""
+    name = memory.name(vehicle)
+    known = list(memory.history.periods)
+    used = sum(len(memory.history.of(name, s.place)) for s in result.slopes)
+    added = sum(len(s.periods) for s in result.slopes)
+    text = f'history {path}: {used} periods of "{name}" known, {added} of this drive written'
+    if name in known or not known:
+        return text
+    shown = ", ".join(f'"{n}"' for n in known[:5]) + (", ..." if len(known) > 5 else "")
+    return f"{text}; the name is new, known are {shown}"
 
 
 def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:

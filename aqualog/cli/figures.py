@@ -99,5 +99,8 @@ def _print(made: list[Figure], files: list[str], *, as_json: bool) -> None:
 
     from aqualog.report.text import table
 
-    rows = [(c.claim, f.number, c.verdict, shorten(c.found, 100, placeholder=" ...")) for f in made for c in f.findings]
+    # whole where it is kept or passed on, one line each where it is looked at
+    width = 100 if sys.stdout.isatty() else 10_000
+    found = [(f, c) for f in made for c in f.findings]
+    rows = [(c.claim, f.number, c.verdict, shorten(c.found, width, placeholder=" ...")) for f, c in found]
     sys.stdout.write(table(("claim", "figure", "verdict", "found"), rows) + "\n")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from aqualog.model.term import Model
 
 __all__ = ["simulate"]
-
-SLOW_S = 5.0  # a first step that takes longer than this is compiling
 
 
 def simulate(
@@ -178,7 +175,7 @@ def _simulated(
     from dataclasses import replace
 
     steps("preparing")
-    with _told_if_slow(console):
+    with console.told_if_slow("the simulation"):
         from aqualog.model.simulate import simulate as run
 
         run(replace(scenario, duration_s=min(scenario.duration_s, 0.2)))
@@ -186,20 +183,6 @@ def _simulated(
     start = time.perf_counter()
     result = run(scenario, model)
     return result, scenario.duration_s / max(time.perf_counter() - start, 1e-9)
-
-
-@contextmanager
-def _told_if_slow(console: Console) -> Iterator[None]:
-    from threading import Timer
-
-    text = "compiling the simulation; this takes a while, once after an installation"
-    timer = Timer(SLOW_S, console.note, [text])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def _comment(path: Path, scenario: Scenario, model_file: Path | None) -> str:

@@ -37,7 +37,7 @@ def slip_slope(
     signals: Signals = None,
     dbc: Dbc = None,
     out: Annotated[
-        Path | None,
+        str | None,
         typer.Option("-o", "--out", help="Folder for slip_slope.json, .csv and .html.", metavar="DIR"),
     ] = None,
     method: Annotated[
@@ -55,6 +55,16 @@ def slip_slope(
     mu_max: Annotated[
         float, typer.Option("--mu-max", help="Largest traction coefficient used.", min=0.02, max=1.0)
     ] = 0.3,
+    delay: Annotated[
+        float | None,
+        typer.Option(
+            "--delay",
+            help="By how much v_x is late against the wheels, where known; else it is estimated (velocity only).",
+            metavar="SECONDS",
+            min=-1.0,
+            max=1.0,
+        ),
+    ] = None,
     rate: Rate = None,
     as_json: Json = False,
     force: Force = False,
@@ -73,13 +83,14 @@ def slip_slope(
       aqualog slip-slope drive.mf4 --vehicle car.toml
       aqualog slip-slope wheels.csv imu.csv --signals map.toml --vehicle car.toml -o out
       aqualog slip-slope drive.mcap --vehicle awd.toml --method velocity --json
+      aqualog slip-slope drive.mcap --vehicle awd.toml --method velocity --delay 0.12
       aqualog slip-slope track.mf4 --vehicle car.toml --traction accelerometer --mu-max 0.5
     """
     from aqualog.cli.console import guarded
 
     with guarded(debug=debug):
         code = _slip_slope(
-            logs, vehicle, signals, dbc or [], out, method, traction, mu_max, rate,
+            logs, vehicle, signals, dbc or [], out, method, traction, mu_max, delay, rate,
             as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
@@ -91,10 +102,11 @@ def _slip_slope(
     vehicle_file: Path | None,
     map_file: Path | None,
     dbc: list[Path],
-    out: Path | None,
+    out_name: str | None,
     method: str,
     traction: str,
     mu_max: float,
+    delay: float | None,
     rate: float | None,
     *,
     as_json: bool,
@@ -108,6 +120,7 @@ def _slip_slope(
 
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: which axle is driven, radii, where the mass is")
+    out = None if out_name is None else _folder(out_name)
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=[out / n for n in _RESULTS] if out else [], force=force,
         quiet=quiet, verbose=verbose, progress=progress, vehicle_file=vehicle_file,
@@ -122,7 +135,7 @@ def _slip_slope(
         loaded = load_signals(paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps)
         console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
         steps("estimating")
-        result = slip_slopes(loaded, vehicle, method=method, traction=traction, mu_max=mu_max)
+        result = slip_slopes(loaded, vehicle, method=method, traction=traction, mu_max=mu_max, delay=delay)
         steps("writing")
         if out is not None:
             _write_results(result, out, name, title, loaded.quality.notes)
@@ -133,6 +146,22 @@ def _slip_slope(
         console.note(f"results are in {out}: {', '.join(_RESULTS)}")
     lossy = loaded.quality.truncated or loaded.quality.lost_in_files
     return int(ExitCode.PARTIAL) if lossy else int(ExitCode.DONE)
+
+
+def _folder(name: str) -> Path:
+    """The folder for results; it need not exist, but nothing may be in its way."""
+    from aqualog.errors import ConfigError
+
+    expected = "a folder for the results"
+    if not name.strip():
+        raise ConfigError("-o is empty", expected=expected)
+    out = Path(name)
+    if out.exists() and not out.is_dir():
+        raise ConfigError("-o is a file", where=name, expected=expected)
+    there = next((p for p in out.parents if p.exists()), Path())
+    if not there.is_dir():
+        raise ConfigError(f"-o is below a file, {there}", where=name, expected=expected)
+    return out
 
 
 def _write_results(result: DirectResult, out: Path, name: str, title: str, notes: tuple[str, ...]) -> None:

@@ -56,9 +56,9 @@ def check_needs(
         "spin_up": [*(driven_omega if len(driven_omega) == len(vehicle.driven) else []), *too_slow],
         "resistance": resistance,
         "slip_slope_drop": [*omega, *torque, *too_slow],
-        "tie_rod": [s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have] or [NOT_YET],
+        "tie_rod": [*(s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have), NOT_YET],
         "joint_criteria": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
-        "joint_cusum": [*omega, *resistance] or [NOT_YET],
+        "joint_cusum": [*omega, *resistance, NOT_YET],
     }
     unavailable = [Unavailable(d, tuple(dict.fromkeys(missing[d]))) for d in DETECTORS if missing[d]]
     gone = {u.detector for u in unavailable}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from aqualog.notation import WHEELS
+from aqualog.notation import AXLES, WHEELS
 from aqualog.types import FloatArray, Signals
 from aqualog.vehicle import Vehicle
 
@@ -16,6 +16,7 @@ WINDOW = 0.5  # [s] over which changes are compared: longer than latencies, shor
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
 RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
+LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less tells no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 
 
@@ -38,7 +39,10 @@ def implausible(signals: Signals, features: Mapping[str, FloatArray], vehicle: V
     wheels = {
         w: signals.array(f"omega_{w}")[::step] * vehicle.r_e(w) for w in WHEELS if f"omega_{w}" in signals.symbols
     }
-    notes = [*_acceleration(signals, wheels, step), *_yaw(signals, wheels, step), *_resistance(features)]
+    notes = [
+        *_acceleration(signals, wheels, step), *_yaw(signals, wheels, step), *_resistance(features),
+        *_drivetrain(signals, vehicle),
+    ]  # fmt: skip
     return tuple(notes)
 
 
@@ -87,6 +91,33 @@ def _resistance(features: Mapping[str, FloatArray]) -> list[str]:
         f"the resistance measure lies at {np.median(measure):+.2f} m/s^2 in the middle of this drive: check mass, "
         "wheel torque (gear ratio, sign, unit) and the offset of a_x before believing the resistance detector"
     ]
+
+
+def _drivetrain(signals: Signals, vehicle: Vehicle) -> list[str]:
+    """Which axles the torques drive, against which the vehicle file says."""
+    drive = {}
+    for axle, wheels in AXLES.items():
+        known = [signals.array(f"torque_{w}") for w in wheels if f"torque_{w}" in signals.symbols]
+        sums = np.sum(known, axis=0) if known else np.zeros(0)
+        sums = sums[np.isfinite(sums)]
+        drive[axle] = float(np.quantile(sums, 0.9)) if sums.size >= 500 else float("nan")
+    most = max((v for v in drive.values() if v == v), default=0.0)
+    if most < LEAST_DRIVE:
+        return []
+    name = {"f": "front", "r": "rear"}
+    for axle, torque in drive.items():
+        is_driven = f"{axle}l" in vehicle.driven
+        if not is_driven and torque > 0.1 * most:
+            return [
+                f"the vehicle file says {vehicle.drivetrain}, but the {name[axle]} wheels are driven with up to "
+                f'{torque:.0f} N m: drivetrain = "awd"?'
+            ]
+        if is_driven and torque < 0.02 * most:
+            return [
+                f"the vehicle file says {vehicle.drivetrain}, but the {name[axle]} wheels are never driven: "
+                f'drivetrain = "{"rwd" if axle == "f" else "fwd"}"?'
+            ]
+    return []
 
 
 def _means(x: FloatArray, step: int) -> FloatArray:

@@ -41,11 +41,14 @@ def chosen(asked: Sequence[str]) -> tuple[str, ...]:
     """
     found: set[str] = set()
     for name in asked:
-        match = [n for n in NUMBERS if name in ("all", n, n.split(".")[0])]
+        chapter, _, figure = name.partition(".")
+        # 3.06 is how the files are named
+        plain = f"{chapter}.{int(figure)}" if figure.isdecimal() and figure.isascii() and len(figure) < 4 else name
+        match = [n for n in NUMBERS if plain in ("all", n, n.split(".")[0])]
         if not match:
-            later = "; those of chapter 2 come in a later version" if name.split(".")[0] == "2" else ""
+            later = "; those of chapter 2 come in a later version" if chapter == "2" else ""
             raise ConfigError(
-                f"there is no figure {name!r}{later}", expected=f"all, 3 or one of {' '.join(NUMBERS)}",
+                f"there is no figure {name[:40]!r}{later}", expected=f"all, 3 or one of {' '.join(NUMBERS)}",
                 hint="aqualog figures 3.6 -o DIR",
             )  # fmt: skip
         found.update(match)

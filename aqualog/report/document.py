@@ -110,9 +110,12 @@ def _slope(summary: SlopeSummary) -> dict[str, Any]:
         "slope": _number(summary.slope),
         "slope_sd": _number(summary.slope_sd),
         "reference": _number(summary.reference),
+        "reference_from": summary.reference_from,
         "beta": None if summary.beta is None else _number(summary.beta),
         "offset": _number(summary.offset),
         "changes": summary.alarms,
+        "judged_s": _number(summary.judged_s),
+        "dropped_s": _number(summary.dropped_s),
         "seconds": {name: _number(s) for name, s in summary.seconds.items()},
         "inactive": {name: _number(s) for name, s in summary.inactive.items()},
     }

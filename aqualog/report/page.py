@@ -73,6 +73,7 @@ def render_page(result: DriveResult, *, title: str) -> str:
         problems=tables.problems(result),
         events=tables.event_rows(result),
         detectors=tables.detector_rows(result),
+        slopes=tables.slope_rows(result),
         signals=tables.signal_rows(result),
         fault_columns=tables.fault_columns(),
         faults=tables.fault_rows(result),

@@ -8,9 +8,18 @@ from typing import Any
 from aqualog import __version__
 from aqualog.detect.slip_slope.direct import DirectResult, PlaceSlope, Recursion
 from aqualog.detect.slip_slope.regression import Interval, Line
+from aqualog.detect.slip_slope.stability import percent
 from aqualog.report.text import table
 
-__all__ = ["SCHEMA_VERSION", "slope_csv", "slope_document", "slope_text", "used_and_left_out", "way_sentence"]
+__all__ = [
+    "SCHEMA_VERSION",
+    "delay_sentence",
+    "slope_csv",
+    "slope_document",
+    "slope_text",
+    "used_and_left_out",
+    "way_sentence",
+]
 
 SCHEMA_VERSION = 1
 
@@ -32,6 +41,15 @@ def way_sentence(result: DirectResult) -> str:
     return f"{_METHODS[result.method]}, {_TRACTIONS[result.traction]}"
 
 
+def delay_sentence(line: Line) -> str:
+    """By how much v_x is late; empty where it is not asked or cannot be told."""
+    if not (line.told and math.isfinite(line.delay)):
+        return ""
+    low, high = line.delay_ci
+    interval = f" (95 %: {low:+.3f} ... {high:+.3f})" if math.isfinite(low) else " (given)"
+    return f"v_x is late by {line.delay:+.3f} s{interval}, taken out"
+
+
 # --- text ------------------------------------------------------------------------------------------------------------
 
 
@@ -44,6 +62,7 @@ def slope_text(result: DirectResult) -> str:
         return "\n".join([*lines, table(("place", "slope", "sd", "learnt s", "changes"), rows)]) + "\n"
     lines.append(table(_HEADER, [_row(p) for p in result.places]))
     lines += [f"  {p.place}: cannot tell: {p.line.reason}" for p in result.places if not p.line.told]
+    lines += [f"  {p.place}: {delay_sentence(p.line)}" for p in result.places if delay_sentence(p.line)]
     lines += ["", "over the session"]
     parts = [_segment_row(p, i) for p in result.places for i in range(len(p.segments))]
     if parts:
@@ -102,10 +121,10 @@ def _segment_row(p: PlaceSlope, i: int) -> tuple[str, ...]:
 
 
 def _per_hour(p: PlaceSlope) -> str:
-    if not math.isfinite(p.stability.per_hour):
+    if math.isnan(p.stability.per_hour):
         return ""
     low, high = p.stability.per_hour_ci
-    return f"; {100 * p.stability.per_hour:+.0f} % per hour (95 %: {100 * low:+.0f} ... {100 * high:+.0f} %)"
+    return f"; {percent(p.stability.per_hour)} per hour (95 %: {percent(low)} ... {percent(high)})"
 
 
 # --- JSON and CSV ----------------------------------------------------------------------------------------------------
@@ -159,6 +178,9 @@ def _line(line: Line) -> dict[str, Any]:
         "attenuation_corrected": line.is_corrected,
         "samples": line.samples,
         "blocks": line.blocks,
+        "delay_s": _number(line.delay),
+        "delay_ci95": _pair(line.delay_ci),
+        "delay_shared": _number(line.shared),
         "reason": line.reason or None,
     }
 

@@ -13,7 +13,7 @@ from aqualog.report.figures.slip_scatter import slip_scatter
 from aqualog.report.figures.slope_session import recursive_estimate, slope_over_session
 from aqualog.report.figures.time_share import time_share
 from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island, plotly_js
-from aqualog.report.slope_document import way_sentence
+from aqualog.report.slope_document import delay_sentence, way_sentence
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.wording import number
 
@@ -95,5 +95,5 @@ def _row(p: PlaceSlope) -> dict[str, Any]:
             f"{number(100.0 * line.attenuation, 1)}{' (given back)' if line.is_corrected else ''}",
             f"{number(end.slope, 1)} ± {number(end.slope_sd, 1)}",
         ],
-        "reason": line.reason,
+        "reason": f"cannot tell: {line.reason}" if line.reason else delay_sentence(line),
     }

@@ -9,7 +9,7 @@ from typing import Any
 from aqualog.notation import SYMBOLS
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.wording import detector_name, evidence_parts, number, place, pretty_unit, speed_kmh
-from aqualog.types import DriveResult, Event, Origin, TimeFaults
+from aqualog.types import DriveResult, Event, Origin, SlopeSummary, TimeFaults
 
 __all__ = [
     "Cell", "detector_rows", "event_rows", "fault_columns", "fault_rows", "head_facts", "problems", "signal_rows",
@@ -125,6 +125,34 @@ def detector_rows(result: DriveResult) -> list[dict[str, str]]:
         row = {"name": detector_name(item.detector), "where": "–", "events": "–", "state": "unavailable"}
         rows.append({**row, "note": f"needs {', '.join(item.missing)}" if item.missing else ""})
     return rows
+
+
+def slope_rows(result: DriveResult) -> list[list[Cell]]:
+    """What the slip-slope estimator made of each side: estimate, reference, and how long it could tell what."""
+    return [_slope_row(s) for s in result.slopes]
+
+
+def _slope_row(s: SlopeSummary) -> list[Cell]:
+    def seconds(*states: str) -> Cell:
+        total = sum(s.seconds.get(state, 0.0) for state in states)
+        return Cell(number(total, 1), total, is_number=True)
+
+    known = s.slope == s.slope
+    at_end = f"{number(s.slope, 1)} ± {number(s.slope_sd, 1)}" if known else "–"
+    why = sorted(((v, k) for k, v in s.inactive.items() if v >= 0.05), reverse=True)
+    return [
+        Cell(place(s.wheel, s.place), s.place),
+        Cell(at_end, s.slope if known else -1.0, is_number=True),
+        Cell(number(s.reference, 1), s.reference if s.reference == s.reference else -1.0, is_number=True),
+        Cell(s.reference_from or "–", s.reference_from),
+        Cell(number(s.judged_s, 1), s.judged_s, is_number=True),
+        seconds("estimating"),
+        seconds("slope_frozen"),
+        seconds("blind"),
+        seconds("traction_too_large", "spinning", "inactive"),
+        Cell(str(s.alarms), s.alarms, is_number=True),
+        Cell(", ".join(f"{name} {number(v, 1)} s" for v, name in why) or "–", ""),
+    ]
 
 
 def signal_rows(result: DriveResult) -> list[list[Cell]]:

@@ -40,7 +40,11 @@ def _slope(summary: SlopeSummary) -> str:
     total = sum(summary.seconds.values())
     if not math.isfinite(summary.slope) or total <= 0.0:
         return ""
-    dry = f", dry {summary.reference:.1f}" if math.isfinite(summary.reference) else ", no dry value yet"
+    dry = (
+        f", dry {summary.reference:.1f} ({summary.reference_from})"
+        if math.isfinite(summary.reference)
+        else ", no dry value yet"
+    )
     states = {"told": "estimating", "too even": "slope_frozen", "blind": "blind"}
     shares = [f"{label} {summary.seconds[key] / total:.0%}" for label, key in states.items()]
     name = summary.wheel or summary.place
@@ -48,11 +52,13 @@ def _slope(summary: SlopeSummary) -> str:
 
 
 def _lack(missing: Sequence[str]) -> str:
-    signals = [m for m in missing if m != NOT_YET]
+    if NOT_YET in missing:
+        return f"comes with {NOT_YET}"
+    signals = list(missing)
     text = ", ".join(signals)
     for axle in "fr":  # an axle's torque will do
         text = text.replace(f"torque_{axle}l, torque_{axle}r", f"torque_{axle}l, torque_{axle}r (or torque_{axle})")
-    return f"missing {text}" if signals else f"comes with {NOT_YET}"
+    return f"missing {text}"
 
 
 def _row(event: Event) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from conftest import ROOT
 from test_commands import one_error_line, run
 from typer.testing import CliRunner
 
-from aqualog.cli import simulate as command
 from aqualog.cli.console import Console
 from aqualog.cli.main import app
 from aqualog.config.scenario import load_scenario
@@ -314,12 +313,12 @@ def test_a_lane_after_the_drive_is_told(tmp_path):
 
 
 def test_compiling_is_told_only_where_it_takes_long(monkeypatch, capsys):
-    monkeypatch.setattr(command, "SLOW_S", 0.05)
-    with command._told_if_slow(Console()):
+    monkeypatch.setattr("aqualog.cli.console.SLOW_S", 0.05)
+    with Console().told_if_slow("the simulation"):
         pass
     time.sleep(0.15)
     assert capsys.readouterr().err == ""
-    with command._told_if_slow(Console()):
+    with Console().told_if_slow("the simulation"):
         time.sleep(0.4)
     assert "compiling" in capsys.readouterr().err
 

@@ -36,6 +36,10 @@ def folder(tmp_path_factory):
     drive(RWD, torque=False).frame.write_csv(path / "no_torque.csv")
     drive(AWD).frame.drop("v_x").write_csv(path / "awd.csv")
     drive(RWD, even=True, grade=0.0).frame.write_csv(path / "even.csv")
+    drive(AWD, speeds=(12.0, 38.0), late_v=0.1, noise=2e-3).frame.write_csv(path / "late.csv")
+    drive(AWD, late_v=0.1, grade=0.0).frame.write_csv(path / "one_speed.csv")
+    for n in (1, 2, 4):
+        drive(RWD, seconds=n / 20.0).frame.write_csv(path / f"short{n}.csv")
     return path
 
 
@@ -126,6 +130,51 @@ def test_what_cannot_be_done_is_one_line(folder, log, options, code, text):
     assert text in one_error_line(result)
     assert result.stdout == ""
     assert not (folder / "nothing").exists()
+
+
+def test_delay_of_the_velocity_is_told(folder):
+    out = folder / "late_out"
+    result = run(folder / "late.csv", "--vehicle", folder / "awd.toml", "-o", out)
+    assert result.returncode == 0, result.stderr
+    assert "fl: v_x is late by +0.1" in result.stdout
+    place = json.loads((out / "slip_slope.json").read_text())["slip_slope"][0]
+    assert place["delay_s"] == pytest.approx(0.1, abs=0.005)
+    assert place["delay_ci95"][0] < 0.1 < place["delay_ci95"][1]
+    assert place["slope_ci95"][0] < C < place["slope_ci95"][1]
+    assert "v_x is late by +0.1" in (out / "slip_slope.html").read_text()
+    given = run(folder / "one_speed.csv", "--vehicle", folder / "awd.toml", "--delay", "0.1", "--json")
+    assert json.loads(given.stdout)["slip_slope"][0]["slope"] == pytest.approx(C, rel=0.05)
+    refused = run(folder / "one_speed.csv", "--vehicle", folder / "awd.toml")
+    assert refused.returncode == 4
+    assert "delay of v_x cannot be told" in one_error_line(refused)
+
+
+def test_no_figure_per_hour_of_a_short_session(written):
+    result, out = written
+    assert "per hour" not in result.stdout
+    stability = json.loads((out / "slip_slope.json").read_text())["slip_slope"][0]["stability"]
+    assert stability["change_per_hour"] is None
+    assert stability["change_per_hour_ci95"] == [None, None]
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_short_logs_are_one_line(folder, n):
+    result = run(folder / f"short{n}.csv", "--vehicle", folder / "rwd.toml")
+    assert result.returncode == 4, result.stderr
+    one_error_line(result)
+
+
+@pytest.mark.parametrize(
+    ("out", "text"),
+    [("drive.csv", "is a file"), ("drive.csv/below/it", "below a file"), ("", "is empty"), (" ", "is empty")],
+)
+def test_folder_for_results_is_checked_first(folder, out, text):
+    target = folder / out if out.strip() else out
+    for force in ((), ("--force",)):
+        result = run(folder / "even.csv", "--vehicle", folder / "rwd.toml", "-o", target, *force)
+        assert result.returncode == 2, result.stderr
+        assert text in one_error_line(result)
+    assert (folder / "drive.csv").is_file()
 
 
 def test_vehicle_must_be_given(folder):

@@ -1,5 +1,7 @@
 """Wrong units and signs are told."""
 
+from dataclasses import replace
+
 import polars as pl
 import pytest
 from drives import CAR, drive
@@ -10,10 +12,13 @@ SPEEDS = {"speed_kmh": ((0.0, 70.0), (10, 110.0), (20, 70.0), (30, 120.0), (40, 
 CURVES = {"yaw_rate": ((0, 0), (6, 0), (8, 0.2), (14, -0.2), (20, 0.2), (30, -0.2), (40, 0))}
 
 
-def notes(**changes):
+KNOWN = replace(CAR, given=CAR.given | {"tyre.slip_slope_r"})  # its dry slope, so that no remark asks for it
+
+
+def notes(car=KNOWN, **changes):
     signals, _ = drive(CAR, **SPEEDS, **CURVES)
     frame = signals.frame.with_columns(**{n: f(signals.frame) for n, f in changes.items()})
-    return detect_drive(type(signals)(frame, signals.dt_ns, None, {}, signals.quality, ()), CAR).notes
+    return detect_drive(type(signals)(frame, signals.dt_ns, None, {}, signals.quality, ()), car).notes
 
 
 def test_a_sound_drive_has_no_note():
@@ -24,6 +29,23 @@ def test_a_sound_drive_has_no_note():
 def test_unit_of_the_wheel_speeds(factor):
     found = notes(**{f"omega_{w}": lambda f, w=w: f[f"omega_{w}"] * factor for w in ("fl", "fr", "rl", "rr")})
     assert any("wheel speeds change" in n for n in found)
+
+
+def test_drivetrain_against_the_torques():
+    """A vehicle file of another car: the free axle is driven, or a driven one never is."""
+    pushed = {f"torque_f{s}": lambda f: f["torque_rl"] for s in "lr"}
+    (found,) = (n for n in notes(**pushed) if "vehicle file says" in n)
+    assert "says rwd, but the front wheels are driven" in found
+    assert 'drivetrain = "awd"' in found
+    awd = replace(KNOWN, drivetrain="awd", torque_split_rear=0.5, given=KNOWN.given | {"tyre.slip_slope_f"})
+    still = {f"torque_f{s}": lambda f: f["torque_rl"] * 0.0 for s in "lr"}
+    (found,) = (n for n in notes(awd, **still) if "vehicle file says" in n)
+    assert 'drivetrain = "rwd"' in found
+    assert not [n for n in notes(awd, **pushed) if "vehicle file says" in n]
+
+
+def test_a_drive_that_is_its_own_reference_says_so():
+    assert any("is this drive's own" in n for n in notes(CAR))
 
 
 def test_sign_of_the_accelerometer():

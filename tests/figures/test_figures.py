@@ -110,10 +110,11 @@ def test_verdicts_and_words():
 
 def test_numbers_that_are_asked_for():
     assert catalogue.chosen(["3.11", "3.2", "3.2"]) == ("3.2", "3.11")
+    assert catalogue.chosen(["3.06"]) == ("3.6",)
     assert catalogue.chosen(["3"]) == catalogue.chosen(["all"]) == catalogue.NUMBERS
     with pytest.raises(ConfigError, match=r"no figure '2.3'; those of chapter 2 come in a later version.*3\.11"):
         catalogue.chosen(["2.3"])
-    for wrong in ("3.12", "3.", "", "4", "3.06"):
+    for wrong in ("3.12", "3.", "", "4", "3.0006", "3.6;", "3.\u0666"):
         with pytest.raises(ConfigError, match=r"expected all, 3 or one of 3\.1 "):
             catalogue.chosen([wrong])
 

@@ -60,6 +60,15 @@ def test_recursive_estimate_alone_makes_a_page():
     assert "<td>left</td>" in html
 
 
+def test_delay_and_reasons_are_on_the_page():
+    result = slip_slopes(drive(AWD, speeds=(12.0, 38.0), late_v=0.1), AWD)
+    first = result.places[0]
+    none = replace(first, line=replace(first.line, reason="no reason at all"))
+    html = render_slope_page(replace(result, places=(none, *result.places[1:])), title="run")
+    assert html.count("v_x is late by +0.1") == 3
+    assert "cannot tell: no reason at all" in html
+
+
 @pytest.mark.browser
 def test_browser_draws_it_without_requests(browser, found, tmp_path):  # noqa: F811
     path = tmp_path / "page.html"

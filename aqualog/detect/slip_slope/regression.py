@@ -4,22 +4,59 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.intervals import student_quantile
-from aqualog.types import FloatArray
+from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["Interval", "Line", "Trend", "fit_line", "fit_trend", "noise_of_traction"]
+__all__ = ["Interval", "Late", "Line", "Trend", "fit_line", "fit_trend", "lag_of_slip", "noise_of_traction"]
 
 LEVEL = 0.95
 LEAST_BLOCKS = 5
 CORRECTED_FROM = 0.01  # share of k that noise of the traction takes away, from which it is given back
 NOISE_MAX = 0.30  # beyond, the correction rests on the noise more than on the data
+SHARED_MAX = 0.95  # of the traction with a / v; beyond, its errors of some percent count five times and more
+TRACTION_MIN = 1e-3  # [-] standard deviation; a slip of 3e-5 goes with it, less than any wheel speed tells
+SLIP_MIN = 1e-7  # [-] standard deviation; measured speeds have more
+EXACT = 1e-12  # relative half width; rounding, not an interval
+SLOPE_RANGE = (1.0, 300.0)  # [-] of a tyre on any road, as the estimator's
+OFFSET_MAX = 0.10  # [-] radii of one car differ by less
+TIMES_MAX = 10.0  # change of the slope beyond which a straight line in time says only that it is large
+LAG_MAX = 0.5  # [s]
+LAG_SAMPLES = 20_000
+
+_FEW = "a longer drive with straight stretches, or a larger --mu-max"
+_EVEN = "a drive that accelerates and coasts on a straight road"
+_APART = "a drive at different speeds or on grades, or --delay where it is known (`aqualog align`)"
+_TURNED = "check drivetrain, wheel mapping, and the sign and unit of the torque"
+_UNITS = "check the torque's unit and whether it is of one wheel, and the mass in the vehicle file"
 
 Interval = tuple[float, float]
 _NOWHERE: Interval = (math.nan, math.nan)
+
+
+class Late(NamedTuple):
+    """What a late reference velocity adds to the slip: delay times acceleration over speed, v(t - tau) = v - a tau.
+
+    `column` (n,) a / v [1/s]; `noise` (n,) its standard deviation. `half` [s]: the delay is off the slip already, known
+    to plus or minus this; NaN: the fit is to tell it.
+    """
+
+    column: FloatArray
+    noise: FloatArray
+    half: float = math.nan
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the fit is to tell the delay."""
+        return math.isnan(self.half)
+
+    def part(self, which: NDArray[np.int64]) -> Late:
+        """Some of the samples."""
+        return Late(self.column[which], self.noise[which], self.half)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +65,9 @@ class Line:
 
     `slope` C_s / F_z [-] with its 95 % interval `slope_ci`; `k` [-] with `k_ci`; `offset` delta [-] with `offset_ci`;
     `scatter` rms of the slip about the line [-]; `attenuation` share of k that the noise of the traction takes away,
-    given back where `is_corrected`; `blocks` of neighbouring samples that the intervals rest on. `reason` says why
-    there is no slope; then `slope` and `slope_ci` are NaN.
+    given back where `is_corrected`; `blocks` of neighbouring samples that the intervals rest on. `delay` of the
+    reference velocity with `delay_ci` [s], and `shared`, how much of the variance of the traction goes with a / v [-],
+    NaN where not asked. `reason` says why there is no slope, `hint` what to try; then `slope` and `slope_ci` are NaN.
     """
 
     k: float
@@ -42,6 +80,10 @@ class Line:
     samples: int
     blocks: int
     reason: str = ""
+    hint: str = ""
+    delay: float = math.nan
+    delay_ci: Interval = _NOWHERE
+    shared: float = math.nan
 
     @property
     def told(self) -> bool:
@@ -61,13 +103,23 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """Relative change of the slope from first to last sample, C(end) / C(start) - 1, with its 95 % interval. [-]"""
+    """Relative change of the slope from first to last sample, C(end) / C(start) - 1, with its 95 % interval. [-]
+
+    Infinite beyond ten times, minus infinite below a tenth.
+    """
 
     change: float
     change_ci: Interval
 
 
-def fit_line(mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, noise: float = 0.0) -> Line:
+class _Noise(NamedTuple):
+    variance: float
+    enters: tuple[FloatArray | float, ...]  # by how much into each column
+
+
+def fit_line(
+    mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, noise: float = 0.0, late: Late | None = None
+) -> Line:
     """Regress slip on traction.
 
     Parameters
@@ -80,53 +132,149 @@ def fit_line(mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, nois
         Block of each sample, ascending; blocks are taken to be independent, samples of one block are not.
     noise : float
         Variance of the noise of `mu`. [-]
+    late : Late, optional
+        For a slip against a velocity whose clock may be late.
 
     Returns
     -------
     Line
-        `reason` is set with fewer than 5 blocks, where k = 0 is in its interval, or where more than 30 % of the
-        variance of `mu` is noise.
+        `reason` is set with fewer than 5 blocks, where traction or slip are constant, where k = 0 is in its interval,
+        where more than 30 % of the variance of `mu` is noise, where the delay cannot be told from the slope, and where
+        slope or offset are not those of a tyre.
 
     Slip is the noisy one of the two: regressing traction on it would give a slope that is too low (a published drive:
     28.7 instead of 41.6). Noise of the traction biases k towards 0 by noise / var(mu); beyond 1 % its variance is taken
-    off the moments, which is Deming's regression with the noise of the traction known instead of a ratio.
+    off the moments, which is Deming's regression with the noise of the traction known instead of a ratio. With a delay
+    to be told, only that part of the traction counts which does not go with a / v, and the noise of a / v is taken off
+    too.
 
     Intervals: jackknife over the blocks with Student's t; degrees of freedom count the blocks by their information.
 
-    Thesis: Eq. (3.14), reference [15]; the sign of the offset as in E8.
+    Thesis: Eq. (3.14), reference [15]; the sign of the offset as in E8. Section 3.2 for the delay.
     """
     blocks = int(np.unique(label).size)
     spread = float(np.var(mu)) if mu.size else 0.0
-    attenuation = noise / spread if spread > 0.0 else math.nan
-    if blocks < LEAST_BLOCKS or not spread > 0.0:
-        reason = f"too few stretches of usable driving: {blocks} of at least {LEAST_BLOCKS}"
+    reason, hint = _nothing_to_fit(blocks, spread, slip)
+    if reason:
         return Line(
-            math.nan, _NOWHERE, math.nan, _NOWHERE, math.nan, attenuation, is_corrected=False, samples=mu.size,
-            blocks=blocks, reason=reason if blocks < LEAST_BLOCKS else "the traction is constant",
+            math.nan, _NOWHERE, math.nan, _NOWHERE, math.nan, math.nan, is_corrected=False, samples=mu.size,
+            blocks=blocks, reason=reason, hint=hint,
         )  # fmt: skip
+    fitted = late if late is not None and late.is_open else None
+    attenuation, shared = noise / spread, math.nan
+    if fitted is not None and attenuation <= NOISE_MAX:
+        attenuation, shared = _alone(mu, fitted, noise)
     is_corrected = CORRECTED_FROM < attenuation <= NOISE_MAX
-    one, zero = np.ones_like(mu), np.zeros_like(mu)
-    design, noisy = np.column_stack([mu, one]), np.column_stack([one, zero])
-    value, half = _jackknife(design, slip, label, noise=noise if is_corrected else 0.0, noisy=noisy)
+    value, half = _fit(mu, slip, label, noise if is_corrected else 0.0, fitted, with_noise=is_corrected)
     k, offset = float(value[0]), float(value[1])
-    k_ci = (k - float(half[0]), k + float(half[0]))
-    reason = ""
-    if attenuation > NOISE_MAX:
-        reason = f"{100 * min(attenuation, 1.0):.0f} % of the variation of the traction is noise"
-    elif not k_ci[0] > 0.0:
-        reason = (
-            f"1 / slope is {k:.3f} with a 95 % interval of {k_ci[0]:.3f} ... {k_ci[1]:.3f}, which holds 0: the "
-            "traction changes too seldom or too little for the noise of the slip"
-        )
-    scatter = float(np.sqrt(np.mean((slip - k * mu - offset) ** 2)))
+    half_k = float(half[0])
+    if late is not None and not late.is_open:
+        half_k = math.hypot(half_k, late.half * float(np.mean(late.column * (mu - mu.mean()))) / spread)
+    k_ci = (k - half_k, k + half_k)
+    if attenuation > NOISE_MAX and math.isnan(shared):
+        reason, hint = f"{100 * min(attenuation, 1.0):.0f} % of the variation of the traction is noise", _EVEN
+    elif not half_k > EXACT * abs(k):
+        reason, hint = "slip and traction repeat themselves exactly: nothing tells how sure the slope is", _EVEN
+    elif k_ci[1] < 0.0 and attenuation <= NOISE_MAX:
+        reason, hint = f"slip falls with traction (1 / slope is {k:.3f})", _TURNED
+    elif attenuation > NOISE_MAX or shared > SHARED_MAX or not k_ci[0] > 0.0:
+        reason, hint = _open_slope(mu, slip, label, k, k_ci, shared)
+    else:
+        reason, hint = _implausible(k, offset)
+    residual = slip - k * mu - offset
+    delay, delay_ci = math.nan, _NOWHERE
+    if fitted is not None:
+        delay = float(value[2])
+        delay_ci = (delay - float(half[2]), delay + float(half[2]))
+        residual = residual - delay * fitted.column
     return Line(
-        k, k_ci, offset, (offset - float(half[1]), offset + float(half[1])), scatter, attenuation, is_corrected,
-        mu.size, blocks, reason,
+        k, k_ci, offset, (offset - float(half[1]), offset + float(half[1])), float(np.sqrt(np.mean(residual**2))),
+        attenuation, is_corrected, mu.size, blocks, reason, hint, delay, delay_ci, shared,
     )  # fmt: skip
 
 
+def _nothing_to_fit(blocks: int, spread: float, slip: FloatArray) -> tuple[str, str]:
+    """Reason and hint where there is no line at all; empty where there is."""
+    if blocks < LEAST_BLOCKS:
+        return f"too few stretches of usable driving: {blocks} of at least {LEAST_BLOCKS}", _FEW
+    if not spread > TRACTION_MIN**2:
+        return "the traction is constant", _EVEN
+    if not float(np.std(slip)) > SLIP_MIN:
+        return (
+            "the slip is constant",
+            "check the wheel mapping: two wheels on one channel, or a signal that stands still",
+        )
+    return "", ""
+
+
+def _alone(mu: FloatArray, late: Late, noise: float) -> tuple[float, float]:
+    """Of the traction that does not go with a / v: share that is noise; and share of the traction that does go."""
+    u = late.column - late.column.mean()
+    var_u, var_mu = float(np.mean(u * u)), float(np.var(mu))
+    slope = float(np.mean(u * mu)) / var_u if var_u > 0.0 else 0.0
+    alone = max(var_mu - slope**2 * var_u, 0.0)
+    blur = noise + slope**2 * float(np.mean(late.noise**2))
+    return blur / alone if alone > TRACTION_MIN**2 else math.inf, 1.0 - alone / var_mu
+
+
+def _open_slope(
+    mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], k: float, k_ci: Interval, shared: float
+) -> tuple[str, str]:
+    """Why no slope is told although there is a line: for the delay alone, or for the noise."""
+    if math.isfinite(shared):
+        value, half = _fit(mu, slip, label, 0.0, None, with_noise=False)
+        if k_ci[0] > 0.0 or abs(float(value[0])) > float(half[0]):
+            return (
+                f"{100.0 * shared:.1f} % of the traction's variation goes with acceleration over speed: a delay of v_x "
+                "cannot be told from the slope", _APART,
+            )  # fmt: skip
+    return (
+        f"1 / slope is {k:.3f} with a 95 % interval of {k_ci[0]:.3f} ... {k_ci[1]:.3f}, which holds 0: the "
+        "traction changes too seldom or too little for the noise of the slip", _EVEN,
+    )  # fmt: skip
+
+
+def _implausible(k: float, offset: float) -> tuple[str, str]:
+    """Reason and hint if this is no tyre; empty if it may be one."""
+    if abs(offset) > OFFSET_MAX:
+        faster = 100.0 * (1.0 / (1.0 - offset) - 1.0) if offset < 1.0 else math.inf
+        word = "faster" if offset > 0.0 else "slower"
+        return (
+            f"the radii in the vehicle file do not fit: without traction the driven wheels run {abs(faster):.0f} % "
+            f"{word} than the free ones (or v_x)", "check r_e and the units of the wheel speeds",
+        )  # fmt: skip
+    if not SLOPE_RANGE[0] <= 1.0 / k <= SLOPE_RANGE[1]:
+        low, high = SLOPE_RANGE
+        return f"a slope of {1.0 / k:.3g} is outside what a tyre has ({low:g} to {high:g})", _UNITS
+    return "", ""
+
+
+def _fit(
+    mu: FloatArray,
+    slip: FloatArray,
+    label: NDArray[np.int64],
+    noise: float,
+    late: Late | None,
+    *,
+    with_noise: bool,
+) -> tuple[FloatArray, FloatArray]:
+    one = np.ones_like(mu)
+    if late is None:
+        return _jackknife([mu, one], slip, label, [_Noise(noise, (1.0, 0.0))])
+    noises = [_Noise(noise, (1.0, 0.0, 0.0))]
+    if with_noise:
+        noises.append(_Noise(1.0, (0.0, 0.0, late.noise)))
+    return _jackknife([mu, one, late.column], slip, label, noises)
+
+
 def fit_trend(
-    t: FloatArray, mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, noise: float = 0.0
+    t: FloatArray,
+    mu: FloatArray,
+    slip: FloatArray,
+    label: NDArray[np.int64],
+    *,
+    noise: float = 0.0,
+    late: Late | None = None,
 ) -> Trend:
     """Change of the slope with time, s = (k + k' tau) mu + delta + delta' tau, tau from -1/2 to 1/2.
 
@@ -136,6 +284,8 @@ def fit_trend(
         [s]
     mu, slip, label, noise
         As in `fit_line`.
+    late : Late, optional
+        A delay of the reference is left open, the same for all of the time.
 
     Returns
     -------
@@ -143,22 +293,29 @@ def fit_trend(
         The offset may drift too: tyres warm up and grow.
     """
     tau = (t - t[0]) / (t[-1] - t[0]) - 0.5
-    zero = np.zeros_like(mu)
-    design = np.column_stack([mu, np.ones_like(mu), tau * mu, tau])
-    noisy = np.column_stack([np.ones_like(mu), zero, tau, zero])
+    columns: list[FloatArray] = [mu, np.ones_like(mu), tau * mu, tau]
+    noisy: tuple[FloatArray | float, ...] = (1.0, 0.0, tau, 0.0)
     is_corrected = CORRECTED_FROM < noise / float(np.var(mu)) <= NOISE_MAX
-    value, half = _jackknife(design, slip, label, noise=noise if is_corrected else 0.0, noisy=noisy)
+    if late is not None:
+        columns, noisy = [*columns, late.column], (*noisy, 0.0)
+    noises = [_Noise(noise if is_corrected else 0.0, noisy)]
+    if late is not None and is_corrected:
+        noises.append(_Noise(1.0, (0.0, 0.0, 0.0, 0.0, late.noise)))
+    value, half = _jackknife(columns, slip, label, noises)
     k = abs(float(value[0]))
     low, middle, high = (_change_of_slope((float(value[2]) + r * float(half[2])) / k) for r in (1.0, 0.0, -1.0))
     return Trend(middle, (low, high))
 
 
 def _change_of_slope(c: float) -> float:
-    """C(end) / C(start) - 1 where 1 / C grows by the share `c` of its middle value, c from -2 to 2."""
-    return math.inf if c <= -2.0 else max((1.0 - 0.5 * c) / (1.0 + 0.5 * c), 0.0) - 1.0
+    """C(end) / C(start) - 1 where 1 / C grows by the share `c` of its middle value; infinite beyond ten times."""
+    at_end, at_start = 1.0 + 0.5 * c, 1.0 - 0.5 * c
+    if at_start >= TIMES_MAX * at_end:
+        return math.inf
+    return -math.inf if at_end >= TIMES_MAX * at_start else at_start / at_end - 1.0
 
 
-def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: NDArray[np.bool_], *, apart: int, k: float) -> float:
+def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, apart: int, k: float) -> float:
     """Variance of that part of the fast changes of the traction which the slip does not follow.
 
     Parameters
@@ -192,20 +349,65 @@ def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: NDArray[np.bool
     return max(float(np.mean(d_mu * d_mu)) - max(real, 0.0), 0.0) / 6.0
 
 
+def lag_of_slip(mu: FloatArray, slip: FloatArray, is_used: BoolArray, dt: float) -> float:
+    """Time by which the slip is late against the traction: the shift with the best correlation.
+
+    Parameters
+    ----------
+    mu, slip : array (n,)
+        Samples in order of time. [-]
+    is_used : bool array (n,)
+        Which ones are compared; of more than 20,000, that many, evenly.
+    dt : float
+        [s]
+
+    Returns
+    -------
+    lag : float
+        NaN where nothing moves together within half a second. Good to 0.05 s. [s]
+    """
+    step = max(1, round(0.02 / dt))
+    shifts = np.arange(-int(LAG_MAX / dt / step), int(LAG_MAX / dt / step) + 1) * step
+    index = np.flatnonzero(is_used)
+    index = index[(index >= -shifts[0]) & (index < mu.size - shifts[-1])]
+    index = index[:: max(1, -(-index.size // LAG_SAMPLES))]
+    good = np.ones(index.size, dtype=bool)
+    for shift in shifts:
+        good &= np.isfinite(mu[index - shift])
+    index = index[good]
+    if index.size < 20:
+        return math.nan
+    y = slip[index] - slip[index].mean()
+    r = np.array([_correlation(mu[index - shift], y) for shift in shifts])
+    k = int(np.argmax(r))
+    if not 0 < k < r.size - 1 or r[k] < 0.5:
+        return math.nan
+    bend = float(r[k - 1] - 2.0 * r[k] + r[k + 1])
+    peak = 0.5 * float(r[k - 1] - r[k + 1]) / bend if bend < 0.0 else 0.0
+    return float(dt * (shifts[k] + step * peak))
+
+
+def _correlation(x: FloatArray, y: FloatArray) -> float:
+    """Of x with y, whose mean is 0; 0 where one of them is constant."""
+    x = x - x.mean()
+    size = math.sqrt(float(x @ x) * float(y @ y))
+    return float(x @ y) / size if size > 1e-30 else 0.0
+
+
 def _jackknife(
-    design: FloatArray, y: FloatArray, label: NDArray[np.int64], *, noise: float, noisy: FloatArray
+    columns: list[FloatArray], y: FloatArray, label: NDArray[np.int64], noises: list[_Noise]
 ) -> tuple[FloatArray, FloatArray]:
     """Least squares with the noise of the design taken off its moments; errors by leaving out one block at a time.
 
     Parameters
     ----------
-    design : array (n, p)
+    columns : list of p arrays (n,)
+        Of the design.
     y : array (n,)
     label : int array (n,)
         Ascending.
-    noise : float
-        Variance of one noise that enters the columns as `noisy`.
-    noisy : array (n, p)
+    noises : list of _Noise
+        Independent of each other.
 
     Returns
     -------
@@ -213,17 +415,28 @@ def _jackknife(
         Estimate and half width of the 95 % interval.
     """
     first = np.flatnonzero(np.diff(label, prepend=label[0] - 1))
-    unit = np.sqrt(np.mean(design * design, axis=0))  # columns differ by orders of magnitude
-    x, c = design / unit, noisy / unit
-    h = np.add.reduceat(x[:, :, None] * x[:, None, :] - noise * c[:, :, None] * c[:, None, :], first, axis=0)
-    g = np.add.reduceat(x * y[:, None], first, axis=0)
+    unit = np.array([math.sqrt(float(np.mean(c * c))) or 1.0 for c in columns])  # they differ by orders of magnitude
+    p = unit.size
+    h, g = np.empty((first.size, p, p)), np.empty((first.size, p))
+    for i in range(p):
+        g[:, i] = np.add.reduceat(columns[i] * y, first) / unit[i]
+        for j in range(i + 1):
+            product = columns[i] * columns[j]
+            for variance, enters in noises:
+                product -= variance * enters[i] * enters[j]
+            h[:, i, j] = h[:, j, i] = np.add.reduceat(product, first) / (unit[i] * unit[j])
     inverse = np.linalg.pinv(h.sum(axis=0), rcond=1e-9, hermitian=True)
     value = inverse @ g.sum(axis=0)
     without = np.einsum("bij,bj->bi", np.linalg.pinv(h.sum(axis=0) - h, rcond=1e-9, hermitian=True), g.sum(axis=0) - g)
     blocks = first.size
     sigma = np.sqrt((blocks - 1) / blocks * np.sum((without - value) ** 2, axis=0))
-    # information of a block about a parameter: what its samples weigh in the estimate
-    inform = np.add.reduceat((x @ inverse) ** 2, first, axis=0)
-    dof = np.maximum(inform.sum(axis=0) ** 2 / np.sum(inform**2, axis=0) - 1.0, 1.0)
-    half = np.array([student_quantile(0.5 + LEVEL / 2.0, float(d)) for d in dof]) * sigma
+    half = np.zeros(p)
+    for i in (j for j in range(p) if sigma[j] > 0.0):
+        # information of a block about a parameter: what its samples weigh in the estimate
+        weight = np.zeros_like(y)
+        for c, w in zip(columns, inverse[i] / unit, strict=True):
+            weight += w * c
+        inform = np.add.reduceat(weight * weight, first)
+        dof = max(float(inform.sum() ** 2 / np.sum(inform**2)) - 1.0, 1.0)
+        half[i] = student_quantile(0.5 + LEVEL / 2.0, dof) * sigma[i]
     return value / unit, half / unit

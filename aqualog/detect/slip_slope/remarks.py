@@ -21,7 +21,7 @@ def remarks(slopes: Sequence[SlopeSummary]) -> tuple[str, ...]:
     """
     said: dict[str, list[str]] = {}
     for slope in slopes:
-        for text in (_sentence(slope), _restless(slope), _always(slope)):
+        for text in (_sentence(slope), _restless(slope), _always(slope), _own(slope)):
             if text:
                 said.setdefault(text, []).append(slope.place)
     return tuple(f"slip slope ({', '.join(places)}): {text}" for text, places in said.items())
@@ -40,14 +40,17 @@ def _sentence(slope: SlopeSummary) -> str:
     if seconds["blind"] > MOST * judged:
         return "blind for most of the drive: hardly any traction on the driven wheels"
     if seconds["estimating"] < (1.0 - MOST) * judged:
-        return "traction too even for most of the drive to tell slope from radius; sudden changes are still found"
+        return (
+            "traction too even for most of the drive to tell slope from radius; only sudden changes under a "
+            "traction of 0.03 and more are found"
+        )
     return ""
 
 
 def _restless(slope: SlopeSummary) -> str:
     """More changes than a road has: something else is in the slip or in the torque."""
     driven = sum(slope.seconds[k] for k in ("estimating", "slope_frozen"))
-    if slope.alarms < 4 or slope.alarms * 600.0 <= RESTLESS * driven:
+    if slope.alarms < 4 or driven < 60.0 or slope.alarms * 600.0 <= RESTLESS * driven:
         return ""
     return (
         f"{slope.alarms} changes in {driven / 60.0:.0f} min of driving, more than a road has: brake torque that is "
@@ -62,4 +65,14 @@ def _always(slope: SlopeSummary) -> str:
     return (
         f"below half of the dry slope of {slope.reference:.0f} for {slope.dropped_s / slope.judged_s:.0%} of the time "
         "judged: is this the tyre that the vehicle file or the history means?"
+    )
+
+
+def _own(slope: SlopeSummary) -> str:
+    """A drive that is its own reference cannot know what it began on."""
+    if slope.reference_from != "this drive" or slope.judged_s < LEAST:
+        return ""
+    return (
+        f"the dry slope of {slope.reference:.0f} is this drive's own: if it began on a slippery road, nothing shows. "
+        "Give tyre.slip_slope_f and slip_slope_r in the vehicle file, or a --history"
     )

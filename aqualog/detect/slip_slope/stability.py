@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.detect.slip_slope.regression import Interval, Line, fit_line, fit_trend
+from aqualog.detect.slip_slope.regression import TIMES_MAX, Interval, Late, Line, fit_line, fit_trend
 from aqualog.types import FloatArray
 
-__all__ = ["Segment", "Stability", "Verdict", "block_labels", "judge_stability", "make_segments"]
+__all__ = ["Segment", "Stability", "Verdict", "block_labels", "judge_stability", "make_segments", "percent"]
 
 Verdict = Literal["stable", "drifts", "varies", "cannot tell"]
 
@@ -22,6 +22,8 @@ SEGMENT_BLOCKS = 6  # of one segment
 MOST_SEGMENTS = 12
 SAME = 0.20  # change of the slope up to which it is stable: a few tenths of a bar, some ten degrees
 LEAST = 0.10  # change that is called a drift
+HOUR = 3600.0  # [s]
+LEAST_SPAN = 1800.0  # [s] less tells nothing of an hour
 SURE = 2.0  # how many times its own interval a segment must lie off; of a dozen, one in thirty sessions does by chance
 
 
@@ -37,7 +39,11 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Stability:
-    """`change` of the slope over `span_s` and `per_hour`, relative, with 95 % intervals; NaN where not told."""
+    """`change` of the slope over `span_s` and `per_hour`, relative, with 95 % intervals.
+
+    NaN where not told, which for `per_hour` is below half an hour; infinite beyond ten times, minus infinite below a
+    tenth.
+    """
 
     verdict: Verdict
     sentence: str
@@ -69,19 +75,29 @@ def block_labels(t: FloatArray) -> NDArray[np.int64]:
 
 
 def make_segments(
-    t: FloatArray, mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], *, dt: float, noise: float
+    t: FloatArray,
+    mu: FloatArray,
+    slip: FloatArray,
+    label: NDArray[np.int64],
+    *,
+    dt: float,
+    noise: float,
+    late: Late | None = None,
 ) -> tuple[Segment, ...]:
-    """Cut the used samples into parts of six blocks and more, at most 12, each with a line of its own."""
+    """Cut the used samples into parts of six blocks and more, at most 12, each with a line of its own.
+
+    A delay of the reference is that of the whole drive (`late` with its half width), taken off already.
+    """
     blocks = int(label[-1]) + 1 if label.size else 0
     count = min(MOST_SEGMENTS, blocks // SEGMENT_BLOCKS)
     if count < 2:
         return ()
     which = label * count // blocks
-    parts = [np.flatnonzero(which == i) for i in range(count)]
-    return tuple(
-        Segment(float(t[p[0]]), float(t[p[-1]]) + dt, p.size * dt, fit_line(mu[p], slip[p], label[p], noise=noise))
-        for p in parts
-    )
+    segments = []
+    for p in (np.flatnonzero(which == i) for i in range(count)):
+        line = fit_line(mu[p], slip[p], label[p], noise=noise, late=None if late is None else late.part(p))
+        segments.append(Segment(float(t[p[0]]), float(t[p[-1]]) + dt, p.size * dt, line))
+    return tuple(segments)
 
 
 def judge_stability(
@@ -93,6 +109,7 @@ def judge_stability(
     whole: Line,
     segments: tuple[Segment, ...],
     noise: float,
+    late: Late | None = None,
 ) -> Stability:
     """Say whether the slope was stable.
 
@@ -105,6 +122,8 @@ def judge_stability(
     segments : tuple of Segment
     noise : float
         As in `fit_line`.
+    late : Late, optional
+        As in `fit_trend`.
 
     Returns
     -------
@@ -118,7 +137,7 @@ def judge_stability(
     if not whole.told or len(segments) < 2:
         text = "cannot tell: too few stretches of usable driving to compare parts of the session"
         return Stability("cannot tell", text, span, math.nan, nothing, math.nan, nothing)
-    trend = fit_trend(t, mu, slip, label, noise=noise)
+    trend = fit_trend(t, mu, slip, label, noise=noise, late=late)
     low, high = trend.change_ci
     verdict, sentence = _verdict(trend.change, low, high, span, segments)
     rate, rate_low, rate_high = (_per_hour(x, span) for x in (trend.change, low, high))
@@ -126,13 +145,25 @@ def judge_stability(
 
 
 def _per_hour(change: float, span: float) -> float:
-    """Relative change in an hour at the same rate; no slope falls by more than 100 %."""
-    exponent = math.log1p(change) * 3600.0 / span if change > -1.0 else -math.inf
-    return math.expm1(min(exponent, 50.0))
+    """Relative change in an hour at the same rate; NaN where the session is too short to say."""
+    if span < LEAST_SPAN:
+        return math.nan
+    if math.isinf(change):
+        return change
+    exponent = math.log1p(change) * HOUR / span
+    limit = math.log(TIMES_MAX)
+    return math.copysign(math.inf, exponent) if abs(exponent) >= limit else math.expm1(exponent)
+
+
+def percent(change: float) -> str:
+    """`+12 %`; words for what is beyond ten times."""
+    if math.isinf(change):
+        return f"more than {TIMES_MAX:g} times" if change > 0.0 else f"less than 1/{TIMES_MAX:g}"
+    return f"{100 * change:+.0f} %"
 
 
 def _verdict(change: float, low: float, high: float, span: float, segments: tuple[Segment, ...]) -> tuple[Verdict, str]:
-    bounds = f"{100 * change:+.0f} % over {span / 60.0:.1f} min (95 %: {100 * low:+.0f} ... {100 * high:+.0f} %)"
+    bounds = f"{percent(change)} over {span / 60.0:.1f} min (95 %: {percent(low)} ... {percent(high)})"
     if (low > 0.0 or high < 0.0) and abs(change) > LEAST:
         return "drifts", f"drifts: {bounds}"
     usual = float(np.nanmedian([s.line.k for s in segments]))

@@ -116,6 +116,7 @@ class SlipSlopeWatch:
         fallback = slope if key in vehicle.given else np.nan
         self._params = Params.make(tuning, dt)
         self._state = estimator.initial_state(tuning, slope=slope, beta=beta_of_ratio(ratio, front=front))
+        self._source = "history" if periods else "vehicle file" if fallback == fallback else "this drive"
         self._drop_params = drop.DropParams.make(dt, memory.rule)
         self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
@@ -178,6 +179,7 @@ class SlipSlopeWatch:
             inactive={
                 name: float(n * self._dt) for name, n in zip(activation.REASONS[1:], self._reasons[1:], strict=True)
             },
+            reference_from=self._reference_from(),
             judged_s=self._judged * self._dt,
             dropped_s=self._dropped * self._dt,
             periods=tuple((p.largest, p.mean, p.seconds) for p in drop.completed(self._drop)),
@@ -190,6 +192,11 @@ class SlipSlopeWatch:
     def _rate(self, name: str, mu: FloatArray) -> FloatArray:
         rate, self._smoothed[name] = derivative(mu, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
         return np.nan_to_num(rate)
+
+    def _reference_from(self) -> str:
+        if not np.isfinite(self._drop.reference):
+            return ""
+        return "this drive" if self._drop.new > 0 and self._source != "history" else self._source
 
     def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
         calm = np.ones(f["v_x_hat"].size, dtype=bool)

@@ -28,5 +28,5 @@ def slip_slope(result: DriveResult) -> list[Row]:
             lines.append(Line(f"{name}, dry", group, MUTED, dry, width=0.9))
     if not lines:
         return []
-    caption = "traction coefficient per slip; below half of its dry value the tyre has lost part of the road"
-    return [Row("Slip slope", caption, "-", tuple(lines), include=(0.0, 40.0))]
+    caption = "traction per slip; dry value in grey"
+    return [Row("Slip slope", caption, "", tuple(lines), include=(0.0, 40.0))]
