@@ -24,7 +24,7 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from aqualog.detect.slip_slope.direct import DirectResult
+    from aqualog.detect.slip_slope.direct_records import DirectResult
 
 __all__ = ["slip_slope"]
 

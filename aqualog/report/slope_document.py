@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from aqualog import __version__
-from aqualog.detect.slip_slope.direct import DirectResult, PlaceSlope, Recursion
+from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
 from aqualog.detect.slip_slope.regression import Interval, Line
 from aqualog.detect.slip_slope.stability import percent
 from aqualog.report.text import table

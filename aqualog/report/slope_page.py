@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from aqualog import __version__
-from aqualog.detect.slip_slope.direct import DirectResult, PlaceSlope
+from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope
 from aqualog.report.figures.slip_scatter import slip_scatter
 from aqualog.report.figures.slope_session import recursive_estimate, slope_over_session
 from aqualog.report.figures.time_share import time_share

@@ -11,7 +11,8 @@ import pytest
 from straight_drive import AWD, FWD, RWD, C, drive
 
 from aqualog.detect.slip_slope import stability as stab
-from aqualog.detect.slip_slope.direct import LEFT_OUT, slip_slopes
+from aqualog.detect.slip_slope.direct import slip_slopes
+from aqualog.detect.slip_slope.direct_inputs import LEFT_OUT
 from aqualog.detect.slip_slope.regression import fit_line, fit_trend, lag_of_slip, noise_of_traction
 from aqualog.detect.slip_slope.stability import block_labels, judge_stability, make_segments, percent
 from aqualog.errors import ConfigError, FitError, SignalError

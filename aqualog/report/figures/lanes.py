@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from aqualog.report.figures.row import VEHICLE, Lane, Row
 from aqualog.report.figures.water import watered
 from aqualog.report.reduce import spans_of
@@ -28,5 +30,7 @@ def lanes(result: DriveResult) -> list[Row]:
 
 def _lane(track: Track) -> Lane:
     label = f"{detector_name(track.detector)} {place(track.wheel, track.side)}".rstrip()
+    if not np.isfinite(track.statistic).any():
+        label += " (not judged)"  # its signals are there, but they told nothing
     spans = spans_of(track.active, at_most=MOST_BARS)
     return Lane(label, track.wheel or VEHICLE, detector_colour(track.detector, track.wheel), spans)

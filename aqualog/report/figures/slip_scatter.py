@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.detect.slip_slope.direct import DirectResult, PlaceSlope
+from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope
 from aqualog.report.figures.slope_axes import axis, layout, rounded, see_through
 from aqualog.report.theme import INK, MUTED, wheel_colour
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.detect.slip_slope.direct import DirectResult, PlaceSlope, Recursion
+from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
 from aqualog.report.figures.slope_axes import axis, layout, rounded
 from aqualog.report.reduce import reduce_indices
 from aqualog.report.theme import wheel_colour

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from aqualog.detect.slip_slope.direct import LEFT_OUT, DirectResult
+from aqualog.detect.slip_slope.direct_inputs import LEFT_OUT
+from aqualog.detect.slip_slope.direct_records import DirectResult
 from aqualog.report.figures.slope_axes import axis, layout
 
 __all__ = ["time_share"]

@@ -1,0 +1,214 @@
+"""What goes into the regression of slip on traction: both of them without delay, and which samples are left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
+from aqualog.detect.negative_force import hold_on, is_braking
+from aqualog.detect.slip_slope import activation
+from aqualog.detect.slip_slope.activation import Limits
+from aqualog.notation import AXLES, WHEELS
+from aqualog.physics.differential import differential_slip
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.slip import V_MIN, wheel_slip
+from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
+from aqualog.types import BoolArray, FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = [
+    "BESIDE",
+    "LEFT_OUT",
+    "LIMITS",
+    "MEDIAN_SQUARE",
+    "NEGATIVE",
+    "S_MAX",
+    "TOO_LARGE",
+    "Place",
+    "Reference",
+    "accelerometer_traction",
+    "braking_of_wheels",
+    "earlier",
+    "left_out",
+    "mean_of",
+    "reference_of",
+    "slip_of",
+    "smoothed",
+    "torque_traction",
+]
+
+LIMITS = Limits(a_x_max=6.0, a_y_max=1.0, yaw_rate_max=0.05)  # straighter than the estimator, which has less to lose
+S_MAX = 0.05  # [-] slip about its median beyond which a wheel spins
+MEDIAN_SQUARE = 0.455  # of a normal variable with variance 1; single bumps do not move it
+TOO_LARGE, NEGATIVE, BESIDE = "traction beyond the limit", "brakes not known", "beside a stretch left out"
+LEFT_OUT = (*activation.REASONS[1 : activation.SPINNING + 1], TOO_LARGE, NEGATIVE, BESIDE)
+"""Why a sample was not used, in this order."""
+
+
+class Place(NamedTuple):
+    """A driven wheel or axle and what it is compared with."""
+
+    name: str
+    i: tuple[str, ...]  # driven
+    j: tuple[str, ...]  # free, () against a velocity
+
+
+class Reference(NamedTuple):
+    """A reference velocity, and what its delay would add to the slip: the third column of the regression."""
+
+    v_x: FloatArray
+    a_over_v: FloatArray  # [1/s]
+    noise: FloatArray  # of a_over_v, standard deviation
+    delay: float | None  # [s] known
+
+
+def torque_traction(
+    f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, width: int
+) -> dict[str, FloatArray]:
+    """As in the features, but without their filters' delays: those are not to be taken for one of v_x."""
+    a_x = columns["a_x"] if "a_x" in columns else f["a_kin_slow"]
+    loads = wheel_loads(
+        smoothed(a_x, width), f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
+        track=vehicle.track,
+    )  # fmt: skip
+    found = {}
+    for w, load in zip(WHEELS, loads, strict=True):
+        if w in vehicle.driven:
+            found[f"mu_{w}"] = traction_coefficient(
+                smoothed(columns[f"torque_{w}"], width), load, np.gradient(f[f"v_line_{w}"], dt) / vehicle.r_e(w),
+                r_l=vehicle.r_l(w), inertia=vehicle.inertia(w), r_w=vehicle.rolling_resistance,
+            )  # fmt: skip
+    return found
+
+
+def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle: Vehicle) -> dict[str, FloatArray]:
+    """Traction of the driven wheels from the accelerometer; see `physics.traction.traction_of_one_axle`."""
+    loads = wheel_loads(
+        a_x, f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg, track=vehicle.track
+    )
+    driven = [i for i, w in enumerate(WHEELS) if w in vehicle.driven]
+    free = [i for i, w in enumerate(WHEELS) if w not in vehicle.driven]
+    one = WHEELS[free[0]]
+    mu = traction_of_one_axle(
+        a_x, f["a_kin_slow"], f["v_x_hat"], loads[driven], loads[free], mass=vehicle.mass,
+        r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
+        free_wheel_mass=2.0 * vehicle.inertia(one) / vehicle.r_e(one) ** 2,
+    )  # fmt: skip
+    return {f"mu_{WHEELS[i]}": mu[row] for row, i in enumerate(driven)}
+
+
+def braking_of_wheels(
+    f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float
+) -> dict[str, BoolArray]:
+    """Where a braking force acts on each wheel."""
+    weight = 0.25 * vehicle.mass * G
+    found = {}
+    for w in WHEELS:
+        torque = columns[f"torque_{w}"] / (vehicle.r_l(w) * weight) if f"torque_{w}" in columns else None
+        bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), torque)
+        found[w], _ = hold_on(bits, 0, seconds=BRAKE_HOLD, dt=dt)
+    return found
+
+
+def smoothed(x: FloatArray, width: int) -> FloatArray:
+    """Centred mean; NaN where one of its samples is. No delay: slip and traction stay together."""
+    if x.size < width:
+        return np.full_like(x, np.nan)
+    good = np.isfinite(x)
+    level = float(x[good].mean()) if good.any() else 0.0
+    half = width // 2
+    mean = np.full(x.size, np.nan)
+    mean[half : x.size - half] = _sums(np.where(good, x - level, 0.0), width) / width + level
+    mean[_near(~good, width)] = np.nan
+    return mean
+
+
+def _sums(x: FloatArray, width: int) -> FloatArray:
+    """Of `width` neighbours each; (n - width + 1,)."""
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    sums: FloatArray = total[width:] - total[:-width]
+    return sums
+
+
+def _near(bad: BoolArray, width: int) -> BoolArray:
+    """Where one of the samples of a centred mean is bad."""
+    half = width // 2
+    near: BoolArray = _sums(np.pad(bad.astype(np.float64), half), 2 * half + 1) > 0.5
+    return near
+
+
+def reference_of(
+    v_x: FloatArray, f: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, delay: float | None
+) -> Reference:
+    """The velocity, and what its delay would add: the acceleration of the driven wheels over their speed.
+
+    The noise of the acceleration is half of what left and right wheels differ by.
+    """
+    axles = [(w, v) for w, v in AXLES.items() if v[0] in vehicle.driven]
+    v = np.mean([mean_of(f, "v_line", wheels) for _, wheels in axles], axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fast = np.where(v > V_MIN, v, np.nan)
+    apart = [np.gradient(f[f"v_line_{left}"] - f[f"v_line_{right}"], dt) for _, (left, right) in axles]
+    calm = (np.abs(f["yaw_rate_slow"]) < LIMITS.yaw_rate_max) & np.isfinite(fast) & np.isfinite(np.sum(apart, axis=0))
+    variance = sum(float(np.median(d[calm] ** 2)) for d in apart) / MEDIAN_SQUARE if calm.any() else 0.0
+    sd = 0.5 * math.sqrt(variance) / len(axles)
+    return Reference(v_x, np.gradient(v, dt) / fast, sd / fast, delay)
+
+
+def earlier(v_x: FloatArray, delay: float, dt: float) -> FloatArray:
+    """A velocity that is late, put where it belongs."""
+    if delay == 0.0:
+        return v_x
+    k = np.arange(v_x.size, dtype=np.float64)
+    moved: FloatArray = np.interp(k + delay / dt, k, v_x, left=math.nan, right=math.nan)
+    return moved
+
+
+def mean_of(f: Mapping[str, FloatArray], stem: str, wheels: Sequence[str]) -> FloatArray:
+    """Mean of a feature over wheels."""
+    mean: FloatArray = np.mean([f[f"{stem}_{w}"] for w in wheels], axis=0)
+    return mean
+
+
+def slip_of(place: Place, f: Mapping[str, FloatArray], v_x: FloatArray | None, vehicle: Vehicle) -> FloatArray:
+    """Slip against the velocity (3.13), or without one against the free wheels (3.16)."""
+    v_i = mean_of(f, "v_line", place.i)
+    if v_x is None:
+        return differential_slip(v_i, mean_of(f, "v_line", place.j))
+    r_e = vehicle.r_e(place.i[0])
+    return wheel_slip(v_i / r_e, v_x, r_e)
+
+
+def left_out(
+    place: Place,
+    f: Mapping[str, FloatArray],
+    mu: FloatArray,
+    slip: FloatArray,
+    braking: Mapping[str, BoolArray],
+    *,
+    width: int,
+    mu_max: float,
+    positive_only: bool,
+) -> FloatArray:
+    """0 where a sample is used, else 1 + index into `LEFT_OUT`."""
+    wheels = (*place.i, *place.j)
+    reason = activation.inactive_reason(
+        v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"],
+        a_w_delta=np.max([np.abs(f[f"a_w_delta_{w}"]) for w in wheels], axis=0),
+        is_braking=np.any([braking[w] for w in wheels], axis=0), limits=LIMITS,
+    )  # fmt: skip
+    with np.errstate(invalid="ignore"):
+        reason[(reason == 0) & (np.abs(mu) > mu_max)] = 1 + LEFT_OUT.index(TOO_LARGE)
+        if positive_only:
+            reason[(reason == 0) & (mu < 0.0)] = 1 + LEFT_OUT.index(NEGATIVE)
+        level = float(np.nanmedian(slip[reason == 0])) if np.isfinite(slip[reason == 0]).any() else 0.0
+        reason[(reason == 0) & (np.abs(slip - level) > S_MAX)] = activation.SPINNING
+    reason[(reason == 0) & np.isnan(mu + slip)] = activation.MISSING
+    # what goes into a mean must all be usable driving; the traction limit is that of the mean itself
+    bad = (reason > 0) & (reason <= activation.SPINNING)
+    reason[(reason == 0) & _near(bad, width)] = 1 + LEFT_OUT.index(BESIDE)
+    return reason
