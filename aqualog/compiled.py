@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
 __all__ = ["compiled", "inlined"]
 
@@ -25,10 +26,15 @@ def compiled(function: Callable[..., Any]) -> Any:
     The kept code is thrown away when a module of `physics` or one beside the function changes: numba itself looks at
     the file of the function alone and would go on with an old equation.
     """
+    # numba chooses the place while it decorates; beside the sources it would leave folders behind that an
+    # uninstallation does not remove, and that hide an editable one
+    own, config.CACHE_DIR = config.CACHE_DIR, config.CACHE_DIR or _user_cache()
     try:
         dispatcher = njit(cache=True, error_model="numpy")(function)
     except RuntimeError:
         return njit(function, error_model="numpy")
+    finally:
+        config.CACHE_DIR = own
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
         index._source_stamp = (index._source_stamp, _stamp(Path(function.__code__.co_filename).parent))
@@ -55,6 +61,18 @@ def inlined(function: Callable[..., Any]) -> Any:
         )  # the last ones have them
         _inlined[function] = njit(FunctionType(code, scope, function.__name__, defaults), error_model="numpy")
     return _inlined[function]
+
+
+@cache
+def _user_cache() -> str:
+    """A folder for machine code in the user's cache; empty where there is none to write to."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    try:
+        folder = (Path(base) if base else Path.home() / ".cache") / "aqualog" / "compiled"
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):
+        return ""
+    return str(folder) if os.access(folder, os.W_OK) else ""
 
 
 @cache

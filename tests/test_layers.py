@@ -1,6 +1,7 @@
 """The order of the layers: a module imports only what stands before it."""
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -64,3 +65,20 @@ def test_help_imports_nothing_heavy(command):
 def test_no_absolute_paths_of_a_machine():
     for path in modules():
         assert "/home/" not in path.read_text(encoding="utf-8")
+
+
+def test_compiled_code_is_kept_outside_the_package(tmp_path):
+    """Beside the sources it would outlive an uninstallation and hide an editable one."""
+    code = "from aqualog.detect import cusum; import numpy as np; cusum.scan(cusum.CusumParams(0, 1, 2, 1), cusum.initial_state(), np.ones(3))"
+    before = set(PACKAGE.rglob("*.nbi"))
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=env)
+    assert list((tmp_path / "aqualog" / "compiled").rglob("*.nbi"))
+    assert set(PACKAGE.rglob("*.nbi")) == before
+    (tmp_path / "file").write_text("")
+    for broken in (tmp_path / "file", tmp_path / "file" / "x"):
+        subprocess.run(
+            [sys.executable, "-c", code],
+            check=True,
+            env={**os.environ, "XDG_CACHE_HOME": str(broken), "NUMBA_CACHE_DIR": ""},
+        )
