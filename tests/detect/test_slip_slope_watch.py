@@ -168,9 +168,9 @@ def test_seconds_judged_and_dropped():
 def test_a_slope_that_is_known_is_judged_under_even_traction_too():
     """Frozen, not lost: the traction varied before, and the slope is known from then."""
     mu = np.where(T < 8.0, 0.06 + 0.03 * np.sin(2.0 * T), 0.06)
-    f = features(RWD, 0.4)
+    f = features(RWD, 0.25)
     for w in ("rl", "rr"):
-        f |= {f"mu_{w}": mu, f"v_line_{w}": 25.0 / (1.0 - mu / (0.4 * 36.0))}
+        f |= {f"mu_{w}": mu, f"v_line_{w}": 25.0 / (1.0 - mu / (0.25 * 36.0))}
     seen, _ = watch(RWD, f)
     assert (seen.estimate.status[-500:] == estimator.FROZEN).all()
     assert np.isfinite(seen.loss[-500:]).all()
