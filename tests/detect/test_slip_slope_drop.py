@@ -1,6 +1,7 @@
 """Criterion 4: the slope against its history (C56, C68), on scripted estimates and on simulated drives."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,16 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aqualog.align.load import load_signals
 from aqualog.config.history import load_history, save_history
+from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.slip_slope import drop
 from aqualog.detect.slip_slope.history import History, Period, reference, remembered
 from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory, pairs
-from aqualog.detect.stream import DriveStream
+from aqualog.detect.stream import DriveStream, detect_drive
 from aqualog.errors import ConfigError
 from aqualog.model.scenario import Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.surface import SURFACES
+from aqualog.report.figures.slip_slope import slip_slope
+from aqualog.report.text import event_table
 from aqualog.types import SlopeSummary
 from aqualog.vehicle import Vehicle
 
@@ -259,6 +264,7 @@ def test_an_excited_all_wheel_drive_notices_snow_and_not_dry_road():
         assert event.end_s == pytest.approx(40.0)
         assert event.evidence["slope_min"] < 0.5 * event.evidence["slope_ref"]
         assert event.threshold == 0.5
+        assert event.peak == pytest.approx(1 - 10 / 31, abs=0.1)
 
 
 def test_at_the_load_share_it_is_blind_and_says_so():
@@ -296,6 +302,21 @@ def test_history_goes_from_drive_to_drive():
     assert {e.side for e in events} == {"left", "right"}
     other, _ = drive(AWD, excitation=SINE, lanes=all_snow, memory=Memory(history, "winter"))
     assert other == []
+
+
+def test_text_and_page_of_a_drive():
+    """Shares of the time in the text, the slope beside its dry value as a row of the page."""
+    samples = Path(__file__).parents[2] / "sample_logs"
+    car = load_vehicle(samples / "vehicle.toml")
+    result = detect_drive(load_signals([samples / "lane_drive.parquet"], vehicle=car), car)
+    told = [line for line in event_table(result).splitlines() if line.startswith(("  rl: ", "  rr: "))]
+    assert len(told) == 2
+    for line in told:
+        assert "dry 31.0 (vehicle file)" in line
+        assert 90 <= sum(int(x) for x in re.findall(r"(\d+)%", line)) <= 101
+    (row,) = slip_slope(result)
+    assert [x.label for x in row.lines] == ["RL", "RL, dry", "RR", "RR, dry"]
+    assert np.nanmin(row.lines[0].values) < 15.0 < 30.0 < np.nanmax(row.lines[1].values)
 
 
 def test_history_of_the_command(tmp_path):
