@@ -191,7 +191,8 @@ class SlopeSummary:
     `seconds` by state of the estimator, `inactive` seconds by reason, `alarms` of its change detection; `periods` what
     the drive adds to the history of the dry slope: largest, mean [-], length [s]; `reference_from` where the dry
     slope comes from (`history`, `vehicle file`, `this drive`, or empty); `judged_s` for how long the slope was compared
-    with the dry one, `dropped_s` for how long of that it was below half of it [s].
+    with the dry one, `dropped_s` for how long of that it was below half of it,
+    `stiff_s` for how long the estimate was stiffer than any tyre [s].
     """
 
     place: str
@@ -208,6 +209,7 @@ class SlopeSummary:
     reference_from: str = ""
     judged_s: float = 0.0
     dropped_s: float = 0.0
+    stiff_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

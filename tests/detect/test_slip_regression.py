@@ -289,7 +289,7 @@ def test_all_wheel_drive_without_velocity_has_the_recursive_estimate_only():
     found = slip_slopes(signals, AWD)
     assert found.method == "differential"
     assert found.places == ()
-    assert [r.place for r in found.recursions] == ["left", "right"]
+    assert [r.place for r in found.recursions] == ["left", "right", "axle"]
     assert found.recursions[0].slope == pytest.approx(C, rel=0.2)
 
 

@@ -142,6 +142,8 @@ def summary(**changes):
         ({"dropped_s": 530.0}, None),
         ({"dropped_s": 550.0}, "is this the tyre"),
         ({"judged_s": 10.0, "dropped_s": 10.0}, None),
+        ({"stiff_s": 59.0}, None),
+        ({"stiff_s": 61.0}, "stiffer than any tyre"),
         ({"seconds": {"estimating": 200.0, "slope_frozen": 0.0, "blind": 400.0}}, "hardly any traction"),
         ({"seconds": {"estimating": 200.0, "slope_frozen": 0.0, "blind": 400.0}, "beta": 1.0}, "slip alike"),
         ({"seconds": {"estimating": 200.0, "slope_frozen": 400.0, "blind": 0.0}}, "too even"),
@@ -175,3 +177,14 @@ def test_a_slope_that_is_known_is_judged_under_even_traction_too():
     assert (seen.estimate.status[-500:] == estimator.FROZEN).all()
     assert np.isfinite(seen.loss[-500:]).all()
     assert seen.active[-500:].all()
+
+
+def test_a_slip_that_does_not_grow_with_the_traction_is_counted():
+    """Braking that is not in the log, or swapped axles: the estimate runs to its bound."""
+    f = features(RWD)
+    for w in ("rl", "rr"):
+        f |= {f"v_line_{w}": np.full(N, 25.0)}
+    _, w = watch(RWD, f)
+    assert w.summary().stiff_s > 30.0
+    _, w = watch(RWD, features(RWD))
+    assert w.summary().stiff_s == 0.0

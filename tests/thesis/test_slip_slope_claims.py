@@ -670,3 +670,14 @@ def test_C99_excitation_is_small(waveform, a_x):
     assert np.abs(np.diff(r.F_x_f[50:]) / np.diff(r.t[50:])).max() < 0.03 * r.F_z_f.min()
     # and the estimator sees it all the same
     assert estimate(HalfCarRun(30.0, v0=20.0, a_x=a_x, nu=0.3, excitation=exc)).slope_sd[-1] < 3.0
+
+
+@pytest.mark.parametrize(("slip", "status"), [(0.0031, "estimating"), (0.0029, "blind"), (-0.0029, "blind")])
+def test_C91_least_differential_slip(slip, status):
+    """3.2: "minimum [...] differential slip": off by default, and on the slip without the radii's error."""
+    y = slip + 4e-3
+    e, _, after = one_step(TUNING._replace(s_min=3e-3), y=y, mu_i=0.1, offset=4e-3)
+    assert estimator.STATUS[int(e.status[0])].split(":")[0].startswith(status)
+    e, _, after = one_step(y=y, mu_i=0.1, offset=4e-3)
+    assert estimator.STATUS[int(e.status[0])] == "estimating"
+    assert np.isfinite(after.belief.k)

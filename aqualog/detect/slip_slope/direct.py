@@ -131,7 +131,8 @@ def slip_slopes(
     recursions: tuple[Recursion, ...] = ()
     if way.method == "differential":
         recursions = tuple(
-            _watched(SlipSlopeWatch(vehicle, pair, signals.dt), smooth, braking, signals.dt) for pair in pairs(vehicle)
+            _watched(SlipSlopeWatch(vehicle, pair, signals.dt), smooth, braking, signals.dt)
+            for pair in (*pairs(vehicle), *pairs(vehicle, per_axle=True))
         )
     refuse(places, recursions, where, signals.frame.height * signals.dt)
     return DirectResult(

@@ -155,7 +155,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 status = SPINNING
             else:
                 window = observability.step(window, p.keep, p.dt, mu_i[i], rho_mu_j[i])
-                has_traction = abs(mu_delta) >= p.mu_min
+                has_traction = abs(mu_delta) >= p.mu_min and abs(y[i] - b.delta) >= p.s_min
                 k_told = observability.sd_slope(window, b.beta, p.r_density) < p.told_k * b.k
                 beta_told = observability.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
                 status = BLIND if not has_traction else (ESTIMATING if k_told else FROZEN)

@@ -11,6 +11,7 @@ __all__ = ["remarks"]
 LEAST = 10.0  # [s] of driving before anything is said
 MOST = 0.5  # share of it
 RESTLESS = 12.0  # changes in ten minutes: roads change less often
+TOO_STIFF = 0.1  # share of the driving
 ALWAYS = 0.9  # share of the drive below half of the dry slope
 
 
@@ -21,7 +22,7 @@ def remarks(slopes: Sequence[SlopeSummary]) -> tuple[str, ...]:
     """
     said: dict[str, list[str]] = {}
     for slope in slopes:
-        for text in (_sentence(slope), _restless(slope), _always(slope), _own(slope)):
+        for text in (_sentence(slope), _restless(slope), _always(slope), _stiff(slope), _own(slope)):
             if text:
                 said.setdefault(text, []).append(slope.place)
     return tuple(f"slip slope ({', '.join(places)}): {text}" for text, places in said.items())
@@ -55,6 +56,16 @@ def _restless(slope: SlopeSummary) -> str:
     return (
         f"{slope.alarms} changes in {driven / 60.0:.0f} min of driving, more than a road has: brake torque that is "
         "not in the log, late or wrongly shared torque, wheel speeds that are noisy or swapped?"
+    )
+
+
+def _stiff(slope: SlopeSummary) -> str:
+    """Slip that hardly grows with the traction: then no drop can be found either."""
+    if slope.stiff_s < max(LEAST, TOO_STIFF * (slope.seconds["estimating"] + slope.seconds["slope_frozen"])):
+        return ""
+    return (
+        f"stiffer than any tyre for {slope.stiff_s:.0f} s, so that no drop can be found there: braking that neither "
+        "torque nor brake_pressure tells, a wrong drivetrain, or swapped wheels?"
     )
 
 

@@ -38,6 +38,8 @@ class Tuning(NamedTuple):
     # activation by the size of the differential traction and slip
     mu_min: float = 0.01  # [-] below, only the offset is learnt
     mu_max: float = 0.30  # [-]
+    # off: the slip is the noisy one, and leaving out its small values picks the noise that makes it large
+    s_min: float = 0.0  # [-] differential slip without its offset below which only the offset is learnt
     s_max: float = 0.05  # [-] beyond, a wheel spins
     # observability
     tau_window: float = 20.0  # [s]
@@ -70,6 +72,7 @@ class Params(NamedTuple):
     h_rest: float
     mu_min: float
     mu_max: float
+    s_min: float
     s_max: float
     keep: float
     told_k: float
@@ -100,6 +103,7 @@ class Params(NamedTuple):
             h_rest=t.rest * t.h,
             mu_min=t.mu_min,
             mu_max=t.mu_max,
+            s_min=t.s_min,
             s_max=t.s_max,
             keep=math.exp(-dt / t.tau_window),
             told_k=t.told_k,

@@ -26,6 +26,7 @@ VARIANCE_MAX = 4.0  # [(m/s^2)^2] "variance of the wheel acceleration below a th
 TAU_VARIANCE = 0.3  # [s]
 # slip and traction alike: noise of the traction (a wheel's acceleration is in it) would flatten slip over traction
 TAU_SMOOTH = 0.15  # [s]
+STIFF = 150.0  # [-] three times a stiff tyre: the slip does not fit the traction
 AFTER_JUMP = 0.5  # [s] a jump of the torque, late by up to 0.3 s, has passed the low-pass
 
 Form = Literal["f", "r"]
@@ -128,7 +129,7 @@ class SlipSlopeWatch:
         self._reasons = np.zeros(len(activation.REASONS))
         self._last = (np.nan, np.nan, np.nan)
         self._alarms = 0
-        self._judged = self._dropped = 0
+        self._judged = self._dropped = self._stiff = 0
 
     def push(self, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], yaw_rate: FloatArray) -> Watched:
         """Take the features of the next piece."""
@@ -182,6 +183,7 @@ class SlipSlopeWatch:
             reference_from=self._reference_from(),
             judged_s=self._judged * self._dt,
             dropped_s=self._dropped * self._dt,
+            stiff_s=self._stiff * self._dt,
             periods=tuple((p.largest, p.mean, p.seconds) for p in drop.completed(self._drop)),
         )
 
@@ -210,6 +212,7 @@ class SlipSlopeWatch:
         judged = ~np.isnan(loss)
         self._judged += int(np.count_nonzero(judged))
         self._dropped += int(np.count_nonzero(loss[judged] > self.drop_threshold))
+        self._stiff += int(np.count_nonzero((estimate.status <= FROZEN) & (estimate.slope > STIFF)))
         self._counts += np.bincount(estimate.status.astype(np.int64), minlength=len(STATUS))
         missing = (reason == 0) & (estimate.status == INACTIVE)  # of the signals only the traction or a speed
         told = np.where(missing, activation.MISSING, reason).astype(np.int64)
