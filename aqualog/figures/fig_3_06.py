@@ -54,8 +54,8 @@ def _c104_phase() -> tuple[Finding, Table]:
             whole=in_order and _STEP_RANGE[0] <= mean["step"] <= _STEP_RANGE[1] and mean["ramp"] > _OTHERS,
             part=in_order,
         ),
-        "A change that meets a large differential traction is found sooner than at phase zero; one that meets a falling "
-        "force waits for a later half wave.",
+        "A change that meets a large differential traction is found sooner than at phase zero; one that meets a "
+        "falling force waits for a later half wave.",
         None if np.isnan(mean["step"]) else mean["step"],
     )
     table = Table(
