@@ -51,6 +51,7 @@ _ALL = [
     *_wheels("torque", "N*m", "net wheel torque, drive minus brake", -12000.0, 12000.0),
     Symbol("tie_rod_fl", "N", "tie-rod force, compression positive", -50000.0, 50000.0),
     Symbol("tie_rod_fr", "N", "tie-rod force, compression positive", -50000.0, 50000.0),
+    Symbol("steering_torque", "N*m", "torque at the steering (assistance, column), left positive", -200.0, 200.0),
     Symbol("water_depth", "m", "water depth on the lane", 0.0, 0.2),
     Symbol("water_depth_left", "m", "water depth in the left track", 0.0, 0.2),
     Symbol("water_depth_right", "m", "water depth in the right track", 0.0, 0.2),

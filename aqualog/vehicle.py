@@ -12,7 +12,7 @@ from typing import Literal
 
 from aqualog.notation import WHEELS
 
-__all__ = ["KEYS", "Drivetrain", "Key", "Vehicle", "vehicle_toml"]
+__all__ = ["COEFFICIENTS", "KEYS", "POLYNOMIALS", "Drivetrain", "Key", "Vehicle", "vehicle_toml"]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
 
@@ -60,6 +60,14 @@ _ALL = [
     Key("tyre", "mu_max", "-", 1.02, 0.05, 3.0, "friction of tyre and dry road", "dry asphalt (K)"),
 ]  # fmt: skip
 
+POLYNOMIALS = {
+    "tie_rod": "tie-rod force [N] over a front wheel's lateral (outward) and longitudinal force",
+    "steering_torque": "steering torque [N m] over the front axle's lateral force and the difference of its drive",
+}
+"""Sections of polynomials: c0, and c_y, c_x with powers from the first on; `sigma` is what they leave on dry road."""
+
+COEFFICIENTS = ("c0", "c_y", "c_x", "sigma")
+
 KEYS: dict[str, Key] = {k.path: k for k in _ALL}
 
 
@@ -97,6 +105,7 @@ class Vehicle:
     slip_slope_r: float = _default("tyre.slip_slope_r")
     mu_max: float = _default("tyre.mu_max")
     tie_rod: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    steering_torque: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     def r_e(self, wheel: str) -> float:
@@ -141,6 +150,8 @@ def vehicle_toml(vehicle: Vehicle) -> str:
             section = key.section
             lines += ["", f"[{section}]"]
         lines.append(f"{key.name} = {getattr(vehicle, key.name)!r}  # [{key.unit}] {key.meaning}")
-    if vehicle.tie_rod:
-        lines += ["", "[tie_rod]", *(f"{n} = {list(c)!r}" for n, c in vehicle.tie_rod.items())]
+    for section in POLYNOMIALS:
+        table = getattr(vehicle, section)
+        if table:
+            lines += ["", f"[{section}]", *(f"{n} = {list(c)!r}" for n, c in table.items())]
     return "\n".join(lines) + "\n"

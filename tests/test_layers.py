@@ -12,8 +12,8 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "detect",
-    "model", "report", "figures", "config", "cli",
+    "errors", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "calibrate",
+    "detect", "rivals", "model", "evaluate", "report", "figures", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
@@ -52,7 +52,7 @@ def test_detectors_read_no_truth_and_no_labels():
 
 @pytest.mark.parametrize(
     "command",
-    [["--help"], *([c, "--help"] for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope"))],
+    [["--help"], *([c, "--help"] for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate"))],
 )
 def test_help_imports_nothing_heavy(command):
     code = f"import sys; sys.argv = ['aqualog', *{command!r}]\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"

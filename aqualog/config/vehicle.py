@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import Faults, is_number, load_toml
-from aqualog.vehicle import KEYS, Vehicle
+from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, Vehicle
 
 __all__ = ["load_vehicle"]
 
-_TIE_ROD = ("c0", "c_y", "c_x")
 _SPLIT = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
 
 
@@ -36,7 +35,8 @@ def load_vehicle(path: Path) -> Vehicle:
         drivetrain = "rwd"
     values["drivetrain"] = drivetrain
     values["torque_split_rear"] = _SPLIT[drivetrain]
-    values["tie_rod"] = _tie_rod(document.pop("tie_rod", {}), faults)
+    for section in POLYNOMIALS:
+        values[section] = _polynomial(document.pop(section, {}), section, faults)
     for section, table in _sections(document, faults).items():
         known = [k.name for k in KEYS.values() if k.section == section]
         for name in table:
@@ -63,25 +63,28 @@ def _sections(document: dict[str, Any], faults: Faults) -> dict[str, dict[str, A
         if name in sections and isinstance(value, dict):
             found[name] = value
         elif isinstance(value, dict):
-            faults.unknown(name, [*sections, "tie_rod"])
+            faults.unknown(name, [*sections, *POLYNOMIALS])
         else:
             found[""][name] = value
     return found
 
 
-def _tie_rod(table: Any, faults: Faults) -> dict[str, tuple[float, ...]]:
+def _polynomial(table: Any, section: str, faults: Faults) -> dict[str, tuple[float, ...]]:
     """`F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
     result: dict[str, tuple[float, ...]] = {}
     if not isinstance(table, dict):
-        faults.add("tie_rod", "tie_rod is not a table")
+        faults.add(section, f"{section} is not a table")
         return result
     for name, value in table.items():
-        if name not in _TIE_ROD:
-            faults.unknown(name, _TIE_ROD)
+        if name not in COEFFICIENTS:
+            faults.unknown(name, COEFFICIENTS)
             continue
         numbers = value if isinstance(value, list) else [value]
         if not numbers or not all(is_number(n) for n in numbers):
             faults.add(name, f"{name} = {value!r} is not a number or a list of numbers")
+            continue
+        if name == "sigma" and not all(n > 0 for n in numbers):
+            faults.add(name, f"{name} = {value!r} is not above 0")
             continue
         result[name] = tuple(float(n) for n in numbers)
     return result

@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.types import BoolArray, Event, FloatArray
+from aqualog.types import BoolArray, Event, FloatArray, Track
 
-__all__ = ["EventBuilder", "Evidence"]
+__all__ = ["EventBook", "EventBuilder", "Evidence", "as_they_are"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 """Name -> (how, values): `first`, `min`, `max`; of a bit, `any` or `at_start`."""
+
+
+def as_they_are(evidence: dict[str, Any]) -> dict[str, Any]:
+    """Evidence needs no further words."""
+    return evidence
 
 
 @dataclass(slots=True)
@@ -38,6 +43,8 @@ class EventBuilder:
         Sample time.
     severity : callable
         Evidence -> `partial` or `full`.
+    explain : callable
+        Gathered evidence -> evidence of the event, where bits and values are to be put into words.
     """
 
     def __init__(
@@ -49,7 +56,9 @@ class EventBuilder:
         threshold: float,
         dt_ns: int,
         severity: Callable[[Mapping[str, Any]], str],
+        explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are,
     ) -> None:
+        self._explain = explain
         self._detector = detector
         self._wheel = wheel
         self._side = side
@@ -118,5 +127,33 @@ class EventBuilder:
             severity=self._severity(opened.evidence),
             peak=opened.peak,
             threshold=self._threshold,
-            evidence=opened.evidence,
+            evidence=self._explain(opened.evidence),
         )
+
+
+class EventBook:
+    """The builders of all events of a drive, one per detector and place."""
+
+    def __init__(self, dt_ns: int) -> None:
+        self._dt_ns = dt_ns
+        self._builders: dict[tuple[str, str | None, str | None], EventBuilder] = {}
+
+    def take(
+        self,
+        track: Track,
+        evidence: Evidence,
+        severity: Callable[[Mapping[str, Any]], str],
+        explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are,
+    ) -> list[Event]:
+        """Events of a track that end within this piece; severity and words are those of the first piece."""
+        key = (track.detector, track.wheel, track.side)
+        if key not in self._builders:
+            self._builders[key] = EventBuilder(
+                track.detector, wheel=track.wheel, side=track.side, threshold=track.threshold, dt_ns=self._dt_ns,
+                severity=severity, explain=explain,
+            )  # fmt: skip
+        return self._builders[key].push(track.active, track.statistic, evidence)
+
+    def finish(self) -> tuple[Event, ...]:
+        """Events that were still going on when the drive ended."""
+        return tuple(e for b in self._builders.values() for e in b.finish())

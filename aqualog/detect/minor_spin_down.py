@@ -10,6 +10,7 @@ import numpy as np
 from aqualog.compiled import compiled
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["MinorParams", "MinorState", "initial_state", "scan"]
@@ -21,6 +22,7 @@ class MinorParams(NamedTuple):
     ew: EwvarParams
     var_min: float  # [(m/s^2)^2] of the watched wheel itself
     delta_min: float  # [(m/s^2)^2] of the difference to the other axle
+    share: float  # of the wheel's variance that the other axle must not have: bumps shake both (C33)
     off_share: float  # ends when the difference or the one-sidedness falls below this share of its limit
     one_sided: float  # mean square of the speed difference below zero over that above: bumps swing a wheel both ways
     v_noise: float  # [m/s] added to the latter, so that noise alone is not one-sided
@@ -30,9 +32,11 @@ class MinorParams(NamedTuple):
     dt: float  # [s]
 
     @staticmethod
-    def make(dt: float) -> MinorParams:
+    def make(dt: float, threshold: float = DEFAULT.minor_spin_down) -> MinorParams:
         """Defaults: half a second of memory, 1.2 (m/s^2)^2 of the wheel, 1.0 of the difference, 8 to 1 below zero."""
-        return MinorParams(from_seconds(0.5, 0.5, dt), 1.2, 1.0, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt)
+        return MinorParams(
+            from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt
+        )
 
 
 class MinorState(NamedTuple):
@@ -85,7 +89,7 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
             active = False
             mean, var, below, above = a, 0.0, 0.0, 0.0
     elif s.age > p.warm_up and still < p.quiet:
-        active = var > p.var_min and delta > p.delta_min and one_sided > p.one_sided
+        active = var > p.var_min and delta > max(p.delta_min, p.share * var) and one_sided > p.one_sided
     state = MinorState(mean, var, mean_other, var_other, below, above, s.age + p.dt, still, active)
     return state, delta, var, active
 
@@ -132,7 +136,8 @@ def scan(
     var : array (n,)
         Variance of the watched wheel. [(m/s^2)^2]
     active : bool array (n,)
-        Begins when variance and difference exceed their limits and the wheel's speed lies eight times more below the
+        Begins when variance and difference exceed their limits (the difference also 0.7 of the variance) and the
+        wheel's speed lies eight times more below the
         vehicle's than above it (mean squares over the same memory); ends when the difference or that ratio falls
         below half its limit, 0.6 s after the last acceleration difference beyond 1 m/s^2, or on braking. After braking
         the moments are new and nothing begins for 0.5 s, after the start for 3 s. NaN in any input: state held,

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from aqualog.notation import SIDES, WHEELS
+from aqualog.notation import AXLES, SIDES, WHEELS
 from aqualog.types import Unavailable
 from aqualog.vehicle import Vehicle
 
-__all__ = ["DETECTORS", "MIN_RATE_MINOR", "NOT_YET", "check_needs"]
+__all__ = ["DETECTORS", "MIN_RATE_MINOR", "check_needs"]
 
 DETECTORS = (
     "spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
     "joint_cusum",
 )  # fmt: skip
 
-NOT_YET = "a later version of aqualog"
 MIN_RATE_SPIN = 5.0  # [Hz] a full spin-down lasts half a second and more
 MIN_RATE_RESISTANCE = 2.0  # [Hz]
 MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel speeds show kerbs and noise only
@@ -56,9 +55,9 @@ def check_needs(
         "spin_up": [*(driven_omega if len(driven_omega) == len(vehicle.driven) else []), *too_slow],
         "resistance": resistance,
         "slip_slope_drop": [*omega, *torque, *too_slow],
-        "tie_rod": [*(s for s in ("tie_rod_fl", "tie_rod_fr") if s not in have), NOT_YET],
+        "tie_rod": _steering(vehicle, have),
         "joint_criteria": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
-        "joint_cusum": [*omega, *resistance, NOT_YET],
+        "joint_cusum": [*resistance, *(omega if len(omega) == len(WHEELS) else [])],
     }
     unavailable = [Unavailable(d, tuple(dict.fromkeys(missing[d]))) for d in DETECTORS if missing[d]]
     gone = {u.detector for u in unavailable}
@@ -66,6 +65,9 @@ def check_needs(
         "spin_down": omega,
         "minor_spin_down": omega,
         "spin_up": [*driven_omega, *torque],
+        "tie_rod": [f"tie_rod_{w}" for w in AXLES["f"] if f"tie_rod_{w}" not in have],
+        "joint_criteria": [*omega, *(["slip_slope_drop"] if "slip_slope_drop" in gone else [])],
+        "joint_cusum": [*omega, *(["slip_slope_drop"] if "slip_slope_drop" in gone else [])],
     }
     return unavailable, [Unavailable(d, tuple(m)) for d, m in limited.items() if m and d not in gone]
 
@@ -73,6 +75,20 @@ def check_needs(
 def _lone_wheel(have: set[str], omega: list[str]) -> list[str]:
     """A single wheel without a reference has nothing to be compared with."""
     return omega if len(omega) == len(WHEELS) - 1 and "v_x" not in have else []
+
+
+def _steering(vehicle: Vehicle, have: set[str]) -> list[str]:
+    """What is missing to compare tie-rod forces, or else the steering torque, with their model."""
+    rods = [f"tie_rod_{w}" for w in AXLES["f"]]
+    front = [f"torque_{w}" for w in AXLES["f"] if w in vehicle.driven and f"torque_{w}" not in have]
+    motion = [*(["a_y"] if "a_y" not in have else []), *(["yaw_rate"] if "yaw_rate" not in have else []), *front]
+    if any(r in have for r in rods):
+        model = [] if vehicle.tie_rod else ["vehicle.tie_rod (aqualog calibrate)"]
+    elif "steering_torque" in have:
+        model = [] if vehicle.steering_torque else ["vehicle.steering_torque (aqualog calibrate)"]
+    else:
+        model = rods
+    return [*model, *motion]
 
 
 def _not_given(vehicle: Vehicle, *keys: str) -> list[str]:

@@ -5,27 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.detect.cusum import CusumParams
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure"]
+__all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure", "usable_for_offset"]
 
 THRESHOLD = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
 V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
 CLIP = 0.8  # [m/s^2] a gear change or a bump shows more for a moment than water ever does (C46)
+V_OFFSET = 5.0  # [m/s] from here on the dry offset is learnt; the less water shows, the better
+A_OFFSET = 1.0  # [m/s^2] beyond, a wrong mass shows in the measure, and curves cost more than the model knows
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
-def alarm_params(dt: float) -> CusumParams:
+def alarm_params(dt: float, threshold: float = DEFAULT.resistance) -> CusumParams:
     """The detector by itself, robust: half the change that is to be found as drift.
 
     0.2 m/s^2 is reported 2 s after it begins, 0.4 m/s^2 after 0.7 s (C76).
     """
-    return CusumParams(0.5 * THRESHOLD, 0.2, 0.3, dt)
+    return CusumParams(0.5 * THRESHOLD, threshold, 1.5 * threshold, dt)
 
 
-def gate_params(dt: float) -> CusumParams:
+def gate_params(dt: float, threshold: float = DEFAULT.joint_criteria) -> CusumParams:
     """The gate of the joint detector, sensitive: it only has to say that something holds the car back (C64)."""
-    return CusumParams(0.5 * THRESHOLD, 0.03, 0.06, dt)
+    return CusumParams(0.5 * THRESHOLD, threshold, 2.0 * threshold, dt)
 
 
 def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_braking: BoolArray) -> FloatArray:
@@ -53,3 +56,24 @@ def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_
         trusted = (v_x > V_MIN) & (np.abs(a_y) < A_Y_MAX)
     x = np.where(trusted, np.clip(delta_a_x, -CLIP, CLIP), 0.0)
     return np.where(np.isnan(delta_a_x), np.nan, np.where(is_braking, -CLIP, x))
+
+
+def usable_for_offset(
+    delta_a_x: FloatArray, v_x: FloatArray, a_kin: FloatArray, a_y: FloatArray, is_braking: BoolArray
+) -> FloatArray:
+    """Resistance measure where it can tell its own offset on dry road: rolling steadily, straight, without brake.
+
+    Parameters
+    ----------
+    delta_a_x, v_x, a_kin, a_y : array (n,)
+        As in `trusted_measure`; `a_kin` kinematic acceleration, low-passed. [m/s^2, m/s]
+    is_braking : bool array (n,)
+
+    Returns
+    -------
+    x : array (n,)
+        Within +-0.8; NaN elsewhere. [m/s^2]
+    """
+    with np.errstate(invalid="ignore"):
+        usable = (v_x > V_OFFSET) & (np.abs(a_kin) < A_OFFSET) & (np.abs(a_y) < A_OFFSET) & ~is_braking
+    return np.where(usable, np.clip(delta_a_x, -CLIP, CLIP), np.nan)

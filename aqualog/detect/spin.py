@@ -12,6 +12,7 @@ import numpy as np
 from aqualog.compiled import compiled
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["SpinParams", "SpinState", "initial_state", "scan"]
@@ -34,9 +35,10 @@ class SpinParams(NamedTuple):
     t_calm: float  # [s]
 
     @staticmethod
-    def make(sign: float, dt: float) -> SpinParams:
+    def make(sign: float, dt: float, threshold: float = DEFAULT.spin_down) -> SpinParams:
         """Defaults: 3 m/s^2 drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
-        return SpinParams(CusumParams(3.0, 0.6, 3.0, dt), sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
+        sums = CusumParams(3.0, threshold, 5.0 * threshold, dt)
+        return SpinParams(sums, sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
 
 
 class SpinState(NamedTuple):

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from aqualog.features.smoothing import UNSET, derivative, fading_lowpass, lowpass
+from aqualog.features.steering_model import STEERING_INPUTS, SteeringModel
 from aqualog.features.velocity import initial_state, observe, params_from_seconds
 from aqualog.notation import WHEELS
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
@@ -25,7 +26,7 @@ __all__ = ["INPUTS", "FeatureStream", "Features"]
 # Everything that features read. Truth and labels are not among them, so that no detector can see them.
 INPUTS = (
     "v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure",
-    *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS),
+    *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS), *STEERING_INPUTS,
 )  # fmt: skip
 
 TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
@@ -67,6 +68,7 @@ class FeatureStream:
         self._r_e = np.array([vehicle.r_e(w) for w in WHEELS])
         self._r_l = np.array([vehicle.r_l(w) for w in WHEELS])
         self._inertia = np.array([vehicle.inertia(w) for w in WHEELS])
+        self._steering = SteeringModel(vehicle, dt, self.available)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Features:
         """Features of the next piece.
@@ -82,7 +84,8 @@ class FeatureStream:
             `v_x_hat`, `a_kin`, `v_line_*` (wheel speeds on the centre line with the file's radii), `v_w_*` (the same
             with radii learnt), `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`,
             `mu_res_*`, `torque_sum`,
-            `delta_a_x` (2.9), and low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`; only those whose signals are there.
+            `delta_a_x` (2.9), low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`, and those of `SteeringModel`; only those
+            whose signals are there.
         """
         n = next(iter(columns.values())).size
         get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}
@@ -106,8 +109,15 @@ class FeatureStream:
         out["a_x_slow"] = self._lowpass("a_x", a_x, TAU_LOAD)
         out["a_y_slow"] = self._lowpass("a_y", np.nan_to_num(a_y), TAU_LOAD)
         out["a_kin_slow"] = self._lowpass("a_kin_slow", a_kin, TAU_LOAD)
+        loads = wheel_loads(
+            out["a_x_slow"], out["a_y_slow"], mass=self.vehicle.mass, l_f=self.vehicle.l_f, l_r=self.vehicle.l_r,
+            h_cg=self.vehicle.h_cg, track=self.vehicle.track,
+        )  # fmt: skip
         if self._has_torque:
-            self._forces(get, omega, out)
+            self._forces(get, omega, loads, out)
+        out |= self._steering.push(
+            get, out["a_y_slow"], yaw_rate, (loads[0], loads[1]), (self._drive(get, 0), self._drive(get, 1))
+        )
         if "brake_pressure" in self.available:
             out["brake_pressure"] = get["brake_pressure"]
         return out
@@ -152,12 +162,16 @@ class FeatureStream:
             out[f"v_w_delta_{wheel}"] = v_w[i] - v_x
             out[f"a_w_delta_{wheel}"] = self._derivative(f"v_w_{wheel}", v_w[i]) - a_ref
 
-    def _forces(self, get: Mapping[str, FloatArray], omega: FloatArray, out: dict[str, FloatArray]) -> None:
+    def _drive(self, get: Mapping[str, FloatArray], i: int) -> FloatArray:
+        """What the torque of a wheel pulls with; nothing where the log has no torque of it. [N]"""
+        name = f"torque_{WHEELS[i]}"
+        torque = get[name] if name in self.available else np.zeros_like(get[name])
+        return torque / float(self._r_l[i])
+
+    def _forces(
+        self, get: Mapping[str, FloatArray], omega: FloatArray, loads: FloatArray, out: dict[str, FloatArray]
+    ) -> None:
         vehicle = self.vehicle
-        loads = wheel_loads(
-            out["a_x_slow"], out["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r,
-            h_cg=vehicle.h_cg, track=vehicle.track,
-        )  # fmt: skip
         # a wheel without a torque signal of its own is a non-driven one that rolls freely
         torque = np.array(
             [get[f"torque_{w}"] if f"torque_{w}" in self.available else np.zeros_like(out["v_x_hat"]) for w in WHEELS]

@@ -18,6 +18,7 @@ from aqualog.report.figures.speed_differences import speed_differences
 from aqualog.report.figures.speeds import speeds
 from aqualog.report.figures.stack import groups, stack
 from aqualog.report.figures.statistics import statistics
+from aqualog.report.figures.tie_rods import tie_rods
 from aqualog.report.figures.water import water
 from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island, plotly_js
 from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
@@ -27,7 +28,7 @@ from aqualog.types import DriveResult
 
 __all__ = ["render_page", "write_page"]
 
-_FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, slip_slope, resistance, water)
+_FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, slip_slope, resistance, tie_rods, water)
 
 
 def write_page(result: DriveResult, path: Path, *, title: str) -> None:

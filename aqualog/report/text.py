@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from aqualog.detect.needs import NOT_YET
 from aqualog.types import DriveResult, Event, SlopeSummary
 
 __all__ = ["event_table", "table"]
@@ -52,8 +51,6 @@ def _slope(summary: SlopeSummary) -> str:
 
 
 def _lack(missing: Sequence[str]) -> str:
-    if NOT_YET in missing:
-        return f"comes with {NOT_YET}"
     signals = list(missing)
     text = ", ".join(signals)
     for axle in "fr":  # an axle's torque will do
@@ -88,9 +85,17 @@ def _evidence(event: Event) -> str:
         parts.append(f"slope down to {evidence['slope_min']:.1f}, dry {evidence.get('slope_ref', math.nan):.1f}")
     if "delta_a_x_max" in evidence:
         parts.append(f"resistance up to {evidence['delta_a_x_max']:.2f} m/s^2")
-    met = [n for n in (1, 2, 3, 5) if evidence.get(f"criterion_{n}")]
+    for key in ("force_residual", "torque_residual"):
+        if f"{key}_min" in evidence:
+            worst = max(evidence[f"{key}_min"], evidence[f"{key}_max"], key=abs)
+            parts.append(f"{worst:+.0f} N off the model" if key[0] == "f" else f"{worst:+.1f} N m off the model")
+    if evidence.get("from_steering_torque"):
+        parts.append("from the steering torque")
+    met = [n for n in (1, 2, 3, 4, 5) if evidence.get(f"criterion_{n}")]
     if met:
         parts.append("criteria " + "+".join(str(n) for n in met))
+    if evidence.get("decided_by"):
+        parts.append("decided by " + " + ".join(d.replace("_", " ") for d in evidence["decided_by"]))
     if evidence.get("braking_at_start"):
         parts.append("while braking")
     return ", ".join(parts)

@@ -19,9 +19,9 @@ _DETECTORS = {
     "spin_up": ("Spin-up", "speed a driven wheel gained faster than the vehicle"),
     "resistance": ("Resistance", "sum of the resistance measure beyond its drift"),
     "slip_slope_drop": ("Slip-slope drop", "share of the dry slip slope that is lost"),
-    "tie_rod": ("Tie-rod force", "loss of tie-rod force"),
+    "tie_rod": ("Tie-rod force", "sum of the tie-rod residual beyond its scatter"),
     "joint_criteria": ("Joint criteria", "wheel criteria met while the resistance gate is open"),
-    "joint_cusum": ("Joint CUSUM", "weighted sum of the single detectors"),
+    "joint_cusum": ("Joint CUSUM", "scaled sum of the single detectors"),
 }
 _UNITS = {"m/s^2": "m/s²", "(m/s^2)^2": "(m/s²)²", "m^2/s^4": "m²/s⁴", "N*m": "N·m", "-": "–"}
 # stem of the key of evidence (lowest and highest value where it ends in _min and _max) -> label, factor, unit, decimals
@@ -34,7 +34,10 @@ _EVIDENCE = {
     "slope_ref": ("dry slip slope", 1.0, "", 1),
     "mu": ("traction coefficient", 1.0, "", 3),
     "delta_a_x": ("resistance measure", 1.0, "m/s²", 2),
+    "force_residual": ("off the tie-rod model", 1.0, "N", 0),
+    "torque_residual": ("off the steering model", 1.0, "N·m", 1),
 }
+_TOLD = ("v_x", "braking", "braking_at_start", "full", "decided_by", "from_steering_torque")  # elsewhere
 _CRITERIA = {1: "spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip slope", 5: "resistance"}
 
 
@@ -79,9 +82,12 @@ def evidence_parts(evidence: Mapping[str, Any]) -> list[str]:
     parts = ["while braking"] if evidence.get("braking_at_start") is True else []
     met = [name for n, name in _CRITERIA.items() if evidence.get(f"criterion_{n}") is True]
     parts += [f"criteria: {' + '.join(met)}"] if met else []
+    decided = evidence.get("decided_by")
+    parts += [f"decided by {' + '.join(detector_name(d).lower() for d in decided)}"] if decided else []
+    parts += ["from the steering torque"] if evidence.get("from_steering_torque") is True else []
     stems: dict[str, dict[str, Any]] = {}
     for key, value in evidence.items():
-        if key in ("v_x", "braking", "braking_at_start", "full") or key.startswith("criterion_"):
+        if key in _TOLD or key.startswith(("criterion_", "term_")):
             continue
         stem, _, which = key.rpartition("_")
         stem, which = (stem, which) if which in ("min", "max") else (key, "")

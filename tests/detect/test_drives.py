@@ -6,7 +6,7 @@ from drives import AWD, CAR, FWD, drive, lane
 from small_model import Lane
 
 from aqualog.detect import minor_spin_down
-from aqualog.detect.stream import detect_drive
+from aqualog.detect.stream import Settings, detect_drive
 
 
 def events(detector=None, **kw):
@@ -155,7 +155,7 @@ def test_a_locked_wheel_is_told_apart_by_braking():
 def test_cornering_would_be_slip_without_yaw_correction():
     signals, _ = drive(CAR, **CORNER)
     with_yaw = detect_drive(signals, CAR).features
-    without = detect_drive(signals, CAR, correct_yaw=False).features
+    without = detect_drive(signals, CAR, settings=Settings(correct_yaw=False)).features
     for wheel in ("fl", "fr", "rl", "rr"):
         name = f"v_w_delta_{wheel}"
         assert np.nanmax(np.abs(with_yaw[name].to_numpy()[200:])) < 0.15

@@ -9,6 +9,7 @@ import numpy as np
 
 from aqualog.compiled import compiled
 from aqualog.detect.slip_slope.history import KEPT_PERIODS, Period, Rule
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["DropParams", "DropState", "completed", "initial_state", "scan"]
@@ -28,9 +29,11 @@ class DropParams(NamedTuple):
     dt: float
 
     @staticmethod
-    def make(dt: float, rule: Rule) -> DropParams:
+    def make(dt: float, rule: Rule, loss: float = DEFAULT.slip_slope_drop) -> DropParams:
         """Half of the reference (thesis: C68); back above 0.6 of it, so that the detection does not flicker there."""
-        return DropParams(0.5, 0.6, 0.2, round(5.0 / dt), round(2.0 / dt), 30.0, 5.0, rule == "max", dt)
+        left = 1.0 - loss
+        back = min(1.2 * left, 0.5 * (1.0 + left))
+        return DropParams(left, back, 0.2, round(5.0 / dt), round(2.0 / dt), 30.0, 5.0, rule == "max", dt)
 
 
 class DropState(NamedTuple):

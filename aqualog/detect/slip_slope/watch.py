@@ -14,6 +14,7 @@ from aqualog.detect.slip_slope import activation, drop, estimator
 from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
 from aqualog.detect.slip_slope.history import History, Rule
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.notation import AXLES, SIDES
 from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
@@ -22,7 +23,9 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
 
-VARIANCE_MAX = 4.0  # [(m/s^2)^2] "variance of the wheel acceleration below a threshold" (C68); tooth noise is below 1
+VARIANCE_MAX = (
+    2.0  # [(m/s^2)^2] "variance of the wheel acceleration below a threshold" (C68); teeth below 0.1, gravel 2.5-5
+)
 TAU_VARIANCE = 0.3  # [s]
 # slip and traction alike: noise of the traction (a wheel's acceleration is in it) would flatten slip over traction
 TAU_SMOOTH = 0.15  # [s]
@@ -101,10 +104,18 @@ class SlipSlopeWatch:
         [s]
     memory : Memory
     tuning : Tuning
+    loss : float
+        Share of the dry slope that must be lost. [-]
     """
 
     def __init__(
-        self, vehicle: Vehicle, pair: Pair, dt: float, memory: Memory | None = None, tuning: Tuning = TUNING
+        self,
+        vehicle: Vehicle,
+        pair: Pair,
+        dt: float,
+        memory: Memory | None = None,
+        tuning: Tuning = TUNING,
+        loss: float = DEFAULT.slip_slope_drop,
     ) -> None:
         memory = memory or Memory()
         self.pair = pair
@@ -118,7 +129,7 @@ class SlipSlopeWatch:
         self._params = Params.make(tuning, dt)
         self._state = estimator.initial_state(tuning, slope=slope, beta=beta_of_ratio(ratio, front=front))
         self._source = "history" if periods else "vehicle file" if fallback == fallback else "this drive"
-        self._drop_params = drop.DropParams.make(dt, memory.rule)
+        self._drop_params = drop.DropParams.make(dt, memory.rule, loss)
         self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
         self._variances = {w: ewvar.initial_state() for w in (*pair.i, *pair.j)}

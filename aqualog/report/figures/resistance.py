@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aqualog.report.figures.row import VEHICLE, Line, Row, feature
-from aqualog.report.theme import detector_colour
+from aqualog.report.theme import MUTED, detector_colour
 from aqualog.types import DriveResult
 
 __all__ = ["resistance"]
@@ -14,6 +14,10 @@ def resistance(result: DriveResult) -> list[Row]:
     values = feature(result.features, "delta_a_x", "m/s^2", "m/s^2")
     if values is None:
         return []
-    line = Line("delta_a_x", VEHICLE, detector_colour("resistance", None), values)
+    lines = [Line("delta_a_x", VEHICLE, detector_colour("resistance", None), values)]
+    offset = feature(result.features, "delta_a_x_offset", "m/s^2", "m/s^2")
     caption = "acceleration that the torques should give minus the measured one; water lifts it"
-    return [Row("Resistance measure", caption, "m/s²", (line,), include=(-0.2, 0.2))]
+    if offset is not None:
+        lines.append(Line("dry offset", VEHICLE, MUTED, offset, width=0.9))
+        caption += "; its offset on dry road in grey"
+    return [Row("Resistance measure", caption, "m/s²", tuple(lines), include=(-0.2, 0.2))]

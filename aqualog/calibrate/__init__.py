@@ -1,0 +1,1 @@
+"""What detectors must know of a car, estimated from its dry drives."""

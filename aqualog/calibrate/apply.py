@@ -1,0 +1,46 @@
+"""The vehicle with what a calibration has told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from aqualog.calibrate.records import Parameter, TieRodFit
+from aqualog.vehicle import Vehicle
+
+__all__ = ["calibrated", "told"]
+
+_KEYS = {
+    "mass": "mass", "drag_area": "drag_area", "rolling_resistance": "rolling_resistance", "r_e_f": "wheels.r_e_f",
+    "r_e_r": "wheels.r_e_r",
+}  # fmt: skip
+
+
+def told(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
+    """Values by key of the vehicle file (`wheels.r_e_f`) that are told, each with the parameter it comes from.
+
+    A ratio of radii that is told without their size keeps the file's mean.
+    """
+    found = {_KEYS[p.name]: (p.value, p) for p in parameters if p.identified and p.name in _KEYS}
+    ratio = next((p for p in parameters if p.name == "r_e_ratio" and p.identified), None)
+    if ratio is not None and not {"wheels.r_e_f", "wheels.r_e_r"} & set(found):
+        mean = 0.5 * (vehicle.r_e_f + vehicle.r_e_r)
+        found["wheels.r_e_f"] = (2.0 * mean * ratio.value / (1.0 + ratio.value), ratio)
+        found["wheels.r_e_r"] = (2.0 * mean / (1.0 + ratio.value), ratio)
+    return found
+
+
+def calibrated(
+    vehicle: Vehicle, parameters: Sequence[Parameter], transfers: Mapping[str, TieRodFit] | None = None
+) -> Vehicle:
+    """The vehicle with the values that are told; the others stay.
+
+    Keys that are told count as given. So do the loaded radii, once the effective ones are: forces rest on those that
+    the calibration has used.
+    """
+    values = told(parameters, vehicle)
+    radii = {"wheels.r_l_f", "wheels.r_l_r"} if "wheels.r_e_f" in values else set()
+    changed = {key.rsplit(".", 1)[-1]: value for key, (value, _) in values.items()}
+    polynomials = {section: {**fit.coefficients, "sigma": (fit.sigma,)} for section, fit in (transfers or {}).items()}
+    given = vehicle.given | set(values) | radii
+    return replace(vehicle, **changed, **polynomials, given=frozenset(given))  # type: ignore[arg-type]

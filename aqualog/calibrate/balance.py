@@ -1,0 +1,150 @@
+"""The dry balance of forces as a regression over the windows of one or more drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.calibrate.design import Windows
+from aqualog.calibrate.offset import Offset
+from aqualog.errors import FitError
+from aqualog.physics.load import G
+from aqualog.types import FloatArray
+
+__all__ = ["Balance", "Sample", "fit_balance", "residual"]
+
+LEAST_WINDOWS = 20
+
+
+class Sample(NamedTuple):
+    """Windows of a drive with the offset of its accelerometer."""
+
+    windows: Windows
+    offset: Offset
+
+
+class Balance(NamedTuple):
+    """Estimates: `inverse_mass` torque gain over mass [1/kg], `drag` drag area over mass [m^2/kg], `levels` (J,) a_x
+    without force and drag at the offset's time [m/s^2], `drifts` (J,) of it [m/s^3], `rolling` r_w [-], `condition` of
+    the scaled columns of force and drag [-].
+    """  # fmt: skip
+
+    inverse_mass: float
+    drag: float
+    levels: FloatArray
+    drifts: FloatArray
+    rolling: float
+    condition: float
+
+
+def fit_balance(samples: Sequence[Sample], fixed: Mapping[str, float]) -> Balance:
+    """Least squares of a_x = k F - kappa D + level_j + drift_j (t - t_j) over the windows of all drives.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+    fixed : mapping
+        Known values; `mass` with `torque_gain` fixes k, `drag_area` couples kappa to it.
+
+    Returns
+    -------
+    Balance
+        level_j = b_j - g r_w with the offset b_j of the drive's accelerometer. Specific force: no grade (E2). What the
+        wheels' inertia takes is off the force (E5).
+
+    Raises
+    ------
+    FitError
+        If there are less than 20 windows, or their forces are all alike.
+
+    Errors in the force would make k too small; means over 2 s leave little of them. A wind is in kappa and the levels.
+
+    Thesis: Eq. (2.9), (2.10) with a measure of zero.
+    """
+    count = sum(s.windows.v.size for s in samples)
+    if count < LEAST_WINDOWS:
+        raise FitError(
+            f"{count} windows of straight, unbraked, dry driving", expected=f"{LEAST_WINDOWS} of 2 s at the least",
+            hint="longer drives; the table of what was left out says why",
+        )  # fmt: skip
+    a = np.concatenate([_centred(s, s.windows.a_x) for s in samples])
+    force = np.concatenate([_centred(s, s.windows.force) for s in samples])
+    drag = np.concatenate([_centred(s, s.windows.drag) for s in samples])
+    k_known = fixed["torque_gain"] / fixed["mass"] if {"mass", "torque_gain"} <= set(fixed) else None
+    inverse_mass, kappa, condition = _slopes(a, force, drag, k_known, fixed)
+    levels, drifts = np.empty(len(samples)), np.empty(len(samples))
+    for j, s in enumerate(samples):
+        rest = s.windows.a_x - inverse_mass * s.windows.force + kappa * s.windows.drag
+        drifts[j], levels[j] = _line(s, rest)
+    return Balance(inverse_mass, kappa, levels, drifts, _rolling(samples, levels), condition)
+
+
+def residual(sample: Sample, *, inverse_mass: float, drag: float, level: float, drift: float) -> FloatArray:
+    """What the balance leaves of a_x in each window. [m/s^2]"""
+    w = sample.windows
+    return w.a_x - inverse_mass * w.force + drag * w.drag - level - drift * (w.t - _time(sample))
+
+
+def _slopes(
+    a: FloatArray, force: FloatArray, drag: FloatArray, k_known: float | None, fixed: Mapping[str, float]
+) -> tuple[float, float, float]:
+    if "drag_area" in fixed:
+        area = fixed["drag_area"]
+        if "mass" in fixed:
+            kappa = area / fixed["mass"]
+            return (k_known if k_known is not None else _slope(force, a + kappa * drag)), kappa, 1.0
+        area = area / fixed.get("torque_gain", 1.0)  # kappa = drag_area / m and k = gain / m: one column
+        k = _slope(force - area * drag, a)
+        return k, k * area, 1.0
+    if k_known is not None:
+        return k_known, -_slope(drag, a - k_known * force), 1.0
+    columns = np.column_stack([force, drag])
+    scale = np.linalg.norm(columns, axis=0)
+    if not (scale > 0.0).all():
+        raise FitError("force or speed never changes", expected="a drive with different speeds and accelerations")
+    scaled = columns / scale
+    solution = np.linalg.lstsq(scaled, a, rcond=None)[0] / scale
+    return float(solution[0]), -float(solution[1]), float(np.linalg.cond(scaled))
+
+
+def _slope(x: FloatArray, y: FloatArray) -> float:
+    square = float(x @ x)
+    if not square > 0.0:
+        raise FitError("force or speed never changes", expected="a drive with different speeds and accelerations")
+    return float(x @ y) / square
+
+
+def _time(sample: Sample) -> float:
+    return sample.offset.t if math.isfinite(sample.offset.t) else float(sample.windows.t.mean())
+
+
+def _line(sample: Sample, y: FloatArray) -> tuple[float, float]:
+    """Slope over the time, and level at the offset's time."""
+    t = sample.windows.t - sample.windows.t.mean()
+    square = float(t @ t)
+    slope = float(t @ y) / square if square > 0.0 else 0.0
+    return slope, float(y.mean()) + slope * (_time(sample) - float(sample.windows.t.mean()))
+
+
+def _centred(sample: Sample, y: FloatArray) -> FloatArray:
+    """A column without the level and drift that each drive has of its own."""
+    if y.size == 0:
+        return y
+    slope, _ = _line(sample, y)
+    t = sample.windows.t
+    centred: FloatArray = y - y.mean() - slope * (t - t.mean())
+    return centred
+
+
+def _rolling(samples: Sequence[Sample], levels: FloatArray) -> float:
+    """Mean of (b_j - level_j) / g, weighted by how well each offset is known; NaN without any."""
+    known = np.array([math.isfinite(s.offset.value) for s in samples])
+    if not known.any():
+        return math.nan
+    b = np.array([s.offset.value for s in samples])[known]
+    sd = np.array([max(s.offset.sd, 0.01) for s in samples])[known]
+    weight = sd**-2 / (sd**-2).sum()
+    return float((weight * (b - levels[known])).sum()) / G

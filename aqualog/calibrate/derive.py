@@ -1,0 +1,97 @@
+"""From the balance's coefficients to the parameters of a car, with what is known from elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from aqualog.calibrate import words
+from aqualog.calibrate.balance import Balance, Sample, fit_balance
+from aqualog.calibrate.records import Parameter
+from aqualog.calibrate.spread import Spread, half_width
+from aqualog.errors import ConfigError
+from aqualog.vehicle import KEYS, Vehicle
+
+__all__ = ["FIXABLE", "GAIN_SD", "balance_parameters", "check_fixed", "derived", "estimates"]
+
+FIXABLE: Mapping[str, tuple[float, float]] = {
+    **{n: (KEYS[n].low, KEYS[n].high) for n in ("mass", "rolling_resistance", "drag_area")},
+    "torque_gain": (0.2, 5.0),
+}
+"""What can be given as known, with its bounds."""
+
+GAIN_SD = 0.02  # [-] of a torque signal whose scale nobody has checked (K; axle efficiency alone is 0.95-0.97, V)
+WIDE: Mapping[str, float] = {
+    "mass": 0.10, "torque_gain": 0.10, "mass_per_gain": 0.10, "drag_area": 0.5, "rolling_resistance": 0.5,
+}  # fmt: skip
+"""Half of an interval over its value beyond which the drives do not tell the parameter."""
+
+_UNITS = {"mass_per_gain": "kg", "mass": "kg", "torque_gain": "-", "drag_area": "m^2", "rolling_resistance": "-"}
+
+
+def check_fixed(fixed: Mapping[str, float]) -> None:
+    """Refuse unknown names and impossible values.
+
+    Raises
+    ------
+    ConfigError
+    """
+    for name, value in fixed.items():
+        if name not in FIXABLE:
+            raise ConfigError(f'--fix "{name}" is not known', expected=", ".join(FIXABLE))
+        low, high = FIXABLE[name]
+        if not low <= value <= high:
+            raise ConfigError(f"--fix {name}={value:g}", expected=f"a value between {low:g} and {high:g}")
+
+
+def derived(balance: Balance, fixed: Mapping[str, float]) -> dict[str, float]:
+    """Parameters by name.
+
+    `mass_per_gain` is what the balance tells; a mass or a torque gain given splits it, without either the gain is 1.
+    """
+    if "mass" in fixed:
+        mass, gain = fixed["mass"], fixed.get("torque_gain", fixed["mass"] * balance.inverse_mass)
+    else:
+        gain = fixed.get("torque_gain", 1.0)
+        mass = gain / balance.inverse_mass
+    return {
+        "mass_per_gain": 1.0 / balance.inverse_mass,
+        "mass": mass,
+        "torque_gain": gain,
+        "drag_area": balance.drag * mass,
+        "rolling_resistance": balance.rolling,
+    } | dict(fixed)
+
+
+def estimates(samples: Sequence[Sample], fixed: Mapping[str, float]) -> dict[str, float]:
+    """`derived` from windows."""
+    return derived(fit_balance(samples, fixed), fixed)
+
+
+def balance_parameters(
+    found: Mapping[str, float], spread: Spread, fixed: Mapping[str, float], vehicle: Vehicle, samples: Sequence[Sample]
+) -> list[Parameter]:
+    """Parameters of the balance with intervals, and why one is not told.
+
+    Without a mass or a torque gain given, the gain's 2 % are in the intervals of mass and drag area: all drives share
+    the one signal, and no number of them takes that out.
+    """
+    has_scale = "mass" in fixed or "torque_gain" in fixed
+    parameters = []
+    for name, unit in _UNITS.items():
+        value = found[name]
+        file_value = float(getattr(vehicle, name)) if name in KEYS else math.nan
+        if name in fixed:
+            parameters.append(
+                Parameter(name, value, (value, value), unit, identified=True, remark="given", file_value=file_value)
+            )
+            continue
+        half = half_width(spread.sd[name], spread.dof[name])
+        if name in ("mass", "drag_area") and not has_scale:
+            half = math.hypot(half, 1.96 * GAIN_SD * value)
+        why = words.why_not(name, value, half, WIDE[name], samples, has_scale=has_scale)
+        remark = "" if why else words.remark(name, has_scale=has_scale, by_drive=spread.by_drive, samples=samples)
+        # without a scale the gain is an assumption, not an estimate
+        ci = (math.nan, math.nan) if name == "torque_gain" and not has_scale else (value - half, value + half)
+        parameters.append(Parameter(name, value, ci, unit, not why, why, remark, file_value))
+    return parameters

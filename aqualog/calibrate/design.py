@@ -1,0 +1,207 @@
+"""Which stretches of a drive tell the balance of forces, as means over windows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.calibrate.lag import earlier, lag_between
+from aqualog.errors import SignalError
+from aqualog.features.stream import INPUTS, FeatureStream
+from aqualog.notation import WHEELS
+from aqualog.physics.resistance import air_drag
+from aqualog.types import BoolArray, FloatArray, Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = ["REASONS", "WINDOW_S", "Drive", "Windows", "prepare"]
+
+WINDOW_S = 2.0  # [s] long against sensor lags (0.1 s), short against manoeuvres
+BLOCK_S = 40.0  # [s] driving within which residuals (wind, surface) hang together
+V_MIN = 6.0  # [m/s]
+A_Y_MAX = 0.8  # [m/s^2] cornering costs force beyond
+YAW_MAX = 0.05  # [rad/s]
+BRAKE_PRESSURE = 0.5e5  # [Pa]
+BESIDE_S = 0.6  # [s] before and after a brake or a gear shift
+FORCE_MIN = 0.02  # [m/s^2] times mass: without a brake signal only a car that is driven is surely not braked
+
+_WATER = ("on_water", "water_depth", "water_depth_left", "water_depth_right")
+REASONS = ("signals missing", "slow or standing", "braking", "brakes not known", "cornering", "gear shift", "wet")
+
+
+class Windows(NamedTuple):
+    """Means over windows (n,) of one drive.
+
+    `a_x` specific force [m/s^2], `force` sum (T - I omega_dot) / r_l [N], `drag` air drag of 1 m^2 [N], `v` [m/s],
+    `t` [s], `block` index of the stretch that a window is resampled with.
+    """
+
+    a_x: FloatArray
+    force: FloatArray
+    drag: FloatArray
+    v: FloatArray
+    t: FloatArray
+    block: FloatArray
+
+
+class Drive(NamedTuple):
+    """One drive as the estimators take it; arrays (n,) on the grid, delays taken out, NaN where missing."""
+
+    name: str
+    dt: float
+    windows: Windows
+    used: BoolArray
+    dry: BoolArray
+    driven_s: float
+    left_out: Mapping[str, float]
+    torque_lag_s: float
+    v_lag_s: float
+    a_x: FloatArray
+    v: FloatArray
+    force: FloatArray
+    altitude: FloatArray | None
+    columns: Mapping[str, FloatArray]
+    features: Mapping[str, FloatArray]
+    has_velocity: bool
+
+
+def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
+    """Signals of one drive to windows.
+
+    Parameters
+    ----------
+    signals : Signals
+        At least `a_x`, the torques of the driven wheels, and `v_x` or wheel speeds.
+    vehicle : Vehicle
+        Radii and inertias count; mass only for the loads.
+    name : str
+        For messages.
+
+    Raises
+    ------
+    SignalError
+        If a signal is missing.
+
+    Braked samples are left out: brake torques are hardly known. So are slow, cornering, wet ones and gear shifts, and
+    their neighbours within 0.6 s. Torque and velocity are moved to the accelerometer's time first.
+    """
+    present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
+    _check(present, vehicle, name)
+    columns = {s: signals.array(s) for s in present}
+    dt = signals.dt
+    features = FeatureStream(vehicle, dt, present).push({s: columns[s] for s in present if s in INPUTS})
+    a_x = columns["a_x"]
+    v = features["v_x_hat"]
+    torque = _torque_force(columns, vehicle)
+    v_lag = lag_between(np.gradient(v, dt), a_x, dt)
+    torque_lag = lag_between(torque, a_x, dt)
+    v = earlier(v, v_lag, dt)
+    force = earlier(torque, torque_lag, dt) - _spinning_force(columns, vehicle, v, dt)
+    reason = _reasons(a_x, v, force, columns, features, vehicle, dt)
+    used = reason == 0
+    windows = _windows(a_x, v, force, used, vehicle, dt)
+    left_out = {r: float(np.count_nonzero(reason == i + 1)) * dt for i, r in enumerate(REASONS)}
+    moving = np.nan_to_num(v) > V_MIN
+    return Drive(
+        name, dt, windows, used, _dry(columns, moving), float(np.count_nonzero(moving)) * dt,
+        {r: s for r, s in left_out.items() if s > 0.0}, torque_lag, v_lag, a_x, v, force, columns.get("altitude"),
+        columns, features, "v_x" in present,
+    )  # fmt: skip
+
+
+def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
+    missing = [s for s in ("a_x", *(f"torque_{w}" for w in vehicle.driven)) if s not in present]
+    if "v_x" not in present and not all(f"omega_{w}" in present for w in WHEELS):
+        missing.append("v_x or the four wheel speeds")
+    if missing:
+        raise SignalError(
+            f"cannot calibrate without {', '.join(missing)}", where=name,
+            expected="accelerometer, torques of the driven wheels, and velocity or wheel speeds",
+            hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+        )  # fmt: skip
+
+
+def _torque_force(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
+    """Wheel torques over the loaded radii; a wheel without a torque signal rolls freely. [N]"""
+    force: FloatArray = np.sum(
+        [columns[f"torque_{w}"] / vehicle.r_l(w) for w in WHEELS if f"torque_{w}" in columns], axis=0
+    )
+    return force
+
+
+def _spinning_force(columns: Mapping[str, FloatArray], vehicle: Vehicle, v: FloatArray, dt: float) -> FloatArray:
+    """What of the torque spins the wheels (E5); without wheel speeds they follow the car. [N]"""
+    total = np.zeros_like(v)
+    for w in WHEELS:
+        omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
+        total = total + vehicle.inertia(w) * np.gradient(omega, dt) / vehicle.r_l(w)
+    return total
+
+
+def _reasons(
+    a_x: FloatArray,
+    v: FloatArray,
+    force: FloatArray,
+    columns: Mapping[str, FloatArray],
+    features: Mapping[str, FloatArray],
+    vehicle: Vehicle,
+    dt: float,
+) -> FloatArray:
+    """0 where a sample is used, else 1 + index into `REASONS`."""
+    reason = np.zeros(v.size)
+
+    def mark(bits: BoolArray, name: str) -> None:
+        reason[bits & (reason == 0)] = 1 + REASONS.index(name)
+
+    width = max(round(BESIDE_S / dt), 1)
+    with np.errstate(invalid="ignore"):
+        mark(np.isnan(a_x + v + force), "signals missing")
+        mark(v < V_MIN, "slow or standing")
+        if "brake_pressure" in columns:
+            mark(_widened(columns["brake_pressure"] > BRAKE_PRESSURE, width), "braking")
+        else:
+            mark(_widened(force < FORCE_MIN * vehicle.mass, width), "brakes not known")
+        mark(np.abs(features["a_y_slow"]) > A_Y_MAX, "cornering")
+        mark(np.abs(features["yaw_rate_slow"]) > YAW_MAX, "cornering")
+        if "gear" in columns:
+            gear = columns["gear"]
+            mark(_widened(np.concatenate([[False], np.diff(gear) != 0.0]) & np.isfinite(gear), width), "gear shift")
+    mark(~_dry(columns, np.ones(v.size, dtype=np.bool_)), "wet")
+    return reason
+
+
+def _dry(columns: Mapping[str, FloatArray], moving: BoolArray) -> BoolArray:
+    """Moving and not on measured or labelled water."""
+    wet = np.zeros(moving.size, dtype=np.bool_)
+    for label in _WATER:
+        if label in columns:
+            wet |= np.nan_to_num(columns[label]) > 0.0
+    dry: BoolArray = moving & ~wet
+    return dry
+
+
+def _widened(bits: BoolArray, width: int) -> BoolArray:
+    """On also `width` samples before and after."""
+    near: BoolArray = np.convolve(bits, np.ones(2 * width + 1), mode="same") > 0.5
+    return near
+
+
+def _windows(
+    a_x: FloatArray, v: FloatArray, force: FloatArray, used: BoolArray, vehicle: Vehicle, dt: float
+) -> Windows:
+    """Means over windows without a break; the drag's mean is that of v^2, not of v."""
+    n = max(round(WINDOW_S / dt), 1)
+    starts = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], used, [False]]).astype(np.int8)))
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        starts += list(range(int(a), int(b) - n + 1, n))
+    rows = np.array(starts, dtype=np.intp)[:, None] + np.arange(n)[None, :] if starts else np.empty((0, n), np.intp)
+    drag = air_drag(v, drag_area=1.0, air_density=vehicle.air_density)
+    block = np.floor(np.arange(len(starts)) / max(round(BLOCK_S / WINDOW_S), 1)) if starts else np.empty(0)
+    if block.size and math.isfinite(block[-1]) and np.count_nonzero(block == block[-1]) < 5 and block[-1] > 0:
+        block[block == block[-1]] -= 1.0  # a remainder too short to stand alone
+    t = np.arange(v.size) * dt
+    mean = {name: x[rows].mean(axis=1) for name, x in (("a", a_x), ("f", force), ("d", drag), ("v", v), ("t", t))}
+    return Windows(mean["a"], mean["f"], mean["d"], mean["v"], mean["t"], block)

@@ -1,0 +1,129 @@
+"""The slow offset of the resistance measure, learnt while driving on dry road and frozen in the wet.
+
+An accelerometer that drifts, a head wind and a wrong rolling resistance all leave a slow offset in the measure (2.9).
+Water comes fast and only ever adds: that is all by which a single scalar can tell them apart.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.compiled import compiled
+from aqualog.features.smoothing import gain
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["OnlineParams", "OnlineState", "initial_state", "scan"]
+
+
+class OnlineParams(NamedTuple):
+    """Tuning; made by `make`. Accelerations in m/s^2, times in s."""
+
+    dt: float
+    k_fast: float  # share of a new sample in the short memory
+    tau: float  # time constant of the offset once it is known
+    guard: float  # the short memory this far above the offset is no offset: nothing is learnt
+    certain: float  # from this much learning on the guard watches
+    bound: float  # the offset stays within +-bound
+    give_up: float  # so long above the guard without a break it is no water lane, and is learnt after all
+    below: float  # so long below -guard the offset was wrong: it is learnt anew
+    v_rest: float  # [m/s] slower than this is standstill
+    rest: float  # so long at standstill everything is learnt anew
+
+    @classmethod
+    def make(cls, dt: float) -> OnlineParams:
+        """Tuning for a sample time dt [s].
+
+        A ramp of 1.6e-3 m/s^3 is what an offset with tau = 60 s follows within the guard of 0.1 m/s^2: faster ones are
+        taken for water, slower ones for drift (ESC accelerometers: 2e-4 m/s^3 rms, up to 1e-3). The guard is half the
+        threshold of partial aquaplaning (thesis 2.2: 0.2 m/s^2), so that no change that matters is learnt. The
+        bound holds an offset of 0.2, as much of drift, and a head wind of 10 m/s at motorway speed (0.17) together.
+        """
+        return cls(dt, gain(1.0, dt), 60.0, 0.1, 1.0, 0.6, 180.0, 5.0, 0.5, 2.0)
+
+
+class OnlineState(NamedTuple):
+    """What is carried: offset [m/s^2], seconds learnt, short memory of x, seconds above, below and at standstill."""
+
+    offset: float
+    age: float
+    fast: float
+    above: float
+    beneath: float
+    resting: float
+
+
+def initial_state(offset: float = 0.0) -> OnlineState:
+    """Before the first sample; `offset` [m/s^2] is reported until the first sample that can be used."""
+    return OnlineState(offset, 0.0, math.nan, 0.0, 0.0, 0.0)
+
+
+@compiled
+def _scan(p, offset, age, fast, above, beneath, resting, x, v_x, frozen):  # type: ignore[no-untyped-def]
+    out = np.empty(x.size)
+    for i in range(x.size):
+        if not math.isnan(v_x[i]):
+            resting = resting + p.dt if v_x[i] < p.v_rest else 0.0
+        if resting > p.rest:  # the controller zeroes its sensor there, and the wind may have turned
+            age = 0.0
+            fast = math.nan
+            above = 0.0
+            beneath = 0.0
+        if not math.isnan(x[i]) and not frozen[i]:
+            fast = x[i] if math.isnan(fast) else fast + p.k_fast * (x[i] - fast)
+            innovation = fast - offset
+            watched = age > p.certain
+            above = above + p.dt if watched and innovation > p.guard else 0.0
+            beneath = beneath + p.dt if watched and innovation < -p.guard else 0.0
+            if beneath > p.below:  # water only adds: less than the dry resistance shows that it was not the dry one
+                age = 0.0
+                beneath = 0.0
+                offset = fast
+            if not (0.0 < above <= p.give_up) and not beneath > 0.0:
+                age = min(age + p.dt, p.tau)
+                # the short memory is late, so that little of a step is learnt before it passes the guard
+                offset += p.dt / age * ((fast if watched else x[i]) - offset)
+                offset = min(max(offset, -p.bound), p.bound)
+        out[i] = offset
+    return out, offset, age, fast, above, beneath, resting
+
+
+def scan(
+    p: OnlineParams, state: OnlineState, x: FloatArray, v_x: FloatArray, frozen: BoolArray
+) -> tuple[FloatArray, OnlineState]:
+    """Offset of the resistance measure over a drive or a piece of one.
+
+    Parameters
+    ----------
+    p : OnlineParams
+    state : OnlineState
+        From `initial_state` or the piece before.
+    x : array (n,)
+        Resistance measure (2.9) where the balance of forces can be trusted; NaN where it is not to be used (braking,
+        cornering, gear shift, gap). Low speeds, 5 m/s and more, are welcome: water hardly shows there. [m/s^2]
+    v_x : array (n,)
+        Velocity, to see standstill; NaN holds. [m/s]
+    frozen : bool array (n,)
+        Wet suspicion from outside: any wheel criterion, the joint gate. Nothing is learnt, no time counts.
+
+    Returns
+    -------
+    offset : array (n,)
+        What to subtract from the measure, after this sample; within +-bound. [m/s^2]
+    state : OnlineState
+
+    A running mean at first (gain dt / age), then a low-pass with the time constant tau. Beyond +-guard nothing is
+    learnt: above it for at most `give_up` seconds, below it for `below` seconds; then the offset begins anew from the
+    lower level. Standstill begins anew too. Limits: x constant gives that constant from the first sample on. What is
+    there from the first sample on cannot be told from an offset: a log that begins on water hides it.
+
+    Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives none; this one knows
+    their joint effect at even traction only.
+    """
+    out, *last = _scan(
+        p, *state, np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(v_x, dtype=np.float64),
+        np.ascontiguousarray(frozen, dtype=np.bool_),
+    )  # fmt: skip
+    return out, OnlineState(*last)

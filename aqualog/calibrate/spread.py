@@ -1,0 +1,131 @@
+"""Intervals of estimates whose residuals hang together: blocks or whole drives left out in turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.calibrate.balance import Sample
+from aqualog.calibrate.design import Windows
+from aqualog.errors import FitError
+from aqualog.intervals import student_quantile
+from aqualog.types import FloatArray
+
+__all__ = [
+    "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "half_width", "jackknife", "jackknife_of", "of_drives",
+    "spread_of",
+]  # fmt: skip
+
+DRIVES_MIN = 4  # from here on the drives themselves show how they differ
+BLOCKS_MIN = 5
+WIND_SD = 3.0  # [m/s] along the road, mean over a drive (K)
+
+Estimate = Mapping[str, float]
+Estimator = Callable[[Sequence[Sample]], Estimate]
+
+
+class Spread(NamedTuple):
+    """Standard deviations by name, degrees of freedom by name, and whether whole drives were left out."""
+
+    sd: Mapping[str, float]
+    dof: Mapping[str, float]
+    by_drive: bool
+
+
+def half_width(sd: float, dof: float) -> float:
+    """Half of the 95 % interval. NaN without a finite standard deviation."""
+    if not math.isfinite(sd):
+        return math.nan
+    return student_quantile(0.975, max(dof, 1.0)) * sd if dof < 200.0 else 1.96 * sd
+
+
+def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, air_density: float) -> Spread:
+    """How far estimates are off.
+
+    Parameters
+    ----------
+    estimator : callable
+        Estimates by name from any subset of drives or windows.
+    samples : sequence of Sample
+    drag : float
+        Drag area over mass, for the wind. [m^2/kg]
+    air_density : float
+        [kg/m^3]
+
+    Four drives or more: jackknife over drives, so that what differs between them (wind, surface, temperature, offset,
+    driver) is in the interval. Fewer: jackknife over blocks of 40 s, plus what one drive cannot show of itself: a
+    steady wind of 3 m/s rms, and the height at its ends, in each drive on its own.
+
+    Raises
+    ------
+    FitError
+        If fewer than five blocks are there.
+    """
+    if len(samples) >= DRIVES_MIN:
+        return of_drives(estimator, samples)
+    within = jackknife_of(estimator, samples)
+    best = estimator(samples)
+    nuisance = dict.fromkeys(best, 0.0)
+    for j, sample in enumerate(samples):
+        for other in (_in_wind(sample, drag=drag, air_density=air_density), _offset_moved(sample)):
+            if other is None:
+                continue
+            moved = estimator([*samples[:j], other, *samples[j + 1 :]])
+            for name in nuisance:
+                nuisance[name] += (moved[name] - best[name]) ** 2
+    sd = {n: math.sqrt(within.sd[n] ** 2 + nuisance[n]) for n in best}
+    # Welch and Satterthwaite: the assumed part is known, the part from the blocks is not
+    dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else 1e3 for n in best}
+    return Spread(sd, dof, by_drive=False)
+
+
+def of_drives(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
+    """Each drive left out in turn."""
+    left = [estimator([s for k, s in enumerate(samples) if k != j]) for j in range(len(samples))]
+    return Spread(*jackknife(left), by_drive=True)
+
+
+def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
+    """Each block of windows left out in turn."""
+    blocks = [(j, b) for j, s in enumerate(samples) for b in np.unique(s.windows.block)]
+    if len(blocks) < BLOCKS_MIN:
+        raise FitError(
+            f"{len(blocks)} blocks of 40 s of straight, unbraked, dry driving",
+            expected=f"{BLOCKS_MIN} at the least for an interval", hint="longer or more drives",
+        )  # fmt: skip
+    left = []
+    for j, b in blocks:
+        rest = [*samples[:j], _without(samples[j], b), *samples[j + 1 :]]
+        left.append(estimator([s for s in rest if s.windows.v.size]))
+    return Spread(*jackknife(left), by_drive=False)
+
+
+def jackknife(left: Sequence[Estimate]) -> tuple[dict[str, float], dict[str, float]]:
+    """Standard deviations and degrees of freedom from estimates with one part left out each."""
+    n = len(left)
+    sd, dof = {}, {}
+    for name in left[0]:
+        x = np.array([e[name] for e in left])
+        sd[name] = math.sqrt((n - 1.0) / n * float(((x - x.mean()) ** 2).sum()))
+        dof[name] = n - 1.0
+    return sd, dof
+
+
+def _without(sample: Sample, block: float) -> Sample:
+    keep = sample.windows.block != block
+    return sample._replace(windows=Windows(*(x[keep] for x in sample.windows)))
+
+
+def _in_wind(sample: Sample, *, drag: float, air_density: float) -> Sample:
+    """The drive as it would have been with a head wind of one standard deviation more."""
+    w = sample.windows
+    extra: FloatArray = 0.5 * air_density * ((w.v + WIND_SD) ** 2 - w.v**2)
+    return sample._replace(windows=w._replace(a_x=w.a_x - drag * extra))
+
+
+def _offset_moved(sample: Sample) -> Sample | None:
+    o = sample.offset
+    return sample._replace(offset=o._replace(value=o.value + o.sd)) if math.isfinite(o.sd) else None

@@ -1,0 +1,161 @@
+"""Transfer from wheel forces to tie rods, identified from a dry drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.calibrate.design import Drive
+from aqualog.calibrate.records import TieRodFit
+from aqualog.errors import FitError
+from aqualog.features.stream import INPUTS, FeatureStream
+from aqualog.intervals import student_quantile
+from aqualog.types import BoolArray, FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["fit_tie_rod", "transfers"]
+
+A_Y_MAX = 4.0  # [m/s^2] beyond, tyres and loads leave what a polynomial of low order follows
+LEAST_S = 20.0  # [s]
+BLOCK_S = 8.0  # [s] about two periods of a slalom
+F_Y_RANGE_MIN = 300.0  # [N] standard deviation below which a drive has not steered
+F_X_RANGE_MIN = 60.0  # [N]
+
+
+def transfers(drives: Sequence[Drive], vehicle: Vehicle) -> tuple[dict[str, TieRodFit], tuple[str, ...]]:
+    """Polynomials of tie rods and steering torque, each from the drive that tells most, and why there is none.
+
+    The forces are those of the detectors' own model (`features.steering_model`), probed with unit polynomials, so that
+    what is identified is what they use. The vehicle's mass scales them: it must be the one that goes with the result.
+    """
+    found: dict[str, TieRodFit] = {}
+    reasons = []
+    for section, signals in (("tie_rod", ("tie_rod_fl", "tie_rod_fr")), ("steering_torque", ("steering_torque",))):
+        fits = []
+        for d in drives:
+            if not {*signals, "a_y", "yaw_rate"} <= set(d.columns):
+                continue
+            F_y, measured = _probed(d, vehicle, section, {"c_y": (1.0,)})
+            F_x, _ = _probed(d, vehicle, section, {"c_x": (1.0,)})
+            try:
+                fits.append(fit_tie_rod(F_y, F_x, measured, dt=d.dt, used=d.dry & (np.abs(d.columns["a_y"]) < A_Y_MAX)))
+            except FitError as error:
+                reasons.append(f"{section} polynomial ({d.name}): {error.line()}")
+        if fits:
+            found[section] = max(fits, key=lambda f: f.seconds * f.explained)
+    told = tuple(r for r in reasons if r.split(" ", 1)[0] not in found)
+    return found, told
+
+
+def _probed(
+    drive: Drive, vehicle: Vehicle, section: str, unit: dict[str, tuple[float, ...]]
+) -> tuple[FloatArray, FloatArray]:
+    """Model and measurement (m, n) with a polynomial that shows one force as it is."""
+    rods, torque = (unit, {}) if section == "tie_rod" else ({}, unit)
+    probe = replace(vehicle, tie_rod=rods, steering_torque=torque)
+    columns = {s: x for s, x in drive.columns.items() if s in INPUTS}
+    f = FeatureStream(probe, drive.dt, columns).push(columns)
+    if section == "steering_torque":
+        return f["steering_hat"][None, :], f["steering_meas"][None, :]
+    names = ("fl", "fr")
+    return np.array([f[f"tie_rod_hat_{w}"] for w in names]), np.array([f[f"tie_rod_meas_{w}"] for w in names])
+
+
+def fit_tie_rod(
+    F_y_outward: FloatArray,
+    F_x: FloatArray,
+    measured: FloatArray,
+    *,
+    dt: float,
+    used: BoolArray | None = None,
+    degree: int = 2,
+) -> TieRodFit:
+    """Polynomial of a tie-rod force in the forces of its wheel.
+
+    Parameters
+    ----------
+    F_y_outward, F_x : array (m, n)
+        Forces of m wheels (left and right share the coefficients); lateral ones away from the centre line. [N]
+    measured : array (m, n)
+        Tie-rod forces, compression positive, filtered as the forces are; NaN where missing. [N]
+    dt : float
+        Sample time. [s]
+    used : bool array (n,), optional
+        Dry, moving.
+    degree : int
+        Of the polynomial in F_y; in F_x it is 1.
+
+    Returns
+    -------
+    TieRodFit
+        `c0`, `c_y` (degree values), `c_x` as `physics.steering.tie_rod_force` takes them; c_x is 0 with an infinite
+        interval where the longitudinal force hardly changes.
+
+    Raises
+    ------
+    FitError
+        If there are less than 20 s, or the car was hardly steered.
+
+    Least squares; intervals by leaving out blocks of 8 s in turn. The explained share is that of the variance of all
+    rods together.
+
+    Thesis: 2.4, polynomials from a multi-body model; here from the drive itself.
+    """
+    good = np.isfinite(F_y_outward) & np.isfinite(F_x) & np.isfinite(measured)
+    if used is not None:
+        good &= used[None, :]
+    seconds = float(good.any(axis=0).sum()) * dt
+    if seconds < LEAST_S:
+        raise FitError(f"{seconds:.0f} s with tie-rod and lateral forces", expected=f"{LEAST_S:g} s of dry driving")
+    y, x, f = F_y_outward[good], F_x[good], measured[good]
+    if float(np.std(y)) < F_Y_RANGE_MIN:
+        raise FitError(
+            f"the front wheels' lateral force varies by {float(np.std(y)):.0f} N rms",
+            expected=f"{F_Y_RANGE_MIN:g} N for a tie-rod polynomial", hint="a dry slalom with 2 m/s^2",
+        )  # fmt: skip
+    has_x = float(np.std(x)) >= F_X_RANGE_MIN
+    scale = float(np.std(y))
+    columns = [np.ones_like(y), *((y / scale) ** k for k in range(1, degree + 1)), *([x / scale] if has_x else [])]
+    block = np.broadcast_to(np.arange(good.shape[1]) // max(round(BLOCK_S / dt), 1), good.shape)[good]
+    table = np.column_stack(columns)
+    best, residual = _solve(table, f)
+    sd, dof = _jackknife(table, f, block)
+    half = student_quantile(0.975, max(dof, 1.0)) * sd
+    units = np.array([1.0, *(scale**k for k in range(1, degree + 1)), *([scale] if has_x else [])])
+    values, low, high = best / units, (best - half) / units, (best + half) / units
+    pairs = [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
+    coefficients = {
+        "c0": (float(values[0]),),
+        "c_y": tuple(float(c) for c in values[1 : degree + 1]),
+        "c_x": (float(values[-1]),) if has_x else (0.0,),
+    }
+    intervals = {
+        "c0": (pairs[0],),
+        "c_y": tuple(pairs[1 : degree + 1]),
+        "c_x": (pairs[-1],) if has_x else ((-math.inf, math.inf),),
+    }
+    explained = 1.0 - float(residual @ residual) / float(((f - f.mean()) ** 2).sum())
+    sigma = math.sqrt(float(residual @ residual) / residual.size)
+    return TieRodFit(coefficients, intervals, sigma, explained, seconds)
+
+
+def _solve(table: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    best = np.asarray(np.linalg.lstsq(table, f, rcond=None)[0], dtype=np.float64)
+    return best, f - table @ best
+
+
+def _jackknife(table: FloatArray, f: FloatArray, block: NDArray[np.intp]) -> tuple[FloatArray, float]:
+    """Standard deviations of the coefficients with one block left out each, and degrees of freedom."""
+    gram, right = table.T @ table, table.T @ f
+    left = []
+    for b in np.unique(block):
+        part = table[block == b]
+        left.append(np.linalg.lstsq(gram - part.T @ part, right - part.T @ f[block == b], rcond=None)[0])
+    x = np.array(left)
+    n = x.shape[0]
+    sd: FloatArray = np.sqrt((n - 1.0) / n * ((x - x.mean(axis=0)) ** 2).sum(axis=0))
+    return sd, n - 1.0

@@ -1,0 +1,104 @@
+"""Sentences of a calibration: what was assumed, what the drives cannot tell, and what would tell it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from aqualog.calibrate.balance import Sample
+from aqualog.calibrate.offset import CLIMB_SD
+from aqualog.calibrate.records import DriveFit, Parameter
+
+__all__ = [
+    "GAIN_UNKNOWN", "RADIUS_SHORT", "cannot_tell", "left_out", "notes", "radius_unknown", "remark", "why_not",
+]  # fmt: skip
+
+GAIN_NOTED = 0.005  # [-]
+GAIN_UNKNOWN = (
+    "mass and torque gain are one ratio in the balance of forces: a weighed car (--fix mass=KG) tells the gain, a gain "
+    "known from a dynamometer (--fix torque_gain=X) the mass"
+)
+
+RADIUS_SHORT = "too little straight, unbraked driving above 30 km/h with all wheel speeds; five times 40 s tell it"
+
+
+def why_not(name: str, value: float, half: float, wide: float, samples: Sequence[Sample], *, has_scale: bool) -> str:
+    """Why a parameter is not identified; empty where it is."""
+    if name == "torque_gain" and not has_scale:
+        return GAIN_UNKNOWN
+    if math.isfinite(half) and value > 0.0 and half <= wide * value:
+        return ""
+    if name == "rolling_resistance":
+        return (
+            "rolling resistance and the accelerometer's offset are one sum; a longer drive, one with altitude, or one "
+            "that ends where it began tells the offset, --fix rolling_resistance=X gives it"
+        )
+    if name == "drag_area":
+        v = np.concatenate([s.windows.v for s in samples]) * 3.6
+        low, high = np.percentile(v, [5.0, 95.0])
+        return (
+            f"drag needs a spread of speeds, these are {low:.0f} to {high:.0f} km/h, and a wind counts as drag; drives "
+            "from 40 to 130 km/h in both directions tell it, --fix drag_area=X gives it"
+        )
+    return "the forces hardly change; some accelerations with 1 m/s^2 and more, unbraked and straight, tell it"
+
+
+def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Sample]) -> str:
+    """What an interval rests on."""
+    parts = []
+    if name in ("mass", "drag_area") and not has_scale:
+        parts.append("torque taken as true within 2 % rms")
+    if name == "drag_area":
+        parts.append("with the air density of the vehicle file")
+    if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
+        parts.append(f"net climb of a drive taken as 0 +- {CLIMB_SD:g} m")
+    parts.append("interval from drives left out" if by_drive else "a steady wind of 3 m/s rms is in the interval")
+    return "; ".join(parts)
+
+
+def radius_unknown(*, ratio_known: bool) -> str:
+    """Without a velocity."""
+    if ratio_known:
+        return "without v_x wheel speeds tell the ratio of the radii only; a GNSS velocity tells their size"
+    return "wheel speeds of all four wheels are needed"
+
+
+def left_out(seconds: Mapping[str, float]) -> str:
+    """`braking 30 s, cornering 12 s`, longest first."""
+    return ", ".join(f"{r} {s:.0f} s" for r, s in sorted(seconds.items(), key=lambda kv: -kv[1]) if s >= 0.5)
+
+
+def cannot_tell(parameters: Sequence[Parameter], more: Sequence[str]) -> tuple[str, ...]:
+    """One sentence for each parameter that is not told, and others."""
+    sentences: dict[str, list[str]] = {}
+    for p in parameters:
+        if not p.identified:
+            sentences.setdefault(p.why_not, []).append(p.name)
+    return (*(f"{', '.join(names)}: {why}" for why, names in sentences.items()), *more)
+
+
+def notes(
+    fits: Sequence[DriveFit], samples: Sequence[Sample], found: Mapping[str, float], *, by_drive: bool
+) -> list[str]:
+    """What a reader should know of the result."""
+    said = []
+    if abs(found["torque_gain"] - 1.0) > GAIN_NOTED:
+        said.append(f"multiply the scale of the torques in the signal map by {found['torque_gain']:.3f}")
+    if sum(math.isfinite(f.mass) for f in fits) > 1:
+        masses = np.array([f.mass for f in fits if math.isfinite(f.mass)])
+        said.append(
+            f"the drives by themselves show {masses.min():.0f} to {masses.max():.0f} kg "
+            f"(sd {masses.std(ddof=1):.0f} kg)"
+        )
+    if not by_drive:
+        said.append(
+            "fewer than four drives cannot show how drives differ: driver, load, driveline temperature and road are "
+            "those of these drives"
+        )
+    if not all(s.offset.has_height for s in samples):
+        said.append("no altitude: a grade is out of the balance of forces anyway, but stays in the offset")
+    late = [f for f in fits if abs(f.torque_lag_s) > 0.15]
+    said += [f"{f.name}: torque is {f.torque_lag_s:+.2f} s late against the accelerometer; taken out" for f in late]
+    return said

@@ -1,0 +1,44 @@
+"""Resistance of the water alone, from a longitudinal model with grade (thesis [36])."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.features.smoothing import UNSET, fading_lowpass, lowpass
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G
+from aqualog.rivals.alarm import alarm_bits
+from aqualog.rivals.records import RivalInputs
+from aqualog.types import Track
+
+__all__ = ["THRESHOLD", "run"]
+
+THRESHOLD = 0.35  # [m/s^2]
+TAU_GRADE = 1.0  # [s] a road's grade changes with its length, an accelerometer's noise does not
+TAU_MEASURE = 0.7  # [s]
+FADE = 0.3  # [s] what was before a gap says little behind it
+V_MIN = 10.0  # [m/s] below, water costs nothing that a balance can show
+A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
+
+
+def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+    """One track of the car; the statistic is the low-passed resistance beyond the nominal one, over the mass. [m/s^2]
+
+    Wheel forces less nominal rolling and air resistance, less m (dv/dt + g sin(theta)), where the grade is the slow
+    part of accelerometer less kinematic acceleration: an accelerometer's offset is taken for a grade and stays in. A
+    plain low-pass (0.7 s) against a threshold, no sum. Held under braking, below 36 km/h and beyond 2.5 m/s^2 sideways.
+
+    Thesis [36].
+    """
+    f = r.features
+    a_x = r.columns["a_x"]
+    grade, _ = lowpass((a_x - f["a_kin"]) / G, UNSET, tau=TAU_GRADE, dt=r.dt)  # sin(theta)
+    beyond = f["delta_a_x"] + a_x - (f["a_kin"] + G * grade)
+    braking = np.any([r.braking[w] for w in WHEELS], axis=0)
+    with np.errstate(invalid="ignore"):
+        usable = (f["v_x_hat"] > V_MIN) & (np.abs(f["a_y_slow"]) < A_Y_MAX) & ~braking
+    measure = np.where(usable, beyond, np.nan)
+    slow, _ = fading_lowpass(measure, 0.0, tau=TAU_MEASURE, fade=FADE, dt=r.dt)
+    statistic = np.where(np.isnan(measure), np.nan, slow)
+    bits = alarm_bits(statistic, threshold, off_share=0.7, dt=r.dt)
+    return (Track("resistance_model", None, None, "m/s^2", statistic, threshold, bits),)

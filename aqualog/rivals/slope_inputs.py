@@ -1,0 +1,136 @@
+"""Slip and traction of driven wheels against a velocity that no driven wheel makes, for the slip-slope rivals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.detect.negative_force import hold_on
+from aqualog.detect.slip_slope.activation import ACTIVE, JUMPING, LIMITS, SPINNING, inactive_reason
+from aqualog.detect.slip_slope.watch import AFTER_JUMP, TAU_SMOOTH
+from aqualog.features.smoothing import UNSET, derivative, lowpass
+from aqualog.notation import WHEELS
+from aqualog.physics.differential import differential_slip
+from aqualog.physics.load import G
+from aqualog.rivals.late_velocity import velocity_lag
+from aqualog.rivals.records import RivalInputs
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["Driven", "driven_wheels", "loss_of_slope", "reference_slope"]
+
+A_X_MAX_LATE = 0.5  # [m/s^2] beyond, what is left of a reference's lag (0.03 s) is a third of the slip
+# Traction below which errors of the velocity are as large as the slip: 1e-3 of free wheels, 2e-3 of a reference
+SHOWN, SHOWN_LATE = 0.03, 0.06  # [-]
+SLIP_MAX = 0.3  # [-] beyond, every tyre slides
+SETTLE, OWN = 10.0, 40.0  # [s] of estimating until, and for which, the drive's own slope becomes the reference
+OWN_LOW, OWN_HIGH = 10.0, 100.0  # [-] a slope that a tyre on asphalt can have: 15-50 (K), and room for radii that err
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """One driven wheel, arrays (n,).
+
+    `slip` (3.13) and traction `mu`, low-passed alike, NaN where not active [-]; `is_active` where both are told;
+    `is_shown` where the traction is large enough for a slope to show; `expected` the slip slope of the vehicle file
+    [-], `is_given` whether the file says it.
+    """
+
+    wheel: str
+    slip: FloatArray
+    mu: FloatArray
+    is_active: BoolArray
+    is_shown: BoolArray
+    expected: float
+    is_given: bool
+
+
+def driven_wheels(r: RivalInputs) -> tuple[Driven, ...]:
+    """Driven wheels, each against the faster free wheel; on an AWD car, the reference velocity without its lag.
+
+    A driven wheel that leaves the road's speed stays in: that is the slope's fall. A free wheel in water can only be
+    slow, so that the faster one is the velocity; where it too leaves the road's speed there is none.
+    """
+    f, car = r.features, r.vehicle
+    free = [w for w in WHEELS if w not in car.driven]
+    v_free, a_free = _faster(r, free) if free else (_in_time(r), np.zeros(f["v_x_hat"].size))
+    limits = LIMITS if free else LIMITS._replace(a_x_max=A_X_MAX_LATE)
+    found = []
+    for wheel in car.driven:
+        slip = np.clip(differential_slip(f[f"v_line_{wheel}"], v_free), -SLIP_MAX, SLIP_MAX)
+        # the torque's own rate: that of the traction holds the wheel's acceleration
+        pull = r.columns[f"torque_{wheel}"] / (car.r_l(wheel) * 0.25 * car.mass * G)
+        rate, _ = derivative(pull, UNSET, tau=TAU_SMOOTH, dt=r.dt)
+        reason = inactive_reason(
+            v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"], a_w_delta=a_free,
+            is_braking=np.any([r.braking[w] for w in (wheel, *free)], axis=0), mu_rate=np.abs(np.nan_to_num(rate)),
+            limits=limits,
+        )  # fmt: skip
+        unsettled, _ = hold_on((reason == JUMPING) | (reason == SPINNING), 0, seconds=AFTER_JUMP, dt=r.dt)
+        is_active = (reason == ACTIVE) & ~unsettled
+        mu, _ = lowpass(np.where(is_active, f[f"mu_{wheel}"], np.nan), UNSET, tau=TAU_SMOOTH, dt=r.dt)
+        with np.errstate(invalid="ignore"):
+            shown = np.abs(mu) > (SHOWN if free else SHOWN_LATE)
+        key = f"slip_slope_{wheel[0]}"
+        found.append(
+            Driven(
+                wheel,
+                lowpass(np.where(is_active, slip, np.nan), UNSET, tau=TAU_SMOOTH, dt=r.dt)[0],
+                mu,
+                is_active,
+                shown,
+                float(getattr(car, key)),
+                f"tyre.{key}" in car.given,
+            )
+        )
+    return tuple(found)
+
+
+def _faster(r: RivalInputs, free: list[str]) -> tuple[FloatArray, FloatArray]:
+    """Speed of the faster free wheel [m/s], and its acceleration difference, absolute [m/s^2]."""
+    f, (one, other) = r.features, free
+    with np.errstate(invalid="ignore"):
+        first = ~(f[f"v_line_{other}"] > f[f"v_line_{one}"])
+    v = np.where(first, f[f"v_line_{one}"], f[f"v_line_{other}"])
+    a_w = np.where(first, f[f"a_w_delta_{one}"], f[f"a_w_delta_{other}"])
+    return v, np.abs(a_w)
+
+
+def _in_time(r: RivalInputs) -> FloatArray:
+    """Velocity without the lag of its reference, v(t) = v(t - lag) + lag a."""
+    lag = velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=r.dt)
+    return r.features["v_x_hat"] + lag * r.features["a_kin_slow"]
+
+
+def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArray:
+    """Dry slope that estimates are compared with: the vehicle file's, else the drive's own first stable part.
+
+    Parameters
+    ----------
+    wheel : Driven
+    slope : array (n,)
+        Estimate, NaN where not active. [-]
+    dt : float
+        [s]
+
+    Returns
+    -------
+    array (n,)
+        [-] Without a value in the file the median of 30 s of estimates after 10 s, NaN until they have passed and for
+        good if it is no slope of a tyre on asphalt (10-100). Left out on purpose: a drive that begins on snow without
+        a value in the file is compared with snow.
+    """
+    if wheel.is_given:
+        return np.full(slope.size, wheel.expected)
+    reference = np.full(slope.size, np.nan)
+    known = np.flatnonzero(np.isfinite(slope))
+    first, last = round(SETTLE / dt), round(OWN / dt)
+    if known.size > last:
+        own = float(np.median(slope[known[first:last]]))
+        reference[known[last] :] = own if OWN_LOW < own < OWN_HIGH else np.nan
+    return reference
+
+
+def loss_of_slope(slope: FloatArray, reference: FloatArray) -> FloatArray:
+    """Share of the dry slope that is lost, 1 - C / C_ref; below 0 for a stiffer one. [-]"""
+    return 1.0 - slope / reference

@@ -1,0 +1,105 @@
+"""Slip slope by recursive least squares with forgetting (thesis [14], [17])."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.compiled import compiled
+from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
+from aqualog.notation import side_of
+from aqualog.rivals.alarm import alarm_bits
+from aqualog.rivals.records import RivalInputs
+from aqualog.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
+from aqualog.types import BoolArray, FloatArray, Track
+
+__all__ = ["PATIENCE", "THRESHOLD", "RlsParams", "run", "scan"]
+
+THRESHOLD = 0.7  # [-]
+PATIENCE = 1.0  # [s] an alarm outlasts missing estimates by this
+R = 1.4e-7  # [s] spectral density of the slip's noise, the unit of the covariances
+SLIP_LINE = 0.1  # [-] beyond, a line says no more
+
+
+class RlsParams(NamedTuple):
+    """Forgetting factors per step and bounds; made by `make`."""
+
+    keep_k: float  # of the inverse slope, which changes with the road
+    keep_delta: float  # of the offset, which is the radii's
+    P_k: float  # at the start, and at most: without traction forgetting alone would let it grow without bound
+    P_delta: float
+
+    @staticmethod
+    def make(dt: float) -> RlsParams:
+        """Memories of 8 s and 60 s; at the start 0.01 of 1 / C and 5e-3 of the offset, as of the thesis' own filter."""
+        return RlsParams(math.exp(-dt / 8.0), math.exp(-dt / 60.0), dt * 0.01**2 / R, dt * 5e-3**2 / R)
+
+
+@compiled
+def _scan(p, k, s, mu, is_active):  # type: ignore[no-untyped-def]
+    slope = np.empty_like(s)
+    offset = np.empty_like(s)
+    delta, P_k, P_delta = 0.0, p.P_k, p.P_delta
+    for i in range(s.size):
+        if not is_active[i] or math.isnan(s[i]) or math.isnan(mu[i]):
+            slope[i], offset[i] = math.nan, delta
+            continue
+        e = s[i] - k * mu[i] - delta
+        a = P_k * mu[i] / p.keep_k
+        b = P_delta / p.keep_delta
+        scale = 1.0 + a * mu[i] + b
+        k = min(max(k + a / scale * e, K_MIN), K_MAX)
+        delta += b / scale * e
+        # each parameter's own line of the covariance alone, as if the other were known (multiple forgetting)
+        P_k = min(P_k / (p.keep_k + P_k * mu[i] * mu[i]), p.P_k)
+        P_delta = min(P_delta / (p.keep_delta + P_delta), p.P_delta)
+        slope[i], offset[i] = 1.0 / k, delta
+    return slope, offset
+
+
+def scan(
+    p: RlsParams, slip: FloatArray, mu: FloatArray, is_active: BoolArray, *, slope: float
+) -> tuple[FloatArray, FloatArray]:
+    """Slope and offset of slip = mu / C + delta over a drive.
+
+    Parameters
+    ----------
+    p : RlsParams
+    slip, mu : array (n,)
+        NaN: left out. [-]
+    is_active : bool array (n,)
+        False: left out, everything held.
+    slope : float
+        At the start. [-]
+
+    Returns
+    -------
+    slope, offset : array (n,)
+        C_s / F_z within 1 ... 300, NaN where left out; offset of the slip. [-]
+
+    Least squares with a forgetting factor per parameter: slope with 8 s, offset with 60 s.
+    """
+    result: tuple[FloatArray, FloatArray] = _scan(
+        p, 1.0 / slope, np.ascontiguousarray(slip, dtype=np.float64), np.ascontiguousarray(mu, dtype=np.float64),
+        np.ascontiguousarray(is_active, dtype=np.bool_),
+    )  # fmt: skip
+    return result
+
+
+def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+    """One track per driven wheel; the statistic is the loss of slope against the dry one. [-]
+
+    Thesis [14], [17]: (3.14) by recursive least squares. [17] makes the maximum friction a linear function of the
+    slope, which orders drives as the slope does, so that the slope itself is compared.
+    """
+    p = RlsParams.make(r.dt)
+    tracks = []
+    for w in driven_wheels(r):
+        slope, _ = scan(p, np.clip(w.slip, -SLIP_LINE, SLIP_LINE), w.mu, w.is_active, slope=w.expected)
+        loss = loss_of_slope(slope, reference_slope(w, slope, dt=r.dt))
+        statistic = np.where(w.is_shown, loss, np.nan)
+        bits = alarm_bits(statistic, threshold, off_share=0.8, patience_s=PATIENCE, dt=r.dt)
+        tracks.append(Track("slope_rls", w.wheel, side_of(w.wheel), "-", statistic, threshold, bits))
+    return tuple(tracks)

@@ -1,0 +1,93 @@
+"""Thresholds on wheel deceleration and slip, with and without braking (thesis [32])."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aqualog.compiled import compiled
+from aqualog.detect.wheel_watch import SLIP_FULL
+from aqualog.features.smoothing import UNSET, derivative
+from aqualog.features.stream import TAU_WHEEL
+from aqualog.notation import WHEELS, side_of
+from aqualog.physics.slip import slip_of_wheel_speed
+from aqualog.rivals.alarm import alarm_bits
+from aqualog.rivals.records import RivalInputs
+from aqualog.types import FloatArray, Track
+
+__all__ = ["THRESHOLD", "critical_share", "run", "severity"]
+
+THRESHOLD = 1.0  # [-] of both critical levels; rule in `catalogue`, as for all rivals
+# Without brakes nothing but water (or another slippery road) slows a wheel faster than the car (K): lifting off takes
+# 1-2 m/s^2 and less than 1 % of slip. With brakes a wheel on a dry road reaches 2-3 g and 20 % of slip before its
+# controller lets go (K).
+DECELERATION, SLIP = 2.5, 0.02  # [m/s^2], [-]
+DECELERATION_BRAKING, SLIP_BRAKING = 40.0, 0.35  # [m/s^2], [-]
+MEMORY = 0.15  # [s] the deceleration comes before the slip that it makes
+V_MIN = 5.0  # [m/s]
+
+
+@compiled
+def _envelope(keep, x):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    peak = 0.0
+    for i in range(x.size):
+        if math.isnan(x[i]):
+            peak = peak * keep
+            out[i] = math.nan
+        else:
+            peak = max(x[i], peak * keep)
+            out[i] = peak
+    return out
+
+
+def critical_share(deceleration: FloatArray, negative_slip: FloatArray, *, dt: float) -> FloatArray:
+    """Smaller one of the shares of both critical levels that a wheel has reached.
+
+    Parameters
+    ----------
+    deceleration, negative_slip : array (n,)
+        Of the wheel, over their critical levels; positive where the wheel slows down. NaN: NaN. [-]
+    dt : float
+        [s]
+
+    Returns
+    -------
+    share : array (n,)
+        The deceleration counts as its decaying peak, which fades with 0.15 s: it comes before the slip. [-]
+    """
+    peak: FloatArray = _envelope(math.exp(-dt / MEMORY), np.ascontiguousarray(deceleration, dtype=np.float64))
+    return np.minimum(peak, negative_slip)
+
+
+def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+    """One track per wheel; the statistic is the share of both critical levels. [-]
+
+    The deceleration is the wheel's own, not its difference to the car's: the method looks at wheel speeds alone. An
+    alarm ends when the slip has fallen below half its level.
+
+    Thesis [32]: critical deceleration levels and slips for spin-downs with and without braking.
+    """
+    v_x = r.features["v_x_hat"]
+    tracks = []
+    for wheel in WHEELS:
+        braking = r.braking[wheel]
+        v_w = r.features[f"v_w_{wheel}"]
+        a_w, _ = derivative(v_w, UNSET, tau=TAU_WHEEL, dt=r.dt)
+        with np.errstate(invalid="ignore"):
+            slip = -slip_of_wheel_speed(v_w, v_x) / np.where(braking, SLIP_BRAKING, SLIP)
+            slip = np.where(v_x < V_MIN, 0.0, slip)
+        deceleration = -a_w / np.where(braking, DECELERATION_BRAKING, DECELERATION)
+        statistic = critical_share(deceleration, slip, dt=r.dt)
+        bits = alarm_bits(statistic, threshold, stay=slip, dt=r.dt)
+        tracks.append(Track("wheel_thresholds", wheel, side_of(wheel), "-", statistic, threshold, bits))
+    return tuple(tracks)
+
+
+def severity(evidence: Mapping[str, Any]) -> str:
+    """Full where the wheel has lost a quarter of its speed without brakes; braked wheels lose it on any road."""
+    lost = evidence.get("slip_min", 0.0) < SLIP_FULL
+    return "full" if lost and not evidence.get("braking", False) else "partial"

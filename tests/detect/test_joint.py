@@ -1,0 +1,176 @@
+"""Joint detectors: truth table, terms of the sum, what decides, and where a lost slope counts."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from aqualog.detect import joint, joint_cusum, other_surface
+from aqualog.detect.events import EventBook
+from aqualog.detect.joint_cusum import TERMS, JointCusumParams
+from aqualog.detect.joint_watch import JointCriteriaWatch, JointCusumWatch
+from aqualog.detect.scene import Scene
+from aqualog.notation import WHEELS
+from aqualog.types import Track
+
+DT = 0.01
+N = 200
+
+
+def scene(**f):
+    features = {"v_x_hat": np.full(N, 27.0), "delta_a_x": np.full(N, 0.3)}
+    features |= {f"v_w_{w}": np.full(N, 27.0) for w in WHEELS}
+    return Scene(features | f, {w: np.zeros(N, dtype=bool) for w in WHEELS})
+
+
+def track(detector, bits, wheel="fr", statistic=None):
+    bits = np.broadcast_to(np.asarray(bits, dtype=bool), (N,)).copy()
+    statistic = bits.astype(float) if statistic is None else np.broadcast_to(statistic, (N,)).astype(float)
+    return Track(detector, None if detector == "resistance" else wheel, "right", "-", statistic, 0.5, bits)
+
+
+def warned(criteria, gate, *, slope=True):
+    names = {n: d for d, n in joint.CRITERIA.items()}
+    tracks = [track(names[k], k in criteria) for k in names]
+    watch = JointCriteriaWatch(DT)
+    bits = np.full(N, gate)
+    found, _, _ = watch.push(scene(), tracks, np.full(N, 0.3), bits, np.full(N, slope), EventBook(10_000_000))
+    return bool(found.active.any())
+
+
+@pytest.mark.parametrize("criteria", [c for r in range(6) for c in itertools.combinations(range(1, 6), r)])
+@pytest.mark.parametrize("gate", [False, True])
+def test_c64_warning_is_the_gate_and_at_least_one_other(criteria, gate):
+    """Truth table over all 64 rows: resistance by itself (5) is its own indicator, never a joint warning."""
+    assert warned(criteria, gate) == (gate and any(k in criteria for k in (1, 2, 3, 4)))
+
+
+def test_a_lost_slope_that_cannot_be_waters_does_not_warn():
+    assert warned((4,), True)
+    assert not warned((4,), True, slope=False)
+    assert warned((2, 4), True, slope=False)
+
+
+def test_the_warning_names_what_decided():
+    watch, book = JointCriteriaWatch(DT), EventBook(10_000_000)
+    late = np.arange(N) > 60
+    tracks = [track("minor_spin_down", np.arange(N) > 20), track("spin_down", late), track("resistance", late)]
+    gate = np.arange(N) > 40
+    _, _, features = watch.push(scene(), tracks, np.full(N, 0.3), gate, np.ones(N, dtype=bool), book)
+    (event,) = book.finish()
+    assert event.start_s == pytest.approx(0.41)  # the gate opens
+    assert event.evidence["decided_by"] == ["minor_spin_down"]
+    assert event.evidence["criterion_1"] and event.evidence["criterion_5"] and not event.evidence["criterion_3"]
+    assert not any(k.startswith("at_start") for k in event.evidence)
+    assert features["criterion_2"][30] == 1.0 and features["joint_gate"][30] == 0.0
+
+
+def test_a_criterion_that_began_under_braking_does_not_count():
+    s = scene()
+    braking = {w: np.arange(N) < 30 for w in WHEELS}
+    watch = JointCriteriaWatch(DT)
+    bits = np.arange(N) > 10
+    found, _, _ = watch.push(
+        Scene(s.f, braking), [track("spin_down", bits)], np.full(N, 0.3), np.ones(N, dtype=bool),
+        np.ones(N, dtype=bool), EventBook(10_000_000),
+    )  # fmt: skip
+    assert not found.active.any()
+
+
+# --- joint detector 2 -----------------------------------------------------------------------------------------------
+
+ALL = {"spin_up": 1.5, "spin_down": 1.5, "resistance": 0.3, "minor_spin_down": 4.0, "slip_slope_drop": 0.75}
+
+
+def of(p, statistics, g_variance=0.0):
+    tracks = [(track(d, True, statistic=x), np.ones(N, dtype=bool)) for d, x in statistics.items()]
+    return joint_cusum.terms(p, tracks, np.full(N, g_variance), N)
+
+
+def test_c71_the_sum_of_scaled_terms():
+    """(2.11) by hand: 0.3/1.5 + 0.6/1.5 + 0.15/0.3 + (2.25 - 0.5)/(4 - 0.5), the slope left out."""
+    p = JointCusumParams(with_slope=False)
+    parts = of(
+        p, {"spin_up": 0.3, "spin_down": 0.6, "resistance": 0.15, "minor_spin_down": 2.25, "slip_slope_drop": 0.9}
+    )
+    assert sum(x[0] for x in parts.values()) == pytest.approx(0.2 + 0.4 + 0.5 + 0.5, abs=1e-12)
+    assert parts["slip_slope_drop"].max() == 0.0
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_each_term_ends_at_its_weight_and_never_is_negative(name):
+    for value, expected in ((-5.0, 0.0), (0.0, 0.0), (ALL[name], 1.0), (100.0, 1.0), (np.nan, 0.0)):
+        parts = of(JointCusumParams(), {name: value})
+        assert parts[name] == pytest.approx(expected)
+    weights = tuple(2.0 if n == name else 0.0 for n in TERMS)
+    parts = of(JointCusumParams(weights=weights), ALL)
+    assert {n: x[0] for n, x in parts.items()} == {n: 2.0 if n == name else 0.0 for n in TERMS}
+
+
+def test_e6_the_third_term_can_be_the_variance():
+    p = JointCusumParams(third="variance")
+    parts = of(p, {"resistance": 0.3}, g_variance=0.25)
+    assert parts["resistance"] == pytest.approx(0.25)
+
+
+def test_the_largest_wheel_decides_and_braked_wheels_do_not_count():
+    p = JointCusumParams()
+    tracks = [
+        (track("spin_down", True, "fl", 0.3), np.ones(N, dtype=bool)),
+        (track("spin_down", True, "fr", 0.9), np.ones(N, dtype=bool)),
+        (track("spin_down", True, "rl", 1.5), np.zeros(N, dtype=bool)),
+    ]
+    assert joint_cusum.terms(p, tracks, np.zeros(N), N)["spin_down"] == pytest.approx(0.6)
+
+
+def test_the_sum_warns_above_its_threshold_and_names_the_terms():
+    book = EventBook(10_000_000)
+    watch = JointCusumWatch(DT, JointCusumParams(), 1.2)
+    ramp = np.clip((np.arange(N) - 50) * 0.01, 0.0, 1.0)
+    tracks = [track("resistance", True, statistic=0.3), track("spin_down", True, statistic=1.5 * ramp)]
+    always = np.ones(N, dtype=bool)
+    found, _, features = watch.push(scene(), tracks, np.full(N, 0.3), always, always, book)
+    first = np.flatnonzero(found.active)[0]
+    assert first == 71  # 1 + 0.21 > 1.2
+    assert found.statistic == pytest.approx(1.0 + ramp)
+    assert features["joint_term_resistance"] == pytest.approx(1.0)
+    (event,) = book.finish()
+    assert event.evidence["decided_by"] == ["resistance", "spin_down"]
+    assert event.severity == "full"
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_without_resistance_the_sum_does_not_warn_unless_asked_to(gated):
+    never, always = np.zeros(N, dtype=bool), np.ones(N, dtype=bool)
+    tracks = [track("spin_up", True, statistic=1.5), track("spin_down", True, statistic=1.5)]
+    watch = JointCusumWatch(DT, JointCusumParams(gated=gated), 1.2)
+    found, _, _ = watch.push(scene(), tracks, np.zeros(N), never, always, EventBook(10_000_000))
+    assert found.active.all() != gated
+    assert found.statistic == pytest.approx(2.0)
+
+
+# --- where a lost slope counts -----------------------------------------------------------------------------------------
+
+
+def allowed(x, v_x, dropped, loss):
+    n = len(x)
+    args = (np.broadcast_to(a, (n,)) for a in (x, v_x, dropped, loss))
+    bits, _ = other_surface.scan(other_surface.OtherParams.make(DT), other_surface.initial_state(), *args)
+    return bits
+
+
+def test_a_lost_slope_counts_with_the_resistance_of_water_only():
+    n = 500
+    assert allowed(np.full(n, 0.3), 25.0, True, 0.6)[-1]
+    assert not allowed(np.full(n, 0.15), 25.0, True, 0.6).any()  # compacted snow
+    assert not allowed(np.full(n, 0.3), 15.0, True, 0.6).any()  # too slow for a film to lift half of the contact
+
+
+def test_a_slope_lost_at_low_speed_stays_anothers_until_the_road_is_dry_again():
+    slow, fast, dry = np.full(300, 12.0), np.full(500, 25.0), np.full(1200, 25.0)
+    v = np.concatenate([slow, fast, dry, fast])
+    dropped = np.concatenate([np.ones(800), np.zeros(1200), np.ones(500)]).astype(bool)
+    loss = np.where(dropped, 0.6, 0.05)
+    bits = allowed(np.full(v.size, 0.4), v, dropped, loss)
+    assert not bits[300:800].any()
+    assert bits[2050:].all()
