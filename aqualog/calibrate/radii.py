@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,8 @@ __all__ = ["Radii", "fit_radii", "radii_of_blocks", "radius_parameters"]
 V_MIN = 8.0  # [m/s]
 A_MAX = 2.0  # [m/s^2]
 BLOCK = 20  # windows
-MODEL_SD = 5e-5  # [-] what wheel inertia, load transfer and clocks leave at zero torque (D)
+MODEL_SD: Mapping[str, float] = {"r_e_f": 7e-5, "r_e_r": 7e-5, "r_e_ratio": 5e-5}
+"""What clocks (5 ms at 0.3 m/s^2 of coasting and 22 m/s), inertia and load transfer leave at zero torque (D). [-]"""
 
 
 class Radii(NamedTuple):
@@ -112,7 +113,7 @@ def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Paramet
                 )
             )
             continue
-        half = math.hypot(half_width(spread[0][name], spread[1][name]), 1.96 * MODEL_SD * value)
+        half = math.hypot(half_width(spread[0][name], spread[1][name]), 1.96 * MODEL_SD[name] * value)
         remark = "front over rear" if name == "r_e_ratio" else "v_x taken as true"
         parameters.append(
             Parameter(

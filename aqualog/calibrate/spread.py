@@ -55,28 +55,39 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
     air_density : float
         [kg/m^3]
 
-    Four drives or more: jackknife over drives, so that what differs between them (wind, surface, temperature, offset,
-    driver) is in the interval. Fewer: jackknife over blocks of 40 s, plus what one drive cannot show of itself: a
-    steady wind of 3 m/s rms, and the height at its ends, in each drive on its own.
+    Jackknife over blocks of 40 s, plus what one drive cannot show of itself: a steady wind of 3 m/s rms, and the height
+    at its ends, in each drive on its own. Four drives or more: also a jackknife over drives, so that what differs
+    between them (wind, surface, temperature, offset, driver) is in the interval; the wider of both counts, because
+    few drives may agree by chance.
 
     Raises
     ------
     FitError
         If fewer than five blocks are there.
     """
-    if len(samples) >= DRIVES_MIN:
-        return of_drives(estimator, samples)
+    assumed = _of_blocks_and_assumptions(estimator, samples, drag=drag, air_density=air_density)
+    if len(samples) < DRIVES_MIN:
+        return assumed
+    seen = of_drives(estimator, samples)
+    wider = {n: seen if half_width(seen.sd[n], seen.dof[n]) >= half_width(assumed.sd[n], assumed.dof[n]) else assumed
+             for n in seen.sd}  # fmt: skip
+    return Spread({n: w.sd[n] for n, w in wider.items()}, {n: w.dof[n] for n, w in wider.items()}, by_drive=True)
+
+
+def _of_blocks_and_assumptions(
+    estimator: Estimator, samples: Sequence[Sample], *, drag: float, air_density: float
+) -> Spread:
     within = jackknife_of(estimator, samples)
     best = estimator(samples)
-    nuisance = dict.fromkeys(best, 0.0)
+    assumed = dict.fromkeys(best, 0.0)
     for j, sample in enumerate(samples):
-        for other in (_in_wind(sample, drag=drag, air_density=air_density), _offset_moved(sample)):
-            if other is None:
-                continue
-            moved = estimator([*samples[:j], other, *samples[j + 1 :]])
-            for name in nuisance:
-                nuisance[name] += (moved[name] - best[name]) ** 2
-    sd = {n: math.sqrt(within.sd[n] ** 2 + nuisance[n]) for n in best}
+        winds = [_in_wind(sample, w, drag=drag, air_density=air_density) for w in (WIND_SD, -WIND_SD)]
+        for others in (winds, [_offset_moved(sample)]):
+            moved = [estimator([*samples[:j], o, *samples[j + 1 :]]) for o in others if o is not None]
+            for name in assumed if moved else ():
+                # a tail wind does less than a head wind: the larger of both counts
+                assumed[name] += max((m[name] - best[name]) ** 2 for m in moved)
+    sd = {n: math.sqrt(within.sd[n] ** 2 + assumed[n]) for n in best}
     # Welch and Satterthwaite: the assumed part is known, the part from the blocks is not
     dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else 1e3 for n in best}
     return Spread(sd, dof, by_drive=False)
@@ -119,10 +130,10 @@ def _without(sample: Sample, block: float) -> Sample:
     return sample._replace(windows=Windows(*(x[keep] for x in sample.windows)))
 
 
-def _in_wind(sample: Sample, *, drag: float, air_density: float) -> Sample:
-    """The drive as it would have been with a head wind of one standard deviation more."""
+def _in_wind(sample: Sample, wind: float, *, drag: float, air_density: float) -> Sample:
+    """The drive as it would have been with some head wind more."""
     w = sample.windows
-    extra: FloatArray = 0.5 * air_density * ((w.v + WIND_SD) ** 2 - w.v**2)
+    extra: FloatArray = 0.5 * air_density * ((w.v + wind) ** 2 - w.v**2)
     return sample._replace(windows=w._replace(a_x=w.a_x - drag * extra))
 
 

@@ -74,6 +74,14 @@ def detect(
             metavar="RULE",
         ),
     ] = "robust",
+    thresholds: Annotated[
+        Path | None,
+        typer.Option(
+            "--thresholds",
+            help="Thresholds of the detectors (TOML), as `aqualog evaluate --tune` writes them.",
+            metavar="FILE",
+        ),
+    ] = None,
     fail_on_event: Annotated[
         bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
     ] = False,
@@ -101,7 +109,7 @@ def detect(
 
     with guarded(debug=debug):
         code = _detect(
-            logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference,
+            logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference, thresholds,
             fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
@@ -119,6 +127,7 @@ def _detect(
     history_file: Path | None,
     configuration: str,
     reference: str,
+    thresholds_file: Path | None,
     *,
     fail_on_event: bool,
     as_json: bool,
@@ -133,6 +142,7 @@ def _detect(
     from aqualog.cli.files import refuse_existing
     from aqualog.cli.setup import prepare
     from aqualog.config.history import update_history
+    from aqualog.config.settings import load_settings
     from aqualog.detect.slip_slope.history import drive_key, remembered
     from aqualog.io.write_log import check_suffix
 
@@ -141,6 +151,7 @@ def _detect(
         check_suffix(write)
         targets.append(write)
     memory = _memory(history_file, configuration, reference, out)
+    settings = load_settings(thresholds_file) if thresholds_file else None
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
         progress=progress, vehicle_file=vehicle_file,
@@ -149,6 +160,8 @@ def _detect(
     vehicle = setup.vehicle
     if history_file is not None:
         refuse_existing([history_file], force=True, sources=[*paths, *targets])
+    if thresholds_file is not None:
+        refuse_existing(targets, force=force, sources=[thresholds_file])
     with console.steps() as steps:
         from aqualog.align.load import load_signals
         from aqualog.detect.stream import detect_drive
@@ -163,7 +176,8 @@ def _detect(
         key = drive_key(loaded) if history_file else ""
         # what takes long of a short drive is the compiler; of a long one it is the drive
         with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
-            result = detect_drive(loaded, vehicle, memory=replace(memory, history=memory.history.without(key)))
+            known = replace(memory, history=memory.history.without(key))
+            result = detect_drive(loaded, vehicle, settings=settings, memory=known)
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")

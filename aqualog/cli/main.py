@@ -9,9 +9,11 @@ import sys
 import typer
 
 from aqualog import __version__
+from aqualog.cli.calibrate import calibrate
 from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
 from aqualog.cli.detect import detect
+from aqualog.cli.evaluate import evaluate
 from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
 from aqualog.cli.simulate import simulate
@@ -33,6 +35,8 @@ app.command(no_args_is_help=True)(inspect)
 app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
 app.command(no_args_is_help=True)(slip_slope)
+app.command(no_args_is_help=True)(calibrate)
+app.command(no_args_is_help=True)(evaluate)
 app.command(no_args_is_help=True)(simulate)
 app.command(no_args_is_help=True)(figures)
 

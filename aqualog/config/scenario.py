@@ -12,8 +12,9 @@ from typing import Any
 from aqualog.config.toml_file import TableFaults, is_number, load_toml
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
-from aqualog.model.scenario import Excitation, Lane, Profile, Scenario, Steering
-from aqualog.model.sensors import SENSORS
+from aqualog.model.faults import FAULT_KINDS, SensorFault
+from aqualog.model.scenario import Excitation, Kick, Lane, Profile, Scenario, Steering
+from aqualog.model.sensors import SENSORS, Sensors
 from aqualog.model.surface import SURFACES
 from aqualog.model.tyre import TYRE_KEYS, TYRES, Tyre
 from aqualog.vehicle import Vehicle
@@ -76,6 +77,9 @@ _ALL = [
     ScenarioKey("", "brake_profile", "s, N*m", None, 0.0, 50000.0, "brake torque of all wheels, [[t, M], ...]"),
     ScenarioKey("", "torque_profile", "s, N*m", None, -20000.0, 20000.0, "drive torque on top of the driver's"),
     ScenarioKey("", "split_profile", "s, -", None, 0.0, 1.0, "rear share of the drive torque (awd), [[t, share], ...]"),
+    ScenarioKey("", "wind_profile", "s, km/h", None, -150.0, 150.0, "head wind over time, on top of `head_wind_kmh`"),
+    ScenarioKey("", "drive_share_profile", "s, -", None, 0.0, 2.0, "share of the driver's torque that arrives"),
+    _text("", "brakes", "plain", "plain, antilock"),
     ScenarioKey("", "water_scatter", "-", 1.0, 0.0, 3.0, "scales how the contact varies on water; 0: even"),
     ScenarioKey("lane", "start_s", "s", None, 0.0, _DAY, "time at which the lane begins; or `start_m`"),
     ScenarioKey("lane", "end_s", "s", None, 0.0, _DAY, "time at which it ends, also beyond the drive; or `end_m`"),
@@ -87,6 +91,16 @@ _ALL = [
     ScenarioKey("lane", "irregularity_left", "-", 0.05, 0.0, 1.0, "rms of the depth along the lane, over its mean"),
     ScenarioKey("lane", "irregularity_right", "-", 0.05, 0.0, 1.0, "as left"),
     _text("lane", "surface", "asphalt", ", ".join(SURFACES)),
+    _text("lane", "surface_right", None, "under the right wheels, if it is another one than under the left"),
+    ScenarioKey("kick", "at_m", "m", None, 0.0, _FAR, "way of the front axle at a kerb or hole; must be given"),
+    ScenarioKey("kick", "length_m", "m", 0.5, 0.1, 10.0, "length of the blow; the load rebounds for twice as long"),
+    _text("kick", "side", "both", "left, right, both"),
+    ScenarioKey("kick", "torque_nm", "N*m", 0.0, 0.0, 5000.0, "torque against the wheel at its height"),
+    ScenarioKey("kick", "load_n", "N", 0.0, -20000.0, 20000.0, "load on the wheel at its height"),
+    _text("fault", "signal", None, "signal or bus message that fails; must be given"),
+    ScenarioKey("fault", "start_s", "s", None, 0.0, _DAY, "begin; must be given"),
+    ScenarioKey("fault", "end_s", "s", None, 0.0, _DAY, "end; must be given"),
+    _text("fault", "kind", "missing", ", ".join(FAULT_KINDS)),
     _text("steering", "kind", "sine", "sine"),
     ScenarioKey(
         "steering",
@@ -138,7 +152,7 @@ class _Reader:
 
     def read(self) -> Scenario:
         top, faults = self._document, self._faults
-        self._check_names("", top, extra=("lane", "steering", "excitation"))
+        self._check_names("", top, extra=("lane", "kick", "fault", "steering", "excitation"))
         vehicle = self._vehicle()
         car = vehicle or Vehicle()  # so that the rest of the file is checked too; never returned
         tyre = self._tyre("tyre") or TYRES["worn_summer"]
@@ -169,7 +183,11 @@ class _Reader:
             grade=self._grade(),
             head_wind=self._number("", top, "head_wind_kmh") / 3.6,
             water_scatter=self._number("", top, "water_scatter"),
-            sensors=SENSORS[self._choice("", top, "sensors", tuple(SENSORS))],
+            wind=tuple((t, v / 3.6) for t, v in self._profile("wind_profile", "t [s]", _DAY)),
+            drive_share=self._profile("drive_share_profile", "t [s]", _DAY),
+            antilock=self._choice("", top, "brakes", ("plain", "antilock")) == "antilock",
+            kicks=self._kicks(),
+            sensors=self._sensors(),
         )
         faults.raise_if_any()
         return scenario
@@ -350,13 +368,16 @@ class _Reader:
 
     # lanes
 
+    def _tables(self, name: str) -> list[dict[str, Any]]:
+        tables = self._document.get(name, [])
+        if isinstance(tables, list) and all(isinstance(t, dict) for t in tables):
+            return tables
+        self._faults.add(name, f"{name} is not a list of tables; write [[{name}]]")
+        return []
+
     def _lanes(self) -> tuple[Lane, ...]:
-        tables = self._document.get("lane", [])
-        if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
-            self._faults.add("lane", "lane is not a list of tables; write [[lane]]")
-            return ()
         lanes: dict[int, Lane] = {}
-        for index, table in enumerate(tables):
+        for index, table in enumerate(self._tables("lane")):
             with self._faults.inside("lane", index):
                 lane = self._lane(table)
                 if lane is None:
@@ -383,6 +404,9 @@ class _Reader:
         left, right = (self._number("lane", table, n, both) for n in water[1:])
         left_rms, right_rms = (self._number("lane", table, f"irregularity_{side}") for side in ("left", "right"))
         surface = SURFACES[self._choice("lane", table, "surface", SURFACES)]
+        right_surface = None
+        if "surface_right" in table:
+            right_surface = SURFACES[self._choice("lane", table, "surface_right", SURFACES)]
         first, last = (self._one_of("lane", table, (f"{e}_s", f"{e}_m")) for e in ("start", "end"))
         if first is None or last is None:
             return None
@@ -394,7 +418,35 @@ class _Reader:
         if start >= end:
             self._faults.add(last, f"lane: {last} = {end:g} does not come after {first} = {start:g}")
             return None
-        return Lane(start, end, in_metres, left / 1e3, right / 1e3, left_rms, right_rms, surface)
+        return Lane(start, end, in_metres, left / 1e3, right / 1e3, left_rms, right_rms, surface, right_surface)
+
+    # kerbs and faults
+
+    def _kicks(self) -> tuple[Kick, ...]:
+        kicks = []
+        for index, table in enumerate(self._tables("kick")):
+            with self._faults.inside("kick", index):
+                self._check_names("kick", table)
+                at = self._required("kick", table, "at_m")
+                side: Any = self._choice("kick", table, "side", ("both", "left", "right"))
+                length, torque, load = (self._number("kick", table, n) for n in ("length_m", "torque_nm", "load_n"))
+                kicks.append(Kick(at, length, side, torque, load))
+        return tuple(kicks)
+
+    def _sensors(self) -> Sensors:
+        sensors = SENSORS[self._choice("", self._document, "sensors", tuple(SENSORS))]
+        known = {n for g in sensors.groups for n in (g.name, *g.signals)}
+        faults = []
+        for index, table in enumerate(self._tables("fault")):
+            with self._faults.inside("fault", index):
+                self._check_names("fault", table)
+                where = self._choice("fault", table, "signal", sorted(known))
+                start, end = (self._required("fault", table, n) for n in ("start_s", "end_s"))
+                if start >= end:
+                    self._faults.add("end_s", f"fault: end_s = {end:g} does not come after start_s = {start:g}")
+                kind: Any = self._choice("fault", table, "kind", FAULT_KINDS)
+                faults.append(SensorFault(where, start, end, kind))
+        return replace(sensors, faults=tuple(faults)) if faults else sensors
 
     # steering and excitation
 

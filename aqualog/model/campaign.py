@@ -10,7 +10,7 @@ import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,7 @@ def simulate_campaign(
     _own(folder)
     (folder / "logs").mkdir(parents=True, exist_ok=True)
     stamp = _code_stamp()
-    digests = {r.name: hashlib.sha256(f"{stamp}{r!r}".encode()).hexdigest() for r in runs}
+    digests = {r.name: hashlib.sha256(f"{stamp}{_told(r)}".encode()).hexdigest() for r in runs}
     known = {} if force else _finished(folder, digests)
     # a torn last line would swallow the next one
     write_text(folder / STATE, "".join(_line(done) for done in known.values()))
@@ -104,6 +104,12 @@ def simulate_campaign(
     _work(todo, folder, digests, jobs=jobs, record=record)
     _write_campaign(folder, programme, [r for r in runs if r.name not in failed], known | made)
     return CampaignOutcome(len(made), len(known), failed)
+
+
+def _told(run: Run) -> str:
+    """All that a run is, the same in every process: sets of names have no order of their own."""
+    believed = "" if run.vehicle is None else vehicle_toml(run.vehicle)
+    return repr(replace(run, vehicle=None)) + believed
 
 
 def _own(folder: Path) -> None:
@@ -193,7 +199,7 @@ def _quiet_worker() -> None:
 
 def _one(run: Run, path: str, digest: str) -> Done | str:
     try:
-        simulation = simulate(run.scenario)
+        simulation = simulate(run.scenario, run.model)
         comment = f"simulated: {run.name}, seed {run.scenario.seed}"
         write_whole(Path(path), lambda p: write_simulation(p, simulation, suffix=".mf4", comment=comment))
     except (AqualogError, OSError) as error:
@@ -208,7 +214,7 @@ def _one(run: Run, path: str, digest: str) -> Done | str:
 
 def _write_campaign(folder: Path, programme: str, runs: Sequence[Run], done: dict[str, Done]) -> None:
     """Vehicle files, the table of runs, and last the campaign file that makes them one."""
-    vehicles: dict[str, Vehicle] = {_vehicle_file(r): r.scenario.vehicle for r in runs}
+    vehicles: dict[str, Vehicle] = {_vehicle_file(r): r.vehicle or r.scenario.vehicle for r in runs}
     for name, vehicle in vehicles.items():
         write_text(folder / name, vehicle_toml(vehicle))
     rows = [_row(r, done[r.name]) for r in runs]
@@ -217,12 +223,13 @@ def _write_campaign(folder: Path, programme: str, runs: Sequence[Run], done: dic
     first = next(iter(vehicles), "vehicle.toml")
     write_text(
         folder / "campaign.toml",
-        f'# Simulated, not measured: the test programme of chapter 2 of the thesis.\nname = "{programme}"\n'
-        f'vehicle = "{first}"\nruns = "runs.csv"\n',
+        f'# Simulated, not measured.\nname = "{programme}"\nvehicle = "{first}"\nruns = "runs.csv"\n',
     )
 
 
 def _vehicle_file(run: Run) -> str:
+    if run.vehicle is not None:
+        return f"vehicle_{run.name}.toml"
     stem = "".join(c if c.isalnum() else "_" for c in run.scenario.vehicle.name.lower()).strip("_")
     return f"vehicle_{'_'.join(part for part in stem.split('_') if part)}.toml"
 
@@ -235,7 +242,7 @@ def _row(run: Run, done: Done) -> list[str]:
         "log": f"logs/{run.name}.mf4",
         "tyre": s.tyre_front.name,
         "tread_depth_mm": f"{s.tyre_front.tread_depth * 1e3:.2f}",
-        "wear": WEAR[s.tyre_front.name],
+        "wear": WEAR.get(s.tyre_front.name, "worn"),
         "pressure_front_bar": f"{s.p_front * 1e-5:.2f}",
         "pressure_rear_bar": f"{s.p_rear * 1e-5:.2f}",
         "water_depth_mm": f"{run.water_depth * 1e3:.2f}",

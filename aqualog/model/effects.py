@@ -171,6 +171,16 @@ _ALL = [
         _on_plant(lambda p, v, _: p._replace(torque_gain=p.torque_gain * v["gain"])), twins=("payload_mass",),
     ),
     Effect(
+        "trailer", "mass and air drag of a trailer", "A trailer of {mass:.0f} kg was towed.", "caravans 0.5-1.5 t (K)",
+        (
+            Parameter("mass", "kg", 0.0, 500.0, 0.0, 4000.0, 50.0, "on its own wheels"),
+            Parameter("delta_drag_area", "m^2", 0.0, 0.5, 0.0, 5.0, 0.05, "on top of the car's"),
+        ),
+        _on_plant(lambda p, v, _: p._replace(
+            towed_mass=p.towed_mass + v["mass"], drag_area=p.drag_area + v["delta_drag_area"])),
+        twins=("payload_mass", "aero_drag"),
+    ),
+    Effect(
         "wheel_inertia", "inertia of the wheels [kg m^2]", "A wheel has {delta_inertia:+.2f} kg m^2 more inertia.",
         "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel"),),
@@ -240,6 +250,20 @@ _ALL = [
             )
         ),
         _WHEEL_PLACES, twins=("velocity_scale",),
+    ),
+    Effect(
+        "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",
+        "-20 % of the pressure: -1.5 % of the loaded radius, the rolling radius less (V)",
+        (
+            Parameter("radius", "-", 0.0, 0.008, 0.0, 0.1, 0.001, "share of the radius that is lost in the end"),
+            Parameter("slope", "-", 0.0, 0.1, -0.9, 1.0, 0.02, "relative change of the slip slope in the end"),
+            Parameter("start", "s", 0.0, 30.0, 0.0, 86400.0, 1.0, "begin"),
+            Parameter("duration", "s", 30.0, 20.0, 0.1, 86400.0, 1.0, "until the end state; of the last such term"),
+        ),
+        _on_plant(lambda p, v, w: p._replace(
+            leak_radius=_shifted(p.leak_radius, w, v["radius"]), leak_slope=_shifted(p.leak_slope, w, v["slope"]),
+            leak_start=v["start"], leak_time=v["duration"])),
+        _WHEEL_PLACES, twins=("tyre_radius",),
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",

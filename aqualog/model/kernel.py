@@ -12,6 +12,7 @@ import numpy as np
 
 from aqualog.compiled import compiled, inlined
 from aqualog.model import excitation
+from aqualog.model.antilock import antilock
 from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, Plant, flat
 from aqualog.model.road import (
     BUMPS,
@@ -23,11 +24,14 @@ from aqualog.model.road import (
     GRADE,
     IN_METRES,
     IRREGULARITY_LEFT,
+    KICK_LOAD,
+    KICK_TORQUE,
     LANE_COMPLIANCE,
     LANE_MU,
     ROLLING,
     ROUGHNESS,
     START,
+    SURFACE_WIDTH,
     Road,
 )
 from aqualog.physics import (
@@ -38,6 +42,7 @@ from aqualog.physics import (
     resistance,
     rolling,
     slip,
+    steering,
     surface,
     tyre_brush,
     water,
@@ -62,6 +67,7 @@ _SCALARS = (
 _WHEELS = (
     "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
     "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full",
+    "aligning", "load_moment", "braking",
 )  # fmt: skip
 COLUMNS = {name: i for i, name in enumerate(_SCALARS)} | {name: len(_SCALARS) + 4 * i for i, name in enumerate(_WHEELS)}
 _WIDTH = len(_SCALARS) + 4 * len(_WHEELS)
@@ -90,11 +96,15 @@ class Controls(NamedTuple):
     steer: FloatArray  # [rad]
     exc: FloatArray  # unit excitation waveform
     grade: FloatArray  # [rad] on top of the road's
+    wind: FloatArray  # [m/s] head wind on top of the plant's
+    gain: FloatArray  # share of the driver's torque that reaches the wheels: clutch, gear shifts
     has_driver: bool
     keeps_lane: bool
     exc_kind: int  # 0 force, 1 traction coefficient, 2 relative
     exc_amplitude: float
     scatter: float
+    antilock: bool = False  # the brakes let go of a wheel that is about to lock
+    kicks: bool = False  # the road has kerbs or holes
 
 
 def run(n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road, controls: Controls) -> FloatArray:
@@ -129,6 +139,7 @@ _air_drag = inlined(resistance.air_drag)
 _grade_force = inlined(resistance.grade_force)
 _cornering_drag = inlined(resistance.cornering_drag)
 _rolling_force = inlined(resistance.rolling_resistance_force)
+_aligning_moment = inlined(steering.aligning_moment)
 _effective_radius = inlined(rolling.effective_radius)
 _warm_up_factor = inlined(rolling.warm_up_factor)
 _load_factor = inlined(rolling.load_factor)
@@ -182,20 +193,24 @@ def _track(track, position, ds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type: ignore[no-untyped-def]
+def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released):  # type: ignore[no-untyped-def]
     """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is `recorded`.
 
-    `track` (m, 3) holds the stretch and the film left by the left and right front wheel.
+    `track` (m, 3) holds the stretch and the film left by the left and right front wheel, `released` (4,) the share of
+    each wheel's brake torque that the antilock system holds off.
     """
     v_x, v_y, yaw_rate, position = y[V_X], y[V_Y], y[YAW_RATE], y[S]
     wheelbase = p.l_f + p.l_r
     steer = c.steer + y[STEER]
     grade = c.grade + _at(r.fields, GRADE, position, r.ds)
-    drag = _air_drag(v_x + p.head_wind, p.drag_area, p.air_density) + _table(extra, v_x)
+    drag = _air_drag(v_x + p.head_wind + c.wind, p.drag_area, p.air_density) + _table(extra, v_x)
     drag += _cornering_drag(y[A_Y], p.mass, p.cornering_drag)
+    if p.towed_mass > 0.0:
+        drag += _rolling_force(p.towed_mass * G, wheels[2].r_w)
     slope_down = _grade_force(grade, p.mass)
     warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time)
     loads = _loads(y[A_X], y[A_Y], p.mass, p.l_f, p.l_r, p.h_cg, p.track)
+    leak = min(max((t - p.leak_start) / p.leak_time, 0.0), 1.0)
 
     split_rear = c.split_rear
     # mean loaded radius of the driven wheels, by their share
@@ -225,7 +240,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             if abs(y[INTEGRAL]) > MAX_INTEGRAL * p.mass * G and y[INTEGRAL] * error > 0.0:
                 f[INTEGRAL] = 0.0
             f[BRAKE] = (max(least - wanted, 0.0) * r_drive - y[BRAKE]) / PEDAL_TIME
-        drive = y[DRIVE] + c.drive
+        drive = y[DRIVE] * c.gain + c.drive
         drive = min(drive, p.power / max(turning, 1.0))
         if drive < 0.0:  # an engine brakes, it does not drive backwards
             drive *= min(max(turning, 0.0), 1.0)
@@ -267,7 +282,8 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         F_z = loads[i]
         omega = y[OMEGA + i]
         v_along, v_across = _wheel_velocity(v_x, v_y, yaw_rate, angle, x, y_i)
-        r_e = _effective_radius(q.r_e, v_along, q.radius_growth)
+        r_e = _effective_radius(q.r_e, v_along, q.radius_growth) * (1.0 - q.leak_radius * leak)
+        r_l = q.r_l * (1.0 - q.leak_radius * leak)
         rim = omega * r_e
 
         # the road under this wheel
@@ -278,17 +294,21 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         r_w = q.r_w * warm
         bump = 0.0
         film = 0.0
+        of_side = SURFACE_WIDTH * side
         if lane >= 0:
-            if r.lanes[lane, LANE_MU] >= 0.0:
-                mu = r.lanes[lane, LANE_MU]
-            compliance = r.lanes[lane, LANE_COMPLIANCE]
-            r_w += r.lanes[lane, ROLLING]
-            bump = r.lanes[lane, ROUGHNESS] * _at(r.fields, BUMPS + side, where, r.ds)
+            if r.lanes[lane, LANE_MU + of_side] >= 0.0:
+                mu = r.lanes[lane, LANE_MU + of_side]
+            compliance = r.lanes[lane, LANE_COMPLIANCE + of_side]
+            r_w += r.lanes[lane, ROLLING + of_side]
+            bump = r.lanes[lane, ROUGHNESS + of_side] * _at(r.fields, BUMPS + side, where, r.ds)
             if front:
                 uneven = 1.0 + r.lanes[lane, IRREGULARITY_LEFT + side] * _at(r.fields, DEPTH + side, where, r.ds)
                 film = r.lanes[lane, DEPTH_LEFT + side] * max(uneven, 0.0)
             else:
                 film = track[behind, 1 + side]
+        if s.kicks > 0.0:
+            bump += _at(r.fields, KICK_TORQUE + side, where, r.ds)
+            F_z = max(F_z + _at(r.fields, KICK_LOAD + side, where, r.ds), 0.0)
 
         # what the water leaves of the contact, and what it costs
         L = 1.0
@@ -323,7 +343,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
                 _wave_drag(film, ahead, q.width, q.h_wave)
                 + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
             )
-        slope = q.slip_slope * np.exp(min(max(q.slip_slope_drift * t, -3.0), 3.0))
+        slope = q.slip_slope * (1.0 + q.leak_slope * leak) * np.exp(min(max(q.slip_slope_drift * t, -3.0), 3.0))
         slope = _series_slope(slope * _load_factor(F_z, q.F_z_ref, q.load_sensitivity), compliance)
         C_x = slope * F_z
         C_y = _series_slope(q.cornering_slope, compliance) * F_z
@@ -353,17 +373,17 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
         F_x, F_y = _brush_forces(s_x, s_y, F_z, mu, C_x, C_y, L)
 
         # the wheel's balance of torques
-        torque = 0.5 * (1.0 - split_rear if front else split_rear) * drive + (0.5 if front else -0.5) * exc * q.r_l
-        braking = q.brake_split * brake_total
-        water_torque = film_force * q.r_l + shift
-        resisting = _rolling_force(F_z, r_w) * q.r_l + water_torque + q.brake_drag
+        torque = 0.5 * (1.0 - split_rear if front else split_rear) * drive + (0.5 if front else -0.5) * exc * r_l
+        braking = q.brake_split * brake_total * (1.0 - released[i])
+        water_torque = film_force * r_l + shift
+        resisting = _rolling_force(F_z, r_w) * r_l + water_torque + q.brake_drag
         # resistance fades out near standstill instead of jumping, over what one step of it can change
         standstill = max(1.0, s.dt * (resisting + braking) / q.inertia)
         turn = min(max(omega / standstill, -1.0), 1.0)
-        f[OMEGA + i] = (torque - F_x * q.r_l - (resisting + braking) * turn + bump) / q.inertia
+        f[OMEGA + i] = (torque - F_x * r_l - (resisting + braking) * turn + bump) / q.inertia
         # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
         dF_dsx = abs(F_x) / abs(s_x) if abs(s_x) > 1e-9 else C_x * _stiffness_ratio(L)
-        arm = q.r_l / q.inertia
+        arm = r_l / q.inertia
         jac[OMEGA + i] = -dF_dsx * ds_domega * arm
         jac[_J_W + i] = -dF_dsx * ds_dv * arm
         jac[_J_V + i] = dF_dsx * ds_domega / p.mass
@@ -403,9 +423,15 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track):  # type
             out[base + 56] = resisting * turn
             out[base + 60] = v_along
             out[base + 64] = r_e
+            if front:
+                half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
+                out[base + 72] = _aligning_moment(s_x, s_y, F_z, mu, C_x, C_y, L, half)
+            out[base + 76] = _rolling_force(F_z, r_w) * r_l * turn + shift
+            out[base + 80] = braking * turn
             out[base + 68] = v_full * max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
 
-    a_x = (sum_x - drag) / p.mass  # specific force: what an accelerometer shows
+    # specific force: what an accelerometer shows; a trailer is pulled along
+    a_x = (sum_x - drag) / (p.mass + p.towed_mass)
     a_y = sum_y / p.mass
     f[V_X] = a_x - slope_down / p.mass + yaw_rate * v_y
     f[V_Y] = a_y - yaw_rate * v_x
@@ -458,15 +484,18 @@ def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # t
     cells = 2 + int((n * dt * 120.0 + 50.0) / r.ds) if r.lanes.shape[0] > 0 else 2
     track = np.zeros((cells, 3))
     track[:, 0] = -1.0
+    released = np.zeros(4)
+    releasing = np.zeros(4)
     p = car[0]
     s = settings[0]
     recorded, silent = True, False
     h_track_left, h_track_right = wheels[2].h_track, wheels[3].h_track
     film, contact_at = len(_SCALARS) + 44, len(_SCALARS) + 32
+    omega_at, v_at, r_at = len(_SCALARS), len(_SCALARS) + 60, len(_SCALARS) + 64
     written = -1
     for k in range(n + 1):
         t = k * dt
-        _rhs(t, y, f, jac, row, recorded, p, wheels, extra, r, s, controls[k], track)
+        _rhs(t, y, f, jac, row, recorded, p, wheels, extra, r, s, controls[k], track, released)
         if k % every == 0:
             rows[k // every] = row
         if k == n:
@@ -479,9 +508,11 @@ def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # t
                 track[j, 1] = _residual_film(row[film], row[contact_at], h_track_left)
                 track[j, 2] = _residual_film(row[film + 1], row[contact_at + 1], h_track_right)
             written = max(written, here)
+        if s.antilock > 0.0:
+            antilock(released, releasing, row, omega_at, v_at, r_at, dt)
         _solve(f, jac, h, k1)
         y1 = y + dt * k1
-        _rhs(t + dt, y1, f, unused, row, silent, p, wheels, extra, r, s, controls[k + 1], track)
+        _rhs(t + dt, y1, f, unused, row, silent, p, wheels, extra, r, s, controls[k + 1], track, released)
         for i in range(N_STATES):
             rest[i] = f[i] - 2.0 * k1[i]
         _solve(rest, jac, h, k2)

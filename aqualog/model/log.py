@@ -13,7 +13,7 @@ from aqualog.model.simulate import TRUTH_SYMBOLS, Simulation
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.types import FloatArray, TimeArray
 
-__all__ = ["START_NS", "groups_of", "table_of", "write_simulation"]
+__all__ = ["START_NS", "grid_of", "groups_of", "table_of", "write_simulation"]
 
 START_NS = 1_748_000_000_000_000_000  # made up: a drive that never was must be the same whenever it is simulated
 _OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time stamps of its messages
@@ -22,7 +22,7 @@ _OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time st
 def write_simulation(path: Path, simulation: Simulation, *, suffix: str, comment: str) -> None:
     """Write a drive in the format of a suffix; the same drive gives the same bytes."""
     groups = groups_of(simulation) if suffix in _OWN_STAMPS else table_of(simulation)
-    write_log(path, _grid(simulation), groups, suffix=suffix, start_ns=START_NS, comment=comment, written_ns=START_NS)
+    write_log(path, grid_of(simulation), groups, suffix=suffix, start_ns=START_NS, comment=comment, written_ns=START_NS)
 
 
 def groups_of(simulation: Simulation) -> list[LogGroup]:
@@ -34,14 +34,15 @@ def groups_of(simulation: Simulation) -> list[LogGroup]:
 
 def table_of(simulation: Simulation) -> list[LogGroup]:
     """All groups on one grid at the scenario's rate, as a logger's table is made."""
-    grid = _grid(simulation)
+    grid = grid_of(simulation)
     return [
         LogGroup(g.name, {n: (*_about(n), _onto(grid, _stamps(g), n, x)) for n, x in g.columns.items()})
         for g in simulation.measured
     ]
 
 
-def _grid(simulation: Simulation) -> TimeArray:
+def grid_of(simulation: Simulation) -> TimeArray:
+    """Time of the table's rows from the start. [ns]"""
     scenario = simulation.setup.scenario
     dt_ns = round(1e9 / scenario.rate_hz)
     return np.arange(max(round(scenario.duration_s * scenario.rate_hz), 2), dtype=np.int64) * dt_ns

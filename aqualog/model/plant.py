@@ -73,6 +73,11 @@ class Plant(NamedTuple):
     water_drag_gain: FloatArray
     h_track: FloatArray
     contact_scatter: FloatArray
+    towed_mass: float  # [kg] of a trailer: pulled along, carried by its own wheels
+    leak_start: float  # [s] a tyre loses its air from here on
+    leak_time: float  # [s] for so long
+    leak_radius: FloatArray  # share of the radius that is lost by then
+    leak_slope: FloatArray  # relative change of the slip slope by then
     drag_over_v: FloatArray  # (k, 2) knots: v [m/s], extra force against the motion [N]
 
 
@@ -146,6 +151,11 @@ def build_plant(
         water_drag_gain=np.ones(4),
         h_track=of("h_track"),
         contact_scatter=of("contact_scatter"),
+        towed_mass=0.0,
+        leak_start=0.0,
+        leak_time=1.0,
+        leak_radius=np.zeros(4),
+        leak_slope=np.zeros(4),
         drag_over_v=np.array([[0.0, 0.0], [100.0, 0.0]]),
     )
 

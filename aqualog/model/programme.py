@@ -1,17 +1,19 @@
-"""Test programmes as data: the drives of the thesis' chapter 2."""
+"""Test programmes as data: the drives of the thesis' chapter 2, and one of each situation."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from aqualog.model.plant import FRONT_COMPLIANCE
+from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Lane, Scenario, Steering
+from aqualog.model.situations import SITUATIONS, TUNING_POOL, Drawn, draw
+from aqualog.model.sketch import slalom_angle
+from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
-from aqualog.physics.load import G
 from aqualog.vehicle import Vehicle
 
-__all__ = ["PROGRAMMES", "Run", "thesis"]
+__all__ = ["PROGRAMMES", "Run", "situations", "thesis"]
 
 KMH = 1.0 / 3.6  # [m/s]
 PRESSURES = {"low": 1.9e5, "medium": 2.3e5, "high": 2.8e5}  # [Pa] the thesis gives names only (K)
@@ -35,6 +37,7 @@ SUV_REAR = replace(SUV, name="SUV AWD, drive to the rear", torque_split_rear=0.9
 CONSTANT = (60, 70, 80, 89, 98, 106, 112, 118, 124)
 BINNED = (60, 70, 80, 90, 100, 110)
 WEAR = {"very_worn_summer": "very_worn", "worn_summer": "worn", "new_summer": "new", "new_winter": "new"}
+PlainTerm = tuple[str, tuple[tuple[str, float], ...], str | None]  # effect, values, place
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,13 @@ class Run:
     manoeuvre: str
     figures: str  # figures of the thesis that it serves
     water_depth: float  # [m] nominal, right track; 0 for a dry run
+    terms: tuple[PlainTerm, ...] = ()  # of the model, as data that another process can be given
+    vehicle: Vehicle | None = None  # as the vehicle file has it; None: as it is driven
+
+    @property
+    def model(self) -> Model:
+        """The model that the terms make."""
+        return Model(tuple(Term(EFFECTS[name], dict(values), where) for name, values, where in self.terms))
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +84,18 @@ def thesis() -> tuple[Run, ...]:
     return tuple(runs.values())
 
 
-PROGRAMMES = {"thesis": thesis}
+def situations() -> tuple[Run, ...]:
+    """One drive of each situation, from the pool that thresholds are chosen with."""
+    return tuple(_of_situation(draw(name, 1, TUNING_POOL)) for name in SITUATIONS)
+
+
+def _of_situation(d: Drawn) -> Run:
+    given = tuple((t.effect.name, tuple(sorted(t.values.items())), t.where) for t in d.model.terms)
+    depth = max((max(lane.depth_left, lane.depth_right) for lane in d.scenario.lanes), default=0.0)
+    return Run(f"{d.name}_1", d.scenario, d.name, "", depth, given, d.believed)
+
+
+PROGRAMMES = {"thesis": thesis, "situations": situations}
 
 _Drive = tuple[_Case, float, float, int, str, str]
 
@@ -142,9 +163,7 @@ def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures
     )  # fmt: skip
     steering = None
     if manoeuvre == "slalom":  # 2 m/s^2 with a period of 4 s (thesis 2.4), by the steady gain of the two-track model
-        slope = TYRES[case.tyre].cornering_slope
-        understeer = (1.0 / (FRONT_COMPLIANCE * slope) - 1.0 / slope) / G
-        steering = Steering(2.0 * (case.vehicle.wheelbase / (v * v) + understeer), 4.0)
+        steering = Steering(slalom_angle(case.vehicle, TYRES[case.tyre], v, 2.0), 4.0)
     p = PRESSURES[case.pressure]
     scenario = Scenario(
         case.vehicle, TYRES[case.tyre], TYRES[case.tyre], p, p, case.load_front, case.load_rear,

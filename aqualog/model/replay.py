@@ -83,6 +83,8 @@ def replay(
         split_rear=np.full(n + 1, split_rear),
         steer=still,
         exc=still,
+        wind=still,
+        gain=np.ones(n + 1),
         grade=still if grade is None else np.interp(fine, t - t[0], grade),
         has_driver=False,
         keeps_lane=False,

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.compiled import compiled
-from aqualog.model.scenario import Scenario
+from aqualog.model.scenario import Kick, Lane, Scenario
+from aqualog.model.surface import Surface
 from aqualog.types import FloatArray
 
 __all__ = ["DRY", "Road", "build_road"]
@@ -18,20 +19,22 @@ DEPTH_LENGTH, BUMP_LENGTH = 5.0, 0.3  # [m] correlation of the water's depth and
 
 
 # columns of a stretch
-IN_METRES, START, END, DEPTH_LEFT, DEPTH_RIGHT, IRREGULARITY_LEFT, IRREGULARITY_RIGHT, ROLLING, ROUGHNESS = range(9)
-LANE_MU, LANE_COMPLIANCE = 9, 10  # friction of the tyre on it, negative: the tyre's own
-_LANE_WIDTH = 11
+IN_METRES, START, END, DEPTH_LEFT, DEPTH_RIGHT, IRREGULARITY_LEFT, IRREGULARITY_RIGHT = range(7)
+# of the surface under the left wheels, and `SURFACE_WIDTH` further of that under the right ones
+ROLLING, ROUGHNESS, LANE_MU, LANE_COMPLIANCE = range(7, 11)  # a negative friction: the tyre's own
+SURFACE_WIDTH = 4
+_LANE_WIDTH = 7 + 2 * SURFACE_WIDTH
 # columns of the fields; of sides and wheels from the left, from fl
-CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE = 0, 2, 6, 8, 10
-_FIELD_WIDTH = 11
+CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE, KICK_TORQUE, KICK_LOAD = 0, 2, 6, 8, 10, 11, 13
+_FIELD_WIDTH = 15
 
 
 class Road(NamedTuple):
-    """Stretches (k, 11) and fields (m, 11) over the position of the front axle, from 0, `ds` apart.
+    """Stretches (k, 15) and fields (m, 15) over the position of the front axle, from 0, `ds` apart.
 
     The last stretch of `lanes` that holds a point rules; outside all is dry asphalt. The contact's, the depth's and
     the bumps' fields have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`. The slope
-    angle is in rad, uphill positive.
+    angle is in rad, uphill positive; kerbs and holes give torque [N m] and wheel load [N] of either side.
     """
 
     ds: float
@@ -53,13 +56,13 @@ def build_road(scenario: Scenario, length: float) -> Road:
     """
     ds = DS if length < 20e3 else DS_LONG
     m = int(length / ds) + 2
-    s = np.arange(m) * ds
+    s: FloatArray = np.arange(m, dtype=np.float64) * ds
     table = np.array(
         [
             [
                 float(lane.in_metres), lane.start, lane.end, lane.depth_left, lane.depth_right,
-                lane.irregularity_left, lane.irregularity_right, lane.surface.rolling, lane.surface.roughness,
-                -1.0 if lane.surface.mu is None else lane.surface.mu, lane.surface.compliance,
+                lane.irregularity_left, lane.irregularity_right, *_of_surface(lane.surface),
+                *_of_surface(lane.surface_right or lane.surface),
             ]
             for lane in scenario.lanes
         ],
@@ -71,11 +74,31 @@ def build_road(scenario: Scenario, length: float) -> Road:
     if any(lane.depth_left > 0 or lane.depth_right > 0 for lane in scenario.lanes):
         lengths = [front, front, front, front, rear, rear, DEPTH_LENGTH, DEPTH_LENGTH]
         _fill(fields, CONTACT_ROAD, streams[:8], ds, lengths)
-    if any(lane.surface.roughness > 0 for lane in scenario.lanes):
+    if any(_roughness(lane) > 0 for lane in scenario.lanes):
         _fill(fields, BUMPS, streams[8:10], ds, [BUMP_LENGTH, BUMP_LENGTH])
     if scenario.grade:
         fields[:, GRADE] = np.interp(s, [p[0] for p in scenario.grade], [p[1] for p in scenario.grade])
+    for kick in scenario.kicks:
+        _add_kick(fields, s, kick)
     return Road(ds, table, fields)
+
+
+def _of_surface(surface: Surface) -> tuple[float, float, float, float]:
+    return surface.rolling, surface.roughness, -1.0 if surface.mu is None else surface.mu, surface.compliance
+
+
+def _roughness(lane: Lane) -> float:
+    return max(lane.surface.roughness, (lane.surface_right or lane.surface).roughness)
+
+
+def _add_kick(fields: FloatArray, s: FloatArray, kick: Kick) -> None:
+    """Half a sine against the wheel and on its load, then the load that the springing wheel lacks."""
+    x = (s - kick.at) / kick.length
+    hit = np.where((x >= 0.0) & (x <= 1.0), np.sin(np.pi * x), 0.0)
+    back = np.where((x > 1.0) & (x <= 3.0), np.sin(0.5 * np.pi * (x - 1.0)), 0.0)
+    for side in {"left": (0,), "right": (1,)}.get(kick.side, (0, 1)):
+        fields[:, KICK_TORQUE + side] -= kick.torque * hit
+        fields[:, KICK_LOAD + side] += kick.load * (hit - 0.5 * back)
 
 
 def _fill(fields: FloatArray, first: int, streams: list[np.random.Generator], ds: float, lengths: list[float]) -> None:

@@ -10,7 +10,7 @@ from aqualog.model.surface import SURFACES, Surface
 from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Excitation", "Lane", "Scenario", "Steering", "Waveform"]
+__all__ = ["Excitation", "Kick", "Lane", "Scenario", "Steering", "Waveform"]
 
 Waveform = Literal["triangle", "sine", "ramp", "step"]
 AmplitudeKind = Literal["force", "mu", "relative"]
@@ -22,7 +22,7 @@ class Lane:
     """A stretch of road that is not dry asphalt, between two times [s] or two positions [m] (`in_metres`).
 
     `depth_left`, `depth_right`: mean water [m]; `irregularity_left`, `irregularity_right`: rms of the depth along the
-    lane, relative to its mean [-].
+    lane, relative to its mean [-]; `surface_right` where the right wheels run on another surface than the left ones.
     """
 
     start: float
@@ -33,6 +33,22 @@ class Lane:
     irregularity_left: float = 0.05
     irregularity_right: float = 0.05
     surface: Surface = SURFACES["asphalt"]
+    surface_right: Surface | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Kick:
+    """A kerb, joint or hole that the wheels of a side meet, front ones first, rear ones a wheelbase later.
+
+    `at`: way of the front axle [m]; `length` of the blow [m]; `torque` against the wheel [N m] and `load` on it [N] at
+    its height; the load rebounds to minus half of it. `side`: left, right or both.
+    """
+
+    at: float
+    length: float = 0.5
+    side: Literal["left", "right", "both"] = "both"
+    torque: float = 0.0
+    load: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,5 +96,9 @@ class Scenario:
     split_rear: Profile = ()  # rear share of the drive torque over time; empty: the vehicle's
     grade: Profile = ()  # (s [m], slope angle [rad]) over the position
     head_wind: float = 0.0  # [m/s]
+    wind: Profile = ()  # [m/s] head wind over time, on top of `head_wind`
+    drive_share: Profile = ()  # share of the driver's torque that reaches the wheels over time; empty: all of it
+    antilock: bool = False  # brakes with an antilock system
+    kicks: tuple[Kick, ...] = ()
     water_scatter: float = 1.0  # scales the contact's fluctuation; 0 for an even contact
     sensors: Sensors = field(default=ESC)

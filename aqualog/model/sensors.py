@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aqualog.compiled import compiled
+from aqualog.model.faults import SensorFault, with_faults
 from aqualog.model.pickup import edge_times, reported_speed, ring_angles, rolled_angle
 from aqualog.notation import SYMBOLS, WHEELS
 from aqualog.types import FloatArray
@@ -87,6 +88,7 @@ class Sensors:
     tooth_jitter: float = 0.0  # rms of an edge, in tooth pitches
     tooth_pattern: float = 0.0  # rms of the fixed pitch error, in tooth pitches
     tone_ring: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # once-per-turn speed error, relative amplitude
+    faults: tuple[SensorFault, ...] = ()
 
     def with_channel(self, signal: str, channel: Channel) -> Sensors:
         """The same with another channel."""
@@ -132,14 +134,16 @@ def _measure_group(truth: Truth, sensors: Sensors, group: Group, rate_hz: float,
         channel = sensors.channels.get(name, Channel())
         seen = at - channel.latency_s - channel.delay_s
         if _is_state(truth, name):
-            columns[name] = _sampled(truth, _column(truth, name), seen, held=True)
+            x = _sampled(truth, _column(truth, name), seen, held=True)
+            columns[name] = with_faults(x, at, sensors.faults, names=(name, group.name))
             continue
         if name in _OMEGA and sensors.teeth > 0:
             # the controller's filter runs at the rate of its reports
             x = _lagged(_picked_up(truth, sensors, name, seen, 1.0 / rate_hz, seed), channel.lag_s, 1.0 / rate_hz)
         else:
             x = _sampled(truth, _lagged(_rolling(truth, sensors, name, seed), channel.lag_s, _step(truth)), seen)
-        columns[name] = _through(channel, x, at, name, group.name if group.one_draw else name, seed)
+        x = _through(channel, x, at, name, group.name if group.one_draw else name, seed)
+        columns[name] = with_faults(x, at, sensors.faults, names=(name, group.name))
     return Measured(group.name, at * (1.0 + group.skew_ppm * 1e-6), columns)
 
 
@@ -283,7 +287,7 @@ ESC = Sensors(
         Group("esc", ("a_x", "a_y", "yaw_rate"), rate_hz=50.0),  # V: opendbc, VW ESP_02
         Group("drive", _TORQUE, rate_hz=50.0, one_draw=True),  # K
         Group("brake", ("brake_pressure",), rate_hz=50.0),  # K
-        Group("steering", ("steer_angle",), rate_hz=100.0),  # K
+        Group("steering", ("steer_angle", "steering_torque"), rate_hz=100.0),  # K
         Group("gnss", ("v_x",), rate_hz=20.0),  # K
         Group("tie_rods", ("tie_rod_fl", "tie_rod_fr")),  # test equipment, at the logger's rate
         Group("road", ("on_water", "water_depth_left", "water_depth_right")),  # labels, perfect
@@ -297,6 +301,8 @@ ESC = Sensors(
         "brake_pressure": Channel(resolution=0.3e5),  # [Pa] 0.3 bar, V: opendbc, VW ESP
         # [rad] at the road wheel: 0.1 deg of the steering wheel over a ratio of 15, K
         "steer_angle": Channel(noise=5e-4, resolution=math.radians(0.1) / 15.0),
+        # [N m] assistance and column; friction of the rack shows as an offset, K
+        "steering_torque": Channel(noise=0.1, resolution=0.05, latency_s=0.010, offset_spread=0.2),
         "v_x": Channel(noise=0.02, latency_s=0.1),  # [m/s] V: 2 cm/s (Stanford); [s] V: ms to 0.5 s (race-technology)
         "tie_rod_fl": _TIE_ROD,
         "tie_rod_fr": _TIE_ROD,

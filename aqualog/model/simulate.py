@@ -9,16 +9,17 @@ import numpy as np
 from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.excitation import waveform
-from aqualog.model.plant import Plant, build_plant, with_mass_at
+from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, Plant, build_plant, with_mass_at
 from aqualog.model.road import GRADE, build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
 from aqualog.model.start import resistance_at, rolling_state
 from aqualog.model.term import Model, Setup
 from aqualog.notation import WHEELS
+from aqualog.physics.contact import contact_half_length
 from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
-from aqualog.physics.steering import tie_rod_force
+from aqualog.physics.steering import STEERING, kingpin_moment, steering_torque, tie_rod_force
 from aqualog.types import FloatArray
 
 __all__ = ["STEP_S", "TRUTH_SYMBOLS", "Simulation", "assemble", "drive_truth", "run_kernel", "simulate"]
@@ -30,7 +31,6 @@ FINE_RATE_HZ = 1000.0  # of the record that sensors sample
 FINE_LIMIT_S = 300.0  # longer drives are recorded more coarsely, to keep memory in bounds
 NO_WEDGE = 1e4  # [m/s] from here on the physics means: no aquaplaning at any speed
 PRESSURE_PER_TORQUE = 1.5e3  # [Pa/(N m)] brake pressure over the sum of the brake torques (K)
-TIE_ROD = {"c0": (0.0,), "c_y": (0.11,), "c_x": (0.06,)}  # where the vehicle file has none (K)
 _EXC_KIND = {"force": 0, "mu": 1, "relative": 2}
 
 _WHEEL_TRUTH = {
@@ -170,11 +170,15 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         steer=steer,
         exc=np.zeros(n + 1) if exc is None else np.asarray(waveform(exc.waveform, t, period=exc.period_s)),
         grade=np.zeros(n + 1),
+        wind=_profile(scenario.wind, t),
+        gain=_profile(scenario.drive_share, t) if scenario.drive_share else np.ones(n + 1),
         has_driver=True,
         keeps_lane=steering is None,
         exc_kind=0 if exc is None else _EXC_KIND[exc.amplitude_kind],
         exc_amplitude=0.0 if exc is None else float(exc.amplitude),
         scatter=float(scenario.water_scatter),
+        antilock=scenario.antilock,
+        kicks=bool(scenario.kicks),
     )
 
 
@@ -184,7 +188,7 @@ def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
     a = float(controls.a_target[0]) + G * float(np.sin(theta))  # specific force
     drag, rolling = resistance_at(plant, v, a)
     arm = 0.5 * ((1.0 - rear) * plant.r_l[:2].sum() + rear * plant.r_l[2:].sum())
-    drive = (plant.mass * a + rolling.sum() + drag) * arm
+    drive = ((plant.mass + plant.towed_mass) * a + rolling.sum() + drag) * arm
     return rolling_state(plant, v=v, a=a, drive=float(drive), split_rear=rear)
 
 
@@ -209,7 +213,8 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
         columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
-    columns |= _tie_rods(wheels, of_wheels("wave_drag"), scenario)
+    rod_wheels = {n: of_wheels(n) for n in ("aligning", "load_moment", "braking", "wave_drag")}
+    columns |= _steering(wheels | rod_wheels, plant, scenario)
     if scenario.lanes:
         columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
     v_w = np.array(wheels["omega"]) * np.array(of_wheels("r_e"))
@@ -226,17 +231,31 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
     }
 
 
-def _tie_rods(
-    wheels: dict[str, list[FloatArray]], wave_drag: list[FloatArray], scenario: Scenario
-) -> dict[str, FloatArray]:
+def _steering(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
+    """Forces in the tie rods and torque at the steering.
+
+    A vehicle file with a polynomial says how the dry car's rods are; what the water adds comes on top.
+    """
     given = scenario.vehicle.tie_rod
-    c = {name: given.get(name, (0.0,)) for name in TIE_ROD} if given else TIE_ROD
-    return {
-        f"tie_rod_f{side}": tie_rod_force(
-            wheels["F_x"][i] - wave_drag[i], sign * wheels["F_y"][i], c0=c["c0"], c_y=c["c_y"], c_x=c["c_x"]
-        )
-        for i, (side, sign) in enumerate((("l", 1.0), ("r", -1.0)))
-    }
+    rods = []
+    for i, outward in enumerate((1.0, -1.0)):
+        F_x, F_y = wheels["F_x"][i] - wheels["wave_drag"][i], outward * wheels["F_y"][i]
+        aligning, load_moment, braking = outward * wheels["aligning"][i], wheels["load_moment"][i], wheels["braking"][i]
+        if given:
+            c0, c_y, c_x = (given.get(n, (0.0,)) for n in ("c0", "c_y", "c_x"))
+            wet = wheels["contact"][i] < 1.0
+            half = contact_half_length(
+                wheels["F_z"][i], p=float(plant.p[i]), a_ref=float(plant.half_length[i]), F_z_ref=F_Z_HALF_LENGTH,
+                p_ref=P_HALF_LENGTH,
+            )  # fmt: skip
+            trail = np.where(wet, aligning + half / 3.0 * F_y, 0.0)
+            shifted = np.where(wet, load_moment - plant.r_w[i] * wheels["F_z"][i] * plant.r_l[i], 0.0)
+            water = (trail + np.sin(STEERING.inclination) * shifted) / STEERING.arm
+            rods.append(tie_rod_force(F_x, F_y, c0=c0, c_y=c_y, c_x=c_x) + water)
+        else:
+            moment = kingpin_moment(F_x, F_y, wheels["F_z"][i], aligning, load_moment, braking, r_l=float(plant.r_l[i]))
+            rods.append(moment / STEERING.arm)
+    return {"tie_rod_fl": rods[0], "tie_rod_fr": rods[1], "steering_torque": steering_torque(rods[0], rods[1])}
 
 
 def _labels(scenario: Scenario, front: FloatArray, rear: FloatArray) -> dict[str, FloatArray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
-from aqualog.physics.load import wheel_loads
+from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag
 from aqualog.physics.rolling import effective_radius
 from aqualog.types import FloatArray
@@ -19,6 +19,7 @@ def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
     through_air = np.array([v + plant.head_wind])
     drag = float(air_drag(through_air, drag_area=plant.drag_area, air_density=plant.air_density)[0])
     drag += float(np.interp(v, plant.drag_over_v[:, 0], plant.drag_over_v[:, 1]))
+    drag += plant.towed_mass * G * float(plant.r_w[2])
     rolling = plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
     return drag, rolling + plant.brake_drag / plant.r_l
 

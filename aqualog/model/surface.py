@@ -32,6 +32,7 @@ SURFACES: dict[str, Surface] = {
         # slope 30 -> 10 on low friction (thesis 3.3): 1/10 = 1/30 + 1/15
         Surface("snow", mu=0.30, compliance=1.0 / 15.0, rolling=0.012, roughness=15.0, source="snow on asphalt (K)"),
         Surface("snow_on_ice", mu=0.29, compliance=1.0 / 30.0, rolling=0.008, roughness=8.0, source="Fig. 3.1 (D)"),
+        Surface("deep_snow", mu=0.30, compliance=1.0 / 12.0, rolling=0.035, roughness=25.0, source="fresh (K)"),
         Surface("ice", mu=0.12, source="dry ice: slope as on asphalt (thesis 3.1)"),
         Surface("wet_ice", mu=0.06, compliance=1.0 / 60.0, source="thesis Fig. 3.1 (D)"),
         Surface("gravel", mu=0.60, compliance=1.0 / 25.0, rolling=0.015, roughness=60.0, source="(K)"),

@@ -1,14 +1,149 @@
-"""Steering: from tyre forces to tie rods."""
+"""Steering: from tyre forces to tie rods and the steering wheel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.physics.tyre_brush import brush_parts, sliding_edge
 from aqualog.types import FloatArray
 
-__all__ = ["tie_rod_force"]
+__all__ = ["STEERING", "SteeringGeometry", "aligning_moment", "kingpin_moment", "steering_torque", "tie_rod_force"]
+
+
+class SteeringGeometry(NamedTuple):
+    """Front suspension of a passenger car, the rods behind the axle. [m, rad]
+
+    General knowledge (K) throughout: arm 0.11-0.15 m, caster trail 15-35 mm, hub offset 30-75 mm, inclination 10-15
+    deg, caster angle 4-8 deg, rack 45-60 mm per turn of the pinion.
+    """
+
+    arm: float = 0.13  # from the kingpin to the rod
+    caster_trail: float = 0.020  # kingpin's ground point ahead of the contact's centre
+    hub_offset: float = 0.060  # wheel centre outboard of the kingpin, at its height
+    inclination: float = 0.218  # kingpin leans inward
+    caster: float = 0.10  # kingpin leans back
+    ratio: float = 8.0e-3  # pinion's pitch radius: torque at the steering over the rack's force
+
+
+STEERING = SteeringGeometry()
+
+
+def aligning_moment(
+    s_x: FloatArray,
+    s_y: FloatArray,
+    F_z: FloatArray,
+    *,
+    mu: float,
+    C_x: float,
+    C_y: float,
+    L: FloatArray | float,
+    a: FloatArray,
+) -> FloatArray:
+    """Moment of the lateral force of a brush tyre about the vertical through the centre of its patch.
+
+    Parameters
+    ----------
+    s_x, s_y, F_z, mu, C_x, C_y, L
+        As in `brush_forces`.
+    a : array
+        Half length of the patch. [m]
+
+    Returns
+    -------
+    M_z : array
+        Turning left positive: a force to the left behind the centre turns the wheel to the right. [N m]
+
+    The sticking bristles' forces grow linearly from the front edge b of the dry contact to where they begin to slide:
+    they act at two thirds of that stretch. The sliding ones follow the rest of the parabola. Limits: small slip on a
+    full contact gives -a/3 F_y; full sliding of a full contact 0; on a shortened one the remaining force acts further
+    back, -a (1 - 2 L / 3) F_y, until it vanishes with L.
+
+    H. B. Pacejka, Tire and Vehicle Dynamics, chapter 3 (K), for L = 1; D for L < 1.
+    """
+    g_x = C_x * s_x
+    g_y = C_y * s_y
+    g = np.sqrt(g_x * g_x + g_y * g_y)
+    s = np.sqrt(s_x * s_x + s_y * s_y)
+    limit = np.maximum(mu * F_z, 1e-9)
+    theta = g / (3.0 * limit)
+    stuck, _ = brush_parts(theta, L)
+    b = 2.0 * L - 1.0
+    xi = sliding_edge(theta, L)
+    at_stuck = b - 2.0 / 3.0 * (b - xi)
+    # 3/4 of the integral of x (1 - x^2) from -1 to xi, the sliding bristles' share of the parabola
+    moment_slid = -0.1875 * (1.0 - xi * xi) ** 2
+    stuck_y = limit * stuck * g_y / np.maximum(g, 1e-12)
+    M_z: FloatArray = a * (stuck_y * at_stuck + limit * moment_slid * s_y / np.maximum(s, 1e-15))
+    return M_z
+
+
+def kingpin_moment(
+    F_x: FloatArray,
+    F_y_outward: FloatArray,
+    F_z: FloatArray,
+    M_z_outward: FloatArray,
+    load_moment: FloatArray,
+    braking: FloatArray,
+    *,
+    r_l: float,
+    geometry: SteeringGeometry = STEERING,
+) -> FloatArray:
+    """Moment of all that acts on a front wheel about its kingpin.
+
+    Parameters
+    ----------
+    F_x : array
+        Longitudinal force that the wheel hands to its carrier: of the tyre less that of the water on the wheel's
+        centre, forward positive. [N]
+    F_y_outward, M_z_outward : array
+        Lateral force away from the centre line, and `aligning_moment` that turns the wheel's front there (left wheel:
+        M_z, right wheel: -M_z). [N], [N m]
+    F_z : array
+        Wheel load. [N]
+    load_moment : array
+        Wheel load times its forward shift, by rolling resistance and by the water's wedge. [N m]
+    braking : array
+        Brake torque, which the carrier takes up, >= 0. [N m]
+    r_l : float
+        Loaded radius. [m]
+
+    Returns
+    -------
+    M : array
+        Turning the wheel's front outward positive. [N m]
+
+    A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, on the hub offset,
+    backward forces turn it outward. Brakes make that lever the scrub radius, hub_offset - r_l sin(inclination). The
+    load that the wedge carries ahead of the centre has the lever sin(inclination): 60 mm at 4 kN turn the wheel outward
+    with 52 N m, 0.4 kN in the rod, as long as the wedge is there, whether the wheel spins down or up. Small angles;
+    no steer angle, no inertia of the wheel about the kingpin, no friction.
+
+    Thesis: section 2.4 measures what comes of it (C61-C63); geometry D.
+    """
+    sine = np.sin(geometry.inclination)
+    scrub = geometry.hub_offset - r_l * sine
+    moment: FloatArray = (
+        M_z_outward
+        - geometry.caster_trail * F_y_outward
+        - geometry.hub_offset * F_x
+        - sine * braking
+        + sine * load_moment
+        - scrub * np.sin(geometry.caster) * F_z
+    )
+    return moment
+
+
+def steering_torque(rod_left: FloatArray, rod_right: FloatArray, *, ratio: float = STEERING.ratio) -> FloatArray:
+    """Torque at the steering, assistance and driver together, that holds the rack against its rods.
+
+    Tie-rod forces in N, compression positive, rods behind the axle; `ratio` in m. Left positive: in a left turn the
+    outer, right rod is pressed and the left one pulled, and the steering is held to the left. What both front wheels
+    show alike cancels. [N m]
+    """
+    return ratio * (rod_right - rod_left)
 
 
 def tie_rod_force(

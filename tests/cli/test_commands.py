@@ -51,7 +51,7 @@ def test_json_of_the_contract():
     assert set(event) >= {"detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence"}
     assert (event["wheel"], event["side"], event["severity"]) == ("fr", "right", "partial")
     assert event["evidence"]["slip_min"] < 0
-    assert {u["detector"] for u in document["unavailable"]} == {"tie_rod", "joint_cusum"}
+    assert {u["detector"] for u in document["unavailable"]} == {"tie_rod"}
     assert set(document["quality"]) >= {"dropped_samples", "time_jumps", "truncated"}
 
 

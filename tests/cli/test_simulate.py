@@ -29,7 +29,7 @@ from aqualog.notation import SYMBOLS
 CAR = ROOT / "sample_logs" / "vehicle.toml"
 FORMATS = ("mf4", "mcap", "csv", "parquet")
 SCENARIO = f"""vehicle = "{CAR}"
-speed_kmh = 95
+speed_kmh = 110
 duration_s = 3
 sample_rate_hz = 100
 [[lane]]

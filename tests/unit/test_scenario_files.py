@@ -14,7 +14,8 @@ from aqualog.config.scenario import SAMPLE_RATES_HZ, SCENARIO_KEYS, load_scenari
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
-from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.faults import SensorFault
+from aqualog.model.scenario import Kick, Lane, Scenario
 from aqualog.model.sensors import ESC, IDEAL
 from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
@@ -79,13 +80,16 @@ def test_what_is_left_out_is_the_default_of_the_record(folder):
 def test_listed_defaults_are_those_that_are_taken(folder):
     bare = SHORT + "[[lane]]\nstart_s = 1\nend_s = 2\nwater_depth_mm = 0\n[steering]\namplitude_deg = 1\nperiod_s = 2\n"
     bare = bare.replace("vehicle.toml", "awd.toml") + '[excitation]\nkind = "sine"\namplitude_n = 100\nperiod_s = 2\n'
+    bare += '[[kick]]\nat_m = 5\n[[fault]]\nsignal = "a_x"\nstart_s = 1\nend_s = 2\n'
     before = load(folder, bare)
     for key in SCENARIO_KEYS.values():
         if key.default is None or key.name == "water_depth_mm":
             continue
         value = int(key.default) if key.name == "seed" else key.default
         line = f"{key.name} = {json.dumps(value)}\n"
-        header = {"": "", "lane": "[[lane]]\n", "steering": "[steering]\n", "excitation": "[excitation]\n"}[key.table]
+        header = {"": "", "steering": "[steering]\n", "excitation": "[excitation]\n"}.get(
+            key.table, f"[[{key.table}]]\n"
+        )
         text = bare.replace(header, header + line, 1) if header else line + bare
         if "water_depth" in key.name:
             text = text.replace("water_depth_mm = 0\n", 'surface = "asphalt"\n')
@@ -266,6 +270,8 @@ def _with(key, value):
         "lane": {"start_s": 1.0, "end_s": 2.0, "water_depth_mm": 1.0},
         "steering": {"amplitude_deg": 1.0, "period_s": 5.0},
         "excitation": {"kind": "sine", "amplitude_n": 100.0, "period_s": 5.0},
+        "kick": {"at_m": 5.0},
+        "fault": {"signal": "a_x", "start_s": 1.0, "end_s": 2.0},
     }
     table = tables[key.table] if key.table else top
     for rival in (("speed_kmh", "profile"), ("amplitude_deg", "steering_wheel_amplitude_deg")):
@@ -280,7 +286,7 @@ def _with(key, value):
     table[key.name] = value
     lines = [f"{n} = {_toml(v)}" for n, v in top.items()]
     if key.table:
-        header = f"[[{key.table}]]" if key.table == "lane" else f"[{key.table}]"
+        header = f"[[{key.table}]]" if key.table in ("lane", "kick", "fault") else f"[{key.table}]"
         lines += [header, *(f"{n} = {_toml(v)}" for n, v in table.items())]
     return "\n".join(lines) + "\n"
 
@@ -316,15 +322,13 @@ def test_bounds(folder, key):
 
 def test_a_key_at_a_sound_value_loads(folder):
     for key in SCENARIO_KEYS.values():
-        if key.name in ("seed", "vehicle", "kind", "surface", "sensors", "sample_rate_hz") or key.name.startswith(
-            "tyre"
-        ):
+        if key.low == -math.inf or key.name in ("seed", "sample_rate_hz"):  # words, and special numbers
             continue
         middle = max(key.low, min(key.high, 3.0)) if "relative" not in key.name and "mu" not in key.name else 0.2
         if key.name == "end_m":
             middle = 50.0
         value = [[0.0, middle]] if key.name.endswith("profile") else middle
-        if key.path in ("lane.start_s", "lane.start_m"):
+        if key.path in ("lane.start_s", "lane.start_m", "fault.start_s"):
             value = 0.5
         load(folder, _with(key, value))
 
@@ -545,3 +549,61 @@ def test_a_pipe_is_no_vehicle_file(tmp_path):
     (tmp_path / "s.toml").write_text('vehicle = "pipe"\nspeed_kmh = 80.0\n')
     with pytest.raises(ConfigError, match="pipe"):
         load_scenario(tmp_path / "s.toml")
+
+
+def test_split_surface_wind_shifts_brakes_kerbs_and_faults(folder):
+    scenario = load(
+        folder,
+        SHORT
+        + """
+wind_profile = [[0, 0], [5, 36]]
+drive_share_profile = [[1, 1], [1.1, 0]]
+brakes = "antilock"
+[[lane]]
+start_s = 1
+end_s = 2
+surface = "ice"
+surface_right = "asphalt"
+[[kick]]
+at_m = 40
+length_m = 0.4
+side = "right"
+torque_nm = 200
+load_n = -3000
+[[fault]]
+signal = "wheels"
+start_s = 2
+end_s = 2.5
+[[fault]]
+signal = "a_x"
+start_s = 3
+end_s = 4
+kind = "frozen"
+""",
+    )
+    assert scenario.wind == ((0.0, 0.0), (5.0, pytest.approx(10.0)))
+    assert scenario.drive_share == ((1.0, 1.0), (1.1, 0.0))
+    assert scenario.antilock
+    lane = scenario.lanes[0]
+    assert (lane.surface.name, lane.surface_right.name) == ("ice", "asphalt")
+    assert scenario.kicks == (Kick(40.0, 0.4, "right", 200.0, -3000.0),)
+    assert scenario.sensors.faults == (SensorFault("wheels", 2.0, 2.5), SensorFault("a_x", 3.0, 4.0, "frozen"))
+    assert replace(scenario.sensors, faults=()) == ESC
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('brakes = "abs"', "brakes"),
+        ('[[fault]]\nsignal = "omega"\nstart_s = 1\nend_s = 2', "signal"),
+        ('[[fault]]\nsignal = "a_x"\nstart_s = 2\nend_s = 1', "does not come after"),
+        ('[[fault]]\nsignal = "a_x"\nstart_s = 2', "end_s is missing"),
+        ("[[kick]]\nload_n = 100", "at_m is missing"),
+        ('[[kick]]\nat_m = 1\nside = "front"', "side"),
+        ("[kick]\nat_m = 1", "list of tables"),
+        ('[[lane]]\nstart_s = 1\nend_s = 2\nsurface = "ice"\nsurface_right = "sand"', "surface_right"),
+    ],
+)
+def test_faults_of_the_new_keys_are_told(folder, text, said):
+    with pytest.raises(ConfigError, match=said):
+        load(folder, SHORT + text + "\n")

@@ -1,0 +1,52 @@
+"""Faults of a table file (CSV), all of them in one message."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+from aqualog.errors import ConfigError
+
+__all__ = ["LineFaults"]
+
+MOST = 20  # faults that are spelt out; a table with a wrong column has one in every line
+
+
+class LineFaults:
+    """Collects the faults of a file by line, then raises them together."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._found: list[str] = []
+
+    def add(self, line: int | None, message: str) -> None:
+        """Note a fault on a line (from 1), or of the file."""
+        self._found.append(f"line {line}: {message}" if line else message)
+
+    def unknown(self, line: int | None, what: str, name: str, known: Iterable[str]) -> None:
+        """Note a name that does not exist, with the nearest one that does."""
+        names = sorted(known)
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+        self.add(line, f'unknown {what} "{name[:60]}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
+
+    def number(self, line: int | None, name: str, text: str, *, low: float, high: float, unit: str) -> float | None:
+        """A number within its bounds, or None with the fault noted."""
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isnan(value):
+            self.add(line, f"{name} = {text[:40]!r} is not a number")
+            return None
+        if not low <= value <= high:
+            self.add(line, f"{name} = {value:g} is outside {low:g} ... {high:g} {unit}".rstrip())
+            return None
+        return value
+
+    def raise_if_any(self) -> None:
+        """Raise one ConfigError with the faults."""
+        if self._found:
+            more = f"; and {len(self._found) - MOST} more" if len(self._found) > MOST else ""
+            raise ConfigError("; ".join(self._found[:MOST]) + more, where=str(self._path))

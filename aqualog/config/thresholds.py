@@ -1,0 +1,91 @@
+"""Thresholds files: TOML with the tables `[thresholds]` and `[rivals]`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from aqualog.config.toml_file import TableFaults, load_toml
+from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS, Thresholds
+from aqualog.errors import ConfigError
+
+__all__ = ["load_thresholds", "thresholds_text"]
+
+_TABLES = ("thresholds", "rivals")
+_HIGHEST = 1e6
+
+
+def load_thresholds(path: Path) -> tuple[Thresholds, dict[str, float]]:
+    """Read and check a thresholds file.
+
+    Returns
+    -------
+    thresholds : Thresholds
+        Those that are left out keep their default.
+    rivals : dict name -> float
+        Only those that are given.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of the file in one message.
+    """
+    document, text = load_toml(path, what="thresholds file")
+    faults = TableFaults(path, text)
+    for name in document:
+        if name not in _TABLES:
+            faults.unknown(name, _TABLES)
+    own = _numbers(document, "thresholds", [f.name for f in fields(Thresholds)], faults)
+    rivals: dict[str, float] = {}
+    if "rivals" in document:
+        from aqualog.rivals.catalogue import RIVALS
+
+        rivals = _numbers(document, "rivals", list(RIVALS), faults)
+    for name, value in own.items():
+        try:
+            Thresholds(**{name: value})
+        except ConfigError as error:
+            with faults.inside("thresholds"):
+                faults.add(name, error.line())
+    faults.raise_if_any()
+    return Thresholds(**{f.name: own.get(f.name, getattr(DEFAULT, f.name)) for f in fields(Thresholds)}), rivals
+
+
+def thresholds_text(
+    thresholds: Thresholds, rivals: Mapping[str, float] | None = None, *, comments: Iterable[str] = ()
+) -> str:
+    """The TOML text of thresholds, with their units and meanings; reading it again gives the same values."""
+    lines = [f"# {''.join(c if c.isprintable() else ' ' for c in text)}" for text in comments]
+    lines.append("[thresholds]")
+    for f in fields(thresholds):
+        unit = "" if UNITS[f.name] == "-" else f" [{UNITS[f.name]}]"
+        lines.append(f"{f.name} = {float(getattr(thresholds, f.name))!r}  # {MEANINGS[f.name]}{unit}")
+    if rivals:
+        from aqualog.rivals.catalogue import RIVALS
+
+        lines += ["", "[rivals]"]
+        for name, value in rivals.items():
+            unit = "" if RIVALS[name].unit == "-" else f" [{RIVALS[name].unit}]"
+            lines.append(f"{name} = {float(value)!r}  # {RIVALS[name].title}{unit}")
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(document: Mapping[str, Any], table: str, known: list[str], faults: TableFaults) -> dict[str, float]:
+    values = document.get(table, {})
+    if not isinstance(values, dict):
+        faults.add(table, f"{table} is not a table")
+        return {}
+    found: dict[str, float] = {}
+    with faults.inside(table):
+        for name in values:
+            if name not in known:
+                faults.unknown(name, known)
+                continue
+            value = faults.number(values, name, low=0.0, high=_HIGHEST, unit="")
+            if value == 0.0:
+                faults.add(name, f"{name} = 0 is not above 0")
+            elif value is not None:
+                found[name] = value
+    return found

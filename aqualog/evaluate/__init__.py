@@ -1,0 +1,1 @@
+"""Detections against labels: recall, latency, false alarms, confusion, and thresholds proposed from them."""

@@ -1,0 +1,119 @@
+"""Labels of a drive: what happened when, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+__all__ = [
+    "AQUAPLANING", "EFFECTS", "SURFACES", "WATER_AFTER_S", "Label", "Labels", "Span", "joined", "overlaps",
+    "without",
+]  # fmt: skip
+
+Span = tuple[float, float]
+"""Start and end. [s]"""
+
+AQUAPLANING = ("full", "partial", "water")
+EFFECTS = ("spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod")
+SURFACES = (
+    "dry", "damp", "snow", "ice", "gravel", "rough", "split", "braking", "abs", "kerb", "pothole", "cornering",
+    "gear_shift",
+)  # fmt: skip
+
+CAR_GAP_S = 1.0  # [s] episodes of the car that are nearer than this are one
+WATER_AFTER_S = 1.0  # [s] what water has set off may still come to light this long after it
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """One stretch of a drive.
+
+    `effect` is one of `AQUAPLANING`, one of `EFFECTS` (what a single detector is to see), or anything else: a surface
+    or a situation, which serves the confusion table only. `wheel` is None for what holds of the car.
+    """
+
+    start_s: float
+    end_s: float
+    effect: str
+    wheel: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """All labels of one drive.
+
+    `knows` names the effects of `AQUAPLANING` whose absence means something: truth and a labels file know all three, a
+    lane's times or the signal `on_water` know of water only. `source` says where the labels come from.
+    """
+
+    items: tuple[Label, ...]
+    knows: frozenset[str]
+    source: str
+
+    def of(self, effect: str, wheel: str | None = None) -> list[Span]:
+        """Stretches of an effect: of one wheel, or of the car (union over wheels, gaps below 1 s closed)."""
+        spans = [(x.start_s, x.end_s) for x in self.items if x.effect == effect and wheel in (None, x.wheel)]
+        return joined(spans, CAR_GAP_S if wheel is None and effect in ("full", "partial") else 0.0)
+
+    def names_wheels(self, effect: str) -> bool:
+        """Whether the labels tell on which wheel an effect was."""
+        return any(x.effect == effect and x.wheel is not None for x in self.items)
+
+    @property
+    def afloat(self) -> list[Span]:
+        """Partial or full aquaplaning of any wheel, for telling it from mere water."""
+        return joined([*self.of("partial"), *self.of("full")], 0.0)
+
+    @property
+    def water(self) -> list[Span]:
+        """Water under any wheel; aquaplaning and its effects are on water even where the labels do not say so."""
+        found = [(x.start_s, x.end_s) for x in self.items if x.effect in (*AQUAPLANING, *EFFECTS)]
+        return joined(found, 0.0)
+
+    @property
+    def water_widened(self) -> list[Span]:
+        """Water and the second after it: only an event that begins outside of this is a false alarm."""
+        return joined([(a, b + WATER_AFTER_S) for a, b in self.water], 0.0)
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Effects beside aquaplaning that the labels name, in order of appearance."""
+        return tuple(dict.fromkeys(x.effect for x in self.items if x.effect not in AQUAPLANING))
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Effects that are neither aquaplaning, nor a detector's, nor a surface that aqualog knows by name."""
+        return tuple(e for e in self.others if e not in (*EFFECTS, *SURFACES))
+
+
+def joined(spans: Iterable[Span], gap: float) -> list[Span]:
+    """Union of stretches; those whose gap is below `gap` [s], or that touch, become one. Sorted."""
+    out: list[Span] = []
+    for start, end in sorted(spans):
+        if out and (start <= out[-1][1] or start - out[-1][1] < gap - 1e-9):
+            out[-1] = (out[-1][0], max(out[-1][1], end))
+        else:
+            out.append((start, end))
+    return out
+
+
+def without(spans: Sequence[Span], holes: Sequence[Span]) -> list[Span]:
+    """What is left of the stretches outside the holes. Both sorted and disjoint."""
+    out: list[Span] = []
+    for start, end in spans:
+        for a, b in holes:
+            if b <= start or a >= end:
+                continue
+            if a > start:
+                out.append((start, a))
+            start = b
+            if start >= end:
+                break
+        if start < end:
+            out.append((start, end))
+    return out
+
+
+def overlaps(span: Span, others: Iterable[Span]) -> bool:
+    """Whether a stretch shares time with any of the others."""
+    return any(span[0] < b and a < span[1] for a, b in others)

@@ -1,0 +1,74 @@
+"""Thresholds from curves: few false alarms first, then recall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from aqualog.detect.thresholds import Thresholds
+from aqualog.evaluate.roc import RocPoint
+from aqualog.rivals.catalogue import RIVALS
+
+__all__ = ["LIMIT_PER_HOUR", "Choice", "applied", "choose"]
+
+LIMIT_PER_HOUR = 0.01
+"""False alarms that a threshold may cause: one in a hundred hours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The point proposed for a detector, and why."""
+
+    point: RocPoint
+    reason: str
+
+
+def choose(points: Sequence[RocPoint], *, limit: float = LIMIT_PER_HOUR) -> dict[str, Choice]:
+    """Propose a threshold for each detector.
+
+    Parameters
+    ----------
+    points : sequence of RocPoint
+        On the drives to tune on.
+    limit : float
+        False alarms per hour outside water. [1/h]
+
+    Returns
+    -------
+    dict detector -> Choice
+        Among the thresholds whose false alarms stay within the limit, the one of highest recall of partial
+        aquaplaning; where none stays within, the one with the fewest false alarms. Ties: recall of full aquaplaning,
+        fewer false alarms, nearer to where it was.
+    """
+    by_detector: dict[str, list[RocPoint]] = {}
+    for p in points:
+        by_detector.setdefault(p.detector, []).append(p)
+    return {name: _choice(own, limit) for name, own in by_detector.items()}
+
+
+def applied(choices: Mapping[str, Choice], thresholds: Thresholds, rivals: Mapping[str, float]) -> tuple[
+    Thresholds, dict[str, float]
+]:  # fmt: skip
+    """Thresholds, and those of the rivals, with the proposals in them."""
+    values = {name: c.point.threshold for name, c in choices.items()}
+    own = replace(thresholds, **{n: x for n, x in values.items() if n not in RIVALS})
+    return own, {**rivals, **{n: x for n, x in values.items() if n in RIVALS}}
+
+
+def _choice(points: Sequence[RocPoint], limit: float) -> Choice:
+    within = [p for p in points if not p.false_alarms.per_hour > limit]
+    if within:
+        best = max(within, key=_merit)
+        return Choice(best, f"highest recall with at most {limit:g} false alarms per hour")
+    fewest = min(p.false_alarms.count for p in points)
+    best = max((p for p in points if p.false_alarms.count == fewest), key=_merit)
+    return Choice(best, f"no threshold keeps to {limit:g} false alarms per hour; the fewest there are")
+
+
+def _merit(p: RocPoint) -> tuple[float, float, float, float]:
+    return (_zero(p.partial.share), _zero(p.full.share), -p.false_alarms.count, -abs(math.log(p.factor)))
+
+
+def _zero(share: float) -> float:
+    return 0.0 if math.isnan(share) else share

@@ -1,0 +1,231 @@
+"""Situations of road, weather and driving in which no wheel floats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from aqualog.model.scenario import Lane, Profile, Steering
+from aqualog.model.sensors import ESC
+from aqualog.model.sketch import KMH, Sketch, Taken, lagging_torque, slalom_angle, terms
+from aqualog.model.surface import Surface
+from aqualog.model.term import Model
+from aqualog.physics.load import G
+
+__all__ = ["MAKERS"]
+
+NONE = Model()
+
+
+def _cruise(k: Sketch, low: float, high: float, *, spread: float = 0.08, **given: Any) -> Taken:
+    duration, v = k.between(60.0, 120.0), k.between(low, high) * KMH
+    scenario = k.drive(duration, k.cruise(duration, v, spread=spread), **given)
+    return Taken(scenario, NONE, f"about {v / KMH:.0f} km/h")
+
+
+def _dry(k: Sketch) -> Taken:
+    return _cruise(k, 60.0, 110.0, spread=0.15)
+
+
+def _motorway(k: Sketch) -> Taken:
+    """Turbulence behind lorries: gusts of 3 m/s rms, faster than those of the weather (K)."""
+    return _cruise(k, 110.0, 140.0, wind=k.gusts(125.0, 3.0, mean=k.between(-3.0, 3.0), every_s=1.0))
+
+
+def _hilly(k: Sketch) -> Taken:
+    return _cruise(k, 50.0, 90.0, grade=k.hills(0.05, every_m=k.between(60.0, 150.0)))
+
+
+def _head_wind(k: Sketch) -> Taken:
+    return _cruise(k, 80.0, 120.0, head_wind=10.0, wind=k.gusts(125.0, 2.0))
+
+
+def _all_the_way(k: Sketch, surface: Surface, low: float, high: float, **given: Any) -> Taken:
+    taken = _cruise(k, low, high, lanes=(Lane(0.0, 1e5, in_metres=True, surface=surface),), **given)
+    return taken._replace(note=f"{taken.note}, {_told(surface)}")
+
+
+def _told(surface: Surface) -> str:
+    return surface.name + ("" if surface.mu is None else f" of mu {surface.mu:.2f}")
+
+
+def _damp(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("damp", k.pool.damp), 70.0, 120.0, spread=0.12)
+
+
+def _snow(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("snow", k.pool.snow), 40.0, 80.0)
+
+
+def _deep_snow(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("deep_snow", k.pool.snow, rolling=k.between(0.02, 0.04)), 30.0, 60.0)
+
+
+def _ice(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("ice", k.pool.ice), 30.0, 60.0, grade=k.hills(0.005))
+
+
+def _wet_ice(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("wet_ice", k.pool.wet_ice), 20.0, 50.0, spread=0.04, grade=k.hills(0.002))
+
+
+def _gravel(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("gravel", (0.5, 0.7)), 40.0, 80.0)
+
+
+def _rough(k: Sketch) -> Taken:
+    return _all_the_way(k, k.surface("rough", roughness=k.between(40.0, 80.0)), 50.0, 100.0)
+
+
+def _snow_entry(k: Sketch) -> Taken:
+    """From a cleared road onto snow, at a steady speed, gently faster or slower."""
+    v, a = k.between(60.0, 100.0) * KMH, k.between(-0.5, 0.3)
+    entry, stay = k.between(15.0, 30.0), k.between(5.0, 25.0)
+    surface = k.surface("snow", k.pool.snow)
+    speed: Profile = ((0.0, v), (entry, v), (entry + stay, max(v + a * stay, 10.0)))
+    scenario = k.drive(entry + stay + 10.0, speed, lanes=(Lane(entry, entry + stay, surface=surface),))
+    return Taken(scenario, NONE, f"{_told(surface)} from {entry:.0f} s at {v / KMH:.0f} km/h")
+
+
+def _split(k: Sketch) -> Taken:
+    """Snow or ice under the wheels of one side, asphalt under the others: a road that is half cleared."""
+    name = k.one_of("snow", "ice")
+    low, dry = k.surface(name, k.pool.snow if name == "snow" else k.pool.ice), k.surface("asphalt")
+    left, right = k.one_of((low, dry), (low, dry), (dry, low))
+    duration, v = k.between(40.0, 80.0), k.between(40.0, 80.0) * KMH
+    lanes = tuple(
+        Lane(t, t + k.between(5.0, 12.0), surface=left, surface_right=right)
+        for t in (k.between(10.0, 14.0), k.between(27.0, 30.0))
+    )
+    scenario = k.drive(duration, k.cruise(duration, v), lanes=lanes)
+    return Taken(scenario, NONE, f"{_told(low)} {'left' if left is low else 'right'}, {v / KMH:.0f} km/h")
+
+
+def _braking(k: Sketch, surface: Surface, mu: float, *, demand: float, antilock: bool) -> Taken:
+    """Two stops, or nearly; the driver asks for `demand` of what the friction holds."""
+    v, low = k.between(70.0, 110.0) * KMH if mu > 0.5 else k.between(50.0, 80.0) * KMH, 10.0 * KMH
+    a = min(demand, 0.85) * mu * G
+    seconds = (v - low) / a
+    torque = demand * mu * k.vehicle.mass * G * k.vehicle.r_l_f
+    start, points, brake, t = k.between(8.0, 15.0), [(0.0, v)], [(0.0, 0.0)], 0.0
+    for t_0 in (start, start + seconds + 25.0):
+        t = t_0 + seconds
+        points += [(t_0, v), (t, low), (t + 2.0, low), (t + 2.0 + (v - low) / min(2.0, 0.4 * mu * G), v)]
+        brake += [(t_0, 0.0), (t_0 + 0.2, torque), (t, torque), (t + 0.2, 0.0)]
+        if points[-1][0] > start + seconds + 25.0:
+            break  # on a slippery road it takes long to be fast again: one stop
+    scenario = k.drive(
+        max(points[-1][0], t) + 5.0, tuple(points), brake_torque=tuple(brake), antilock=antilock,
+        lanes=() if surface.name == "asphalt" else (Lane(0.0, 1e5, in_metres=True, surface=surface),),
+    )  # fmt: skip
+    return Taken(scenario, NONE, f"{_told(surface)}, from {v / KMH:.0f} km/h")
+
+
+def _abs_dry(k: Sketch) -> Taken:
+    return _braking(k, k.surface("asphalt"), 1.0, demand=1.3, antilock=True)
+
+
+def _abs_damp(k: Sketch) -> Taken:
+    surface = k.surface("damp", k.pool.damp)
+    return _braking(k, surface, surface.mu or 1.0, demand=1.35, antilock=True)
+
+
+def _abs_snow(k: Sketch) -> Taken:
+    surface = k.surface("snow", k.pool.snow)
+    return _braking(k, surface, surface.mu or 0.3, demand=1.6, antilock=True)
+
+
+def _hard_braking(k: Sketch) -> Taken:
+    return _braking(k, k.surface("asphalt"), 1.0, demand=k.between(0.5, 0.75), antilock=False)
+
+
+def _hard_acceleration(k: Sketch) -> Taken:
+    a, v_0, v_1 = k.between(2.5, 4.0), k.between(15.0, 40.0) * KMH, k.between(90.0, 130.0) * KMH
+    t, t_1 = k.between(5.0, 10.0), (v_1 - v_0) / k.between(2.5, 4.0)
+    speed: Profile = ((0.0, v_0), (t, v_0), (t + t_1, v_1), (t + t_1 + 10.0, v_1), (t + t_1 + 25.0, v_0 + 5.0))
+    speed += ((t + t_1 + 30.0, v_0 + 5.0), (t + t_1 + 35.0, min(v_0 + 5.0 + 5.0 * a, v_1)))
+    return Taken(k.drive(speed[-1][0] + 5.0, speed), NONE, f"{a:.1f} m/s^2")
+
+
+def _gear_shifts(k: Sketch) -> Taken:
+    """Torque that breaks off and comes back a little too high, three to six times, reported late."""
+    n, share, t = int(k.rng.integers(3, 7)), [(0.0, 1.0)], k.between(6.0, 10.0)
+    for _ in range(n):
+        gap, over = k.between(0.2, 0.6), k.between(1.05, 1.3)
+        share += [(t, 1.0), (t + 0.08, 0.0), (t + gap, 0.0), (t + gap + 0.15, over), (t + gap + 0.5, 1.0)]
+        t += k.between(3.0, 7.0)
+    v_0, a = k.between(20.0, 40.0) * KMH, k.between(0.8, 2.0)
+    v_1 = min(v_0 + a * (t - 5.0), 140.0 * KMH)
+    speed: Profile = ((0.0, v_0), (4.0, v_0), (4.0 + (v_1 - v_0) / a, v_1))
+    sensors = lagging_torque(ESC, k.between(0.05, 0.15))
+    scenario = k.drive(t + 10.0, speed, drive_share=tuple(share), sensors=sensors)
+    return Taken(scenario, NONE, f"{n} shifts, {a:.1f} m/s^2")
+
+
+def _cornering(k: Sketch) -> Taken:
+    v, a_y = k.between(50.0, 90.0) * KMH, k.between(0.7, 0.9) * G
+    steering = Steering(1.1 * slalom_angle(k.vehicle, k.tyre, v, a_y), k.between(10.0, 16.0), k.between(4.0, 8.0))
+    scenario = k.drive(k.between(40.0, 60.0), ((0.0, v),), steering=steering)
+    return Taken(scenario, NONE, f"{a_y / G:.2f} g at {v / KMH:.0f} km/h")
+
+
+def _stop_and_go(k: Sketch) -> Taken:
+    points, t = [(0.0, 30.0 * KMH), (5.0, 30.0 * KMH)], 5.0
+    while t < 80.0:
+        v = k.between(15.0, 50.0) * KMH
+        down, stand, up = points[-1][1] / k.between(0.8, 2.0), k.between(2.0, 8.0), v / k.between(0.8, 1.8)
+        points += [(t + down, 0.0), (t + down + stand, 0.0), (t + down + stand + up, v)]
+        t = points[-1][0] + k.between(2.0, 8.0)
+        points.append((t, v))
+    return Taken(k.drive(t + 3.0, tuple(points)), NONE, "")
+
+
+def _standstill(k: Sketch) -> Taken:
+    """Waiting, a short way, waiting."""
+    wait, v = k.between(10.0, 20.0), k.between(20.0, 40.0) * KMH
+    points = ((0.0, 0.0), (wait, 0.0), (wait + v, v), (wait + v + 8.0, v), (wait + 2.0 * v + 8.0, 0.0))
+    return Taken(k.drive(points[-1][0] + wait, points, grade=()), NONE, "")
+
+
+def _roof_box(k: Sketch) -> Taken:
+    """Four passengers and a box on the roof; the vehicle file knows of neither."""
+    taken = _cruise(k, 80.0, 130.0)
+    people = k.between(220.0, 330.0)
+    box = {"delta_drag_area": k.between(0.1, 0.25)}
+    scenario = replace(taken.scenario, load_front=0.45 * people, load_rear=0.55 * people)
+    return Taken(scenario, terms(("aero_drag", box, None)), f"{taken.note}, {people:.0f} kg")
+
+
+def _trailer(k: Sketch) -> Taken:
+    taken = _cruise(k, 70.0, 100.0, spread=0.12)
+    mass = k.between(500.0, 1200.0)
+    model = terms(("trailer", {"mass": mass, "delta_drag_area": k.between(0.5, 1.5)}, None))
+    return Taken(replace(taken.scenario, load_rear=60.0), model, f"{taken.note}, {mass:.0f} kg in tow")
+
+
+MAKERS = {
+    "dry_cruise": ("dry country road", _dry),
+    "motorway": ("dry motorway in the turbulence of others", _motorway),
+    "hilly": ("grades of up to 8 %", _hilly),
+    "head_wind": ("a head wind of 10 m/s", _head_wind),
+    "damp": ("a damp road without a layer of water", _damp),
+    "snow_entry": ("onto snow at speed", _snow_entry),
+    "snow": ("snow from the start", _snow),
+    "deep_snow": ("deep snow", _deep_snow),
+    "ice": ("dry ice", _ice),
+    "wet_ice": ("wet ice", _wet_ice),
+    "gravel": ("gravel", _gravel),
+    "rough_asphalt": ("broken asphalt", _rough),
+    "split_friction": ("snow or ice under one side", _split),
+    "abs_dry": ("antilock braking on dry asphalt", _abs_dry),
+    "abs_damp": ("antilock braking on a damp road", _abs_damp),
+    "abs_snow": ("antilock braking on snow", _abs_snow),
+    "hard_braking": ("hard braking without an antilock system, wheels not locked", _hard_braking),
+    "hard_acceleration": ("hard acceleration", _hard_acceleration),
+    "gear_shifts": ("gear shifts, torque reported late", _gear_shifts),
+    "cornering_limit": ("0.7 to 0.9 g to the side", _cornering),
+    "stop_and_go": ("stop and go", _stop_and_go),
+    "standstill": ("standstill, a short way, standstill", _standstill),
+    "roof_box": ("roof box and four passengers, unknown to the vehicle file", _roof_box),
+    "trailer": ("a trailer, unknown to the vehicle file", _trailer),
+}

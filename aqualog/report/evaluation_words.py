@@ -1,0 +1,191 @@
+"""What an evaluation says, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from aqualog.evaluate.compare import TARGETS, Better, better_rivals, coverage, situation_scores
+from aqualog.evaluate.match import LIMITS_S
+from aqualog.evaluate.records import RunRecord
+from aqualog.evaluate.roc import JOINT
+from aqualog.evaluate.run import Evaluation, Tuning
+from aqualog.evaluate.score import HOUR_S, Rate, Recall, Score, score_all
+from aqualog.rivals.catalogue import RIVALS
+
+__all__ = [
+    "better_sentences", "coverage_sentences", "headline", "notes_of", "percent", "rate_text", "recall_text",
+    "seconds_text", "short", "title_of", "tuning_sentences", "verdicts",
+]  # fmt: skip
+
+_MEASURES = {
+    "full": "of full aquaplaning found",
+    "partial": "of partial aquaplaning found",
+    "false alarms": "false alarms per hour",
+}
+
+
+def title_of(detector: str) -> str:
+    """`spin_down` -> `spin-down`; a rival with its reference."""
+    if detector in RIVALS:
+        return f"{RIVALS[detector].title} {RIVALS[detector].reference}"
+    return detector.replace("_", " ")
+
+
+def recall_text(r: Recall) -> str:
+    """`12/13 (92 %)`; a dash without episodes."""
+    return f"{r.found}/{r.episodes} ({percent(r.share)})" if r.episodes else "-"
+
+
+def percent(share: float) -> str:
+    """A share in per cent; one decimal where it matters."""
+    if math.isnan(share):
+        return "-"
+    text = f"{100.0 * share:.1f}" if share > 0.9 and share < 1.0 else f"{100.0 * share:.0f}"
+    return f"{text} %"
+
+
+def rate_text(rate: Rate) -> str:
+    """`0.4 (0.1 ... 1.4)` per hour, a dash without time."""
+    if not rate.seconds > 0.0:
+        return "-"
+    low, high = rate.per_hour_ci95
+    return f"{short(rate.per_hour)} ({short(low)} ... {short(high)})"
+
+
+def short(x: float) -> str:
+    """Two significant digits, never as a power of ten."""
+    if math.isnan(x):
+        return "-"
+    return f"{x:.0f}" if abs(x) >= 10.0 else f"{x:.2g}"
+
+
+def notes_of(records: Sequence[RunRecord]) -> list[str]:
+    """Notes of all drives; one that several share is told once, with their number."""
+    drives: dict[str, list[str]] = {}
+    for r in records:
+        for text in r.notes:
+            drives.setdefault(text, []).append(r.name)
+    return [f"{names[0] if len(names) == 1 else f'{len(names)} drives'}: {text}" for text, names in drives.items()]
+
+
+def seconds_text(x: float) -> str:
+    """A latency: `0.12`; `never` where more episodes are missed than the quantile allows."""
+    if math.isnan(x):
+        return "-"
+    return "never" if math.isinf(x) else f"{x:.2f}"
+
+
+def headline(evaluation: Evaluation) -> str:
+    """The verdict in one sentence: the best joint detector, else the best of all."""
+    scores = score_all(evaluation.records)
+    ran = {n: s for n, s in scores.items() if s.runs}
+    joint = [ran[n] for n in JOINT if n in ran]
+    if not ran:
+        return "No detector could run."
+    best = max(joint or list(ran.values()), key=_merit)
+    return f"{title_of(best.detector)[:1].upper()}{title_of(best.detector)[1:]} {_did(best)}."
+
+
+def verdicts(records: Sequence[RunRecord]) -> list[str]:
+    """A sentence for each joint detector: what it did, beside what is asked for."""
+    scores = score_all(records)
+    out = []
+    for name in JOINT:
+        s = scores.get(name)
+        if s is None or not s.runs:
+            continue
+        lacks = [
+            f"{effect} {percent(r.share)} of {percent(TARGETS[effect])}"
+            for effect, r in (("full", s.full), ("partial", s.partial))
+            if r.episodes and r.share < TARGETS[effect]
+        ]
+        if s.false_alarms.seconds > 0.0 and s.false_alarms.per_hour > TARGETS["per_hour"]:
+            lacks.append(f"{s.false_alarms.per_hour:.3g} false alarms per hour, asked for {TARGETS['per_hour']:g}")
+        end = "; all that is asked for, as far as these drives can tell"
+        if lacks:
+            end = f"; short of what is asked for: {', '.join(lacks)}"
+        out.append(f"{title_of(name)} {_did(s)}{end}.")
+    return out
+
+
+def _did(s: Score) -> str:
+    parts = [
+        f"found {recall_text(r)} of {effect} aquaplaning within {LIMITS_S[effect]:g} s"
+        for effect, r in (("full", s.full), ("partial", s.partial))
+        if r.episodes
+    ]
+    hours = s.false_alarms.seconds / HOUR_S
+    parts.append(f"raised {s.false_alarms.count} false alarms in {hours:.3g} h outside water")
+    return ", ".join(parts)
+
+
+def _merit(s: Score) -> tuple[int, float, float]:
+    """What is asked for and met, then recall, then silence."""
+    shares = {effect: r.share for effect, r in (("full", s.full), ("partial", s.partial)) if r.episodes}
+    met = sum(share >= TARGETS[effect] for effect, share in shares.items())
+    met += s.false_alarms.per_hour <= TARGETS["per_hour"]
+    return met, (sum(shares.values()) / len(shares) if shares else 0.0), -s.false_alarms.count
+
+
+def coverage_sentences(records: Sequence[RunRecord]) -> list[str]:
+    """In how many situations each detector does what is asked for (C78)."""
+    return [
+        f"{title_of(c.detector)}: finds {percent(TARGETS['partial'])} of partial aquaplaning in {c.found} of "
+        f"{c.of_aquaplaning} situations, quiet in {c.quiet} of {c.of_dry}"
+        for c in coverage(situation_scores(records)).values()
+        if c.of_aquaplaning or c.of_dry
+    ]
+
+
+def better_sentences(records: Sequence[RunRecord]) -> list[str]:
+    """Where a rival is better than the thesis' method, or that it is nowhere; empty without rivals."""
+    if not any(n in RIVALS for r in records for n in r.detectors):
+        return []
+    found = better_rivals(records)
+    if not found:
+        return ["No rival is better than a method of the thesis that ran beside it on the same drives."]
+    groups: dict[tuple[str, str, str], list[Better]] = {}
+    for b in found:
+        groups.setdefault((b.rival, b.against, b.situation), []).append(b)
+    return [_better(key, some) for key, some in groups.items()]
+
+
+def _better(key: tuple[str, str, str], some: Sequence[Better]) -> str:
+    rival, against, situation = key
+    where = f" in {situation}" if situation else " over all drives"
+    things = [
+        f"{_value(b, b.rival_value)} against {_value(b, b.own_value)} {_MEASURES[b.measure]}{_sure(b)}" for b in some
+    ]
+    price = ", but is worse in another measure" if some[0].at_a_price else ""
+    return f"{title_of(rival)} is better than {title_of(against)}{where}: {'; '.join(things)}{price}."
+
+
+def _value(b: Better, x: float) -> str:
+    return short(x) if b.measure == "false alarms" else percent(x)
+
+
+def _sure(b: Better) -> str:
+    return "" if b.is_sure else " (within chance)"
+
+
+def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping[str, Score]) -> list[str]:
+    """What was tuned on what, and what each proposal does on the drives that it has not seen."""
+    lines = [
+        f"thresholds proposed on {len(tuning.tuned_on)} drives, reported on {len(tuning.reported_on)} others"
+        f"{f', {len(tuning.unused)} unused' if tuning.unused else ''}: {tuning.rule}"
+    ]
+    for name, choice in tuning.choices.items():
+        p = choice.point
+        old, new = before.get(name), after.get(name)
+        told = ""
+        if old is not None and new is not None:
+            told = (
+                f"; on the others partial {recall_text(old.partial)} -> {recall_text(new.partial)}, false alarms "
+                f"{old.false_alarms.count} -> {new.false_alarms.count}"
+            )
+        lines.append(
+            f"{title_of(name)}: {p.threshold:.4g} ({p.factor:.2g} times), {choice.reason} "
+            f"({p.false_alarms.count} in {p.false_alarms.seconds / HOUR_S:.3g} h){told}"
+        )
+    return lines

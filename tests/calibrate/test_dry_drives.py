@@ -1,0 +1,168 @@
+"""Calibration on simulated dry drives."""
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from calibrate.dry_drives import believed, campaign, car, one_drive, truth
+
+from aqualog.calibrate.design import prepare
+from aqualog.calibrate.lag import earlier, lag_between
+from aqualog.calibrate.offset import energy_offset
+from aqualog.calibrate.run import calibrate
+from aqualog.config.vehicle import load_vehicle
+from aqualog.config.vehicle_edit import calibrated_toml
+from aqualog.errors import FitError, SignalError
+from aqualog.model.sensors import ESC, IDEAL
+from aqualog.types import Quality, Signals
+from aqualog.vehicle import Vehicle
+
+
+@pytest.fixture(scope="module")
+def ideal():
+    rng = np.random.default_rng(31)
+    true, _ = car(rng)
+    return true, one_drive(true, 1.0, rng, seconds=300.0, wind=0.0, sensors=IDEAL)
+
+
+@pytest.fixture(scope="module")
+def series():
+    signals, true, gain = campaign(32, 2, seconds=300.0)
+    return signals, true, gain, calibrate(signals, ["a", "b"], believed(true))
+
+
+def test_perfect_sensors_give_the_truth(ideal):
+    true, signals = ideal
+    known = truth(true, 1.0, signals)
+    result = calibrate([signals], ["drive"], believed(true), {"torque_gain": 1.0})
+    for name, limit in (
+        ("mass", 2e-3), ("drag_area", 5e-3), ("r_e_f", 2e-4), ("r_e_r", 2e-4), ("r_e_ratio", 1.5e-4),
+        ("rolling_resistance", 0.15),
+    ):  # fmt: skip
+        assert result.get(name).value == pytest.approx(known[name], rel=limit), name
+
+
+def test_series_sensors_within_the_intervals(series):
+    signals, true, gain, result = series
+    known = truth(true, gain, signals[0])
+    for name in ("mass_per_gain", "mass", "drag_area", "rolling_resistance", "r_e_f", "r_e_r", "r_e_ratio"):
+        p = result.get(name)
+        half = 0.5 * (p.ci95[1] - p.ci95[0])
+        assert abs(p.value - known[name]) < 1.6 * half, name  # two of three would be luck, none far off is not
+    assert not result.get("torque_gain").identified
+    assert any("one ratio" in s for s in result.cannot_tell)
+
+
+def test_a_weighed_car_tells_the_torque_gain(series):
+    signals, true, gain, _ = series
+    result = calibrate(signals, ["a", "b"], believed(true), {"mass": true.mass})
+    assert result.get("torque_gain").value == pytest.approx(1.0 / gain, rel=0.01)
+    assert result.get("torque_gain").identified
+    assert result.get("mass").ci95 == (true.mass, true.mass)
+    assert any("multiply the scale of the torques" in n for n in result.notes) == (abs(1.0 / gain - 1.0) > 0.005)
+
+
+def test_hills_do_not_matter_to_mass():
+    """The accelerometer's specific force has no grade in it (E2)."""
+    rng = np.random.default_rng(33)
+    true, _ = car(rng)
+    seeds = np.random.default_rng(5), np.random.default_rng(5)
+    flat, hilly = (
+        one_drive(true, 1.0, r, seconds=360.0, wind=0.0, grade=g, sensors=IDEAL)
+        for r, g in zip(seeds, (0.0, 3.0), strict=True)
+    )
+    masses = [calibrate([s], ["x"], believed(true)).get("mass_per_gain").value for s in (flat, hilly)]
+    assert masses[0] == pytest.approx(true.mass, rel=2e-3)
+    assert masses[1] == pytest.approx(true.mass, rel=2e-3)
+
+
+def test_offset_from_the_energy_balance(ideal):
+    true, signals = ideal
+    plain = energy_offset(prepare(signals, believed(true), "x"))
+    moved = replace(signals, frame=signals.frame.with_columns(pl.col("a_x") - 0.2))
+    offset = energy_offset(prepare(moved, believed(true), "x"))
+    assert offset.value - plain.value == pytest.approx(-0.2, abs=1e-3)
+    assert abs(plain.value) < 3.0 * plain.sd
+    t = signals.array("t")
+    climbing = replace(signals, frame=signals.frame.with_columns(pl.col("altitude") + pl.Series(100.0 * t / t[-1])))
+    higher = energy_offset(prepare(climbing, believed(true), "x"))
+    assert higher.value - plain.value == pytest.approx(-9.81 * 100.0 / plain.way, rel=0.02)
+    blind = energy_offset(prepare(replace(signals, frame=signals.frame.drop("altitude")), believed(true), "x"))
+    assert blind.sd > 2.0 * plain.sd
+
+
+def test_lags_are_found_and_taken_out(ideal):
+    _, signals = ideal
+    a = signals.array("a_x")
+    dt = signals.dt
+    late = np.concatenate([np.full(10, np.nan), a[:-10]])
+    assert lag_between(late, a, dt) == pytest.approx(10 * dt, abs=0.003)
+    assert lag_between(a, late, dt) == pytest.approx(-10 * dt, abs=0.003)
+    np.testing.assert_allclose(earlier(late, 10 * dt, dt)[20:-20], a[20:-20], atol=1e-9)
+    assert lag_between(np.random.default_rng(1).normal(size=a.size), a, dt) == 0.0
+
+
+def test_late_torque_does_not_bias_mass(ideal):
+    true, signals = ideal
+    wheels = [f"torque_{w}" for w in ("fl", "fr", "rl", "rr")]
+    late = replace(signals, frame=signals.frame.with_columns(pl.col(w).shift(15) for w in wheels))
+    result = calibrate([late], ["x"], believed(true))
+    assert result.get("mass_per_gain").value == pytest.approx(true.mass, rel=4e-3)
+    assert result.drives[0].torque_lag_s == pytest.approx(0.3, abs=0.02)
+
+
+def test_without_velocity_the_ratio_of_the_radii_remains(series):
+    signals, true, gain, _ = series
+    blind = [replace(s, frame=s.frame.drop("v_x")) for s in signals]
+    result = calibrate(blind, ["a", "b"], believed(true))
+    assert result.get("r_e_ratio").value == pytest.approx(truth(true, gain, signals[0])["r_e_ratio"], rel=3e-4)
+    assert not result.get("r_e_f").identified
+    assert any("ratio of the radii only" in s for s in result.cannot_tell)
+    assert result.get("mass_per_gain").value == pytest.approx(true.mass * gain, rel=0.02)
+
+
+def test_braked_and_wet_driving_is_left_out(ideal):
+    true, signals = ideal
+    plain = prepare(signals, believed(true), "x")
+    wet = replace(signals, frame=signals.frame.with_columns(pl.lit(1.0).alias("on_water")))
+    assert plain.left_out["braking"] > 5.0
+    assert plain.windows.v.size > 60
+    assert prepare(wet, believed(true), "x").windows.v.size == 0
+    with pytest.raises(FitError, match="wet"):
+        calibrate([wet], ["x"], believed(true))
+
+
+def test_missing_signals_are_named():
+    frame = pl.DataFrame({"t": np.arange(100) * 0.01, "v_x": np.full(100, 20.0)})
+    with pytest.raises(SignalError, match=r"a_x, torque_rl, torque_rr"):
+        calibrate([Signals(frame, 10**7, None, {}, Quality(), ("x",))], ["x"], Vehicle())
+
+
+def test_vehicle_file_holds_values_and_intervals(series, tmp_path):
+    _, true, _, result = series
+    path = tmp_path / "car.toml"
+    path.write_text(calibrated_toml(believed(true), result), encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    loaded = load_vehicle(path)
+    assert loaded.mass == result.get("mass").value
+    assert loaded.r_e_f == result.get("r_e_f").value
+    assert loaded.r_l_f == believed(true).r_l_f
+    assert "h_cg" not in loaded.given
+    assert "# h_cg = " in text
+    low, high = result.get("mass").ci95
+    assert f"95 %: {low:.5g} ... {high:.5g}" in text
+    assert "# - torque_gain: mass and torque gain are one ratio" in text
+
+
+def test_between_drives_the_heavy_one_stands_out():
+    """Four drives, the last with 200 kg more: its own mass against the others tells it."""
+    rng = np.random.default_rng(34)
+    true, gain = car(rng)
+    heavy = replace(true, mass=true.mass + 200.0)
+    signals = [one_drive(c, gain, rng, seconds=320.0, sensors=ESC) for c in (true, true, true, heavy)]
+    result = calibrate(signals, list("abcd"), believed(true), {"torque_gain": 1.0 / gain})
+    difference, low, high = result.drives[3].against_others
+    assert low < 200.0 < high
+    assert difference == pytest.approx(200.0, abs=30.0)
+    assert low > 0.0

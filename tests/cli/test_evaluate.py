@@ -1,0 +1,175 @@
+"""`aqualog evaluate` as a user calls it."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from evaluate.made import write_campaign
+
+CODE = """
+import typer
+from aqualog.cli.evaluate import evaluate
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+app.command()(evaluate)
+app(prog_name="aqualog evaluate")
+"""
+
+
+def run(*args):
+    return subprocess.run(
+        [sys.executable, "-c", CODE, *map(str, args)], capture_output=True, text=True, check=False,
+        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
+    )  # fmt: skip
+
+
+def errors(result):
+    assert "Traceback" not in result.stderr
+    return [line for line in result.stderr.splitlines() if line.startswith("error:")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("evaluate")
+    write_campaign(path)
+    (path / "dry.csv.labels").write_text("start_s,end_s,effect,wheel\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(folder):
+    page = folder / "page.html"
+    return run(folder / "campaign.toml", "--by", "tyre", "--rivals", "--roc", "--json", "-o", page), page
+
+
+def test_a_broken_log_is_told_and_the_others_are_evaluated(whole):
+    result, _ = whole
+    assert result.returncode == 3, result.stderr
+    lines = errors(result)
+    assert len(lines) == 1
+    assert "broken.mf4" in lines[0]
+
+
+def test_json_is_one_document(whole):
+    document = json.loads(whole[0].stdout, parse_constant=lambda c: pytest.fail(c))
+    assert document["drives"]["evaluated"] == 4
+    assert list(document["drives"]["failed"]) == ["broken.mf4"]
+    joint = document["detectors"]["joint_criteria"]
+    assert joint["full"]["episodes"] == 1
+    assert joint["full"]["found"] == 1
+    assert joint["full"]["latency_median_s"] < 0.5
+    assert joint["false_alarms"]["count"] == 0
+    assert joint["false_alarms"]["hours"] * 3600 == pytest.approx(4 * 12.0 - 3 * (3.5 + 1.0), abs=0.5)
+    assert [b["groups"]["tyre"] for b in document["by"]] == ["new_winter", "worn_summer"]
+    assert sum(b["detectors"]["joint_criteria"]["drives"] for b in document["by"]) == 4
+    assert {"full", "partial", "water only", "none"} <= set(document["confusion"])
+    assert set(document["situations"]) == {"lane", "dry road"}
+    assert {p["detector"] for p in document["roc"]} >= {"spin_down", "joint_cusum", "wheel_thresholds"}
+    assert document["rivals"] == {}
+    assert document["tuning"] is None
+    assert [r["name"] for r in document["runs"]] == ["deep.mf4", "dry.csv", "deep2.parquet", "slow.mcap"]
+
+
+def test_page_needs_no_network(whole):
+    text = whole[1].read_text(encoding="utf-8")
+    assert text.count("<script") == 3
+    assert "http-equiv" in text
+    assert "src=" not in text.split("<script>")[0]
+    head = text[: text.index('<script type="application/json"')]
+    assert "short drives" in head
+    assert head.index('class="headline"') < head.index('id="detectors"') < head.index('id="confusion"')
+    assert "of full aquaplaning within 0.5 s" in head
+    assert "broken.mf4" in head
+    assert "rival" in head
+    figures = json.loads(text.split('id="figure-data">')[1].split("</script>")[0])
+    assert set(figures) == {
+        "recall-matrix",
+        "alarm-matrix",
+        "roc-full",
+        "roc-partial",
+        "latency-full",
+        "latency-partial",
+    }
+    assert figures["alarm-matrix"]["data"][0]["y"] == ["lane", "dry road"]
+
+
+def test_tuning_writes_thresholds_that_can_be_used(folder):
+    target = folder / "tuned.toml"
+    result = run(folder / "campaign.toml", "--tune", target, "--json")
+    assert result.returncode == 3, result.stderr
+    tuning = json.loads(result.stdout)["tuning"]
+    assert not set(tuning["tuned_on"]) & set(tuning["reported_on"])
+    assert {r["name"] for r in json.loads(result.stdout)["runs"]} == set(tuning["reported_on"])
+    assert "no vehicle and no tyre is in both parts" in tuning["rule"]
+    assert "[thresholds]" in target.read_text()
+    again = run(folder / "campaign.toml", "--tune", target)
+    assert again.returncode == 2
+    assert "--force" in errors(again)[0]
+    used = run(folder / "campaign.toml", "--thresholds", target, "--json")
+    assert used.returncode == 3
+    assert json.loads(used.stdout)["thresholds"] == json.loads(result.stdout)["thresholds"]
+
+
+def test_logs_with_a_labels_file(folder):
+    labels = folder / "labels.csv"
+    labels.write_text("start_s,end_s,effect,wheel\n5.0,9.0,water,\n5.2,8.5,full,fl\n10,11,puddle of mud,\n")
+    result = run(folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels, "-v")
+    assert result.returncode == 0, result.stderr
+    assert "puddle of mud serve the confusion table only" in result.stderr
+    row = next(line for line in result.stdout.splitlines() if line.startswith("spin_down"))
+    assert "1/1 (100 %)" in row
+    shifted = folder / "shifted.csv"
+    shifted.write_text("start_s,end_s,effect,wheel\n10.5,11.5,full,fl\n")
+    missed = run(folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", shifted, "--json")
+    joint = json.loads(missed.stdout)["detectors"]["joint_criteria"]
+    assert joint["full"]["found"] == 0
+    assert joint["false_alarms"]["count"] >= 1
+
+
+def test_logs_without_water_share_an_empty_labels_file(folder):
+    result = run(
+        folder / "dry.csv",
+        folder / "slow.mcap",
+        "--vehicle",
+        folder / "rwd.toml",
+        "--labels",
+        folder / "dry.csv.labels",
+        "--json",
+    )
+    assert result.returncode == 0, result.stderr
+    rate = json.loads(result.stdout)["detectors"]["joint_criteria"]["false_alarms"]
+    assert rate["hours"] * 3600 == pytest.approx(24.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "text"),
+    [
+        (("dry.csv",), 2, "--vehicle"),
+        (("campaign.toml", "dry.csv"), 2, "stands among other inputs"),
+        (("campaign.toml", "--vehicle", "rwd.toml"), 2, "beside a campaign"),
+        (("campaign.toml", "--by", "tire"), 2, 'did you mean "tyre"'),
+        (("gone.toml",), 2, "not found"),
+        (("dry.csv", "deep.mf4", "--vehicle", "rwd.toml", "--labels", "one.csv"), 2, "one labels file for 2 logs"),
+        (("broken.mf4", "--vehicle", "rwd.toml"), 4, "broken.mf4"),
+        (("campaign.toml", "-o", "runs.csv"), 2, "exists already"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(folder, args, code, text):
+    (folder / "one.csv").write_text("start_s,end_s,effect,wheel\n1,2,water,\n")
+    result = run(*(folder / a if "." in a else a for a in args))
+    assert result.returncode == code, result.stderr
+    lines = errors(result)
+    assert len(lines) == 1
+    assert text in lines[0]
+    assert result.stdout == ""
+
+
+def test_help_loads_nothing_heavy():
+    code = CODE.replace(
+        'app(prog_name="aqualog evaluate")',
+        "import sys\ntry:\n    app(['--help'])\nexcept SystemExit:\n    print('LOADED', *sys.modules)",
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "aqualog evaluate campaign.toml --tune thresholds.toml" in out
+    assert not {"numpy", "polars", "numba", "plotly", "jinja2"} & set(out.split("LOADED")[-1].split())

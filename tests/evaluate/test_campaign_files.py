@@ -1,0 +1,190 @@
+"""Campaign and labels files: what they say, and all that is wrong with them at once."""
+
+from pathlib import Path
+
+import pytest
+
+from aqualog.config.campaign import group_keys, load_campaign
+from aqualog.config.labels import load_labels
+from aqualog.errors import ConfigError
+from aqualog.evaluate.labels import Label
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "car.toml").write_text('name = "car"\n')
+    (tmp_path / "other.toml").write_text('name = "other"\n')
+    (tmp_path / "map.toml").write_text("[signals]\n")
+    (tmp_path / "lane.csv").write_text("start_s,end_s,effect,wheel\n")
+    return tmp_path
+
+
+def written(folder, text, runs=None):
+    path = folder / "campaign.toml"
+    path.write_text(text, encoding="utf-8")
+    if runs is not None:
+        (folder / "runs.csv").write_text(runs, encoding="utf-8")
+    return path
+
+
+HEAD = 'name = "wet lane"\nvehicle = "car.toml"\nsignals = "map.toml"\n'
+
+
+def test_tables_and_a_csv_say_the_same(folder):
+    tables = load_campaign(written(folder, HEAD + """
+[[run]]
+log = "logs/a.mf4"
+tyre = "summer"
+wear = "worn"
+tread_depth_mm = 3
+pressure_rear_bar = 1.9
+water_depth_mm = 1.3
+lane_start_s = 4.0
+lane_end_s = 9.5
+x_driver = "A"
+[[run]]
+log = "logs/b.mf4"
+vehicle = "other.toml"
+labels = "lane.csv"
+"""))  # fmt: skip
+    csv = load_campaign(written(folder, HEAD + 'runs = "runs.csv"\n', """\
+log,tyre,wear,tread_depth_mm,pressure_rear_bar,water_depth_mm,lane_start_s,lane_end_s,x_driver,vehicle,labels
+logs/a.mf4,summer,worn,3,1.9,1.3,4.0,9.5,A,,
+
+logs/b.mf4,,,,,,,,,other.toml,lane.csv
+"""))  # fmt: skip
+    assert tables == csv
+    first, second = tables.runs
+    assert tables.name == "wet lane"
+    assert tables.signals == folder / "map.toml"
+    assert (first.logs, first.vehicle, first.labels) == ((folder / "logs/a.mf4",), folder / "car.toml", None)
+    assert first.lane == (4.0, 9.5)
+    assert first.values["tread_depth_mm"] == 3.0
+    assert first.groups["x_driver"] == "A"
+    assert first.groups["water_depth_mm"] == "1.3"
+    assert (second.vehicle, second.labels, second.lane) == (folder / "other.toml", folder / "lane.csv", None)
+
+
+def test_a_drive_of_several_files(folder):
+    tables = load_campaign(written(folder, HEAD + '[[run]]\nlog = ["a.csv", "b.csv"]\n'))
+    csv = load_campaign(written(folder, HEAD + 'runs = "runs.csv"\n', "log\na.csv; b.csv\n"))
+    assert tables.runs[0].logs == csv.runs[0].logs == (folder / "a.csv", folder / "b.csv")
+    assert "names no log" in faults(written(folder, HEAD + '[[run]]\nlog = ["a.csv", 3]\n'))
+
+
+def faults(path):
+    with pytest.raises(ConfigError) as caught:
+        load_campaign(path)
+    return str(caught.value)
+
+
+def test_all_faults_of_the_tables_are_named_at_once(folder):
+    text = faults(written(folder, """\
+name = "x"
+vehicel = "car.toml"
+[[run]]
+log = "a.mf4"
+vehicle = "missing.toml"
+tire = "summer"
+tread_depth_mm = "deep"
+[[run]]
+log = "b.mf4"
+vehicle = "car.toml"
+wear = "used"
+pressure_front_bar = 230
+lane_start_s = 4.0
+[[run]]
+vehicle = "car.toml"
+lane_start_s = 4.0
+lane_end_s = 2.0
+labels = "none.csv"
+"""))  # fmt: skip
+    for part in (
+        'line 2: unknown key "vehicel" (did you mean "vehicle"?)', "line 5: vehicle = 'missing.toml'",
+        'line 6: unknown key "tire" (did you mean "tyre"?)', "line 7: tread_depth_mm = deep is not a number",
+        "line 11: wear = 'used'", "line 12: pressure_front_bar = 230 is outside 0.2 ... 20 bar",
+        "line 13: lane_start_s and lane_end_s go together", "a run names no log", "line 18: labels = 'none.csv'",
+    ):  # fmt: skip
+        assert part in text, text
+    assert text.count("campaign.toml") == 1
+
+
+def test_all_faults_of_the_csv_are_named_with_those_of_the_file(folder):
+    text = faults(written(folder, 'nam = "x"\nruns = "runs.csv"\nvehicle = "gone.toml"\n', """\
+log,tyer,water_depth_mm,x_free
+a.mf4,s,thick,1
+,s,1,1
+b.mf4,s,1
+c.mf4,s,999,1
+"""))  # fmt: skip
+    for part in (
+        'unknown key "nam"', "vehicle = 'gone.toml'", "runs.csv", 'line 1: unknown column "tyer" (did you mean "tyre"?)',
+        "line 2: water_depth_mm = 'thick' is not a number", "line 3: a run names no log", "line 4: 3 cells",
+        "line 5: water_depth_mm = 999 is outside",
+    ):  # fmt: skip
+        assert part in text, text
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ('vehicle = "car.toml"\n', "no runs"),
+        ('vehicle = "car.toml"\nruns = "runs.csv"\n[[run]]\nlog = "a"\n', "both [[run]] and runs"),
+        ('vehicle = "car.toml"\nruns = 3\n', "runs = '3' is not a text"),
+        ('vehicle = "car.toml"\nrun = 3\n', "run is not a list"),
+        ('[[run]]\nlog = "a.mf4"\n', "no vehicle"),
+        ('vehicle = "car.toml"\nruns = "empty.csv"\n', "no run in it"),
+        ('vehicle = "car.toml"\nruns = "gone.csv"\n', "gone.csv: table of runs not found"),
+        ("run = [\n", "not valid TOML"),
+    ],
+)
+def test_what_is_no_campaign_is_told(folder, text, part):
+    (folder / "empty.csv").write_text("log,tyre\n\n")
+    assert part in faults(written(folder, text))
+
+
+def test_many_faults_are_counted(folder):
+    rows = "".join(f"a{i}.mf4,thick\n" for i in range(50))
+    text = faults(written(folder, HEAD + 'runs = "runs.csv"\n', "log,water_depth_mm\n" + rows))
+    assert text.count("is not a number") == 20
+    assert "and 30 more" in text
+
+
+def test_group_names():
+    known = ("tyre", "water_depth_mm", "pressure_front_bar", "pressure_rear_bar", "x_driver")
+    assert group_keys(["tyre", "depth", "x_driver"], known) == ("tyre", "water_depth_mm", "x_driver")
+    assert group_keys(["pressure", "water-depth"], known) == (
+        "pressure_front_bar",
+        "pressure_rear_bar",
+        "water_depth_mm",
+    )
+    with pytest.raises(ConfigError, match=r'"tyres" \(did you mean "tyre"\?\), "load"'):
+        group_keys(["tyres", "load"], known)
+
+
+def labels(tmp_path, text):
+    path = Path(tmp_path) / "labels.csv"
+    path.write_text(text, encoding="utf-8")
+    return load_labels(path)
+
+
+def test_labels_file(tmp_path):
+    got = labels(
+        tmp_path, "start_s, end_s,effect,wheel\n1.0,2.5,full,fl\n2.0,3.0,full,fl\n\n 5, 6 ,snow,\n-1,4,water,\n"
+    )
+    assert got == (Label(1.0, 3.0, "full", "fl"), Label(5.0, 6.0, "snow"), Label(0.0, 4.0, "water"))
+    assert labels(tmp_path, "start_s,end_s,effect,wheel\n") == ()
+    assert labels(tmp_path, "effect,start_s,end_s\nwater,1,2\n") == (Label(1.0, 2.0, "water"),)
+
+
+def test_all_faults_of_a_labels_file_are_named_at_once(tmp_path):
+    with pytest.raises(ConfigError) as caught:
+        labels(tmp_path, "start_s,end_s,effect,wheel\n1,x,full,fl\n3,2,full,fl\n1,2,full,front\n1,2,,\n1,2,3,4,5\n")
+    text = str(caught.value)
+    for part in ("line 2: end_s = 'x'", "line 3: end_s = 2 is not after", 'unknown wheel "front"', "line 5: no effect",
+                 "line 6: 5 cells"):  # fmt: skip
+        assert part in text
+    with pytest.raises(ConfigError, match="no column end_s"):
+        labels(tmp_path, "start_s,end,effect\n")
+    with pytest.raises(ConfigError, match="no column start_s"):
+        labels(tmp_path, "")
