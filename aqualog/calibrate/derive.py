@@ -21,10 +21,11 @@ FIXABLE: Mapping[str, tuple[float, float]] = {
 """What can be given as known, with its bounds."""
 
 GAIN_SD = 0.02  # [-] of a torque signal whose scale nobody has checked (K; axle efficiency alone is 0.95-0.97, V)
-WIDE: Mapping[str, float] = {
-    "mass": 0.10, "torque_gain": 0.10, "mass_per_gain": 0.10, "drag_area": 0.5, "rolling_resistance": 0.5,
-}  # fmt: skip
+WIDE: Mapping[str, float] = {"mass": 0.10, "torque_gain": 0.10, "mass_per_gain": 0.10, "drag_area": 0.5}
 """Half of an interval over its value beyond which the drives do not tell the parameter."""
+WIDE_ROLLING = (
+    0.005  # [-] the same for r_w, not over its value: else only drives that show too much of it would tell it
+)
 
 _UNITS = {"mass_per_gain": "kg", "mass": "kg", "torque_gain": "-", "drag_area": "m^2", "rolling_resistance": "-"}
 
@@ -89,7 +90,8 @@ def balance_parameters(
         half = half_width(spread.sd[name], spread.dof[name])
         if name in ("mass", "drag_area") and not has_scale:
             half = math.hypot(half, 1.96 * GAIN_SD * value)
-        why = words.why_not(name, value, half, WIDE[name], samples, has_scale=has_scale)
+        limit = WIDE_ROLLING if name == "rolling_resistance" else WIDE[name] * value
+        why = words.why_not(name, value, half, limit, samples, has_scale=has_scale)
         remark = "" if why else words.remark(name, has_scale=has_scale, by_drive=spread.by_drive, samples=samples)
         # without a scale the gain is an assumption, not an estimate
         ci = (math.nan, math.nan) if name == "torque_gain" and not has_scale else (value - half, value + half)

@@ -24,11 +24,11 @@ GAIN_UNKNOWN = (
 RADIUS_SHORT = "too little straight, unbraked driving above 30 km/h with all wheel speeds; five times 40 s tell it"
 
 
-def why_not(name: str, value: float, half: float, wide: float, samples: Sequence[Sample], *, has_scale: bool) -> str:
+def why_not(name: str, value: float, half: float, limit: float, samples: Sequence[Sample], *, has_scale: bool) -> str:
     """Why a parameter is not identified; empty where it is."""
     if name == "torque_gain" and not has_scale:
         return GAIN_UNKNOWN
-    if math.isfinite(half) and value > 0.0 and half <= wide * value:
+    if math.isfinite(half) and value > 0.0 and half <= limit:
         return ""
     if name == "rolling_resistance":
         return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ import typer
 from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Signals, Vehicle, Verbose
 
 if TYPE_CHECKING:
+    from aqualog.detect.joint_cusum import JointCusumParams
     from aqualog.evaluate.run import Evaluation
 
 __all__ = ["evaluate"]
@@ -124,19 +126,24 @@ def _evaluate(
     keys = group_keys([k.strip() for k in by.split(",") if k.strip()], given.keys)
     console.detail(f"{len(given.sources)} drives of {given.name}")
     with console.steps() as steps:
+        from aqualog.config.settings import load_settings
         from aqualog.config.thresholds import load_thresholds
         from aqualog.detect.thresholds import DEFAULT
         from aqualog.evaluate.run import evaluate as evaluate_drives
         from aqualog.evaluate.run import tune as tune_drives
 
         start, of_rivals = load_thresholds(thresholds_file) if thresholds_file else (DEFAULT, {})
+        sources = given.sources
+        if thresholds_file is not None:
+            joint = load_settings(thresholds_file).joint_cusum
+            sources = tuple(replace(s, joint=joint) for s in sources)
         work = tune_drives if tune_file else evaluate_drives
         result = work(
-            given.sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=steps
+            sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=steps
         )  # fmt: skip
         steps("writing")
         if result.records:
-            _write(result, given.name, keys, tune_file, out)
+            _write(result, given.name, keys, tune_file, out, sources[0].joint)
     for name, reason in result.failed.items():
         sys.stderr.write(f"error: {clean(reason if name in reason else f'{name}: {reason}')}\n")
     if not result.records:
@@ -152,8 +159,16 @@ def _evaluate(
     return int(ExitCode.PARTIAL) if result.failed or lossy else int(ExitCode.DONE)
 
 
-def _write(result: Evaluation, title: str, keys: tuple[str, ...], tune_file: Path | None, out: Path | None) -> None:
+def _write(
+    result: Evaluation,
+    title: str,
+    keys: tuple[str, ...],
+    tune_file: Path | None,
+    out: Path | None,
+    joint: JointCusumParams,
+) -> None:
     from aqualog.cli.files import write_text, write_whole
+    from aqualog.config.settings import joint_text
     from aqualog.config.thresholds import thresholds_text
     from aqualog.report.evaluation_page import write_evaluation_page
 
@@ -162,7 +177,7 @@ def _write(result: Evaluation, title: str, keys: tuple[str, ...], tune_file: Pat
             f"proposed on {len(result.tuning.tuned_on)} drives of {title}, reported on {len(result.records)} others:",
             result.tuning.rule,
         ]
-        write_text(tune_file, thresholds_text(result.thresholds, result.rivals, comments=about))
+        write_text(tune_file, thresholds_text(result.thresholds, result.rivals, comments=about) + joint_text(joint))
     if out is not None:
         write_whole(out, lambda p: write_evaluation_page(result, p, title=title, by=keys))
 

@@ -1,13 +1,21 @@
-"""Settings of the detectors from a thresholds file."""
+"""Settings of the detectors from a thresholds file: thresholds, and what enters the sum of joint detector 2."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from aqualog.config.thresholds import load_thresholds
+from aqualog.config.toml_file import TableFaults, load_toml
+from aqualog.detect.joint_cusum import TERMS, JointCusumParams
 from aqualog.detect.stream import Settings
 
-__all__ = ["load_settings"]
+__all__ = ["joint_text", "load_settings"]
+
+_SWITCHES = ("with_slope", "gated")
+_THIRD = ("resistance", "variance")
+_KEYS = ("third", *_SWITCHES, "weights")
 
 
 def load_settings(path: Path) -> Settings:
@@ -16,7 +24,52 @@ def load_settings(path: Path) -> Settings:
     Raises
     ------
     ConfigError
-        With all faults of the file in one message.
+        With all faults of a table in one message.
     """
     thresholds, _ = load_thresholds(path)
-    return Settings(thresholds=thresholds)
+    document, text = load_toml(path, what="thresholds file")
+    faults = TableFaults(path, text)
+    table = document.get("joint_cusum", {})
+    params = JointCusumParams()
+    if not isinstance(table, dict):
+        faults.add("joint_cusum", "joint_cusum is not a table")
+        table = {}
+    with faults.inside("joint_cusum"):
+        for name, value in table.items():
+            if name not in _KEYS:
+                faults.unknown(name, _KEYS)
+            elif name == "third" and value not in _THIRD:
+                faults.add(name, f'third = {value!r:.40} is not one of "resistance", "variance"')
+            elif name in _SWITCHES and not isinstance(value, bool):
+                faults.add(name, f"{name} = {value!r:.40} is not true or false")
+            elif name == "weights":
+                params = _weighted(params, value, faults)
+            else:
+                params = replace(params, **{name: value})
+    faults.raise_if_any()
+    return Settings(thresholds=thresholds, joint_cusum=params)
+
+
+def joint_text(params: JointCusumParams) -> str:
+    """The table `[joint_cusum]` as TOML, empty where all is as built in; reading it again gives the same values."""
+    if params == JointCusumParams():
+        return ""
+    weights = ", ".join(f"{t} = {float(w)!r}" for t, w in zip(TERMS, params.weights, strict=True))
+    switches = "".join(f"{name} = {str(getattr(params, name)).lower()}\n" for name in _SWITCHES)
+    return f'\n[joint_cusum]\nthird = "{params.third}"\n{switches}weights = {{ {weights} }}\n'
+
+
+def _weighted(params: JointCusumParams, value: Any, faults: TableFaults) -> JointCusumParams:
+    """Weights by the name of their term; those that are left out stay."""
+    if not isinstance(value, dict):
+        faults.add("weights", "weights is not a table such as { resistance = 1.0 }")
+        return params
+    weights = dict(zip(TERMS, params.weights, strict=True))
+    for name in value:
+        if name not in TERMS:
+            faults.unknown(name, TERMS)
+            continue
+        number = faults.number(value, name, low=0.0, high=100.0, unit="")
+        if number is not None:
+            weights[name] = number
+    return replace(params, weights=tuple(weights[t] for t in TERMS))

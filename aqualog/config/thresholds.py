@@ -1,4 +1,4 @@
-"""Thresholds files: TOML with the tables `[thresholds]` and `[rivals]`."""
+"""Thresholds files: TOML with the tables `[thresholds]`, `[rivals]` and `[joint_cusum]`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aqualog.errors import ConfigError
 
 __all__ = ["load_thresholds", "thresholds_text"]
 
-_TABLES = ("thresholds", "rivals")
+_TABLES = ("thresholds", "rivals", "joint_cusum")  # the last is read by config.settings
 _HIGHEST = 1e6
 
 

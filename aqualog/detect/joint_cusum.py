@@ -36,7 +36,7 @@ class JointCusumParams:
     third: Literal["resistance", "variance"] = "resistance"
     with_slope: bool = True
     gated: bool = True
-    weights: tuple[float, float, float, float, float] = (1.0, 1.0, 1.0, 1.0, 1.0)
+    weights: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0)
 
 
 def terms(

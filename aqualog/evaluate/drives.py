@@ -11,6 +11,7 @@ import numpy as np
 
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
+from aqualog.detect.joint_cusum import JointCusumParams
 from aqualog.errors import SignalError
 from aqualog.evaluate.labels import Label, Labels, Span
 from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
@@ -27,13 +28,17 @@ _TRUTH = (*(f"{stem}_{w}" for stem in TRUTH_STEMS for w in WHEELS), "true_v_x")
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive with its labels. `groups` is its configuration: key -> value as text."""
+    """A drive with its labels.
+
+    `groups` is its configuration: key -> value as text; `joint` what joint detector 2 sums.
+    """
 
     name: str
     signals: Signals
     vehicle: Vehicle
     labels: Labels
     groups: Mapping[str, str] = field(default_factory=dict)
+    joint: JointCusumParams = field(default_factory=JointCusumParams)
 
 
 class Source(Protocol):
@@ -84,6 +89,7 @@ class LogSource:
     labels: tuple[Label, ...] | None = None
     lanes: tuple[Span, ...] = ()
     groups: Mapping[str, str] = field(default_factory=dict)
+    joint: JointCusumParams = field(default_factory=JointCusumParams)
 
     def load(self) -> Drive:
         """Read the drive.
@@ -94,7 +100,7 @@ class LogSource:
             Also if the drive has no labels of any kind.
         """
         signals = load_signals(self.paths, vehicle=self.vehicle, signal_map=self.signal_map, dbc=self.dbc)
-        return Drive(self.name, signals, self.vehicle, self._labels(signals), self.groups)
+        return Drive(self.name, signals, self.vehicle, self._labels(signals), self.groups, self.joint)
 
     def _labels(self, signals: Signals) -> Labels:
         if self.labels is not None:

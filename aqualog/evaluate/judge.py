@@ -55,7 +55,7 @@ def run_detectors(
     notes: list[str] = []
     v_x = drive.signals.array("v_x")
     if own:
-        result = detect_drive(drive.signals, drive.vehicle, settings=Settings(thresholds=thresholds))
+        result = detect_drive(drive.signals, drive.vehicle, settings=Settings(thresholds, joint_cusum=drive.joint))
         events += result.events
         tracks += result.tracks
         unavailable += [u.detector for u in result.unavailable]
