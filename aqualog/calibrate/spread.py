@@ -15,11 +15,13 @@ from aqualog.intervals import student_quantile
 from aqualog.types import FloatArray
 
 __all__ = [
-    "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "half_width", "jackknife", "jackknife_of", "of_drives",
-    "spread_of",
+    "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "combined", "half_width", "jackknife", "jackknife_of",
+    "of_drives", "spread_of",
 ]  # fmt: skip
 
 DRIVES_MIN = 4  # from here on the drives themselves show how they differ
+DOF_KNOWN = 1e3  # degrees of freedom of a variance that counts as known
+DOUBT = 0.25  # [-] chance of a spread between drives as large as seen, below which the assumptions are given up
 BLOCKS_MIN = 5
 WIND_SD = 3.0  # [m/s] along the road, mean over a drive (K)
 
@@ -56,9 +58,8 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
         [kg/m^3]
 
     Jackknife over blocks of 40 s, plus what one drive cannot show of itself: a steady wind of 3 m/s rms, and the height
-    at its ends, in each drive on its own. Four drives or more: also a jackknife over drives, so that what differs
-    between them (wind, surface, temperature, offset, driver) is in the interval; the wider of both counts, because
-    few drives may agree by chance.
+    at its ends, in each drive on its own. Four drives or more: `combined` with a jackknife over drives, so that what
+    differs between them (wind, surface, temperature, offset, driver) is in the interval.
 
     Raises
     ------
@@ -68,10 +69,38 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
     assumed = _of_blocks_and_assumptions(estimator, samples, drag=drag, air_density=air_density)
     if len(samples) < DRIVES_MIN:
         return assumed
-    seen = of_drives(estimator, samples)
-    wider = {n: seen if half_width(seen.sd[n], seen.dof[n]) >= half_width(assumed.sd[n], assumed.dof[n]) else assumed
-             for n in seen.sd}  # fmt: skip
-    return Spread({n: w.sd[n] for n, w in wider.items()}, {n: w.dof[n] for n, w in wider.items()}, by_drive=True)
+    return combined(assumed, of_drives(estimator, samples))
+
+
+def combined(assumed: Spread, seen: Spread) -> Spread:
+    """One spread from the assumed one and that seen between drives, name by name.
+
+    Both are variances of the same estimate where the assumptions hold, and are pooled, weighted by their degrees of
+    freedom. Where the drives differ so much more that F = seen / assumed exceeds its 75 % quantile, the drives alone
+    count. Pooling after a preliminary test at 25 %, not 5 %, keeps nearly the nominal level whatever the true spread is
+    (Bozivich, Bancroft & Hartley 1956, K). For normal estimates 95 % intervals from four drives cover in 96 % where the
+    assumptions hold and in at least 92 % where the variance is any multiple of the assumed one (D). The wider of the
+    two would cover in 98 %: it picks the estimate that erred upwards.
+    """
+    sd, dof = {}, {}
+    for n in seen.sd:
+        a, s, nu_a, nu_s = assumed.sd[n] ** 2, seen.sd[n] ** 2, min(assumed.dof[n], DOF_KNOWN), seen.dof[n]
+        if variance_ratio_chance(s / a, nu_s, nu_a) < DOUBT if a > 0.0 else True:
+            sd[n], dof[n] = seen.sd[n], nu_s
+        else:
+            dof[n] = nu_a + nu_s
+            sd[n] = math.sqrt((nu_a * a + nu_s * s) / dof[n])
+    return Spread(sd, dof, by_drive=True)
+
+
+def variance_ratio_chance(ratio: float, dof: float, dof_below: float) -> float:
+    """Chance that F of two independent variances exceeds `ratio`; degrees of freedom >= 1 above and below."""
+    # x = sin^2(u) turns the beta density of x = dof F / (dof F + dof_below) into powers without a pole
+    u = np.linspace(0.0, 0.5 * math.pi, 4_001)
+    density = np.sin(u) ** (dof - 1.0) * np.cos(u) ** (dof_below - 1.0)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    at = math.atan(math.sqrt(ratio * dof / dof_below))
+    return 1.0 - float(np.interp(at, u, area)) / float(area[-1])
 
 
 def _of_blocks_and_assumptions(
@@ -85,11 +114,11 @@ def _of_blocks_and_assumptions(
         for others in (winds, [_offset_moved(sample)]):
             moved = [estimator([*samples[:j], o, *samples[j + 1 :]]) for o in others if o is not None]
             for name in assumed if moved else ():
-                # a tail wind does less than a head wind: the larger of both counts
-                assumed[name] += max((m[name] - best[name]) ** 2 for m in moved)
+                # mean square over head and tail wind, which come alike
+                assumed[name] += sum((m[name] - best[name]) ** 2 for m in moved) / len(moved)
     sd = {n: math.sqrt(within.sd[n] ** 2 + assumed[n]) for n in best}
     # Welch and Satterthwaite: the assumed part is known, the part from the blocks is not
-    dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else 1e3 for n in best}
+    dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else DOF_KNOWN for n in best}
     return Spread(sd, dof, by_drive=False)
 
 
@@ -100,18 +129,27 @@ def of_drives(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
 
 
 def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
-    """Each block of windows left out in turn."""
-    blocks = [(j, b) for j, s in enumerate(samples) for b in np.unique(s.windows.block)]
-    if len(blocks) < BLOCKS_MIN:
+    """Each block of windows left out in turn; only how blocks of one drive differ counts.
+
+    A sum over drives, as strata: what sets a whole drive apart (its wind) would otherwise count here and again with the
+    assumptions.
+    """
+    blocks = [[(j, b) for b in np.unique(s.windows.block)] for j, s in enumerate(samples)]
+    if (count := sum(len(b) for b in blocks)) < BLOCKS_MIN:
         raise FitError(
-            f"{len(blocks)} blocks of 40 s of straight, unbraked, dry driving",
+            f"{count} blocks of 40 s of straight, unbraked, dry driving",
             expected=f"{BLOCKS_MIN} at the least for an interval", hint="longer or more drives",
         )  # fmt: skip
-    left = []
-    for j, b in blocks:
-        rest = [*samples[:j], _without(samples[j], b), *samples[j + 1 :]]
-        left.append(estimator([s for s in rest if s.windows.v.size]))
-    return Spread(*jackknife(left), by_drive=False)
+    parts = []
+    for of_drive in blocks:
+        left = []
+        for j, b in of_drive:
+            rest = [*samples[:j], _without(samples[j], b), *samples[j + 1 :]]
+            left.append(estimator([s for s in rest if s.windows.v.size]))
+        parts.append(jackknife(left))
+    names = parts[0][0]
+    sd = {n: math.sqrt(sum(p[0][n] ** 2 for p in parts)) for n in names}
+    return Spread(sd, dict.fromkeys(names, float(sum(len(b) - 1 for b in blocks))), by_drive=False)
 
 
 def jackknife(left: Sequence[Estimate]) -> tuple[dict[str, float], dict[str, float]]:

@@ -24,7 +24,7 @@ def figures(
     numbers: Annotated[
         list[str],
         typer.Argument(
-            help="Figures of the thesis by number (3.6), by chapter (3), or all.",
+            help="Figures of the thesis by number (3.6), by chapter (2, 3), or all.",
             metavar="NUMBER...",
             show_default=False,
         ),
@@ -45,7 +45,7 @@ def figures(
     \b
     Examples:
       aqualog figures 3.6 -o figures
-      aqualog figures 3.9 3.10 -o figures --force
+      aqualog figures 2.25 3.9 -o figures --force
       aqualog figures 3 -o figures --json
       aqualog figures all -o figures --progress plain
     """  # fmt: skip

@@ -80,7 +80,7 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
     below = (1.0 - beta) * s.below + beta * min(dv, 0.0) ** 2
     above = (1.0 - beta) * s.above + beta * max(dv, 0.0) ** 2
     one_sided = below / (above + p.v_noise * p.v_noise)
-    delta = var - var_other
+    shown, delta = var, var - var_other
     active = s.active
     if active:
         is_on = delta > p.off_share * p.delta_min and one_sided > p.off_share * p.one_sided
@@ -91,7 +91,7 @@ def _step(p, s, a, a_other, dv, v, allowed):  # type: ignore[no-untyped-def]
     elif s.age > p.warm_up and still < p.quiet:
         active = var > p.var_min and delta > max(p.delta_min, p.share * var) and one_sided > p.one_sided
     state = MinorState(mean, var, mean_other, var_other, below, above, s.age + p.dt, still, active)
-    return state, delta, var, active
+    return state, delta, shown, active
 
 
 @compiled

@@ -10,7 +10,8 @@ from aqualog.figures.record import Figure, stem_of
 
 __all__ = ["NUMBERS", "chosen", "make"]
 
-NUMBERS = tuple(f"3.{n}" for n in range(1, 12))
+_CHAPTER_2 = ("2.8", "2.9", "2.21", "2.22", "2.23", "2.25")
+NUMBERS = (*_CHAPTER_2, *(f"3.{n}" for n in range(1, 12)))
 
 
 def make(number: str) -> Figure:
@@ -46,9 +47,9 @@ def chosen(asked: Sequence[str]) -> tuple[str, ...]:
         plain = f"{chapter}.{int(figure)}" if figure.isdecimal() and figure.isascii() and len(figure) < 4 else name
         match = [n for n in NUMBERS if plain in ("all", n, n.split(".")[0])]
         if not match:
-            later = "; those of chapter 2 come in a later version" if chapter == "2" else ""
+            made = f"; of chapter 2 there are {', '.join(_CHAPTER_2)}" if chapter == "2" else ""
             raise ConfigError(
-                f"there is no figure {name[:40]!r}{later}", expected=f"all, 3 or one of {' '.join(NUMBERS)}",
+                f"there is no figure {name[:40]!r}{made}", expected=f"all, 2, 3 or one of {' '.join(NUMBERS)}",
                 hint="aqualog figures 3.6 -o DIR",
             )  # fmt: skip
         found.update(match)

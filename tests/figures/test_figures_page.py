@@ -86,7 +86,7 @@ def test_table_has_units_and_the_numbers_that_are_drawn(number):
     figure = made(number)
     rows = list(csv.reader(io.StringIO(figure_csv(figure))))
     header = rows[0]
-    assert all(re.search(r"\[(-|%|s|N|1e-3 s)\]$", name) for name in header), header
+    assert all(re.search(r"\[(-|%|s|N|1e-3 s|m/s|m/s\^2|\(m/s\^2\)\^2)\]$", name) for name in header), header
     assert {len(r) for r in rows} == {len(header)}
     columns = list(zip(*rows[1:], strict=True))
     for i, panel in enumerate(figure.panels):

@@ -132,7 +132,9 @@ class SlipSlopeWatch:
         self._drop_params = drop.DropParams.make(dt, memory.rule, loss)
         self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
-        self._variances = {w: ewvar.initial_state() for w in (*pair.i, *pair.j)}
+        # of the wheels that are judged: the others may dip while the slope of these is lost (C72, C74)
+        judged = (*pair.i, *pair.j) if self._two_driven else pair.i
+        self._variances = {w: ewvar.initial_state() for w in judged}
         self._smoothed: dict[str, float] = {}
         self._after_jump = 0
         self._dt = dt

@@ -1,0 +1,207 @@
+"""The study behind the figures of chapter 2: a scene driven again and again, under all detectors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from aqualog.calibrate.apply import calibrated
+from aqualog.calibrate.design import prepare
+from aqualog.calibrate.tie_rod import transfers
+from aqualog.detect.slip_slope.history import History, remembered
+from aqualog.detect.slip_slope.watch import Memory
+from aqualog.detect.stream import detect_drive
+from aqualog.errors import FitError
+from aqualog.model.scenario import Scenario, Steering
+from aqualog.model.signals import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.sketch import KMH, slalom_angle
+from aqualog.model.thesis_scenes import scene
+from aqualog.types import BoolArray, DriveResult, FloatArray, Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = [
+    "DRY_SEED", "MANY", "SEEDS", "SOME", "Known", "SceneRun", "in_runs", "known", "residual", "run", "run_of", "runs",
+    "scatter", "share", "spread", "stretches",
+]  # fmt: skip
+
+Speed = tuple[tuple[float, float], ...]  # (t [s], v [m/s])
+
+SEEDS = tuple(range(3001, 3021))
+"""The first one is drawn; claims are judged over all."""
+
+DRY_SEED = 3000
+MANY, SOME = 0.8, 0.5  # shares of the runs: what mostly happens, and what happens at least in every other run
+_SLALOM_S, _DRY_S = 40.0, 80.0
+_PUSH_S, _CHANGE_S = 5.0, 12.0  # of a change of speed: 1 m/s^2 either way in both drives
+_SETTLED_S = 5.0  # after which a drive has settled
+_A_Y = 2.0  # [m/s^2] the slalom of the thesis' Figure 2.23
+_FALL, _RISE = 70 * KMH, 110 * KMH  # [m/s] between which the dry drive varies
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a car before the wet drive.
+
+    `vehicle` with the tie-rod polynomial of a dry slalom, `memory` with the slip slopes of a dry drive, `explained` the
+    share of the variance of the dry rods that the polynomial explains. [-]
+    """
+
+    vehicle: Vehicle
+    memory: Memory
+    explained: float
+
+
+@dataclass(frozen=True, slots=True)
+class SceneRun:
+    """One drive of a scene; `t` (n,) [s]."""
+
+    seed: int
+    scenario: Scenario
+    result: DriveResult
+    t: FloatArray
+
+    @property
+    def entry(self) -> float:
+        """Beginning of the first lane. [s]"""
+        return self.scenario.lanes[0].start
+
+    @property
+    def exit(self) -> float:
+        """End of the last lane. [s]"""
+        return self.scenario.lanes[-1].end
+
+    def signal(self, name: str) -> FloatArray:
+        """A measured signal, or the truth by which a drive is judged (`true_slip_fr`), array (n,)."""
+        return self.result.signals.array(name)
+
+    def feature(self, name: str) -> FloatArray:
+        """A feature of the detectors, array (n,)."""
+        return np.asarray(self.result.features[name].to_numpy(), dtype=np.float64)
+
+    def within(self, start: float, end: float) -> BoolArray:
+        """Samples from one time to another, bool array (n,)."""
+        return (self.t >= start - 1e-9) & (self.t < end - 1e-9)
+
+    def on_lane(self) -> BoolArray:
+        """Samples from entry to exit, bool array (n,)."""
+        return self.within(self.entry, self.exit)
+
+    def active(self, detector: str, wheel: str | None = None) -> BoolArray:
+        """Detection bit of a detector, of one wheel or of any, array (n,)."""
+        bits = np.zeros(self.t.size, dtype=bool)
+        for track in self.result.tracks:
+            if track.detector == detector and wheel in (None, track.wheel):
+                bits |= track.active
+        return bits
+
+    def statistic(self, detector: str) -> tuple[FloatArray, float]:
+        """Statistic (n,) of a detector of the whole car, and its threshold."""
+        track = next(t for t in self.result.tracks if t.detector == detector)
+        return track.statistic, track.threshold
+
+    def events(self, detector: str, wheel: str | None = None) -> list[float]:
+        """Times at which its events begin. [s]"""
+        return [e.start_s for e in self.result.events if e.detector == detector and wheel in (None, e.wheel)]
+
+    def after_entry(self, bits: BoolArray) -> float:
+        """Time from the entry to the first sample on the lane in which a bit is set; NaN if there is none. [s]"""
+        at = np.flatnonzero(bits & self.on_lane())
+        return float(self.t[at[0]] - self.entry) if at.size else float("nan")
+
+
+@lru_cache(maxsize=8)
+def known(number: str) -> Known:
+    """What dry drives of a scene's car, on the same tyres, have told; never the wet drive.
+
+    Raises
+    ------
+    FitError
+        If the dry slalom gives no polynomial.
+    """
+    wet = scene(number)
+    car = replace(wet.vehicle, given=wet.vehicle.given | {"mass"})
+    v = 0.5 * (_FALL + _RISE)
+    steering = Steering(slalom_angle(car, wet.tyre_front, v, _A_Y), 4.0)
+    # faster and slower in turn, else the coefficient of the longitudinal force would not be told
+    pushes = _turns(_SLALOM_S, _PUSH_S, 0.9 * v, 1.1 * v)
+    slalom = _dry(wet, car, _SLALOM_S, pushes, steering)
+    found, reasons = transfers([prepare(slalom, car, "dry slalom")], car)
+    if "tie_rod" not in found:
+        raise FitError("the dry slalom gives no tie-rod polynomial: " + "; ".join(reasons), where=f"figure {number}")
+    shown = detect_drive(_dry(wet, car, _DRY_S, _turns(_DRY_S, _CHANGE_S, _RISE, _FALL), None), car)
+    memory = Memory(remembered(History(), car.name, shown.slopes))
+    return Known(calibrated(car, (), {"tie_rod": found["tie_rod"]}), memory, found["tie_rod"].explained)
+
+
+def _turns(duration_s: float, every_s: float, first: float, second: float) -> Speed:
+    """Speed that goes from one value to another and back. [s, m/s]"""
+    times = np.arange(0.0, duration_s + every_s, every_s)
+    return tuple((float(t), second if i % 2 else first) for i, t in enumerate(times))
+
+
+def _dry(wet: Scenario, car: Vehicle, duration_s: float, speed: Speed, steering: Steering | None) -> Signals:
+    dry = replace(
+        wet, vehicle=car, duration_s=duration_s, speed=speed, steering=steering, lanes=(), seed=DRY_SEED, split_rear=()
+    )
+    return as_signals(simulate(dry), vehicle=car)
+
+
+def run(number: str, seed: int) -> SceneRun:
+    """A scene driven with other noise and another fluctuation of the contact, and what the detectors make of it."""
+    return run_of(replace(scene(number), seed=seed), known(number))
+
+
+def run_of(scenario: Scenario, car: Known) -> SceneRun:
+    """A drive under all detectors."""
+    signals = as_signals(simulate(scenario), vehicle=car.vehicle)
+    result = detect_drive(signals, car.vehicle, memory=car.memory)
+    return SceneRun(scenario.seed, scenario, result, signals.array("t"))
+
+
+@lru_cache(maxsize=1)
+def runs(number: str) -> tuple[SceneRun, ...]:
+    """A scene over all `SEEDS`; only those of one scene are kept."""
+    return tuple(run(number, seed) for seed in SEEDS)
+
+
+def stretches(r: SceneRun, bits: BoolArray, *, gap_s: float = 0.05) -> list[slice]:
+    """Where a bit is set, as slices; stretches less than a gap apart are one."""
+    at = np.flatnonzero(bits)
+    if not at.size:
+        return []
+    parts = np.split(at, np.flatnonzero(np.diff(r.t[at]) > gap_s + 1e-9) + 1)
+    return [slice(int(p[0]), int(p[-1]) + 1) for p in parts]
+
+
+def residual(r: SceneRun, wheel: str) -> FloatArray:
+    """Measured minus calculated tie-rod force, array (n,). [N]"""
+    return r.feature(f"tie_rod_meas_{wheel}") - r.feature(f"tie_rod_hat_{wheel}")
+
+
+def scatter(r: SceneRun, wheel: str) -> float:
+    """Root mean square of the residual on the dry road before the entry. [N]"""
+    return float(np.sqrt(np.nanmean(residual(r, wheel)[r.within(_SETTLED_S, r.entry)] ** 2)))
+
+
+def share(all_runs: Sequence[SceneRun], holds: Callable[[SceneRun], bool]) -> float:
+    """Share of the runs of which something is true. [-]"""
+    return float(np.mean([holds(r) for r in all_runs]))
+
+
+def in_runs(x: float) -> str:
+    """A share in words: 17 of 20."""
+    return f"{round(x * len(SEEDS))} of {len(SEEDS)}"
+
+
+def spread(values: Sequence[float], digits: int = 2) -> str:
+    """Median and range of the values that are there; how many are not."""
+    there = [v for v in values if np.isfinite(v)]
+    if not there:
+        return "never"
+    text = f"{np.median(there):.{digits}f} ({min(there):.{digits}f} to {max(there):.{digits}f})"
+    missing = len(values) - len(there)
+    return f"{text}, {missing} without" if missing else text
