@@ -26,7 +26,9 @@ def test_signals(name):
     assert f"`{name}`" in README or f"`{stem}_fl ... rr`" in README
 
 
-@pytest.mark.parametrize("command", ["detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate"])
+@pytest.mark.parametrize(
+    "command", ["detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate"]
+)
 def test_commands(command):
     assert f"`{command} " in README
 

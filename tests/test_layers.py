@@ -52,7 +52,13 @@ def test_detectors_read_no_truth_and_no_labels():
 
 @pytest.mark.parametrize(
     "command",
-    [["--help"], *([c, "--help"] for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate"))],
+    [
+        ["--help"],
+        *(
+            [c, "--help"]
+            for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate")
+        ),
+    ],
 )
 def test_help_imports_nothing_heavy(command):
     code = f"import sys; sys.argv = ['aqualog', *{command!r}]\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"

@@ -51,7 +51,7 @@ class JointCriteriaWatch:
     def push(
         self, scene: Scene, tracks: Sequence[Track], x: FloatArray, gate: BoolArray, slope: BoolArray, book: EventBook
     ) -> tuple[Track, list[Event], dict[str, FloatArray]]:
-        """Track, closed events and features `criterion_1` ... `criterion_5`, `joint_gate` of the next piece.
+        """Track, closed events and features `criterion_1` ... `criterion_5`, `criterion_full`, `joint_gate`.
 
         Parameters
         ----------
@@ -87,6 +87,7 @@ class JointCriteriaWatch:
         }
         features = {f"criterion_{k}": b.astype(np.float64) for k, b in found.met.items()}
         features["joint_gate"] = gate.astype(np.float64)
+        features["criterion_full"] = found.is_full.astype(np.float64)
         return track, book.take(track, evidence, _severity, _explain_criteria), features
 
     def _began_free(self, track: Track, scene: Scene) -> BoolArray:
@@ -129,10 +130,10 @@ class JointCusumWatch:
             "delta_a_x_max": ("max", scene.unbraked_resistance),
             **{f"term_{name}": ("max", part) for name, part in parts.items()},
             **{f"at_start_{name}": ("first", part) for name, part in parts.items()},
-            "spin_down_max": ("max", _largest(tracks, "spin_down", scene.size)),
+            "full": ("any", f.get("criterion_full", np.zeros(scene.size)) > 0.0),
         }
         features = {f"joint_term_{name}": part for name, part in parts.items()}
-        return track, book.take(track, evidence, _severity_sum, _explain_terms), features
+        return track, book.take(track, evidence, _severity, _explain_terms), features
 
     def _variance_sum(self, tracks: Sequence[Track]) -> FloatArray:
         sums = []
@@ -153,19 +154,8 @@ def _counts(track: Track, scene: Scene) -> BoolArray:
     return bits
 
 
-def _largest(tracks: Sequence[Track], detector: str, n: int) -> FloatArray:
-    found = [np.nan_to_num(t.statistic) for t in tracks if t.detector == detector]
-    return np.max(found, axis=0) if found else np.zeros(n)
-
-
 def _severity(evidence: Mapping[str, Any]) -> str:
     return "full" if evidence.get("full", False) else "partial"
-
-
-def _severity_sum(evidence: Mapping[str, Any]) -> str:
-    """A wheel that has lost as much as the sum can count of a spin-down has lost the road."""
-    most = max(evidence.get("term_spin_down", 0.0), evidence.get("term_spin_up", 0.0))
-    return "full" if most >= 1.0 else "partial"
 
 
 def _explain_criteria(evidence: dict[str, Any]) -> dict[str, Any]:
@@ -176,7 +166,7 @@ def _explain_criteria(evidence: dict[str, Any]) -> dict[str, Any]:
 
 def _explain_terms(evidence: dict[str, Any]) -> dict[str, Any]:
     """`decided_by`: the terms of the sum when it crossed the threshold, largest first."""
-    rest = {k: v for k, v in evidence.items() if not k.startswith("at_start_") and k != "spin_down_max"}
+    rest = {k: v for k, v in evidence.items() if not k.startswith("at_start_")}
     start = {name: float(evidence.get(f"at_start_{name}", 0.0)) for name in joint_cusum.TERMS}
     found = sorted((n for n, v in start.items() if v >= LEAST_TERM), key=lambda n: -start[n])
     return {**rest, "decided_by": found}

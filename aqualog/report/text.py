@@ -108,5 +108,5 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _pad(cell: str, width: int) -> str:
-    is_number = cell[:1].isdigit() or (cell[:1] in "+-" and cell[1:2].isdigit())
+    is_number = cell.lstrip("+-").split(" ")[0].replace(".", "", 1).isdigit() and cell.count(" ") < 2
     return cell.rjust(width) if is_number else cell.ljust(width)

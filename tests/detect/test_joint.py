@@ -60,9 +60,12 @@ def test_the_warning_names_what_decided():
     (event,) = book.finish()
     assert event.start_s == pytest.approx(0.41)  # the gate opens
     assert event.evidence["decided_by"] == ["minor_spin_down"]
-    assert event.evidence["criterion_1"] and event.evidence["criterion_5"] and not event.evidence["criterion_3"]
+    assert event.evidence["criterion_1"]
+    assert event.evidence["criterion_5"]
+    assert not event.evidence["criterion_3"]
     assert not any(k.startswith("at_start") for k in event.evidence)
-    assert features["criterion_2"][30] == 1.0 and features["joint_gate"][30] == 0.0
+    assert features["criterion_2"][30] == 1.0
+    assert features["joint_gate"][30] == 0.0
 
 
 def test_a_criterion_that_began_under_braking_does_not_count():
@@ -136,7 +139,7 @@ def test_the_sum_warns_above_its_threshold_and_names_the_terms():
     assert features["joint_term_resistance"] == pytest.approx(1.0)
     (event,) = book.finish()
     assert event.evidence["decided_by"] == ["resistance", "spin_down"]
-    assert event.severity == "full"
+    assert event.severity == "partial"  # no wheel has lost the road
 
 
 @pytest.mark.parametrize("gated", [True, False])

@@ -13,6 +13,7 @@ from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import Thresholds
 from aqualog.notation import WHEELS
 from aqualog.physics.load import wheel_loads
+from aqualog.report.document import result_groups
 from aqualog.types import Quality, Signals
 
 DT, N = 0.01, 2000
@@ -94,7 +95,8 @@ def test_the_steering_torque_stands_in_and_says_so():
     vehicle = replace(CAR, steering_torque={"c0": (0.3,), "c_y": (1e-3,), "sigma": (0.3,)})
     assert found(slalom(steering=True), vehicle)[0] == []
     (event,) = found(slalom(6.0, steering=True), vehicle)[0]
-    assert event.wheel is None and event.side is None
+    assert event.wheel is None
+    assert event.side is None
     assert event.evidence["from_steering_torque"] is True
     assert 4.0 < event.evidence["torque_residual_max"] < 7.0
 
@@ -124,3 +126,11 @@ def test_scaled_residual_by_hand():
     )  # fmt: skip
     assert z[:4] == pytest.approx([2.0, 500.0 / 70.0, tie_rod.CLIP, 0.0])
     assert np.isnan(z[4])
+
+
+def test_statistics_and_signals_have_names_of_their_own():
+    """A written log is read again: the sum of the detector must not be taken for the force."""
+    _, result = found(slalom(700.0))
+    names = [n for g in result_groups(result) for n in g.columns]
+    assert len(set(names)) == len(names)
+    assert {"tie_rod_fl", "tie_rod_cusum_fl", "tie_rod_cusum_fl_bit"} <= set(names)

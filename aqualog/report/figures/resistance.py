@@ -16,7 +16,7 @@ def resistance(result: DriveResult) -> list[Row]:
         return []
     lines = [Line("delta_a_x", VEHICLE, detector_colour("resistance", None), values)]
     offset = feature(result.features, "delta_a_x_offset", "m/s^2", "m/s^2")
-    caption = "acceleration that the torques should give minus the measured one; water lifts it"
+    caption = "nominal minus measured acceleration; water lifts it"
     if offset is not None:
         lines.append(Line("dry offset", VEHICLE, MUTED, offset, width=0.9))
         caption += "; its offset on dry road in grey"
