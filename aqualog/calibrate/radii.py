@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,19 +12,19 @@ from aqualog.calibrate import words
 from aqualog.calibrate.design import WINDOW_S, Drive
 from aqualog.calibrate.lag import earlier, lag_between
 from aqualog.calibrate.records import Parameter
-from aqualog.calibrate.spread import BLOCKS_MIN, DRIVES_MIN, half_width, jackknife
+from aqualog.calibrate.spread import BLOCKS_MIN, DRIVES_MIN, Spread, combined, half_width, jackknife, stratified
 from aqualog.notation import AXLES, WHEELS
 from aqualog.physics.load import G
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Radii", "fit_radii", "radii_of_blocks", "radius_parameters"]
+__all__ = ["Radii", "fit_radii", "radii_of_blocks", "radii_spread", "radius_parameters"]
 
 V_MIN = 8.0  # [m/s]
 A_MAX = 2.0  # [m/s^2]
 BLOCK = 20  # windows
-MODEL_SD: Mapping[str, float] = {"r_e_f": 7e-5, "r_e_r": 7e-5, "r_e_ratio": 5e-5}
-"""What clocks (5 ms at 0.3 m/s^2 of coasting and 22 m/s), inertia and load transfer leave at zero torque (D). [-]"""
+SLIP_SD = 2e-5  # [-] of a driven wheel: 5 % of the slip r_w / C that it rolls freely with (D)
+AWD_SD = 7e-5  # [-] with no free wheel: 5 ms of clock at 0.3 m/s^2 of coasting and 22 m/s (D)
 
 
 class Radii(NamedTuple):
@@ -36,9 +36,10 @@ class Radii(NamedTuple):
 
 
 def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
-    """Windows of one drive in blocks, each (k, 5).
+    """Windows of one drive in blocks, each (k, 6).
 
-    v / omega_f, v / omega_r [m], omega_r / omega_f, force over weight, and on AWD cars acceleration over speed [1/s].
+    v / omega_f, v / omega_r [m], omega_r / omega_f, force over weight, acceleration over speed [1/s], acceleration
+    [m/s^2].
 
     Empty where a wheel speed is missing. The wheels of an axle are averaged: what a slight curve does to left and right
     cancels.
@@ -48,8 +49,8 @@ def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
     f, r = (np.mean([drive.columns[f"omega_{w}"] for w in AXLES[a]], axis=0) for a in ("f", "r"))
     v = np.full(f.size, math.nan)
     if drive.has_velocity:
-        # 0.1 s of delay at the 0.3 m/s^2 of a coasting car would be 0.1 % of radius; free wheels share the velocity's
-        # clock, driven ones lead it by their slip
+        # 0.1 s of delay at the 0.3 m/s^2 of a coasting car would be 0.1 % of radius; free wheels tell it, driven ones
+        # lead the velocity by their slip
         v = drive.columns["v_x"]
         if vehicle.drivetrain != "awd":
             free = f if vehicle.drivetrain == "rwd" else r
@@ -65,55 +66,79 @@ def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
         for x in (f, r, v, drive.force, np.gradient(drive.v, drive.dt))
     )
     f, r, v, force, a_kin = means
-    late = a_kin / (f * vehicle.r_e_f) if vehicle.drivetrain == "awd" else np.zeros_like(force)
-    table = np.column_stack([v / f, v / r, r / f, force / (vehicle.mass * G), late])
+    table = np.column_stack([v / f, v / r, r / f, force / (vehicle.mass * G), a_kin / (f * vehicle.r_e_f), a_kin])
     return [
         table[i : i + BLOCK] for i in range(0, table.shape[0], BLOCK) if table[i : i + BLOCK].shape[0] >= BLOCK // 2
     ]
 
 
-def fit_radii(blocks: Sequence[FloatArray]) -> Radii:
+def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Radii:
     """Radii of wheels that no torque drives.
 
-    v / omega of a driven wheel falls with the force by the slip (3.13), a cubic for the brush, of which only the
-    value at zero counts; on AWD cars, where no wheel tells a delay of v_x, it also falls with acceleration over speed.
-    At zero a wheel rolls freely, and its own rolling resistance, a slip of r_w / C (0.03 %), is in the radius.
+    Parameters
+    ----------
+    drives : sequence of sequences of array (k, 6)
+        Blocks of each drive by `radii_of_blocks`.
+    drivetrain : {"fwd", "rwd", "awd"}
+
+    v / omega of a free axle is its radius, and what its delay makes of acceleration: a / v times some 10 ms, in each
+    drive its own, which the peak of a correlation leaves. v / omega of a driven wheel falls with the force by the slip
+    (3.13), a cubic for the brush, of which only the value at zero counts, and with the acceleration, which the free
+    wheels' inertia answers with slip. At zero a wheel rolls freely, and its own rolling resistance, a slip of r_w / C
+    (0.04 %), is in the radius. On AWD cars all wheels are driven, and one delay is taken for all drives.
     """
-    x = np.concatenate(list(blocks))
-    columns = np.column_stack([np.ones(x.shape[0]), x[:, 3], x[:, 3] ** 2, x[:, 3] ** 3, x[:, 4]])
+    of_drives = [np.concatenate(list(b)) for b in drives if len(b)]
+    x = np.concatenate(of_drives)
+    one = np.ones(x.shape[0])
+    driven = [one, x[:, 3], x[:, 3] ** 2, x[:, 3] ** 3]
+    if drivetrain == "awd":
+        return Radii(*(_constant([*driven, x[:, 4]], x[:, i]) for i in range(3)))
+    index = np.repeat(np.arange(len(of_drives)), [d.shape[0] for d in of_drives])
+    delays = [np.where(index == j, x[:, 4], 0.0) for j in range(len(of_drives))]
+    ratio = _constant([*driven, x[:, 5]], x[:, 2])
+    if drivetrain == "rwd":
+        front = _constant([one, *delays], x[:, 0])
+        return Radii(front, front / ratio, ratio)
+    rear = _constant([one, *delays], x[:, 1])
+    return Radii(rear * ratio, rear, ratio)
 
-    def at_zero(y: FloatArray) -> float:
-        return float(np.linalg.lstsq(columns, y, rcond=None)[0][0]) if np.isfinite(y).all() else math.nan
 
-    return Radii(at_zero(x[:, 0]), at_zero(x[:, 1]), at_zero(x[:, 2]))
+def _constant(columns: Sequence[FloatArray], y: FloatArray) -> float:
+    """Coefficient of the first column by least squares; NaN where y is missing."""
+    return float(np.linalg.lstsq(np.column_stack(columns), y, rcond=None)[0][0]) if np.isfinite(y).all() else math.nan
+
+
+def radii_spread(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Spread:
+    """Blocks of 40 s left out in turn within their drive; from four drives on combined with whole drives left out."""
+
+    def without(j: int, k: int) -> dict[str, float]:
+        kept = [b for i, b in enumerate(drives[j]) if i != k]
+        return fit_radii([*drives[:j], kept, *drives[j + 1 :]], drivetrain)._asdict()
+
+    within = stratified([[without(j, k) for k in range(len(blocks))] for j, blocks in enumerate(drives)])
+    if len(drives) < DRIVES_MIN:
+        return within
+    left = [fit_radii([*drives[:j], *drives[j + 1 :]], drivetrain)._asdict() for j in range(len(drives))]
+    return combined(within, Spread(*jackknife(left), by_drive=True))
 
 
 def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Parameter]:
-    """Radii of both axles and their ratio as parameters; whole drives left out from four on, else blocks of 40 s."""
+    """Radii of both axles and their ratio as parameters, intervals by `radii_spread` and what the model leaves."""
     by_drive = [b for b in (radii_of_blocks(d, vehicle) for d in drives) if b]
-    parts = [np.concatenate(b) for b in by_drive] if len(by_drive) >= DRIVES_MIN else [x for b in by_drive for x in b]
     units = {"r_e_f": "m", "r_e_r": "m", "r_e_ratio": "-"}
     file = {"r_e_f": vehicle.r_e_f, "r_e_r": vehicle.r_e_r, "r_e_ratio": vehicle.r_e_f / vehicle.r_e_r}
-    if len(parts) < BLOCKS_MIN and len(by_drive) < DRIVES_MIN:
+    if sum(len(b) for b in by_drive) < BLOCKS_MIN:
         why = words.radius_unknown(ratio_known=False) if not by_drive else words.RADIUS_SHORT
-        return [
-            Parameter(n, file[n], (math.nan, math.nan), u, identified=False, why_not=why, file_value=file[n])
-            for n, u in units.items()
-        ]
-    best = fit_radii(parts)
-    spread = jackknife([fit_radii([p for k, p in enumerate(parts) if k != j])._asdict() for j in range(len(parts))])
+        return [_untold(n, file[n], u, why) for n, u in units.items()]
+    best = fit_radii(by_drive, vehicle.drivetrain)
+    spread = radii_spread(by_drive, vehicle.drivetrain)
     parameters = []
     for name, unit in units.items():
         value = float(getattr(best, name))
         if not math.isfinite(value):
-            why = words.radius_unknown(ratio_known=True)
-            parameters.append(
-                Parameter(
-                    name, file[name], (math.nan, math.nan), unit, identified=False, why_not=why, file_value=file[name]
-                )
-            )
+            parameters.append(_untold(name, file[name], unit, words.radius_unknown(ratio_known=True)))
             continue
-        half = math.hypot(half_width(spread[0][name], spread[1][name]), 1.96 * MODEL_SD[name] * value)
+        half = math.hypot(half_width(spread.sd[name], spread.dof[name]), 1.96 * _model_sd(name, vehicle) * value)
         remark = "front over rear" if name == "r_e_ratio" else "v_x taken as true"
         parameters.append(
             Parameter(
@@ -121,6 +146,13 @@ def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Paramet
             )
         )
     return parameters
+
+
+def _model_sd(name: str, vehicle: Vehicle) -> float:
+    """What the regression leaves of a radius however long the drives are; nothing on a free axle. [-]"""
+    if vehicle.drivetrain == "awd":
+        return AWD_SD
+    return 0.0 if name == ("r_e_f" if vehicle.drivetrain == "rwd" else "r_e_r") else SLIP_SD
 
 
 def _untold(name: str, value: float, unit: str, why: str) -> Parameter:

@@ -16,7 +16,7 @@ from aqualog.types import FloatArray
 
 __all__ = [
     "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "combined", "half_width", "jackknife", "jackknife_of",
-    "of_drives", "spread_of",
+    "of_drives", "spread_of", "stratified",
 ]  # fmt: skip
 
 DRIVES_MIN = 4  # from here on the drives themselves show how they differ
@@ -146,10 +146,25 @@ def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
         for j, b in of_drive:
             rest = [*samples[:j], _without(samples[j], b), *samples[j + 1 :]]
             left.append(estimator([s for s in rest if s.windows.v.size]))
-        parts.append(jackknife(left))
-    names = parts[0][0]
-    sd = {n: math.sqrt(sum(p[0][n] ** 2 for p in parts)) for n in names}
-    return Spread(sd, dict.fromkeys(names, float(sum(len(b) - 1 for b in blocks))), by_drive=False)
+        parts.append(left)
+    return stratified(parts)
+
+
+def stratified(parts: Sequence[Sequence[Estimate]]) -> Spread:
+    """From estimates with one part left out each, sorted by drive: variances and degrees of freedom add up.
+
+    Drives of a single part are one stratum together; a lone one joins another drive.
+    """
+    strata = [list(left) for left in parts if len(left) > 1]
+    single = [e for left in parts if len(left) == 1 for e in left]
+    if len(single) == 1 and strata:
+        strata[-1] += single
+    elif single:
+        strata.append(single)
+    each = [jackknife(left) for left in strata]
+    names = each[0][0]
+    sd = {n: math.sqrt(sum(e[0][n] ** 2 for e in each)) for n in names}
+    return Spread(sd, {n: sum(e[1][n] for e in each) for n in names}, by_drive=False)
 
 
 def jackknife(left: Sequence[Estimate]) -> tuple[dict[str, float], dict[str, float]]:

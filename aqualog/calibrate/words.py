@@ -54,7 +54,9 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
         parts.append("with the air density of the vehicle file")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
         parts.append(f"net climb of a drive taken as 0 +- {CLIMB_SD:g} m")
-    parts.append("interval from drives left out" if by_drive else "a steady wind of 3 m/s rms is in the interval")
+    parts.append(
+        "a steady wind of 3 m/s rms" + (" and drives left out are" if by_drive else " is") + " in the interval"
+    )
     return "; ".join(parts)
 
 

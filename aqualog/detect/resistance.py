@@ -23,7 +23,8 @@ def alarm_params(dt: float, threshold: float = DEFAULT.resistance) -> CusumParam
 
     0.2 m/s^2 is reported 2 s after it begins, 0.4 m/s^2 after 0.7 s (C76).
     """
-    return CusumParams(0.5 * THRESHOLD, threshold, 1.5 * threshold, dt)
+    # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 0.3 m/s
+    return CusumParams(0.5 * THRESHOLD, threshold, max(1.5 * threshold, 0.3), dt)
 
 
 def gate_params(dt: float, threshold: float = DEFAULT.joint_criteria) -> CusumParams:

@@ -37,7 +37,8 @@ class SpinParams(NamedTuple):
     @staticmethod
     def make(sign: float, dt: float, threshold: float = DEFAULT.spin_down) -> SpinParams:
         """Defaults: 3 m/s^2 drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
-        sums = CusumParams(3.0, threshold, 5.0 * threshold, dt)
+        # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 1.5 m/s
+        sums = CusumParams(3.0, threshold, max(5.0 * threshold, 3.0), dt)
         return SpinParams(sums, sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
 
 

@@ -67,7 +67,7 @@ _SCALARS = (
 _WHEELS = (
     "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
     "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full",
-    "aligning", "load_moment", "braking",
+    "aligning", "braking",
 )  # fmt: skip
 COLUMNS = {name: i for i, name in enumerate(_SCALARS)} | {name: len(_SCALARS) + 4 * i for i, name in enumerate(_WHEELS)}
 _WIDTH = len(_SCALARS) + 4 * len(_WHEELS)
@@ -426,8 +426,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
             if front:
                 half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
                 out[base + 72] = _aligning_moment(s_x, s_y, F_z, mu, C_x, C_y, L, half)
-            out[base + 76] = _rolling_force(F_z, r_w) * r_l * turn + shift
-            out[base + 80] = braking * turn
+            out[base + 76] = braking * turn
             out[base + 68] = v_full * max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
 
     # specific force: what an accelerometer shows; a trailer is pulled along

@@ -213,7 +213,7 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
         columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
-    rod_wheels = {n: of_wheels(n) for n in ("aligning", "load_moment", "braking", "wave_drag")}
+    rod_wheels = {n: of_wheels(n) for n in ("aligning", "braking", "wave_drag")}
     columns |= _steering(wheels | rod_wheels, plant, scenario)
     if scenario.lanes:
         columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
@@ -240,7 +240,7 @@ def _steering(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scena
     rods = []
     for i, outward in enumerate((1.0, -1.0)):
         F_x, F_y = wheels["F_x"][i] - wheels["wave_drag"][i], outward * wheels["F_y"][i]
-        aligning, load_moment, braking = outward * wheels["aligning"][i], wheels["load_moment"][i], wheels["braking"][i]
+        aligning, braking = outward * wheels["aligning"][i], wheels["braking"][i]
         if given:
             c0, c_y, c_x = (given.get(n, (0.0,)) for n in ("c0", "c_y", "c_x"))
             wet = wheels["contact"][i] < 1.0
@@ -249,11 +249,9 @@ def _steering(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scena
                 p_ref=P_HALF_LENGTH,
             )  # fmt: skip
             trail = np.where(wet, aligning + half / 3.0 * F_y, 0.0)
-            shifted = np.where(wet, load_moment - plant.r_w[i] * wheels["F_z"][i] * plant.r_l[i], 0.0)
-            water = (trail + np.sin(STEERING.inclination) * shifted) / STEERING.arm
-            rods.append(tie_rod_force(F_x, F_y, c0=c0, c_y=c_y, c_x=c_x) + water)
+            rods.append(tie_rod_force(F_x, F_y, c0=c0, c_y=c_y, c_x=c_x) + trail / STEERING.arm)
         else:
-            moment = kingpin_moment(F_x, F_y, wheels["F_z"][i], aligning, load_moment, braking, r_l=float(plant.r_l[i]))
+            moment = kingpin_moment(F_x, F_y, wheels["F_z"][i], aligning, braking, r_l=float(plant.r_l[i]))
             rods.append(moment / STEERING.arm)
     return {"tie_rod_fl": rods[0], "tie_rod_fr": rods[1], "steering_torque": steering_torque(rods[0], rods[1])}
 

@@ -44,7 +44,9 @@ def front_axle_lateral_force(
     right (1 kN of difference over 1.5 m of track is 0.3 kN), F_x sin(delta) of steered driven wheels, aligning
     moments (below 2 %). Limits: steady cornering gives the static share l_r / l of m a_y.
 
-    Thesis: section 2.4, "lateral force of the front axle by a two-track model" (no number).
+    Thesis: section 2.4 takes lateral forces from a two-wheel model (no number). Departure: that model would take them
+    from steering and side-slip angles and cornering stiffness; here the balance of forces tells them, so that no
+    stiffness need be known. Lost lateral force shows in the acceleration then, not in the residual.
     """
     wheelbase = l_f + l_r
     return (mass * l_r * a_y + inertia * yaw_acceleration) / wheelbase

@@ -85,7 +85,6 @@ def kingpin_moment(
     F_y_outward: FloatArray,
     F_z: FloatArray,
     M_z_outward: FloatArray,
-    load_moment: FloatArray,
     braking: FloatArray,
     *,
     r_l: float,
@@ -103,8 +102,6 @@ def kingpin_moment(
         M_z, right wheel: -M_z). [N], [N m]
     F_z : array
         Wheel load. [N]
-    load_moment : array
-        Wheel load times its forward shift, by rolling resistance and by the water's wedge. [N m]
     braking : array
         Brake torque, which the carrier takes up, >= 0. [N m]
     r_l : float
@@ -116,10 +113,10 @@ def kingpin_moment(
         Turning the wheel's front outward positive. [N m]
 
     A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, on the hub offset,
-    backward forces turn it outward. Brakes make that lever the scrub radius, hub_offset - r_l sin(inclination). The
-    load that the wedge carries ahead of the centre has the lever sin(inclination): 60 mm at 4 kN turn the wheel outward
-    with 52 N m, 0.4 kN in the rod, as long as the wedge is there, whether the wheel spins down or up. Small angles;
-    no steer angle, no inertia of the wheel about the kingpin, no friction.
+    backward forces turn it outward. Brakes make that lever the scrub radius, hub_offset - r_l sin(inclination). A load
+    that the wedge carries ahead of the centre is a moment about the wheel's axis, which the bearings do not hand on: it
+    slows the wheel down and comes back as longitudinal force. Small angles; no steer angle, no inertia of the wheel
+    about the kingpin, no friction, no toe.
 
     Thesis: section 2.4 measures what comes of it (C61-C63); geometry D.
     """
@@ -130,7 +127,6 @@ def kingpin_moment(
         - geometry.caster_trail * F_y_outward
         - geometry.hub_offset * F_x
         - sine * braking
-        + sine * load_moment
         - scrub * np.sin(geometry.caster) * F_z
     )
     return moment

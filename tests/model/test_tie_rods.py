@@ -48,11 +48,11 @@ def test_dry_rods_are_a_polynomial_in_the_forces(car, v):
     assert explained >= 0.99
 
 
-def test_a_floating_wheel_shows_in_its_own_rod():
-    """Water under the right wheels: the front one spins down, its rod rises by hundreds of N, the other stays."""
+def test_a_wheel_that_loses_the_road_shows_in_its_own_rod():
+    """Water under the right wheels at 105 km/h: spin-downs of the front one raise its rod, the other stays."""
     k, _ = fitted(slalom(SUV_REAR, 30.0))
     lane = Lane(4.0, 9.0, depth_left=0.0, depth_right=1.3e-3)
-    c = drive(SUV_REAR, duration_s=10.0, speed=((0.0, 116 / 3.6),), lanes=(lane,), seed=3)
+    c = drive(SUV_REAR, duration_s=10.0, speed=((0.0, 105 / 3.6),), lanes=(lane,), seed=3)
     excess = {}
     for w, s in SIDES:
         known = terms(c, w, s)
@@ -60,22 +60,26 @@ def test_a_floating_wheel_shows_in_its_own_rod():
         excess[w] = c[f"tie_rod_{w}"] - known @ k
     on_water = c["true_film_fr"] > 0.0
     down = (c["true_slip_fr"] < -0.1) & on_water
-    assert down.any()
+    rolling = (np.abs(c["true_slip_fr"]) < 0.02) & on_water
+    assert down.sum() > 20
     assert np.abs(np.median(excess["fr"][:3000])) < 10.0
-    assert np.percentile(excess["fr"][down], 5) > 250.0
-    assert np.abs(excess["fl"][on_water]).max() < 100.0
+    assert np.percentile(excess["fr"][down], 5) > 150.0
+    assert 50.0 < np.median(excess["fr"][rolling]) < np.median(excess["fr"][down])
+    assert np.abs(excess["fl"][on_water]).max() < 50.0
 
 
-def test_a_spin_up_raises_it_too():
+def test_a_spin_up_leaves_the_force_that_the_torque_promises():
+    """Compared with what the torque would do on a dry road, the rod lacks the traction that the spinning wheel lost."""
     k, _ = fitted(slalom(SUV, 30.0))
     fwd = replace(SUV, name="front", torque_split_rear=0.02)
     lane = Lane(4.0, 8.0, depth_left=1.3e-3, depth_right=1.3e-3)
     c = drive(fwd, duration_s=9.0, speed=((0.0, 29.0), (4.0, 31.0), (8.0, 39.0)), lanes=(lane,), seed=3)
-    up = [(w, s, (c[f"true_slip_{w}"] > 0.15) & (c[f"true_film_{w}"] > 0.0)) for w, s in SIDES]
-    assert any(u.any() for _, _, u in up)
-    for w, s, u in up:
-        if u.any():
-            assert np.median((c[f"tie_rod_{w}"] - terms(c, w, s) @ k)[u]) > 250.0
+    for w, s in SIDES:
+        up = (c[f"true_slip_{w}"] > 0.15) & (c[f"true_film_{w}"] > 0.0)
+        assert up.any()
+        promised = terms(c, w, s)
+        promised[:, 3] = c[f"torque_{w}"] / SUV.r_l_f
+        assert np.median((c[f"tie_rod_{w}"] - promised @ k)[up]) > 250.0
 
 
 def test_a_polynomial_of_the_vehicle_file_is_the_dry_rod():
