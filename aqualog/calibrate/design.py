@@ -16,7 +16,7 @@ from aqualog.physics.resistance import air_drag
 from aqualog.types import BoolArray, FloatArray, Signals
 from aqualog.vehicle import Vehicle
 
-__all__ = ["REASONS", "WINDOW_S", "Drive", "Windows", "prepare"]
+__all__ = ["BESIDE_S", "BRAKE_PRESSURE", "REASONS", "WINDOW_S", "Drive", "Windows", "prepare", "widened"]
 
 WINDOW_S = 2.0  # [s] long against sensor lags (0.1 s), short against manoeuvres
 BLOCK_S = 40.0  # [s] driving within which residuals (wind, surface) hang together
@@ -160,14 +160,14 @@ def _reasons(
         mark(np.isnan(a_x + v + force), "signals missing")
         mark(v < V_MIN, "slow or standing")
         if "brake_pressure" in columns:
-            mark(_widened(columns["brake_pressure"] > BRAKE_PRESSURE, width), "braking")
+            mark(widened(columns["brake_pressure"] > BRAKE_PRESSURE, width), "braking")
         else:
-            mark(_widened(force < FORCE_MIN * vehicle.mass, width), "brakes not known")
+            mark(widened(force < FORCE_MIN * vehicle.mass, width), "brakes not known")
         mark(np.abs(features["a_y_slow"]) > A_Y_MAX, "cornering")
         mark(np.abs(features["yaw_rate_slow"]) > YAW_MAX, "cornering")
         if "gear" in columns:
             gear = columns["gear"]
-            mark(_widened(np.concatenate([[False], np.diff(gear) != 0.0]) & np.isfinite(gear), width), "gear shift")
+            mark(widened(np.concatenate([[False], np.diff(gear) != 0.0]) & np.isfinite(gear), width), "gear shift")
     mark(~_dry(columns, np.ones(v.size, dtype=np.bool_)), "wet")
     return reason
 
@@ -182,7 +182,7 @@ def _dry(columns: Mapping[str, FloatArray], moving: BoolArray) -> BoolArray:
     return dry
 
 
-def _widened(bits: BoolArray, width: int) -> BoolArray:
+def widened(bits: BoolArray, width: int) -> BoolArray:
     """On also `width` samples before and after."""
     near: BoolArray = np.convolve(bits, np.ones(2 * width + 1), mode="same") > 0.5
     return near

@@ -29,6 +29,7 @@ class OnlineParams(NamedTuple):
     bound: float  # the offset stays within +-bound
     give_up: float  # so long above the guard without a break it is no water lane, and is learnt after all
     below: float  # so long below -guard the offset was wrong: it is learnt anew
+    returned: float  # so long back at the level before that, it was a wind that had paused
     v_rest: float  # [m/s] slower than this is standstill
     rest: float  # so long at standstill everything is learnt anew
 
@@ -41,11 +42,14 @@ class OnlineParams(NamedTuple):
         threshold of partial aquaplaning (thesis 2.2: 0.2 m/s^2), so that no change that matters is learnt. The
         bound holds an offset of 0.2, as much of drift, and a head wind of 10 m/s at motorway speed (0.17) together.
         """
-        return cls(dt, gain(1.0, dt), 60.0, 0.1, 1.0, 0.6, 180.0, 5.0, 0.5, 2.0)
+        return cls(dt, gain(1.0, dt), 60.0, 0.1, 1.0, 0.6, 180.0, 10.0, 2.0, 0.5, 2.0)
 
 
 class OnlineState(NamedTuple):
-    """What is carried: offset [m/s^2], seconds learnt, short memory of x, seconds above, below and at standstill."""
+    """What is carried: offset [m/s^2], seconds learnt, short memory of x, seconds above, below and at standstill.
+
+    `before` is the level that was given up for a lower one, NaN if none; `back` the seconds at that level again.
+    """
 
     offset: float
     age: float
@@ -53,15 +57,17 @@ class OnlineState(NamedTuple):
     above: float
     beneath: float
     resting: float
+    before: float
+    back: float
 
 
 def initial_state(offset: float = 0.0) -> OnlineState:
     """Before the first sample; `offset` [m/s^2] is reported until the first sample that can be used."""
-    return OnlineState(offset, 0.0, math.nan, 0.0, 0.0, 0.0)
+    return OnlineState(offset, 0.0, math.nan, 0.0, 0.0, 0.0, math.nan, 0.0)
 
 
 @compiled
-def _scan(p, offset, age, fast, above, beneath, resting, x, v_x, frozen):  # type: ignore[no-untyped-def]
+def _scan(p, offset, age, fast, above, beneath, resting, before, back, x, v_x, frozen):  # type: ignore[no-untyped-def]
     out = np.empty(x.size)
     for i in range(x.size):
         if not math.isnan(v_x[i]):
@@ -71,6 +77,7 @@ def _scan(p, offset, age, fast, above, beneath, resting, x, v_x, frozen):  # typ
             fast = math.nan
             above = 0.0
             beneath = 0.0
+            before = math.nan
         if not math.isnan(x[i]) and not frozen[i]:
             fast = x[i] if math.isnan(fast) else fast + p.k_fast * (x[i] - fast)
             innovation = fast - offset
@@ -80,14 +87,22 @@ def _scan(p, offset, age, fast, above, beneath, resting, x, v_x, frozen):  # typ
             if beneath > p.below:  # water only adds: less than the dry resistance shows that it was not the dry one
                 age = 0.0
                 beneath = 0.0
+                before = offset
                 offset = fast
+            # a car that leaves the lee of a wood meets the same wind again; water as large as that is reported first
+            back = back + p.dt if above > 0.0 and abs(fast - before) < 0.5 * p.guard else 0.0
+            if back > p.returned:
+                offset = before
+                age = p.certain
+                above = 0.0
+                before = math.nan
             if not (0.0 < above <= p.give_up) and not beneath > 0.0:
                 age = min(age + p.dt, p.tau)
                 # the short memory is late, so that little of a step is learnt before it passes the guard
                 offset += p.dt / age * ((fast if watched else x[i]) - offset)
                 offset = min(max(offset, -p.bound), p.bound)
         out[i] = offset
-    return out, offset, age, fast, above, beneath, resting
+    return out, offset, age, fast, above, beneath, resting, before, back
 
 
 def scan(
@@ -106,7 +121,7 @@ def scan(
     v_x : array (n,)
         Velocity, to see standstill; NaN holds. [m/s]
     frozen : bool array (n,)
-        Wet suspicion from outside: any wheel criterion, the joint gate. Nothing is learnt, no time counts.
+        Wet suspicion from outside: any wheel criterion, a lost slip slope. Nothing is learnt, no time counts.
 
     Returns
     -------
@@ -116,7 +131,8 @@ def scan(
 
     A running mean at first (gain dt / age), then a low-pass with the time constant tau. Beyond +-guard nothing is
     learnt: above it for at most `give_up` seconds, below it for `below` seconds; then the offset begins anew from the
-    lower level. Standstill begins anew too. Limits: x constant gives that constant from the first sample on. What is
+    lower level, and goes back to the one before where the measure stays within half a guard of it for `returned`
+    seconds. Standstill begins anew too. Limits: x constant gives that constant from the first sample on. What is
     there from the first sample on cannot be told from an offset: a log that begins on water hides it.
 
     Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives none; this one knows

@@ -9,17 +9,22 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.calibrate.design import Drive
+from aqualog.calibrate.design import BESIDE_S, BRAKE_PRESSURE, Drive, widened
 from aqualog.calibrate.records import TieRodFit
 from aqualog.errors import FitError
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.intervals import student_quantile
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G
 from aqualog.types import BoolArray, FloatArray
 from aqualog.vehicle import Vehicle
 
 __all__ = ["fit_tie_rod", "transfers"]
 
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres and loads leave what a polynomial of low order follows
+V_MIN = 8.0  # [m/s] as the detector
+A_BRAKED = -2.0  # [m/s^2] neither engine nor resistance decelerates a car more
+LIFTED = -0.06  # of the weight: more than an engine's drag
 LEAST_S = 20.0  # [s]
 BLOCK_S = 8.0  # [s] about two periods of a slalom
 F_Y_RANGE_MIN = 300.0  # [N] standard deviation below which a drive has not steered
@@ -41,14 +46,29 @@ def transfers(drives: Sequence[Drive], vehicle: Vehicle) -> tuple[dict[str, TieR
                 continue
             F_y, measured = _probed(d, vehicle, section, {"c_y": (1.0,)})
             F_x, _ = _probed(d, vehicle, section, {"c_x": (1.0,)})
+            # left and right turn the steering alike, so that even powers of the axle's force are none of its torque
+            degree = 2 if section == "tie_rod" else 1
             try:
-                fits.append(fit_tie_rod(F_y, F_x, measured, dt=d.dt, used=d.dry & (np.abs(d.columns["a_y"]) < A_Y_MAX)))
+                fits.append(fit_tie_rod(F_y, F_x, measured, dt=d.dt, used=_telling(d, vehicle), degree=degree))
             except FitError as error:
                 reasons.append(f"{section} polynomial ({d.name}): {error.line()}")
         if fits:
             found[section] = max(fits, key=lambda f: f.seconds * f.explained)
     told = tuple(r for r in reasons if r.split(" ", 1)[0] not in found)
     return found, told
+
+
+def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:
+    """Dry, moving, within the polynomial's range, and unbraked as in the detector: brakes act on another lever."""
+    columns, f = drive.columns, drive.features
+    torque = np.sum([columns[f"torque_{w}"] for w in WHEELS if f"torque_{w}" in columns], axis=0)
+    with np.errstate(invalid="ignore"):
+        if "brake_pressure" in columns:
+            braked = columns["brake_pressure"] > BRAKE_PRESSURE
+        else:
+            braked = (f["a_kin_slow"] < A_BRAKED) | (torque / vehicle.r_l("fl") < LIFTED * vehicle.mass * G)
+        bits: BoolArray = drive.dry & (np.abs(f["a_y_slow"]) < A_Y_MAX) & (f["v_x_hat"] > V_MIN)
+    return bits & ~widened(braked, max(round(BESIDE_S / drive.dt), 1))
 
 
 def _probed(

@@ -26,7 +26,7 @@ class Thresholds:
     spin_up: float = 0.6
     resistance: float = 0.2
     slip_slope_drop: float = 0.5
-    tie_rod: float = 0.8
+    tie_rod: float = 0.4
     joint_criteria: float = 0.03
     joint_cusum: float = 1.15
 

@@ -12,7 +12,7 @@ from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
 from aqualog.evaluate.labels import Labels, Span, joined, without
-from aqualog.evaluate.match import LIMITS_S, beginning_in, cells_of, hits, rows_of
+from aqualog.evaluate.match import LIMITS_S, beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.records import DetectorRun, RunRecord
 from aqualog.rivals.catalogue import run_rivals
 from aqualog.types import Event, FloatArray, Track
@@ -130,7 +130,9 @@ def _detector_run(
         wheel_full=of_wheels["full"],
         wheel_partial=of_wheels["partial"],
         own=hits(own, spans, limit=LIMITS_S["partial"], water=water),
-        false_alarms=tuple(round(a, 6) for a, _ in beginning_in(of_car, dry)),
+        false_alarms=tuple(
+            round(t, 6) for t in sorted([*(a for a, _ in beginning_in(of_car, dry)), *outlasting(of_car, water)])
+        ),
         on_water=len(beginning_in(of_car, wet)),
         cells=cells_of(rows, of_car),
     )

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 from aqualog.evaluate.labels import Labels, Span, joined, overlaps, without
 
-__all__ = ["LIMITS_S", "Cell", "Hit", "beginning_in", "cells_of", "hits", "rows_of"]
+__all__ = ["LIMITS_S", "Cell", "Hit", "beginning_in", "cells_of", "hits", "outlasting", "rows_of"]
 
 LIMITS_S = {"full": 0.5, "partial": 2.0}
 """An episode must be found within this time of its beginning. [s]"""
+
+OUTLASTS_S = 10.0  # [s] an alarm that is still on so long after the water is a false one too
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,8 @@ def hits(episodes: Sequence[Span], events: Sequence[Span], *, limit: float, wate
     limit : float
         An event that overlaps the first `limit` seconds finds the episode. [s]
     water : sequence of (start, end)
-        An event that was on before the episode counts only if it began on water: else a stuck alarm would find all.
+        An event that was on before the episode counts only if it began on the same stretch of water: else a stuck alarm
+        would find all.
 
     Returns
     -------
@@ -69,9 +72,14 @@ def _hit(episode: Span, events: Sequence[Span], limit: float, water: Sequence[Sp
             continue
         if begin >= start:
             return Hit(begin - start <= limit + 1e-9, begin - start, before=False)
-        if _is_in(begin, water):
+        if any(_is_in(begin, [stretch]) and _is_in(start, [stretch]) for stretch in water):
             return Hit(found=True, latency=0.0, before=True)
     return Hit(found=False, latency=float("nan"), before=False)
+
+
+def outlasting(events: Sequence[Span], water: Sequence[Span]) -> list[float]:
+    """When events that began on water had gone on for `OUTLASTS_S` seconds beyond the end of their stretch. [s]"""
+    return [b + OUTLASTS_S for begin, stop in events for a, b in water if a <= begin < b and stop > b + OUTLASTS_S]
 
 
 def beginning_in(events: Sequence[Span], spans: Sequence[Span]) -> list[Span]:

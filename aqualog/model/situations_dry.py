@@ -40,6 +40,17 @@ def _head_wind(k: Sketch) -> Taken:
     return _cruise(k, 80.0, 120.0, head_wind=10.0, wind=k.gusts(125.0, 2.0))
 
 
+def _wind_shelter(k: Sketch) -> Taken:
+    """A steady head wind that pauses behind woods and lorries for 5 to 15 s."""
+    wind, t = k.rng.uniform(8.0, 12.0), 25.0
+    profile = [(0.0, wind)]
+    while t < 110.0:
+        lee = k.rng.uniform(5.0, 15.0)
+        profile += [(t, wind), (t + 1.0, 0.2 * wind), (t + lee, 0.2 * wind), (t + lee + 1.0, wind)]
+        t += lee + k.rng.uniform(15.0, 40.0)
+    return _cruise(k, 80.0, 120.0, wind=tuple(profile))
+
+
 def _all_the_way(k: Sketch, surface: Surface, low: float, high: float, **given: Any) -> Taken:
     taken = _cruise(k, low, high, lanes=(Lane(0.0, 1e5, in_metres=True, surface=surface),), **given)
     return taken._replace(note=f"{taken.note}, {_told(surface)}")
@@ -208,6 +219,7 @@ MAKERS = {
     "motorway": ("dry motorway in the turbulence of others", _motorway),
     "hilly": ("grades of up to 8 %", _hilly),
     "head_wind": ("a head wind of 10 m/s", _head_wind),
+    "wind_shelter": ("a head wind that pauses behind woods and lorries", _wind_shelter),
     "damp": ("a damp road without a layer of water", _damp),
     "snow_entry": ("onto snow at speed", _snow_entry),
     "snow": ("snow from the start", _snow),

@@ -64,11 +64,24 @@ def test_step_is_not_learnt_for_three_minutes_then_it_is():
 
 def test_less_than_the_dry_resistance_shows_a_wrong_offset():
     """A log that begins on water hides it; where the water ends, the offset is learnt anew within seconds."""
-    x = np.concatenate([seconds(10.0) + 0.3, seconds(20.0)])
+    x = np.concatenate([seconds(10.0) + 0.3, seconds(30.0)])
     out, _ = offset(x)
     t = np.arange(x.size) * DT
     assert out[t < 9.0].min() > 0.29
-    assert np.abs(out[t > 17.0]).max() < 0.02
+    assert np.abs(out[t > 22.0]).max() < 0.02
+
+
+@pytest.mark.parametrize(("lee", "again"), [(8.0, 0.0), (15.0, 4.0), (60.0, 4.0)])
+def test_a_wind_that_pauses_is_known_when_it_returns(lee, again):
+    """A short lee teaches nothing; after a long one the old level is back within `again` seconds."""
+    x = np.concatenate([seconds(120.0) + 0.2, seconds(lee), seconds(30.0) + 0.2])
+    out, _ = offset(x)
+    t = np.arange(x.size) * DT
+    assert out[t > 120.0 + lee + again].min() > 0.15
+    # a step of another height is no return
+    y = np.concatenate([seconds(120.0) + 0.2, seconds(lee), seconds(30.0) + 0.4])
+    out, _ = offset(y)
+    assert out[-1] < 0.21
 
 
 def test_standstill_begins_anew():
@@ -116,19 +129,22 @@ def test_any_cut_gives_the_same_bits(seed):
 def test_recursion_against_plain_python():
     x, v, frozen = noisy(4000, 9)
     out, _ = online.scan(P, online.initial_state(), x, v, frozen)
-    b, age, fast, above, beneath, rest = 0.0, 0.0, math.nan, 0.0, 0.0, 0.0
+    b, age, fast, above, beneath, rest, before, back = 0.0, 0.0, math.nan, 0.0, 0.0, 0.0, math.nan, 0.0
     for i in range(x.size):
         if not math.isnan(v[i]):
             rest = rest + DT if v[i] < 0.5 else 0.0
         if rest > 2.0:
-            age, fast, above, beneath = 0.0, math.nan, 0.0, 0.0
+            age, fast, above, beneath, before = 0.0, math.nan, 0.0, 0.0, math.nan
         if not (math.isnan(x[i]) or frozen[i]):
             fast = x[i] if math.isnan(fast) else fast + (1.0 - math.exp(-DT)) * (x[i] - fast)
             known = age > 1.0
             above = above + DT if known and fast - b > 0.1 else 0.0
             beneath = beneath + DT if known and fast - b < -0.1 else 0.0
-            if beneath > 5.0:
-                age, beneath, b = 0.0, 0.0, fast
+            if beneath > 10.0:
+                age, beneath, before, b = 0.0, 0.0, b, fast
+            back = back + DT if above > 0.0 and abs(fast - before) < 0.05 else 0.0
+            if back > 2.0:
+                b, age, above, before = before, 1.0, 0.0, math.nan
             if (above == 0.0 or above > 180.0) and beneath == 0.0:
                 age = min(age + DT, 60.0)
                 b = min(max(b + DT / age * ((fast if known else x[i]) - b), -0.6), 0.6)

@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from aqualog.calibrate.tie_rod import fit_tie_rod
+from aqualog.calibrate.design import prepare
+from aqualog.calibrate.tie_rod import fit_tie_rod, transfers
 from aqualog.errors import FitError
+from aqualog.model.scenario import Scenario, Steering
+from aqualog.model.signals import as_signals
+from aqualog.model.simulate import simulate
 from aqualog.physics.steering import tie_rod_force
+from aqualog.vehicle import Vehicle
 
 DT = 0.01
 TRUE = {"c0": (40.0,), "c_y": (-0.31, 8e-6), "c_x": (0.07,)}
@@ -60,3 +65,22 @@ def test_refused_without_steering_or_time():
         fit_tie_rod(F_y, F_x, rods, dt=DT)
     with pytest.raises(FitError, match="20 s"):
         fit_tie_rod(*forces(seconds=10.0), dt=DT)
+
+
+def test_braking_is_left_out_of_a_drive():
+    """Brakes pull at the rods on another lever than the drive: one coefficient for both would be neither."""
+    car = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
+    found = {}
+    for braked in (False, True):
+        brakes = tuple(
+            (t, m) for k in range(4) for t, m in ((15 + 20 * k, 0), (15.3 + 20 * k, 2000), (17 + 20 * k, 0))
+        )  # fmt: skip
+        scenario = Scenario(
+            car, duration_s=90.0, seed=7, speed=tuple((float(t), 20.0 + 4.0 * (t // 8 % 2)) for t in range(0, 91, 8)),
+            steering=Steering(0.015, 4.0), brake_torque=brakes if braked else (),
+        )  # fmt: skip
+        drive = prepare(as_signals(simulate(scenario)), car, "slalom")
+        found[braked] = transfers([drive], car)[0]["tie_rod"]
+    assert found[True].coefficients["c_x"][0] == pytest.approx(found[False].coefficients["c_x"][0], rel=0.05)
+    assert found[True].explained > 0.95
+    assert found[True].sigma < 1.3 * found[False].sigma

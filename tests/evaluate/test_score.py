@@ -7,7 +7,7 @@ import pytest
 
 from aqualog.evaluate.intervals import poisson, wilson
 from aqualog.evaluate.labels import Label, Labels
-from aqualog.evaluate.match import Cell, beginning_in, cells_of, hits, rows_of
+from aqualog.evaluate.match import Cell, beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.records import DetectorRun, RunRecord, record_from_json, record_to_json
 from aqualog.evaluate.score import Rate, confusion, grouped, recall_of, score
 
@@ -50,6 +50,14 @@ def test_event_that_ended_before_does_not_count():
     assert not only([(12.0, 15.0)], [(11.0, 12.0)]).found
     h = only([(12.0, 15.0)], [(12.0, 12.1)])
     assert (h.found, h.latency, h.before) == (True, 0.0, False)
+
+
+def test_an_alarm_that_never_ends_finds_no_later_lane_and_is_a_false_one():
+    two = [(10.0, 13.0), (60.0, 62.0)]
+    first, second = hits([(10.0, 12.0), (60.0, 61.0)], [(11.0, 100.0)], limit=2.0, water=two)
+    assert first.found
+    assert not second.found
+    assert outlasting([(11.0, 100.0), (12.0, 22.9), (5.0, 100.0)], two) == [23.0]
 
 
 def test_beginning_in():
