@@ -92,6 +92,10 @@ def balance_parameters(
             half = math.hypot(half, 1.96 * GAIN_SD * value)
         limit = WIDE_ROLLING if name == "rolling_resistance" else WIDE[name] * value
         why = words.why_not(name, value, half, limit, samples, has_scale=has_scale)
+        if name == "rolling_resistance" and not why and parameters and not parameters[0].identified:
+            why = words.NO_SLOPE  # the level of a balance whose slope is not told is none
+        if name in KEYS and not why and not KEYS[name].low <= value <= KEYS[name].high:
+            why = words.outside(KEYS[name])
         remark = "" if why else words.remark(name, has_scale=has_scale, by_drive=spread.by_drive, samples=samples)
         # without a scale the gain is an assumption, not an estimate
         ci = (math.nan, math.nan) if name == "torque_gain" and not has_scale else (value - half, value + half)

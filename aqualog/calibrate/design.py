@@ -90,6 +90,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
     _check(present, vehicle, name)
     columns = {s: signals.array(s) for s in present}
+    _check_alive(columns, vehicle, name)
     dt = signals.dt
     features = FeatureStream(vehicle, dt, present).push({s: columns[s] for s in present if s in INPUTS})
     a_x = columns["a_x"]
@@ -120,6 +121,18 @@ def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
             f"cannot calibrate without {', '.join(missing)}", where=name,
             expected="accelerometer, torques of the driven wheels, and velocity or wheel speeds",
             hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+        )  # fmt: skip
+
+
+def _check_alive(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> None:
+    """A signal that never changes is frozen or not connected, and would be fitted to the last digit."""
+    torques = [f"torque_{w}" for w in vehicle.driven]
+    speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]
+    dead = [s for s in ("a_x", *torques, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
+    if dead:
+        raise SignalError(
+            f"{', '.join(dead)} never change{'s' if len(dead) == 1 else ''}", where=name,
+            expected="measured signals", hint="check the channel in the signal map",
         )  # fmt: skip
 
 

@@ -76,7 +76,7 @@ def calibrate(
     skipped = [
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]
-    notes = (*words.notes(fits, samples, found, by_drive=spread.by_drive), *skipped)
+    notes = (*words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods
     )

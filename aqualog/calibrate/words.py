@@ -10,16 +10,22 @@ import numpy as np
 from aqualog.calibrate.balance import Sample
 from aqualog.calibrate.offset import CLIMB_SD
 from aqualog.calibrate.records import DriveFit, Parameter
+from aqualog.vehicle import Key
 
 __all__ = [
-    "GAIN_UNKNOWN", "RADIUS_SHORT", "cannot_tell", "left_out", "notes", "radius_unknown", "remark", "why_not",
+    "GAIN_UNKNOWN", "NO_SLOPE", "RADIUS_SHORT", "cannot_tell", "left_out", "notes", "outside", "radius_unknown",
+    "remark", "why_not",
 ]  # fmt: skip
 
 GAIN_NOTED = 0.005  # [-]
+CONTRADICTION = 0.05  # [-]
 GAIN_UNKNOWN = (
     "mass and torque gain are one ratio in the balance of forces: a weighed car (--fix mass=KG) tells the gain, a gain "
     "known from a dynamometer (--fix torque_gain=X) the mass"
 )
+
+NO_SLOPE = "the drives do not tell how force and acceleration go together, so they do not tell what is left over either"
+ACCELEROMETER = "the accelerometer's own scale taken as true"
 
 RADIUS_SHORT = "too little straight, unbraked driving above 30 km/h with all wheel speeds; five times 40 s tell it"
 
@@ -45,11 +51,18 @@ def why_not(name: str, value: float, half: float, limit: float, samples: Sequenc
     return "the forces hardly change; some accelerations with 1 m/s^2 and more, unbraked and straight, tell it"
 
 
+def outside(key: Key) -> str:
+    """A value that no car has."""
+    return f"it comes out beyond {key.low:g} to {key.high:g} {key.unit}: units and signs of torque and a_x want a look"
+
+
 def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Sample]) -> str:
     """What an interval rests on."""
     parts = []
     if name in ("mass", "drag_area") and not has_scale:
         parts.append("torque taken as true within 2 % rms")
+    if name in ("mass", "torque_gain") and has_scale:
+        parts.append(ACCELEROMETER)
     if name == "drag_area":
         parts.append("with the air density of the vehicle file")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
@@ -82,10 +95,21 @@ def cannot_tell(parameters: Sequence[Parameter], more: Sequence[str]) -> tuple[s
 
 
 def notes(
-    fits: Sequence[DriveFit], samples: Sequence[Sample], found: Mapping[str, float], *, by_drive: bool
+    fits: Sequence[DriveFit],
+    samples: Sequence[Sample],
+    found: Mapping[str, float],
+    fixed: Mapping[str, float],
+    *,
+    by_drive: bool,
 ) -> list[str]:
     """What a reader should know of the result."""
     said = []
+    alone = float(np.median([f.mass for f in fits if math.isfinite(f.mass)] or [math.nan]))
+    if {"mass", "torque_gain"} <= set(fixed) and abs(alone / fixed["mass"] - 1.0) > CONTRADICTION:
+        said.append(
+            f"the drives contradict what is given: with torque_gain = {fixed['torque_gain']:g} they show "
+            f"{alone:.0f} kg, not {fixed['mass']:g}; give one of the two"
+        )
     if abs(found["torque_gain"] - 1.0) > GAIN_NOTED:
         said.append(f"multiply the scale of the torques in the signal map by {found['torque_gain']:.3f}")
     if sum(math.isfinite(f.mass) for f in fits) > 1:

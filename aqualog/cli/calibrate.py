@@ -23,9 +23,11 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
+    from aqualog.calibrate.records import Calibration
     from aqualog.cli.console import Steps
     from aqualog.cli.setup import Setup
     from aqualog.types import Signals as SignalTable
+    from aqualog.vehicle import Vehicle as VehicleRecord
 
 __all__ = ["calibrate"]
 
@@ -103,6 +105,7 @@ def _calibrate(
     verbose: bool,
     progress: str,
 ) -> int:
+    from aqualog.cli.console import clean
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
 
@@ -116,12 +119,18 @@ def _calibrate(
     )  # fmt: skip
     drives = _drives(logs)
     with setup.console.steps() as steps:
-        from aqualog.calibrate.run import calibrate as run
+        from aqualog.cli.console import told_if_interrupted
 
-        loaded = [_load(name, paths, setup, dbc, rate, steps) for name, paths in drives]
-        steps("estimating")
-        result = run(loaded, [name for name, _ in drives], setup.vehicle, fixed)
-    notes = tuple(f"{name}: {n}" for (name, _), s in zip(drives, loaded, strict=True) for n in s.quality.notes)
+        with told_if_interrupted("nothing was written"):
+            loaded, failed = _load_all(drives, setup, dbc, rate, steps)
+            steps("estimating")
+            result = _estimated(loaded, failed, setup.vehicle, fixed)
+    for line in failed:
+        sys.stderr.write(f"error: {clean(line)}\n")
+    if result is None:
+        return int(ExitCode.NOTHING_USABLE)
+    drives = [(name, paths) for name, paths in drives if name in loaded]
+    notes = tuple(_of(name, paths, n) for name, paths in drives for n in loaded[name].quality.notes)
     if out_name is not None:
         from aqualog.cli.files import write_text
         from aqualog.config.vehicle_edit import calibrated_toml
@@ -133,7 +142,6 @@ def _calibrate(
 
         title = f"{result.vehicle_name}, {len(drives)} drives"
         write_whole(Path(page_name), lambda p: write_calibration_page(result, p, title=title, notes=notes))
-    from aqualog.cli.console import clean
     from aqualog.report.calibration_document import calibration_document, calibration_text
 
     if as_json:
@@ -145,8 +153,52 @@ def _calibrate(
         setup.console.note(text)
     for path in targets:
         setup.console.note(f"written: {path}")
-    lossy = any(s.quality.truncated or s.quality.lost_in_files for s in loaded) or len(result.drives) < len(drives)
-    return int(ExitCode.PARTIAL) if lossy else int(ExitCode.DONE)
+    lossy = any(s.quality.truncated or s.quality.lost_in_files for s in loaded.values())
+    is_partial = lossy or failed or len(result.drives) < len(drives)
+    return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)
+
+
+def _load_all(
+    drives: list[tuple[str, list[Path]]], setup: Setup, dbc: list[Path], rate: float | None, steps: Steps
+) -> tuple[dict[str, SignalTable], list[str]]:
+    """Drives by name, and a line for each that cannot be read."""
+    from aqualog.errors import AqualogError, ConfigError
+
+    loaded: dict[str, SignalTable] = {}
+    failed: list[str] = []
+    for name, paths in drives:
+        try:
+            loaded[name] = _load(name, paths, setup, dbc, rate, steps)
+        except ConfigError:  # of the options, which are those of all drives
+            raise
+        except (AqualogError, OSError) as error:
+            line = error.line() if isinstance(error, AqualogError) else str(error)
+            failed.append(_of(name, paths, line))
+    return loaded, failed
+
+
+def _of(name: str, paths: list[Path], text: str) -> str:
+    """The text with the drive's name before it, unless the drive is one file that the text names already."""
+    is_file = len(paths) == 1 and name in (paths[0].name, str(paths[0]))
+    return text if is_file and name in text else f"{name}: {text}"
+
+
+def _estimated(
+    loaded: dict[str, SignalTable], failed: list[str], vehicle: VehicleRecord, fixed: dict[str, float]
+) -> Calibration | None:
+    """The calibration; drives that lack a signal leave `loaded` for a line in `failed`; None if all do."""
+    from aqualog.calibrate.run import calibrate as run
+    from aqualog.errors import SignalError
+
+    while loaded:
+        try:
+            return run(list(loaded.values()), list(loaded), vehicle, fixed)
+        except SignalError as error:
+            if error.where not in loaded:
+                raise
+            del loaded[error.where]
+            failed.append(error.line())
+    return None
 
 
 def _load(name: str, paths: list[Path], setup: Setup, dbc: list[Path], rate: float | None, steps: Steps) -> SignalTable:
@@ -184,9 +236,12 @@ def _fixed(texts: list[str]) -> dict[str, float]:
     for text in texts:
         name, _, value = text.partition("=")
         try:
-            fixed[name.strip()] = float(value)
+            number = float(value)
         except ValueError:
             raise ConfigError(f'--fix "{text}"', expected="KEY=VALUE, such as mass=1482") from None
+        if name.strip() in fixed:
+            raise ConfigError(f"--fix {name.strip()} is given twice", expected="one value for each key")
+        fixed[name.strip()] = number
     check_fixed(fixed)
     return fixed
 

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from aqualog.cli.console import Console
+from aqualog.cli.console import Console, told_if_interrupted
 from aqualog.errors import ConfigError, ExitCode
 from aqualog.io.write_log import SUFFIXES
 from aqualog.model.campaign import simulate_campaign
@@ -30,12 +30,8 @@ def run_campaign(name: str, folder: Path, *, jobs: int | None, force: bool, cons
             left = f", {(total - done) * seconds / made:.0f} s left" if made > 0 and done < total else ""
             steps(f"{done} of {total} drives{left}")
 
-        try:
+        with told_if_interrupted("the drives that are done stay, the same command goes on with the rest"):
             outcome = simulate_campaign(name, folder, jobs=jobs or os.cpu_count() or 1, force=force, report=report)
-        except (KeyboardInterrupt, SystemExit):
-            steps.clear()
-            console.note("interrupted: the drives that are done stay, the same command goes on with the rest")
-            raise
     for run, reason in outcome.failed.items():
         sys.stderr.write(f"error: {run}: {reason}\n")
     kept = f", {outcome.kept} were there already" if outcome.kept else ""

@@ -6,14 +6,15 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
+from typing import Any, TextIO, cast
 
 import typer
 
 from aqualog.errors import AqualogError, ConfigError, ExitCode
 
-__all__ = ["Console", "clean", "guarded"]
+__all__ = ["Console", "clean", "guarded", "told_if_interrupted"]
 
 SLOW_S = 5.0  # a first step that takes longer than this is compiling
 PROGRESS_MODES = ("auto", "bar", "plain", "off")
@@ -101,10 +102,23 @@ class Steps:
 
 
 @contextmanager
-def guarded(*, debug: bool) -> Iterator[None]:
-    """One line and the contract's exit code for every error; a traceback only with `--debug`."""
+def told_if_interrupted(text: str) -> Iterator[None]:
+    """What an interrupt within leaves behind, for the line that `guarded` writes."""
     try:
         yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(text) from None
+
+
+@contextmanager
+def guarded(*, debug: bool) -> Iterator[None]:
+    """One line and the contract's exit code for every error and interrupt; a traceback only with `--debug`."""
+    data = _StandardOutput(sys.stdout)
+    try:
+        with redirect_stdout(cast("TextIO", data)):
+            yield
+        # what stdout cannot take must come to light here, not when the interpreter ends
+        data.flush()
     except AqualogError as error:
         if debug:
             traceback.print_exc()
@@ -112,15 +126,23 @@ def guarded(*, debug: bool) -> Iterator[None]:
         raise typer.Exit(int(error.exit_code)) from error
     except BrokenPipeError:
         # the reader of our output has gone; nothing to say, and nobody to say it to
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         raise typer.Exit(int(ExitCode.DONE)) from None
     except OSError as error:
         if debug:
             traceback.print_exc()
         where = f"{error.filename}: " if error.filename else ""
-        sys.stderr.write(f"error: {clean(where)}{error.strerror or error}\n")
+        hint = ""
+        if error.filename == _StandardOutput.NAME:
+            _silence()
+            hint = ". Try: another place for the output"
+        sys.stderr.write(f"error: {clean(where)}{error.strerror or error}{hint}\n")
         raise typer.Exit(int(ExitCode.FAILED)) from error
-    except (typer.Exit, typer.Abort, KeyboardInterrupt):
+    except KeyboardInterrupt as error:
+        # without a word of the command: files are renamed into place, so those that are there are whole
+        sys.stderr.write(f"interrupted{', ' if str(error) else ''}{error}\n")
+        raise typer.Exit(int(ExitCode.INTERRUPTED)) from None
+    except (typer.Exit, typer.Abort):
         raise
     except Exception as error:
         if debug:
@@ -128,3 +150,38 @@ def guarded(*, debug: bool) -> Iterator[None]:
         kind = type(error).__name__
         sys.stderr.write(f"error: aqualog failed ({kind}: {clean(str(error))[:300]}). Try: --debug, and report it\n")
         raise typer.Exit(int(ExitCode.FAILED)) from error
+
+
+class _StandardOutput:
+    """The stream of data; its faults bear its name, which those of a stream do not of themselves."""
+
+    NAME = "standard output"
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write, or raise OSError with the stream's name."""
+        with self._named():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        """Flush, or raise OSError with the stream's name."""
+        with self._named():
+            self._stream.flush()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self.NAME) from error
+
+
+def _silence() -> None:
+    """Nothing more can go to stdout: what is still in its buffer must not fail once more at the end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -159,7 +159,8 @@ def _detect(
     console, paths = setup.console, setup.paths
     vehicle = setup.vehicle
     if history_file is not None:
-        refuse_existing([history_file], force=True, sources=[*paths, *targets])
+        others = [thresholds_file] if thresholds_file is not None else []
+        refuse_existing([history_file], force=True, sources=[*setup.sources, *targets, *others])
     if thresholds_file is not None:
         refuse_existing(targets, force=force, sources=[thresholds_file])
     with console.steps() as steps:

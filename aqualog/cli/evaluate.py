@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,9 @@ import typer
 from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Signals, Vehicle, Verbose
 
 if TYPE_CHECKING:
+    from aqualog.cli.console import Console
     from aqualog.detect.joint_cusum import JointCusumParams
+    from aqualog.evaluate.drives import LogSource
     from aqualog.evaluate.run import Evaluation
 
 __all__ = ["evaluate"]
@@ -108,7 +111,7 @@ def _evaluate(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.console import Console, clean
+    from aqualog.cli.console import Console, clean, told_if_interrupted
     from aqualog.cli.evaluate_inputs import campaign_inputs, is_campaign, log_inputs
     from aqualog.cli.files import refuse_existing
     from aqualog.config.campaign import group_keys
@@ -138,9 +141,10 @@ def _evaluate(
             joint = load_settings(thresholds_file).joint_cusum
             sources = tuple(replace(s, joint=joint) for s in sources)
         work = tune_drives if tune_file else evaluate_drives
-        result = work(
-            sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=steps
-        )  # fmt: skip
+        with told_if_interrupted("nothing was written"):
+            result = work(
+                sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=steps
+            )  # fmt: skip
         steps("writing")
         if result.records:
             _write(result, given.name, keys, tune_file, out, sources[0].joint)
@@ -155,8 +159,29 @@ def _evaluate(
         console.note(f"the page is {out}")
     if tune_file is not None:
         console.note(f"the thresholds are in {tune_file}")
-    lossy = any(r.is_lossy for r in result.records)
-    return int(ExitCode.PARTIAL) if result.failed or lossy else int(ExitCode.DONE)
+    is_lossy = any(r.is_lossy for r in result.records)
+    is_late = _tell_late_labels(result, given.sources, console)
+    return int(ExitCode.PARTIAL) if result.failed or is_lossy or is_late else int(ExitCode.DONE)
+
+
+def _tell_late_labels(result: Evaluation, sources: tuple[LogSource, ...], console: Console) -> bool:
+    """Whether labels of a drive begin after its log has ended, which left them out; told by drive, as those cut are."""
+    from aqualog.cli.console import clean
+    from aqualog.evaluate.labels import after
+
+    ends = {r.name: r.duration_s for r in result.records}
+    of_drives = {s.name: after(s.labels or (), ends[s.name]) for s in sources if s.name in ends}
+    late = {name: sorted({x.start_s for x in labels}) for name, labels in of_drives.items()}
+    for name, starts in late.items():
+        if starts:
+            what = "a label begins" if len(starts) == 1 else f"{len(starts)} labels begin"
+            told = f"{name}: {what} after the log's end at {ends[name]:g} s, at {starts[0]:g} s; left out"
+            sys.stderr.write(f"error: {clean(told)}\n")
+    for s in sources:
+        end = ends.get(s.name, math.inf)
+        if any(x.start_s < end < x.end_s for x in s.labels or ()):
+            console.detail(f"note: {s.name}: labels are cut where the log ends, at {end:g} s")
+    return any(late.values())
 
 
 def _write(

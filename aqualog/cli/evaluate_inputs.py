@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
-from aqualog.cli.files import expand
+from aqualog.cli.files import expand, list_files
 from aqualog.config.campaign import Run, load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
@@ -65,7 +65,9 @@ def campaign_inputs(
     signal_map = load_signal_map(map_path) if map_path else SignalMap()
     vehicles = {p: load_vehicle(p) for p in dict.fromkeys(r.vehicle for r in campaign.runs)}
     sources = tuple(_source(logs, runs, path.parent, vehicles, signal_map, dbc) for logs, runs in of_log.items())
-    files = (path, *(p for logs in of_log for p in logs), *vehicles, *(p for r in campaign.runs if (p := r.labels)))
+    tables = (p for p in (campaign.table, map_path) if p)
+    labelled = (p for r in campaign.runs if (p := r.labels))
+    files = (path, *tables, *dbc, *(p for logs in of_log for p in logs), *vehicles, *labelled)
     return Inputs(campaign.name, sources, campaign.keys, files)
 
 
@@ -88,7 +90,8 @@ def log_inputs(
         LogSource(str(p), (p,), car, signal_map, tuple(dbc), given.get(p), groups={"vehicle": car.name}) for p in paths
     )  # fmt: skip
     name = ", ".join(str(p) for p in paths) if len(paths) <= 2 else f"{paths[0].parent} ({len(paths)} logs)"
-    return Inputs(name, sources, ("vehicle",), (*paths, *(p for p in (vehicle, map_file, labels) if p)))
+    named = (p for p in (vehicle, map_file, labels) if p)  # of labels in a folder, all that are in it
+    return Inputs(name, sources, ("vehicle",), (*paths, *list_files(inputs), *dbc, *named))
 
 
 def _source(

@@ -11,7 +11,7 @@ from aqualog.errors import ConfigError, LogError
 from aqualog.io.sniff import sniff
 from aqualog.io.whole import write_text, write_whole
 
-__all__ = ["expand", "refuse_existing", "write_text", "write_whole"]
+__all__ = ["expand", "list_files", "refuse_existing", "write_text", "write_whole"]
 
 
 def expand(names: Iterable[str]) -> list[Path]:
@@ -30,6 +30,11 @@ def expand(names: Iterable[str]) -> list[Path]:
         for path in _one(name):
             found.setdefault(os.path.realpath(path), path)
     return list(found.values())
+
+
+def list_files(names: Iterable[str]) -> list[Path]:
+    """The lists themselves among what the user typed: they are sources as the logs are that they name."""
+    return [Path(name[1:]) for name in names if name.startswith("@")]
 
 
 def _one(name: str) -> list[Path]:
@@ -83,15 +88,22 @@ def _is_log(path: Path) -> bool:
 def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = ()) -> None:
     """Stop before any work if a result would overwrite something; a source is not overwritten even by force.
 
+    A source that is a folder stands for the files in it. Nor may two results have one name.
+
     Raises
     ------
     ConfigError
         Naming the first file that exists.
     """
-    own = {os.path.realpath(s) for s in sources}
+    own = {os.path.realpath(f) for s in sources for f in (s, *(s.iterdir() if s.is_dir() else ()))}
+    targets: set[str] = set()
     for path in paths:
-        if os.path.realpath(path) in own:
+        real = os.path.realpath(path)
+        if real in own:
             raise ConfigError("is a source of this very run", where=str(path), hint="another name for the result")
+        if real in targets:
+            raise ConfigError("is named for two results", where=str(path), hint="another name for one of them")
+        targets.add(real)
         if path.is_dir():
             raise ConfigError("is a folder", where=str(path), expected="a file to write")
         if path.exists() and not force:

@@ -57,7 +57,7 @@ def _main(
 def run() -> None:
     """Entry point of the installed command.
 
-    A request to end leaves by the usual way, so that no half-written file stays.
+    A request to end is an interrupt as Ctrl-C is: it leaves by the usual way, so that no half-written file stays.
     """
     for stream in (sys.stdout, sys.stderr):
         # a name that the terminal's code page does not have must not cost the work
@@ -70,4 +70,4 @@ def run() -> None:
 
 
 def _leave(number: int, _: object) -> None:
-    sys.exit(128 + number)
+    raise KeyboardInterrupt

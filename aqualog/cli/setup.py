@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
 from aqualog.cli.console import Console
-from aqualog.cli.files import expand, refuse_existing
+from aqualog.cli.files import expand, list_files, refuse_existing
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.vehicle import Vehicle
@@ -18,12 +18,13 @@ __all__ = ["Setup", "prepare"]
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Inputs and configuration of one run."""
+    """Inputs and configuration of one run; `sources` are all files that no result may overwrite."""
 
     console: Console
     paths: list[Path]
     signal_map: SignalMap
     vehicle: Vehicle
+    sources: tuple[Path, ...]
 
 
 def prepare(
@@ -55,8 +56,8 @@ def prepare(
     """
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     paths = expand(logs)
-    own = [*paths, *dbc, *(p for p in (map_file, vehicle_file) if p)]
+    own = (*paths, *list_files(logs), *dbc, *(p for p in (map_file, vehicle_file) if p))
     refuse_existing(targets, force=force, sources=own)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
     vehicle = load_vehicle(vehicle_file) if vehicle_file else Vehicle()
-    return Setup(console, paths, signal_map, vehicle)
+    return Setup(console, paths, signal_map, vehicle, own)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -72,12 +72,15 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """A campaign; paths are relative to where the reader is, not to the file."""
+    """A campaign; paths are relative to where the reader is, not to the file. `table` is the table of runs, if there is
+    one.
+    """
 
     name: str
     path: Path
     signals: Path | None
     runs: tuple[Run, ...]
+    table: Path | None = field(default=None, compare=False)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -114,19 +117,20 @@ def load_campaign(path: Path) -> Campaign:
         faults.add("run", "run is not a list of [[run]] tables")
         tables = []
     runs: list[Run | None] = []
-    for index, table in enumerate(tables):
+    for index, one in enumerate(tables):
         with faults.inside("run", index):
-            runs.append(_run(table, base, vehicle, TomlRun(faults)))
-    if isinstance(document.get("runs"), str):
+            runs.append(_run(one, base, vehicle, TomlRun(faults)))
+    table = base / document["runs"] if isinstance(document.get("runs"), str) else None
+    if table is not None:
         try:
-            runs += _from_table(base / document["runs"], vehicle)
+            runs += _from_table(table, vehicle)
         except ConfigError as error:
             faults.add("runs", error.line())
     faults.raise_if_any()
     done = tuple(r for r in runs if r is not None)
     if not done:
         raise ConfigError("no run in it", where=str(path), expected="at least one log")
-    return Campaign(str(document.get("name", path.stem)), path, signals, done)
+    return Campaign(str(document.get("name", path.stem)), path, signals, done, table)
 
 
 def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from aqualog.config.table_faults import LineFaults
@@ -23,7 +24,8 @@ def load_labels(path: Path) -> tuple[Label, ...]:
 
     `start_s` and `end_s` [s] count from the log's first sample; `effect` is `full`, `partial`, `water`, the name of a
     single detector, or any other text (a surface, a situation), which serves the confusion table only; `wheel` is
-    `fl`, `fr`, `rl`, `rr` or empty. A heading without lines says that there was no water.
+    `fl`, `fr`, `rl`, `rr` or empty. A heading without lines says that there was no water. Full aquaplaning is partial
+    aquaplaning too, as the simulated truth has it: its stretches are added to those of `partial`.
 
     Raises
     ------
@@ -33,7 +35,10 @@ def load_labels(path: Path) -> tuple[Label, ...]:
     rows = read_csv(path, what="labels file")
     faults = LineFaults(path)
     heading = [name.strip() for name in rows[0]] if rows else []
-    for name in heading:
+    _check_form(rows[0] if rows else [], path)
+    for name in dict.fromkeys(n for n in heading if heading.count(n) > 1):
+        faults.add(1, f"column {name} stands twice")
+    for name in dict.fromkeys(heading):
         if name not in _COLUMNS:
             faults.unknown(1, "column", name, _COLUMNS)
     for name in _COLUMNS[:3]:
@@ -51,7 +56,7 @@ def load_labels(path: Path) -> tuple[Label, ...]:
         if label is not None:
             labels.append(label)
     faults.raise_if_any()
-    return _merged(labels)
+    return _merged([*labels, *_partial_too(labels)])
 
 
 def read_csv(path: Path, *, what: str) -> list[list[str]]:
@@ -78,6 +83,29 @@ def read_csv(path: Path, *, what: str) -> list[list[str]]:
         raise ConfigError(f"{what} is not CSV: {error}", where=str(path)) from error
 
 
+def _check_form(first: list[str], path: Path) -> None:
+    """A table of another form has a fault in every line; one message says which form it is."""
+    line = ",".join(first)
+    separator = next((s for s in (";", "\t") if s in line and "start_s" in line), None)
+    expected = ",".join(_COLUMNS)
+    if separator is not None or (";" in line and _is_number(line.split(";", maxsplit=1)[0].replace(",", "."))):
+        told = "tabs" if separator == "\t" else "semicolons"
+        raise ConfigError(
+            f"labels file has {told} between its cells", where=f"{path}: line 1",
+            expected=f"commas, and points in numbers: {expected}",
+        )  # fmt: skip
+    if first and _is_number(first[0]):
+        raise ConfigError("labels file has no heading", where=f"{path}: line 1", expected=expected)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _label(cells: dict[str, str], line: int, faults: LineFaults) -> Label | None:
     start = faults.number(line, "start_s", cells.get("start_s", ""), low=-1e7, high=1e7, unit="s")
     end = faults.number(line, "end_s", cells.get("end_s", ""), low=-1e7, high=1e7, unit="s")
@@ -85,13 +113,23 @@ def _label(cells: dict[str, str], line: int, faults: LineFaults) -> Label | None
     if not effect.isprintable() or not effect:
         faults.add(line, "no effect; expected full, partial, water, a detector or a surface")
     if wheel and wheel not in WHEELS:
-        faults.unknown(line, "wheel", wheel, WHEELS)
+        faults.add(line, f'unknown wheel "{wheel[:60]}"; expected {", ".join(WHEELS)} or nothing')
     if start is None or end is None or not effect:
         return None
     if not end > start:
         faults.add(line, f"end_s = {end:g} is not after start_s = {start:g}")
         return None
+    if end <= 0.0:
+        faults.add(line, f"end_s = {end:g} is not after the log's first sample, from which labels count")
+        return None
     return Label(max(start, 0.0), end, effect, wheel or None)
+
+
+def _partial_too(labels: list[Label]) -> list[Label]:
+    """Full aquaplaning as partial: of the car, or of wheels, as far as the file's own partial labels are such."""
+    of_wheels = {x.wheel is not None for x in labels if x.effect == "partial"}
+    full = [x for x in labels if x.effect == "full"]
+    return [replace(x, effect="partial") for x in full if not of_wheels or (x.wheel is not None) in of_wheels]
 
 
 def _merged(labels: list[Label]) -> tuple[Label, ...]:

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from aqualog.config.toml_file import TableFaults, is_number, load_toml
+from aqualog.config.toml_file import TableFaults, is_number, is_real, load_toml
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
 from aqualog.model.faults import FAULT_KINDS, SensorFault
@@ -256,10 +256,12 @@ class _Reader:
         if not isinstance(points, list) or not points:
             self._faults.add(name, f"{name} is not a list of pairs such as [[0.0, 1.0], [10.0, 2.0]]")
             return ()
+        unit = key.unit.rsplit(", ", maxsplit=1)[-1]
         pairs: list[tuple[float, float]] = []
         for n, point in enumerate(points, 1):
-            if not isinstance(point, list) or len(point) != 2 or not all(is_number(x) for x in point):
-                self._faults.add(name, f"{name}: point {n} is not a pair of numbers [{over}, {values or key.unit}]")
+            if not isinstance(point, list) or len(point) != 2 or not all(is_real(x) for x in point):
+                pair = f"{over}, {values or f'value [{unit}]'}"
+                self._faults.add(name, f"{name}: point {n} is not a pair of numbers [{pair}]")
                 return ()
             x, y = float(point[0]), float(point[1])
             if not 0.0 <= x <= end:
@@ -267,7 +269,6 @@ class _Reader:
             elif pairs and x <= pairs[-1][0]:
                 self._faults.add(name, f"{name}: point {n}: {over} = {x:g} does not come after {pairs[-1][0]:g}")
             if not key.low <= y <= key.high:
-                unit = key.unit.split(", ")[-1]
                 self._faults.add(name, f"{name}: point {n}: {y:g} is outside {key.low:g} ... {key.high:g} {unit}")
             pairs.append((x, y))
         return tuple(pairs)

@@ -12,7 +12,7 @@ from typing import Any
 
 from aqualog.errors import ConfigError
 
-__all__ = ["Faults", "TableFaults", "is_number", "line_of", "load_toml"]
+__all__ = ["Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]
 
 LARGEST = 16 * 2**20  # [byte]
 _HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
@@ -78,11 +78,14 @@ def line_of(text: str, key: str) -> int | None:
     return None
 
 
+def is_real(value: Any) -> bool:
+    """Whether a TOML value is a number, be it beyond all bounds; NaN is none."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and value == value
+
+
 def is_number(value: Any) -> bool:
     """Whether a TOML value is a finite number that a float can hold."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return abs(value) < 1e300 and value == value
+    return is_real(value) and abs(value) < 1e300
 
 
 class Faults:
@@ -107,10 +110,10 @@ class Faults:
     def number(self, table: Mapping[str, Any], key: str, *, low: float, high: float, unit: str) -> float | None:
         """A number within its bounds, or None with the fault noted."""
         value: Any = table.get(key)
-        if not is_number(value):
+        if not is_real(value):
             self.add(key, f"{key} = {str(value)[:40]} is not a number")
             return None
-        if not low <= value <= high:
+        if not low <= value <= high or not is_number(value):
             self.add(key, f"{key} = {value:g} is outside {low:g} ... {high:g} {unit}".rstrip())
             return None
         return float(value)

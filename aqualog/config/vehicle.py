@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from aqualog.config.toml_file import Faults, is_number, load_toml
+from aqualog.config.toml_file import TableFaults, is_real, load_toml
 from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, Vehicle
 
 __all__ = ["load_vehicle"]
+
+MOST_POWERS = 5  # of a polynomial; calibration fits fewer
+LARGEST_TERM = 1e4  # [N], [N*m] constant and spread: as much as the whole force of a tie rod (K)
+LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a half of the tyre's force (K)
+TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
 _SPLIT = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
 
@@ -24,7 +29,7 @@ def load_vehicle(path: Path) -> Vehicle:
         With all faults of the file in one message.
     """
     document, text = load_toml(path, what="vehicle file")
-    faults = Faults(path, text)
+    faults = TableFaults(path, text)
     values: dict[str, Any] = {"name": str(document.pop("name", path.stem))}
     if isinstance(values.get("name"), str) and not values["name"].isprintable():
         faults.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
@@ -36,18 +41,11 @@ def load_vehicle(path: Path) -> Vehicle:
     values["drivetrain"] = drivetrain
     values["torque_split_rear"] = _SPLIT[drivetrain]
     for section in POLYNOMIALS:
-        values[section] = _polynomial(document.pop(section, {}), section, faults)
+        with faults.inside(section):
+            values[section] = _polynomial(document.pop(section, {}), section, faults)
     for section, table in _sections(document, faults).items():
-        known = [k.name for k in KEYS.values() if k.section == section]
-        for name in table:
-            if name not in known:
-                faults.unknown(name, known)
-                continue
-            key = KEYS[f"{section}.{name}" if section else name]
-            number = faults.number(table, name, low=key.low, high=key.high, unit=key.unit)
-            if number is not None:
-                values[name] = number
-                given.add(key.path)
+        with faults.inside(section):
+            _numbers(table, section, faults, values, given)
     faults.raise_if_any()
     # a loaded radius that is not given follows the effective one, so that a truck does not get a car's
     for axle in ("f", "r"):
@@ -56,7 +54,7 @@ def load_vehicle(path: Path) -> Vehicle:
     return Vehicle(**values, given=frozenset(given))
 
 
-def _sections(document: dict[str, Any], faults: Faults) -> dict[str, dict[str, Any]]:
+def _sections(document: dict[str, Any], faults: TableFaults) -> dict[str, dict[str, Any]]:
     sections = {s for s in (k.section for k in KEYS.values()) if s}
     found: dict[str, dict[str, Any]] = {"": {}}
     for name, value in document.items():
@@ -69,22 +67,53 @@ def _sections(document: dict[str, Any], faults: Faults) -> dict[str, dict[str, A
     return found
 
 
-def _polynomial(table: Any, section: str, faults: Faults) -> dict[str, tuple[float, ...]]:
+def _numbers(table: dict[str, Any], section: str, faults: TableFaults, values: dict[str, Any], given: set[str]) -> None:
+    """Plain keys of a table into `values`, their paths into `given`."""
+    known = [k.name for k in KEYS.values() if k.section == section]
+    for name in table:
+        if name in known:
+            key = KEYS[f"{section}.{name}" if section else name]
+            number = faults.number(table, name, low=key.low, high=key.high, unit=key.unit)
+            if number is not None:
+                values[name] = number
+                given.add(key.path)
+        elif section and (name in POLYNOMIALS or name in KEYS):
+            own = f"expected [{name}], a table of its own" if name in POLYNOMIALS else "expected above all tables"
+            faults.add(name, f"{name} stands in [{section}]; {own}")
+        else:
+            faults.unknown(name, known)
+
+
+def _polynomial(table: Any, section: str, faults: TableFaults) -> dict[str, tuple[float, ...]]:
     """`F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
     result: dict[str, tuple[float, ...]] = {}
     if not isinstance(table, dict):
-        faults.add(section, f"{section} is not a table")
+        faults.add(section, f"{section} is not a table; write [{section}]")
         return result
     for name, value in table.items():
         if name not in COEFFICIENTS:
             faults.unknown(name, COEFFICIENTS)
             continue
         numbers = value if isinstance(value, list) else [value]
-        if not numbers or not all(is_number(n) for n in numbers):
-            faults.add(name, f"{name} = {value!r} is not a number or a list of numbers")
-            continue
-        if name == "sigma" and not all(n > 0 for n in numbers):
-            faults.add(name, f"{name} = {value!r} is not above 0")
-            continue
-        result[name] = tuple(float(n) for n in numbers)
+        wrong = _wrong(name, numbers)
+        if wrong:
+            faults.add(name, f"[{section}] {name} = {str(value)[:60]} {wrong}")
+        else:
+            result[name] = tuple(float(n) for n in numbers)
     return result
+
+
+def _wrong(name: str, numbers: list[Any]) -> str:
+    """What is wrong with the numbers of a coefficient; empty if nothing is."""
+    if not numbers or not all(is_real(n) for n in numbers):
+        return "is not a number or a list of numbers"
+    most = 1 if name in ("c0", "sigma") else MOST_POWERS
+    if len(numbers) > most:
+        return f"has {len(numbers)} values; expected {'one' if most == 1 else f'at most {most} powers'}"
+    if name == "sigma":
+        return "" if 0.0 < numbers[0] <= LARGEST_TERM else f"is outside 0 ... {LARGEST_TERM:g}, 0 excluded"
+    for power, n in enumerate(numbers, 0 if name == "c0" else 1):
+        bound = LARGEST_TERM if power == 0 else LARGEST_GAIN / TYPICAL_FORCE ** (power - 1)
+        if not abs(n) <= bound:
+            return f"is outside -{bound:g} ... {bound:g}" + (f" in power {power}" if power > 1 else "")
+    return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -13,7 +13,7 @@ from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.detect.joint_cusum import JointCusumParams
 from aqualog.errors import SignalError
-from aqualog.evaluate.labels import Label, Labels, Span
+from aqualog.evaluate.labels import Label, Labels, Span, after, until
 from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
@@ -100,11 +100,13 @@ class LogSource:
             Also if the drive has no labels of any kind.
         """
         signals = load_signals(self.paths, vehicle=self.vehicle, signal_map=self.signal_map, dbc=self.dbc)
+        signals = _told(signals, self.labels or ())
         return Drive(self.name, signals, self.vehicle, self._labels(signals), self.groups, self.joint)
 
     def _labels(self, signals: Signals) -> Labels:
         if self.labels is not None:
-            return Labels(self.labels, frozenset(("full", "partial", "water")), "labels file")
+            inside = until(self.labels, _end(signals))
+            return Labels(inside, frozenset(("full", "partial", "water")), "labels file")
         found = _truth_of(self.paths, read_options(self.signal_map, self.dbc), signals) or labels_in(signals)
         if found is not None:
             return found
@@ -117,6 +119,24 @@ class LogSource:
             expected="simulated truth, on_water, lane_start_s and lane_end_s in the campaign, or a labels file",
             hint="--labels FILE; one with a heading and no line says that the road was dry",
         )
+
+
+def _end(signals: Signals) -> float:
+    """When the last sample is over. [s]"""
+    return signals.frame.height * signals.dt
+
+
+def _told(signals: Signals, labels: Sequence[Label]) -> Signals:
+    """The drive, with a note on labels that do not end before it does."""
+    end = _end(signals)
+    late = dict.fromkeys(x.start_s for x in after(labels, end))
+    cut = dict.fromkeys(x.end_s for x in labels if x.start_s < end < x.end_s - signals.dt)
+    notes = [f"the label from {t:g} s begins after the log, which ends at {end:g} s; left out" for t in late]
+    notes += [f"the label to {t:g} s is cut where the log ends, at {end:g} s" for t in cut]
+    if not notes:
+        return signals
+    quality = signals.quality
+    return replace(signals, quality=replace(quality, notes=(*quality.notes, *notes)))
 
 
 def labels_in(signals: Signals) -> Labels | None:

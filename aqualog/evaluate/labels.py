@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 __all__ = [
-    "AQUAPLANING", "EFFECTS", "SURFACES", "WATER_AFTER_S", "Label", "Labels", "Span", "joined", "overlaps",
-    "without",
+    "AQUAPLANING", "EFFECTS", "SURFACES", "WATER_AFTER_S", "Label", "Labels", "Span", "after", "joined", "overlaps",
+    "until", "without",
 ]  # fmt: skip
 
 Span = tuple[float, float]
@@ -84,6 +84,16 @@ class Labels:
     def unknown(self) -> tuple[str, ...]:
         """Effects that are neither aquaplaning, nor a detector's, nor a surface that aqualog knows by name."""
         return tuple(e for e in self.others if e not in (*EFFECTS, *SURFACES))
+
+
+def after(items: Iterable[Label], end_s: float) -> tuple[Label, ...]:
+    """Labels that begin when the drive is over: they belong to another drive, or to another clock."""
+    return tuple(x for x in items if x.start_s >= end_s)
+
+
+def until(items: Iterable[Label], end_s: float) -> tuple[Label, ...]:
+    """Labels of a drive of `end_s` [s]: cut where it ends, without those that begin later."""
+    return tuple(replace(x, end_s=min(x.end_s, end_s)) for x in items if x.start_s < end_s)
 
 
 def joined(spans: Iterable[Span], gap: float) -> list[Span]:

@@ -35,7 +35,7 @@ SEEDS = tuple(range(3001, 3021))
 
 DRY_SEED = 3000
 MANY, SOME = 0.8, 0.5  # shares of the runs: what mostly happens, and what happens at least in every other run
-_SLALOM_S, _DRY_S = 40.0, 80.0
+_SLALOM_S, _DRY_S = 80.0, 80.0
 _PUSH_S, _CHANGE_S = 5.0, 12.0  # of a change of speed: 1 m/s^2 either way in both drives
 _SETTLED_S = 5.0  # after which a drive has settled
 _A_Y = 2.0  # [m/s^2] the slalom of the thesis' Figure 2.23

@@ -88,6 +88,7 @@ def simulate_campaign(
     # a torn last line would swallow the next one
     write_text(folder / STATE, "".join(_line(done) for done in known.values()))
     todo = [r for r in runs if r.name not in known]
+    _sweep(folder, todo)
     report(len(known), len(runs))
     failed: dict[str, str] = {}
     made: dict[str, Done] = {}
@@ -149,6 +150,13 @@ def _line(done: Done) -> str:
 
 def _log(folder: Path, name: str) -> Path:
     return folder / "logs" / f"{name}.mf4"
+
+
+def _sweep(folder: Path, runs: Sequence[Run]) -> None:
+    """Remove what a killed process has left half-written of these logs, by the names that `write_whole` gives."""
+    for run in runs:
+        for orphan in (folder / "logs").glob(f".{run.name[:40]}-{'?' * 8}.mf4.tmp"):
+            orphan.unlink(missing_ok=True)
 
 
 def _code_stamp() -> str:

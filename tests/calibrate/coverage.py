@@ -58,7 +58,7 @@ def summary(rows):
         inside = np.abs(z) <= 1.0
         lines.append(
             f"{case:24s} {name:20s} covered {inside.mean():6.1%} of {z.size:4d}, when told {inside[told].mean() if told.any() else np.nan:6.1%}"
-            f" of {told.sum():4d}; half width {np.median(half):6.2%}, mean error {np.mean(z * half):+.2%}"
+            f" of {told.sum():4d}; half width {np.median(half):7.3%}, mean error {np.mean(z * half):+.4%}"
         )
     return "\n".join(lines)
 

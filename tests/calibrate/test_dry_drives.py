@@ -166,3 +166,38 @@ def test_between_drives_the_heavy_one_stands_out():
     assert low < 200.0 < high
     assert difference == pytest.approx(200.0, abs=30.0)
     assert low > 0.0
+
+
+def frozen(signals, *names):
+    value = {n: pl.Series(np.full(signals.frame.height, signals.array(n)[100])) for n in names}
+    return replace(signals, frame=signals.frame.with_columns(**value))
+
+
+@pytest.mark.parametrize("name", ["a_x", "v_x", "omega_rr"])
+def test_a_signal_that_never_changes_is_refused(ideal, name):
+    true, signals = ideal
+    with pytest.raises(SignalError, match=f"{name} never changes"):
+        calibrate([frozen(signals, name)], ["drive"], believed(true))
+
+
+def test_a_dead_torque_is_refused_and_no_rolling_resistance_comes_of_it(ideal):
+    true, signals = ideal
+    torques = [f"torque_{w}" for w in true.driven]
+    with pytest.raises(SignalError, match="never change"):
+        calibrate([frozen(signals, *torques)], ["drive"], believed(true))
+    # a torque of noise tells no slope between force and acceleration, so no level either
+    rng = np.random.default_rng(1)
+    noise = {t: pl.Series(rng.normal(0.0, 2.0, signals.frame.height)) for t in torques}
+    made = replace(signals, frame=signals.frame.with_columns(**noise, brake_pressure=pl.lit(0.0)))
+    found = {p.name: p for p in calibrate([made], ["drive"], believed(true)).parameters}
+    assert not found["mass_per_gain"].identified
+    assert not found["rolling_resistance"].identified
+
+
+def test_what_contradicts_the_drives_is_said(series):
+    signals, true, _, _ = series
+    mass = believed(true).mass
+    result = calibrate(signals, ["a", "b"], believed(true), {"mass": mass, "torque_gain": 0.5})
+    assert any("contradict" in n for n in result.notes)
+    quiet = calibrate(signals, ["a", "b"], believed(true), {"mass": mass})
+    assert not any("contradict" in n for n in quiet.notes)

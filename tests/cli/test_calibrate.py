@@ -97,3 +97,69 @@ def test_nothing_usable(folder, tmp_path):
     assert code == 4
     assert err.count("error:") == 1
     assert "torque_" in err
+
+
+SHORT = "t [s],v_x [m/s],a_x [m/s^2]\n"
+
+
+def bad_logs(folder):
+    """One sample, not a log, and a log without torques."""
+    (folder / "q_one.csv").write_text(SHORT + "0,20,0\n")
+    (folder / "broken.mf4").write_bytes(b"MDF     4.10" + b"\0" * 90)
+    (folder / "poor.csv").write_text(SHORT + "".join(f"{i / 10},20,0\n" for i in range(50)))
+    return [folder / "q_one.csv", folder / "broken.mf4", folder / "poor.csv"]
+
+
+def test_a_bad_log_is_told_and_the_others_are_used(folder, tmp_path):
+    out = tmp_path / "calibrated.toml"
+    first, second, third = bad_logs(tmp_path)
+    code, text, err = run(
+        first,
+        folder / "a.parquet",
+        second,
+        third,
+        folder / "b.parquet",
+        "--vehicle",
+        folder / "car.toml",
+        "--json",
+        "-o",
+        out,
+    )
+    assert code == 3, err
+    assert [d["name"] for d in json.loads(text)["drives"]] == ["a.parquet", "b.parquet"]
+    lines = [line for line in err.splitlines() if line.startswith("error:")]
+    assert len(lines) == 3
+    for path in (first, second, third):
+        assert sum(line.count(path.name) for line in lines) == 1
+    assert lines[0].startswith("error: q_one.csv: ")
+    assert load_vehicle(out).mass > 0.0
+
+
+def test_bad_logs_alone(folder, tmp_path):
+    code, text, err = run(*bad_logs(tmp_path), "--vehicle", folder / "car.toml", "-o", tmp_path / "x.toml")
+    assert code == 4
+    assert err.count("error:") == 3
+    assert "q_one.csv" in err
+    assert text == ""
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_fix_of_one_key_twice(folder):
+    code, _, err = run(
+        folder / "a.parquet", "--vehicle", folder / "car.toml", "--fix", "mass=1500", "--fix", "mass=1600"
+    )
+    assert code == 2
+    assert "--fix mass is given twice" in err
+
+
+def test_a_note_bears_the_name_of_its_file_once(folder, tmp_path):
+    import polars as pl
+
+    frame = pl.read_parquet(folder / "a.parquet")
+    lines = frame.write_csv().splitlines()
+    (tmp_path / "back.csv").write_text("\n".join([*lines[:3000], *lines[2990:]]) + "\n")
+    code, text, err = run(folder / "b.parquet", tmp_path / "back.csv", "--vehicle", folder / "car.toml", "--json")
+    assert code in (0, 3), err
+    notes = [n for n in json.loads(text)["notes"] if "back.csv" in n]
+    assert notes
+    assert all(n.count("back.csv") == 1 for n in notes)

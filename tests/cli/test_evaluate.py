@@ -127,6 +127,18 @@ def test_logs_with_a_labels_file(folder):
     assert joint["false_alarms"]["count"] >= 1
 
 
+def test_a_label_after_the_end_of_the_log_is_told_and_left_out(folder):
+    labels = folder / "late.csv"
+    labels.write_text("start_s,end_s,effect,wheel\n5.2,8.5,full,fl\n40,50,full,fl\n60,61,water,\n11,20,snow,\n")
+    args = (folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels)
+    result = run(*args, "--json")
+    assert result.returncode == 3, result.stderr
+    assert "2 labels begin after the log's end at 12 s, at 40 s; left out" in errors(result)[0]
+    joint = json.loads(result.stdout)["detectors"]["joint_criteria"]
+    assert joint["full"]["episodes"] == joint["partial"]["episodes"] == 1
+    assert "labels are cut where the log ends, at 12 s" in run(*args, "-v").stderr
+
+
 def test_logs_without_water_share_an_empty_labels_file(folder):
     result = run(
         folder / "dry.csv",
@@ -152,7 +164,8 @@ def test_logs_without_water_share_an_empty_labels_file(folder):
         (("gone.toml",), 2, "not found"),
         (("dry.csv", "deep.mf4", "--vehicle", "rwd.toml", "--labels", "one.csv"), 2, "one labels file for 2 logs"),
         (("broken.mf4", "--vehicle", "rwd.toml"), 4, "broken.mf4"),
-        (("campaign.toml", "-o", "runs.csv"), 2, "exists already"),
+        (("campaign.toml", "-o", "runs.csv"), 2, "source of this very run"),
+        (("campaign.toml", "-o", "one.csv"), 2, "exists already"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(folder, args, code, text):

@@ -172,7 +172,12 @@ def test_labels_file(tmp_path):
     got = labels(
         tmp_path, "start_s, end_s,effect,wheel\n1.0,2.5,full,fl\n2.0,3.0,full,fl\n\n 5, 6 ,snow,\n-1,4,water,\n"
     )
-    assert got == (Label(1.0, 3.0, "full", "fl"), Label(5.0, 6.0, "snow"), Label(0.0, 4.0, "water"))
+    assert got == (
+        Label(1.0, 3.0, "full", "fl"),
+        Label(5.0, 6.0, "snow"),
+        Label(0.0, 4.0, "water"),
+        Label(1.0, 3.0, "partial", "fl"),
+    )
     assert labels(tmp_path, "start_s,end_s,effect,wheel\n") == ()
     assert labels(tmp_path, "effect,start_s,end_s\nwater,1,2\n") == (Label(1.0, 2.0, "water"),)
 
@@ -188,3 +193,44 @@ def test_all_faults_of_a_labels_file_are_named_at_once(tmp_path):
         labels(tmp_path, "start_s,end,effect\n")
     with pytest.raises(ConfigError, match="no column start_s"):
         labels(tmp_path, "")
+
+
+def partial(tmp_path, lines):
+    return [x for x in labels(tmp_path, "start_s,end_s,effect,wheel\n" + lines) if x.effect == "partial"]
+
+
+def test_full_aquaplaning_is_partial_too(tmp_path):
+    assert partial(tmp_path, "1,2,full,fl\n4,5,full,\n") == [
+        Label(1.0, 2.0, "partial", "fl"),
+        Label(4.0, 5.0, "partial"),
+    ]
+    # a partial label on both sides of a full one: one episode, as the truth has it
+    assert partial(tmp_path, "1,2,partial,fl\n2,3,full,fl\n3,4,partial,fl\n") == [Label(1.0, 4.0, "partial", "fl")]
+    # partial labels of the car alone do not become labels of some wheels
+    assert partial(tmp_path, "1,4,partial,\n2,3,full,fl\n") == [Label(1.0, 4.0, "partial")]
+    assert partial(tmp_path, "2,3,water,\n") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            "start_s,end_s,effect\n1,2,water\n-5,-1,water\n-5,0,water\n",
+            ("line 3: end_s = -1 is not", "line 4: end_s = 0 is"),
+        ),
+        ("start_s,end_s,effect,end_s\n1,2,water,3\n", ("line 1: column end_s stands twice",)),
+        ("start_s;end_s;effect;wheel\n1;2;water;\n", ("line 1: labels file has semicolons", "expected commas")),
+        ("1,0;2,0;water;\n", ("labels file has semicolons", "points in numbers")),
+        ("start_s\tend_s\teffect\n1\t2\twater\n", ("labels file has tabs",)),
+        ("1.0,2.0,water,\n", ("labels file has no heading; expected start_s,end_s,effect,wheel",)),
+        ("start_s,end_s,effect,wheel\n1,2,full,front\n", ('unknown wheel "front"; expected fl, fr, rl, rr',)),
+    ],
+)
+def test_faults_of_labels_are_told_once(tmp_path, text, parts):
+    with pytest.raises(ConfigError) as caught:
+        labels(tmp_path, text)
+    told = str(caught.value)
+    for part in parts:
+        assert part in told, told
+    assert told.count("line 1") <= 1
+    assert "did you mean" not in told

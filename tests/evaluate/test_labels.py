@@ -5,7 +5,7 @@ import pytest
 from evaluate.made import FWD, scenario
 
 from aqualog.evaluate.drives import LogSource, labels_in
-from aqualog.evaluate.labels import Label, Labels, joined, overlaps, without
+from aqualog.evaluate.labels import Label, Labels, after, joined, overlaps, until, without
 from aqualog.evaluate.truth import spans_of, truth_labels
 from aqualog.model.log import write_simulation
 from aqualog.model.signals import as_signals
@@ -113,3 +113,25 @@ def test_truth_in_a_log_gives_the_labels_of_the_drive(tmp_path, suffix):
         got = drive.labels.of(effect)
         assert len(got) == len(known.of(effect))
         assert np.allclose(got, known.of(effect), atol=0.025), effect
+
+
+def test_labels_end_with_the_drive(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("t [s],v_x [m/s]\n" + "".join(f"{i / 10:g},20\n" for i in range(100)))
+    given = (
+        Label(1.0, 2.0, "water"),
+        Label(9.0, 30.0, "full", "fl"),
+        Label(10.0, 11.0, "snow"),
+        Label(12.0, 13.0, "water"),
+    )
+    drive = LogSource("drive", (path,), FWD, labels=given).load()
+    assert rounded([(x.start_s, x.end_s) for x in drive.labels.items]) == [(1.0, 2.0), (9.0, 10.0)]
+    assert drive.labels.water == [(1.0, 2.0), (9.0, pytest.approx(10.0))]
+    told = "; ".join(drive.signals.quality.notes)
+    assert "the label from 10 s begins after the log" in told
+    assert "the label from 12 s begins after the log" in told
+    assert "the label to 30 s is cut where the log ends, at 10 s" in told
+    assert after(given, 10.0) == given[2:]
+    assert until(given[:1], 10.0) == given[:1]
+    inside = LogSource("drive", (path,), FWD, labels=(Label(9.0, 10.0, "water"),)).load()
+    assert inside.signals.quality.notes == ()

@@ -155,3 +155,55 @@ def test_absurd_vehicle_files_are_configuration_errors(tmp_path, text):
 def test_absurd_maps_are_configuration_errors(tmp_path, text):
     with pytest.raises(ConfigError):
         load_signal_map(write(tmp_path, text))
+
+
+def vehicle_faults(tmp_path, text):
+    with pytest.raises(ConfigError) as error:
+        load_vehicle(write(tmp_path, text))
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("c_y = [0.1, 0, 0, 0, 0, 0]", "has 6 values; expected at most 5 powers"),
+        ("c0 = 1e5", "c0 = 100000.0 is outside -10000 ... 10000"),
+        ("c0 = [1.0, 2.0]", "c0 = [1.0, 2.0] has 2 values; expected one"),
+        ("sigma = [1.0, 2.0]", "has 2 values; expected one"),
+        ("sigma = 0", "sigma = 0 is outside 0 ... 10000, 0 excluded"),
+        ("sigma = 1e300", "is outside 0 ... 10000"),
+        ("c_x = 101", "c_x = 101 is outside -100 ... 100"),
+        ("c_y = [0.1, -0.2]", "is outside -0.1 ... 0.1 in power 2"),
+        ("c_y = 1e300", "is outside -100 ... 100"),
+        ("c_y = []", "is not a number or a list of numbers"),
+        ("c_y = true", "is not a number or a list of numbers"),
+        ("c_z = 1", 'unknown key "c_z"'),
+    ],
+)
+def test_polynomials_have_bounds_and_faults_their_table_and_line(tmp_path, line, said):
+    told = vehicle_faults(
+        tmp_path, f"[tie_rod]\nc0 = 1.0\nc_y = 0.1\nc_x = 0.1\nsigma = 3.0\n[steering_torque]\n{line}\n"
+    )
+    assert "line 7: " in told
+    assert said in told
+    assert "[steering_torque]" in told or "unknown" in told
+
+
+def test_largest_polynomial(tmp_path):
+    text = "[tie_rod]\nc0 = -1e4\nc_y = [100, 0.1, 1e-4, 1e-7, 1e-10]\nsigma = 1e4\n"
+    assert load_vehicle(write(tmp_path, text)).tie_rod["c_y"] == (100.0, 0.1, 1e-4, 1e-7, 1e-10)
+
+
+def test_a_key_in_the_wrong_table_is_told_with_the_table(tmp_path):
+    told = vehicle_faults(tmp_path, "[wheels]\nr_e_f = 0.3\n[tyre]\nslip_slope_f = 31.0\ntie_rod = 3\nmass = 1500\n")
+    assert "line 5: tie_rod stands in [tyre]; expected [tie_rod], a table of its own" in told
+    assert "line 6: mass stands in [tyre]; expected above all tables" in told
+    assert "line 1: tie_rod is not a table; write [tie_rod]" in vehicle_faults(tmp_path, "tie_rod = 3\n")
+
+
+@pytest.mark.parametrize("value", ["1e300", "-1e308", "inf", "9000000000000000000"])
+def test_a_number_beyond_all_bounds_is_told_with_the_bounds(tmp_path, value):
+    told = vehicle_faults(tmp_path, f"mass = {value}\n")
+    assert "is outside 200 ... 60000 kg" in told
+    assert "not a number" not in told
+    assert "mass = nan is not a number" in vehicle_faults(tmp_path, "mass = nan\n")

@@ -607,3 +607,22 @@ kind = "frozen"
 def test_faults_of_the_new_keys_are_told(folder, text, said):
     with pytest.raises(ConfigError, match=said):
         load(folder, SHORT + text + "\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "pair"),
+    [
+        ("wind_profile", "[t [s], value [km/h]]"), ("drive_share_profile", "[t [s], value [-]]"),
+        ("grade_profile", "[s [m], value [%]]"), ("brake_profile", "[t [s], value [N*m]]"),
+    ],
+)  # fmt: skip
+def test_a_point_of_a_profile_is_two_values(folder, name, pair):
+    for point in ("[1.0]", "[1.0, 2.0, 3.0]", '[0.0, "x"]', "[0.0, nan]"):
+        told = refused(folder, f"{SHORT}{name} = [{point}]\n")
+        assert f"{name}: point 1 is not a pair of numbers {pair}" in told
+
+
+def test_a_point_beyond_all_bounds_is_told_with_the_bounds(folder):
+    told = refused(folder, f"{SHORT}wind_profile = [[0.0, 1e300], [1e301, 0.0]]\n")
+    assert "point 1: 1e+300 is outside -150 ... 150 km/h" in told
+    assert "point 2: t [s] = 1e+301 is outside 0 ... 86400" in told

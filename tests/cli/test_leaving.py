@@ -1,0 +1,104 @@
+"""How a command ends before its end: interrupts, an output that takes nothing, and what a killed one leaves behind."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from aqualog.model import campaign
+from aqualog.model.programme import PROGRAMMES
+
+WAITING = """
+import sys, time
+import aqualog.align.load, aqualog.evaluate.run
+def wait(*_, **__):
+    sys.stderr.write("READY\\n")
+    sys.stderr.flush()
+    time.sleep(30)
+aqualog.align.load.load_signals = wait
+aqualog.evaluate.run.evaluate = wait
+from aqualog.cli.main import run
+sys.argv = ["aqualog", *sys.argv[1:]]
+run()
+"""
+PRINTING = """
+import sys
+import typer
+from aqualog.cli.console import guarded
+app = typer.Typer()
+@app.command()
+def print_much(count: int):
+    with guarded(debug=False):
+        sys.stdout.write("x" * count)
+app()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (("calibrate", "a.csv", "-o", "x.toml"), "interrupted, nothing was written"),
+        (("evaluate", "a.csv", "-o", "x.html"), "interrupted, nothing was written"),
+        (("detect", "a.csv", "-o", "x"), "interrupted"),
+    ],
+)
+def test_interrupted(tmp_path, command, told, number):
+    (tmp_path / "car.toml").write_text('name = "car"\n')
+    (tmp_path / "a.csv").write_text("t [s],v_x [m/s]\n0,1\n")
+    with subprocess.Popen(
+        [sys.executable, "-c", WAITING, *command, "--vehicle", "car.toml"], cwd=tmp_path, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stderr.readline() == "READY\n"
+        process.send_signal(number)
+        out, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err.splitlines() == [told]
+    assert out == ""
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "car.toml"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
+@pytest.mark.parametrize("count", [10, 1_000_000])
+def test_an_output_that_takes_nothing(count):
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        result = subprocess.run(
+            [sys.executable, "-c", PRINTING, str(count)], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert result.returncode == 1
+    assert result.stderr == "error: standard output: No space left on device. Try: another place for the output\n"
+
+
+@pytest.mark.parametrize("count", [10, 1_000_000])
+def test_a_reader_that_has_gone_is_no_error(count):
+    with subprocess.Popen(
+        [sys.executable, "-c", PRINTING, str(count)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.close()
+        err = process.stderr.read()
+    assert (process.returncode, err) == (0, "")
+
+
+def killed_while_writing(path):
+    code = "import os, sys; from pathlib import Path; from aqualog.io.whole import write_whole\n"
+    subprocess.run([sys.executable, "-c", f"{code}write_whole(Path(sys.argv[1]), lambda p: os._exit(9))", path])
+
+
+def test_a_campaign_that_goes_on_removes_what_a_killed_one_left(tmp_path, monkeypatch):
+    name, programme = next((n, make()) for n, make in PROGRAMMES.items())
+    logs = tmp_path / "campaign" / "logs"
+    killed_while_writing(logs / f"{programme[0].name}.mf4")
+    killed_while_writing(logs / "other.mf4")
+    (tmp_path / "campaign" / campaign.STATE).touch()
+    assert len(list(logs.iterdir())) == 2
+
+    def work(runs, folder, digests, *, jobs, record):
+        for run in runs:
+            record(run.name, "not tried")
+
+    monkeypatch.setattr(campaign, "_work", work)
+    campaign.simulate_campaign(name, tmp_path / "campaign", jobs=1, force=False, report=lambda *_: None)
+    assert [p.name[:7] for p in logs.iterdir()] == [".other-"]

@@ -1,0 +1,103 @@
+"""What a command reads is not written over, not even by force; no two results have one name."""
+
+import pytest
+from typer.testing import CliRunner
+
+from aqualog.cli.files import refuse_existing
+from aqualog.cli.main import app
+from aqualog.errors import ConfigError
+
+LABELS = "start_s,end_s,effect,wheel\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in {
+        "car.toml": 'name = "car"\n', "map.toml": "[signals]\n", "other.toml": "[signals]\n", "bus.dbc": 'VERSION ""\n',
+        "lane.csv": LABELS, "a.csv": "t [s],v_x [m/s]\n0,1\n", "logs.txt": "a.csv\n", "runs.csv": "log,labels\na.csv,lane.csv\n",
+        "campaign.toml": 'vehicle = "car.toml"\nsignals = "map.toml"\nruns = "runs.csv"\n', "labels/a.csv": LABELS,
+        "labels/b.csv": LABELS, "slopes.json": "{}",
+    }.items():  # fmt: skip
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def refused(args, said):
+    result = CliRunner().invoke(app, [*args, "--force"])
+    assert result.exit_code == 2, result.stderr
+    assert result.stderr.count("error:") == 1
+    assert said in result.stderr
+    return result.stderr
+
+
+CAMPAIGN = ("evaluate", "campaign.toml", "--signals", "other.toml", "--dbc", "bus.dbc")
+LOGS = ("evaluate", "@logs.txt", "--vehicle", "car.toml", "--signals", "map.toml", "--dbc", "bus.dbc")
+
+
+@pytest.mark.parametrize(
+    "target", ["campaign.toml", "runs.csv", "lane.csv", "car.toml", "a.csv", "other.toml", "bus.dbc"]
+)
+@pytest.mark.parametrize("option", ["-o", "--tune"])
+def test_sources_of_a_campaign(folder, target, option):
+    before = (folder / target).read_bytes()
+    refused([*CAMPAIGN, option, target], "source of this very run")
+    assert (folder / target).read_bytes() == before
+
+
+def test_signal_map_of_the_campaign_itself(folder):
+    refused(["evaluate", "campaign.toml", "-o", "map.toml"], "source of this very run")
+
+
+@pytest.mark.parametrize(
+    "target", ["logs.txt", "a.csv", "car.toml", "map.toml", "bus.dbc", "labels/a.csv", "labels/b.csv"]
+)
+def test_sources_of_logs(folder, target):
+    refused([*LOGS, "--labels", "labels", "-o", target], "source of this very run")
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("calibrate", "@logs.txt", "--vehicle", "car.toml", "-o", "logs.txt"),
+        ("calibrate", "@logs.txt", "--vehicle", "car.toml", "--page", "logs.txt"),
+        ("inspect", "@logs.txt", "--write-map", "logs.txt"),
+        ("detect", "@logs.txt", "--history", "logs.txt"),
+        ("detect", "a.csv", "--dbc", "bus.dbc", "--history", "bus.dbc"),
+    ],
+)
+def test_a_list_is_a_source_as_its_logs_are(folder, args):
+    if "--history" in args:
+        (folder / args[-1]).write_text((folder / "slopes.json").read_text())
+        result = CliRunner().invoke(app, list(args))
+        assert result.exit_code == 2
+        return
+    refused(args, "source of this very run")
+    assert (folder / "logs.txt").read_text() == "a.csv\n"
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("calibrate", "a.csv", "--vehicle", "car.toml", "-o", "x", "--page", "./x"),
+        ("evaluate", "campaign.toml", "--tune", "x", "-o", "x"),
+        ("detect", "a.csv", "-o", "out", "--write", "out/signals.parquet"),
+    ],
+)
+def test_two_results_of_one_name(folder, args):
+    refused(args, "named for two results")
+    assert not (folder / "x").exists()
+    assert not (folder / "out").exists()
+
+
+def test_two_names_of_one_result_behind_a_link(folder):
+    (folder / "link").symlink_to(folder / "x")
+    with pytest.raises(ConfigError, match="two results"):
+        refuse_existing([folder / "x", folder / "link"], force=True)
+    refuse_existing([folder / "x", folder / "y"], force=True)
+
+
+def test_files_of_a_folder_that_is_one_log(folder):
+    with pytest.raises(ConfigError, match="source"):
+        refuse_existing([folder / "labels" / "a.csv"], force=True, sources=[folder / "labels"])
