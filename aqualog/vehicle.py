@@ -48,6 +48,7 @@ _ALL = [
     Key("", "air_density", "kg/m^3", 1.204, 0.5, 1.6, "air density", "ISA at 20 degC, sea level"),
     Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017, mean 0.010 (V, TRB)"),
     Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
+    Key("", "torque_gain", "-", 1.0, 0.1, 100.0, "torque at the wheels over the one that the log says", "none"),
     Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),
     Key("wheels", "r_e_f", "m", 0.317, 0.1, 1.0, "effective rolling radius, front", "205/55R16 (D)"),
     Key("wheels", "r_e_r", "m", 0.317, 0.1, 1.0, "effective rolling radius, rear", "205/55R16 (D)"),
@@ -94,6 +95,7 @@ class Vehicle:
     air_density: float = _default("air_density")
     rolling_resistance: float = _default("rolling_resistance")
     torque_split_rear: float = 1.0
+    torque_gain: float = _default("torque_gain")
     steering_ratio: float = _default("steering_ratio")
     r_e_f: float = _default("wheels.r_e_f")
     r_e_r: float = _default("wheels.r_e_r")

@@ -163,14 +163,17 @@ def _clean(
 
 
 def _to_si(symbol: Symbol, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> FloatArray:
-    if not unit or symbol.unit == "bool":
+    if symbol.unit == "bool" or (not unit and not symbol.name.startswith("torque_")):
         return raw
     if symbol.name.startswith("omega_") and parse_unit(unit, where=where).dimension == "speed":
         # speed at the rim: the control unit used some radius of its own; the vehicle's makes it a wheel speed again
         return convert(raw, unit, "m/s", where=where) / vehicle.r_e(symbol.name[-2:])
     if symbol.unit == "-":
         return raw
-    return convert(raw, unit, symbol.unit, where=where)
+    values = convert(raw, unit, symbol.unit, where=where) if unit else raw
+    if symbol.name.startswith("torque_") and vehicle.torque_gain != 1.0:
+        values = vehicle.torque_gain * values
+    return values
 
 
 def _corrected(t_ns: TimeArray, signal_map: SignalMap, file: str) -> TimeArray:

@@ -10,24 +10,29 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["calibrated", "told"]
 
+DIGITS = 7  # of a value in a file: more than any interval has
 _KEYS = {
     "mass": "mass", "drag_area": "drag_area", "rolling_resistance": "rolling_resistance", "r_e_f": "wheels.r_e_f",
-    "r_e_r": "wheels.r_e_r",
+    "r_e_r": "wheels.r_e_r", "torque_gain": "torque_gain",
 }  # fmt: skip
 
 
 def told(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
     """Values by key of the vehicle file (`wheels.r_e_f`) that are told, each with the parameter it comes from.
 
-    A ratio of radii that is told without their size keeps the file's mean.
+    A ratio of radii that is told without their size keeps the file's mean. The torque gain is that of the torques as
+    they were read, which the file's own gain has multiplied already.
     """
     found = {_KEYS[p.name]: (p.value, p) for p in parameters if p.identified and p.name in _KEYS}
+    if "torque_gain" in found:
+        gain, p = found["torque_gain"]
+        found["torque_gain"] = (gain * vehicle.torque_gain, p)
     ratio = next((p for p in parameters if p.name == "r_e_ratio" and p.identified), None)
     if ratio is not None and not {"wheels.r_e_f", "wheels.r_e_r"} & set(found):
         mean = 0.5 * (vehicle.r_e_f + vehicle.r_e_r)
         found["wheels.r_e_f"] = (2.0 * mean * ratio.value / (1.0 + ratio.value), ratio)
         found["wheels.r_e_r"] = (2.0 * mean / (1.0 + ratio.value), ratio)
-    return found
+    return {key: (float(f"{value:.{DIGITS}g}"), p) for key, (value, p) in found.items()}
 
 
 def calibrated(

@@ -81,7 +81,8 @@ def balance_parameters(
     parameters = []
     for name, unit in _UNITS.items():
         value = found[name]
-        file_value = float(getattr(vehicle, name)) if name in KEYS else math.nan
+        # a gain is that of the torques as they were read, the file's is in them already
+        file_value = float(getattr(vehicle, name)) if name in KEYS and name != "torque_gain" else math.nan
         if name in fixed:
             parameters.append(
                 Parameter(name, value, (value, value), unit, identified=True, remark="given", file_value=file_value)

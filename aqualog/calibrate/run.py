@@ -59,7 +59,8 @@ def calibrate(
     usable = [d for d in all_drives if d.windows.v.size >= LEAST_WINDOWS]
     if not usable:
         raise FitError(
-            "no straight, unbraked, dry driving", where=", ".join(names), expected="stretches above 20 km/h",
+            "no straight, unbraked, dry driving", where=", ".join(names),
+            expected="stretches above 20 km/h (a slalom for the tie rods needs straight driving beside it)",
             hint="what was left out: " + "; ".join(f"{d.name}: {words.left_out(d.left_out)}" for d in all_drives),
         )  # fmt: skip
     samples = [Sample(d.windows, energy_offset(d)) for d in usable]
@@ -72,7 +73,8 @@ def calibrate(
         *radius_parameters(usable, vehicle),
         *_offsets(fits, samples, best.levels.tolist(), fixed),
     )
-    rods, missing = transfers(all_drives, calibrated(vehicle, parameters))
+    car = calibrated(vehicle, parameters)
+    rods, missing = transfers(all_drives, car, torque_scale=car.torque_gain / vehicle.torque_gain)
     skipped = [
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]

@@ -31,11 +31,14 @@ F_Y_RANGE_MIN = 300.0  # [N] standard deviation below which a drive has not stee
 F_X_RANGE_MIN = 60.0  # [N]
 
 
-def transfers(drives: Sequence[Drive], vehicle: Vehicle) -> tuple[dict[str, TieRodFit], tuple[str, ...]]:
+def transfers(
+    drives: Sequence[Drive], vehicle: Vehicle, *, torque_scale: float = 1.0
+) -> tuple[dict[str, TieRodFit], tuple[str, ...]]:
     """Polynomials of tie rods and steering torque, each from the drive that tells most, and why there is none.
 
     The forces are those of the detectors' own model (`features.steering_model`), probed with unit polynomials, so that
-    what is identified is what they use. The vehicle's mass scales them: it must be the one that goes with the result.
+    what is identified is what they use. The vehicle's mass scales them: it must be the one that goes with the result;
+    so does `torque_scale`, by which torques will be multiplied on reading from now on. [-]
     """
     found: dict[str, TieRodFit] = {}
     reasons = []
@@ -44,8 +47,8 @@ def transfers(drives: Sequence[Drive], vehicle: Vehicle) -> tuple[dict[str, TieR
         for d in drives:
             if not {*signals, "a_y", "yaw_rate"} <= set(d.columns):
                 continue
-            F_y, measured = _probed(d, vehicle, section, {"c_y": (1.0,)})
-            F_x, _ = _probed(d, vehicle, section, {"c_x": (1.0,)})
+            F_y, measured = _probed(d, vehicle, section, {"c_y": (1.0,)}, torque_scale)
+            F_x, _ = _probed(d, vehicle, section, {"c_x": (1.0,)}, torque_scale)
             # left and right turn the steering alike, so that even powers of the axle's force are none of its torque
             degree = 2 if section == "tie_rod" else 1
             try:
@@ -72,12 +75,12 @@ def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:
 
 
 def _probed(
-    drive: Drive, vehicle: Vehicle, section: str, unit: dict[str, tuple[float, ...]]
+    drive: Drive, vehicle: Vehicle, section: str, unit: dict[str, tuple[float, ...]], torque_scale: float
 ) -> tuple[FloatArray, FloatArray]:
     """Model and measurement (m, n) with a polynomial that shows one force as it is."""
     rods, torque = (unit, {}) if section == "tie_rod" else ({}, unit)
     probe = replace(vehicle, tie_rod=rods, steering_torque=torque)
-    columns = {s: x for s, x in drive.columns.items() if s in INPUTS}
+    columns = {s: x * torque_scale if s.startswith("torque_") else x for s, x in drive.columns.items() if s in INPUTS}
     f = FeatureStream(probe, drive.dt, columns).push(columns)
     if section == "steering_torque":
         return f["steering_hat"][None, :], f["steering_meas"][None, :]

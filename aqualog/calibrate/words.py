@@ -19,6 +19,7 @@ __all__ = [
 
 GAIN_NOTED = 0.005  # [-]
 CONTRADICTION = 0.05  # [-]
+PLAUSIBLE_MASS = (500.0, 45000.0)  # [kg]
 GAIN_UNKNOWN = (
     "mass and torque gain are one ratio in the balance of forces: a weighed car (--fix mass=KG) tells the gain, a gain "
     "known from a dynamometer (--fix torque_gain=X) the mass"
@@ -110,8 +111,16 @@ def notes(
             f"the drives contradict what is given: with torque_gain = {fixed['torque_gain']:g} they show "
             f"{alone:.0f} kg, not {fixed['mass']:g}; give one of the two"
         )
+    if not PLAUSIBLE_MASS[0] < found["mass"] < PLAUSIBLE_MASS[1] or not 0.5 < found["torque_gain"] < 2.0:
+        said.append(
+            f"a mass of {found['mass']:.0f} kg with a torque gain of {found['torque_gain']:.2f} is hardly a car's: is "
+            "the torque that of the motor, without the reduction? (scale in the signal map)"
+        )
     if abs(found["torque_gain"] - 1.0) > GAIN_NOTED:
-        said.append(f"multiply the scale of the torques in the signal map by {found['torque_gain']:.3f}")
+        said.append(
+            f"the torques are {found['torque_gain']:.3f} of what was read: torque_gain in the calibrated vehicle file "
+            "corrects them on reading; a signal map that does so already must not do it twice"
+        )
     if sum(math.isfinite(f.mass) for f in fits) > 1:
         masses = np.array([f.mass for f in fits if math.isfinite(f.mass)])
         said.append(

@@ -12,8 +12,8 @@ __all__ = ["calibrated_toml"]
 def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     """Text of a vehicle file that `config.vehicle.load_vehicle` reads.
 
-    Keys that neither the old file nor the drives tell stand as comments, so that no default poses as given. Values keep
-    all their digits.
+    Keys that neither the old file nor the drives tell stand as comments, so that no default poses as given. Values have
+    seven digits.
     """
     new = calibrated(vehicle, calibration.parameters, calibration.transfers)
     values = told(calibration.parameters, vehicle)

@@ -38,8 +38,8 @@ def choose(points: Sequence[RocPoint], *, limit: float = LIMIT_PER_HOUR) -> dict
     -------
     dict detector -> Choice
         Among the thresholds whose false alarms stay within the limit, the one of highest recall of partial
-        aquaplaning; where none stays within, the one with the fewest false alarms. Ties: recall of full aquaplaning,
-        fewer false alarms, nearer to where it was.
+        aquaplaning. Ties: recall of full aquaplaning, fewer false alarms, nearer to where it was. Where none stays
+        within, or those that do find nothing, the threshold stays as it is: a detector is not switched off by tuning.
     """
     by_detector: dict[str, list[RocPoint]] = {}
     for p in points:
@@ -57,13 +57,16 @@ def applied(choices: Mapping[str, Choice], thresholds: Thresholds, rivals: Mappi
 
 
 def _choice(points: Sequence[RocPoint], limit: float) -> Choice:
+    as_it_is = min(points, key=lambda p: abs(math.log(p.factor)))
+    if not any(p.full.episodes + p.partial.episodes for p in points):
+        return Choice(as_it_is, "was not judged on water; stays as it is")
     within = [p for p in points if not p.false_alarms.per_hour > limit]
-    if within:
-        best = max(within, key=_merit)
-        return Choice(best, f"highest recall with at most {limit:g} false alarms per hour")
-    fewest = min(p.false_alarms.count for p in points)
-    best = max((p for p in points if p.false_alarms.count == fewest), key=_merit)
-    return Choice(best, f"no threshold keeps to {limit:g} false alarms per hour; the fewest there are")
+    if not within:
+        return Choice(as_it_is, f"no threshold keeps to {limit:g} false alarms per hour; stays as it is")
+    best = max(within, key=_merit)
+    if _merit(best)[:2] == (0.0, 0.0):
+        return Choice(as_it_is, f"what keeps to {limit:g} false alarms per hour finds nothing; stays as it is")
+    return Choice(best, f"highest recall among those without more than {limit:g} false alarms per hour seen")
 
 
 def _merit(p: RocPoint) -> tuple[float, float, float, float]:

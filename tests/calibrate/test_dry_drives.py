@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 from calibrate.dry_drives import believed, campaign, car, one_drive, truth
 
+from aqualog.align.load import load_signals
 from aqualog.calibrate.design import prepare
 from aqualog.calibrate.lag import earlier, lag_between
 from aqualog.calibrate.offset import energy_offset
@@ -145,8 +146,8 @@ def test_vehicle_file_holds_values_and_intervals(series, tmp_path):
     path.write_text(calibrated_toml(believed(true), result), encoding="utf-8")
     text = path.read_text(encoding="utf-8")
     loaded = load_vehicle(path)
-    assert loaded.mass == result.get("mass").value
-    assert loaded.r_e_f == result.get("r_e_f").value
+    assert loaded.mass == pytest.approx(result.get("mass").value, rel=1e-6)
+    assert loaded.r_e_f == pytest.approx(result.get("r_e_f").value, rel=1e-6)
     assert loaded.r_l_f == believed(true).r_l_f
     assert "h_cg" not in loaded.given
     assert "# h_cg = " in text
@@ -201,3 +202,22 @@ def test_what_contradicts_the_drives_is_said(series):
     assert any("contradict" in n for n in result.notes)
     quiet = calibrate(signals, ["a", "b"], believed(true), {"mass": mass})
     assert not any("contradict" in n for n in quiet.notes)
+
+
+def test_a_gain_that_is_told_goes_into_the_file_and_onto_the_torques(series, tmp_path):
+    """The weighed car's file with its torque gain: what is read with it shows no gain any more."""
+    signals, true, _, _ = series
+    before = believed(true)
+    mass = 1.1 * true.mass  # a heavier car on the scales: torques must be larger than they were read
+    result = calibrate(signals, ["a", "b"], before, {"mass": mass})
+    path = tmp_path / "car.toml"
+    path.write_text(calibrated_toml(before, result), encoding="utf-8")
+    car = load_vehicle(path)
+    assert car.torque_gain == pytest.approx(result.get("torque_gain").value, rel=1e-6)
+    assert car.torque_gain > 1.05
+    log = tmp_path / "drive.csv"
+    names = [f"torque_{w}" for w in true.driven]
+    frame = signals[0].frame.select("t", "a_x", *names)
+    frame.rename({"t": "t [s]", "a_x": "a_x [m/s^2]", **{n: f"{n} [N*m]" for n in names}}).write_csv(log)
+    plain, scaled = (load_signals([log], vehicle=v).array(names[0]) for v in (before, car))
+    np.testing.assert_allclose(scaled, car.torque_gain * plain, rtol=1e-12)

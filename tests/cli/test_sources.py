@@ -17,7 +17,7 @@ def folder(tmp_path, monkeypatch):
         "car.toml": 'name = "car"\n', "map.toml": "[signals]\n", "other.toml": "[signals]\n", "bus.dbc": 'VERSION ""\n',
         "lane.csv": LABELS, "a.csv": "t [s],v_x [m/s]\n0,1\n", "logs.txt": "a.csv\n", "runs.csv": "log,labels\na.csv,lane.csv\n",
         "campaign.toml": 'vehicle = "car.toml"\nsignals = "map.toml"\nruns = "runs.csv"\n', "labels/a.csv": LABELS,
-        "labels/b.csv": LABELS, "slopes.json": "{}",
+        "labels/b.csv": LABELS, "slopes.json": '{"schema_version": 1, "slip_slope_history": {}}',
     }.items():  # fmt: skip
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -63,18 +63,16 @@ def test_sources_of_logs(folder, target):
         ("calibrate", "@logs.txt", "--vehicle", "car.toml", "-o", "logs.txt"),
         ("calibrate", "@logs.txt", "--vehicle", "car.toml", "--page", "logs.txt"),
         ("inspect", "@logs.txt", "--write-map", "logs.txt"),
-        ("detect", "@logs.txt", "--history", "logs.txt"),
-        ("detect", "a.csv", "--dbc", "bus.dbc", "--history", "bus.dbc"),
     ],
 )
 def test_a_list_is_a_source_as_its_logs_are(folder, args):
-    if "--history" in args:
-        (folder / args[-1]).write_text((folder / "slopes.json").read_text())
-        result = CliRunner().invoke(app, list(args))
-        assert result.exit_code == 2
-        return
     refused(args, "source of this very run")
     assert (folder / "logs.txt").read_text() == "a.csv\n"
+
+
+@pytest.mark.parametrize("args", [("@slopes.json",), ("a.csv", "--dbc", "slopes.json")])
+def test_a_history_is_no_source(folder, args):
+    refused(["detect", *args, "--history", "slopes.json"], "source of this very run")
 
 
 @pytest.mark.parametrize(

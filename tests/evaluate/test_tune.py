@@ -36,10 +36,13 @@ def test_few_false_alarms_come_first_then_recall():
     assert choose(points, limit=1.0)["spin_down"].point.factor == 0.5
 
 
-def test_where_no_threshold_keeps_to_the_limit_the_fewest_alarms_count():
+def test_a_detector_is_not_switched_off_by_tuning():
     choice = choose([point(1.0, 9, 7), point(2.0, 5, 5), point(4.0, 6, 5)])["spin_down"]
-    assert choice.point.factor == 4.0
+    assert choice.point.factor == 1.0
     assert "no threshold keeps" in choice.reason
+    choice = choose([point(1.0, 9, 7), point(4.0, 0, 0)])["spin_down"]
+    assert choice.point.factor == 1.0
+    assert "finds nothing" in choice.reason
 
 
 def test_among_equals_the_nearest_stays():
