@@ -116,6 +116,7 @@ def _evaluate(
     from aqualog.cli.files import refuse_existing
     from aqualog.config.campaign import group_keys
     from aqualog.errors import ExitCode
+    from aqualog.evaluate.judge import ODD_LABELS
     from aqualog.report.evaluation_words import notes_of
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
@@ -154,7 +155,10 @@ def _evaluate(
         return int(ExitCode.NOTHING_USABLE)
     _print(result, keys, as_json=as_json)
     for text in notes_of(result.records):
-        console.detail(f"note: {text}")
+        if ODD_LABELS in text:
+            console.note(text)
+        else:
+            console.detail(f"note: {text}")
     if out is not None:
         console.note(f"the page is {out}")
     if tune_file is not None:

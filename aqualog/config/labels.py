@@ -59,6 +59,15 @@ def load_labels(path: Path) -> tuple[Label, ...]:
     return _merged([*labels, *_partial_too(labels)])
 
 
+_SYNONYMS = {
+    "full_aquaplaning": "full", "total_aquaplaning": "full", "full_hydroplaning": "full",
+    "partial_aquaplaning": "partial", "partial_hydroplaning": "partial",
+    # what is called aquaplaning without a word on how far it went is at least partial
+    "aquaplaning": "partial", "hydroplaning": "partial", "aquaplane": "partial",
+    "wet": "water", "on_water": "water", "lane": "water",
+}  # fmt: skip
+
+
 def read_csv(path: Path, *, what: str) -> list[list[str]]:
     """Rows of a small CSV file.
 
@@ -122,7 +131,7 @@ def _label(cells: dict[str, str], line: int, faults: LineFaults) -> Label | None
     if end <= 0.0:
         faults.add(line, f"end_s = {end:g} is not after the log's first sample, from which labels count")
         return None
-    return Label(max(start, 0.0), end, effect, wheel or None)
+    return Label(max(start, 0.0), end, _SYNONYMS.get(effect.lower().replace(" ", "_"), effect), wheel or None)
 
 
 def _partial_too(labels: list[Label]) -> list[Label]:

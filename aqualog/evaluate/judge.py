@@ -17,7 +17,9 @@ from aqualog.evaluate.records import DetectorRun, RunRecord
 from aqualog.rivals.catalogue import run_rivals
 from aqualog.types import Event, FloatArray, Track
 
-__all__ = ["Found", "judge", "record_of", "run_detectors"]
+__all__ = ["ODD_LABELS", "Found", "judge", "record_of", "run_detectors"]
+
+ODD_LABELS = "effects without a meaning here:"  # how such a note begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,4 +142,6 @@ def _detector_run(
 
 def _odd_labels(drive: Drive) -> list[str]:
     unknown = ", ".join(drive.labels.unknown)
-    return [f"labels {unknown} serve the confusion table only"] if unknown else []
+    if not unknown:
+        return []
+    return [f"{ODD_LABELS} {unknown} serve the confusion table only; full, partial and water are what is scored"]

@@ -24,6 +24,11 @@ from aqualog.report.text import table
 
 __all__ = ["evaluation_text"]
 
+_LEGEND = (
+    "full within 0.5 s, partial within 2 s of its beginning; median and 95 % of the latency over all partial episodes, "
+    "never where more are missed; before: already on, on the same water; on water: events where the contact stays "
+    "above 0.7, neither right nor wrong"
+)
 _HEADER = (
     "detector", "drives", "full", "partial", "median s", "95 % s", "before", "false alarms", "per h (95 %)",
     "per 100 km", "on water",
@@ -34,7 +39,7 @@ def evaluation_text(evaluation: Evaluation, *, by: Sequence[str] = ()) -> str:
     """Tables of detectors, configurations, confusion and situations, and what they say in words."""
     records = evaluation.records
     hours = sum(r.duration_s for r in records) / 3600.0
-    lines = [f"{len(records)} drives, {hours:.3g} h", "", table(_HEADER, _rows(score_all(records)))]
+    lines = [f"{len(records)} drives, {hours:.3g} h", "", table(_HEADER, _rows(score_all(records))), _LEGEND]
     lines += ["", *verdicts(records)]
     for key, some in grouped(records, by).items() if by else ():
         title = ", ".join(f"{k} {v}" for k, v in zip(by, key, strict=True))
