@@ -23,7 +23,7 @@ from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, TUNING_POOL, draw
 from aqualog.notation import WHEELS
 
-DETECTORS = ("spin_down", "minor_spin_down", "spin_up", "joint_criteria")
+DETECTORS = ("spin_down", "minor_spin_down", "spin_up", "joint_criteria", "joint_cusum")
 FIRST_SEED = 150
 LATE_S = 0.2
 RECALL = 0.10  # by which a recall may change
