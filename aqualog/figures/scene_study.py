@@ -36,7 +36,7 @@ SEEDS = tuple(range(3001, 3021))
 DRY_SEED = 3000
 MANY, SOME = 0.8, 0.5  # shares of the runs: what mostly happens, and what happens at least in every other run
 _SLALOM_S, _DRY_S = 80.0, 80.0
-_PUSH_S, _CHANGE_S = 5.0, 12.0  # of a change of speed: 1 m/s^2 either way in both drives
+_PUSH_S, _ROUND_S, _CHANGE_S = 5.0, 20.0, 12.0  # pushes of 1 m/s^2 and rolling out; changes of speed in the dry drive
 _SETTLED_S = 5.0  # after which a drive has settled
 _A_Y = 2.0  # [m/s^2] the slalom of the thesis' Figure 2.23
 _FALL, _RISE = 70 * KMH, 110 * KMH  # [m/s] between which the dry drive varies
@@ -126,8 +126,9 @@ def known(number: str) -> Known:
     car = replace(wet.vehicle, given=wet.vehicle.given | {"mass"})
     v = 0.5 * (_FALL + _RISE)
     steering = Steering(slalom_angle(car, wet.tyre_front, v, _A_Y), 4.0)
-    # faster and slower in turn, else the coefficient of the longitudinal force would not be told
-    pushes = _turns(_SLALOM_S, _PUSH_S, 0.9 * v, 1.1 * v)
+    # pushes, and rolling out without the brake: else the coefficient of the longitudinal force would not be told
+    starts = np.arange(0.0, _SLALOM_S + _ROUND_S, _ROUND_S)
+    pushes = tuple((float(t + after), share * v) for t in starts for after, share in ((0.0, 0.9), (_PUSH_S, 1.1)))
     slalom = _dry(wet, car, _SLALOM_S, pushes, steering)
     found, reasons = transfers([prepare(slalom, car, "dry slalom")], car)
     if "tie_rod" not in found:

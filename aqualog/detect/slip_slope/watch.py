@@ -23,9 +23,7 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
 
-VARIANCE_MAX = (
-    2.0  # [(m/s^2)^2] "variance of the wheel acceleration below a threshold" (C68); teeth below 0.1, gravel 2.5-5
-)
+VARIANCE_MAX = 3.0  # [(m/s^2)^2] "wheel acceleration variance below a threshold" (C68); teeth below 0.1, gravel 2.5-5
 TAU_VARIANCE = 0.3  # [s]
 # slip and traction alike: noise of the traction (a wheel's acceleration is in it) would flatten slip over traction
 TAU_SMOOTH = 0.15  # [s]
