@@ -111,10 +111,10 @@ def _evaluate(
     verbose: bool,
     progress: str,
 ) -> int:
+    from aqualog.campaign.records import group_keys
     from aqualog.cli.console import Console, clean, told_if_interrupted
     from aqualog.cli.evaluate_inputs import campaign_inputs, is_campaign, log_inputs
     from aqualog.cli.files import refuse_existing
-    from aqualog.config.campaign import group_keys
     from aqualog.errors import ExitCode
     from aqualog.evaluate.judge import ODD_LABELS
     from aqualog.report.evaluation_words import notes_of

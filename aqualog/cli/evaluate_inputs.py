@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
+from aqualog.campaign.records import Run
 from aqualog.cli.files import expand, list_files
-from aqualog.config.campaign import Run, load_campaign
+from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from aqualog.config.campaign import group_keys, load_campaign
+from aqualog.campaign.records import group_keys
+from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.errors import ConfigError
 from aqualog.evaluate.labels import Label
