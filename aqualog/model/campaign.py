@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -22,6 +17,7 @@ from aqualog.model.programme import PROGRAMMES, WEAR, Run
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.vehicle import Vehicle, vehicle_toml
+from aqualog.workers import Crashed, work_on
 
 __all__ = ["CampaignOutcome", "simulate_campaign"]
 
@@ -175,34 +171,12 @@ def _work(
     if not runs:
         return
     simulate(Scenario(Vehicle(), duration_s=0.2))  # compiles once, before several processes do
-    context = multiprocessing.get_context("spawn")  # fork would copy the threads of polars and numba
-    with ProcessPoolExecutor(min(jobs, len(runs)), mp_context=context, initializer=_quiet_worker) as pool:
-        pending: dict[Future[Done | str], str] = {
-            pool.submit(_one, r, str(_log(folder, r.name)), digests[r.name]): r.name for r in runs
-        }
-        try:
-            while pending:
-                ready, _ = wait(pending, return_when=FIRST_COMPLETED)
-                for future in ready:
-                    record(pending.pop(future), _outcome(future))
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            for future in [f for f in pending if f.done() and not f.cancelled()]:
-                record(pending.pop(future), _outcome(future))
-            raise
+    tasks = {r.name: (r, str(_log(folder, r.name)), digests[r.name]) for r in runs}
 
+    def told(name: str, outcome: Done | str | Crashed) -> None:
+        record(name, "its process ended: out of memory, or killed" if isinstance(outcome, Crashed) else outcome)
 
-def _outcome(future: Future[Done | str]) -> Done | str:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        return "its process ended: out of memory, or killed"
-
-
-def _quiet_worker() -> None:
-    """An interrupt is the parent's business; a worker finishes the log that it is writing."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ["POLARS_MAX_THREADS"] = "1"
+    work_on(tasks, _one, jobs=jobs, record=told)
 
 
 def _one(run: Run, path: str, digest: str) -> Done | str:

@@ -9,7 +9,7 @@ import numpy as np
 from aqualog.errors import ConfigError
 from aqualog.model.tyre import P_REFERENCE, Tyre
 from aqualog.notation import WHEELS
-from aqualog.physics.load import G
+from aqualog.physics.load import G, centre_shift
 from aqualog.physics.rolling import pressure_factor
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
@@ -174,7 +174,7 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
         raise ConfigError(
             f"a mass of {delta_mass:g} kg on a car of {plant.mass:g} kg", expected="at least 30 % of the car to be left"
         )
-    moved = delta_mass * (x - plant.l_f) / (plant.mass + delta_mass)
+    moved = centre_shift(plant.mass, plant.l_f, delta_mass, x)
     inertia = delta_mass * (x - plant.l_f) * (x - plant.l_f) * plant.mass / (plant.mass + delta_mass)
     if not (plant.l_f + moved > 0.05 and plant.l_r - moved > 0.05 and plant.I_zz + inertia > 0.0):
         raise ConfigError(

@@ -36,6 +36,8 @@ SUV_REAR = replace(SUV, name="SUV AWD, drive to the rear", torque_split_rear=0.9
 
 CONSTANT = (60, 70, 80, 89, 98, 106, 112, 118, 124)
 BINNED = (60, 70, 80, 90, 100, 110)
+BINS = (65, 75, 85, 95, 105, 115)  # middles of the bins of 10 km/h in which slopes are told
+REGRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # [m/s^2] constant speed hardly varies the traction, one run is no interval
 WEAR = {"very_worn_summer": "very_worn", "worn_summer": "worn", "new_summer": "new", "new_winter": "new"}
 PlainTerm = tuple[str, tuple[tuple[str, float], ...], str | None]  # effect, values, place
 
@@ -110,6 +112,11 @@ def _drives() -> Iterator[_Drive]:
     def accelerated(case: _Case, speeds: tuple[int, ...], a: tuple[float, ...], figures: str) -> Iterator[_Drive]:
         return ((case, v, x, 0, "acceleration", figures) for v in speeds for x in a)
 
+    def binned(case: _Case, figures: str, speeds: tuple[int, ...] = BINS) -> Iterator[_Drive]:
+        return (
+            (case, v, a, 0, "acceleration" if a else "constant", figures) for v in speeds for a in REGRESSED
+        )  # fmt: skip
+
     yield from constant(worn, CONSTANT, 3, "2.3,2.4,2.10,2.14,2.17")
     yield from accelerated(worn, (70, 80, 90, 100, 110, 120), (1.0,), "2.4")
     high = _Case(pressure="high")
@@ -147,6 +154,17 @@ def _drives() -> Iterator[_Drive]:
         yield (_Case(vehicle=SUV), 112, 1.5, k, "acceleration", "2.22")
         yield (rear_drive, 104, 0.0, k, "slalom", "2.23")
     yield from constant(_Case(vehicle=SUV), BINNED, 2, "2.10")
+    # slip slopes per bin: passes that vary the traction, five a bin (behind all others, whose seeds are their places)
+    for depth in (0.6, 0.8, 1.1, 1.3, 2.0):
+        yield from binned(_Case(depth_mm=depth), "2.17")
+    for pressure in ("low", "medium", "high"):
+        yield from binned(_Case(pressure=pressure, depth_mm=1.2), "2.18")
+    for depth in (1.3, 2.0):
+        yield from binned(_Case("new_winter", depth_mm=depth), "2.19")
+    for pressure in ("low", "medium"):
+        for front, rear in ((270.0, 0.0), (0.0, 270.0)):
+            yield from binned(_Case(pressure=pressure, depth_mm=1.2, load_front=front, load_rear=rear), "2.20")
+    yield from binned(_Case("very_worn_summer", depth_mm=0.8), "2.16", (95, 105))
 
 
 def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures: str, seed: int) -> Run:
@@ -175,5 +193,5 @@ def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures
 def _name(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str) -> str:
     car = {"sedan RWD": "rwd", "SUV AWD": "awd"}.get(case.vehicle.name, "awdr")
     load = f"_front{case.load_front:.0f}" if case.load_front else f"_rear{case.load_rear:.0f}" if case.load_rear else ""
-    motion = {"constant": "const", "slalom": "slalom"}.get(manoeuvre, f"a{a:+.1f}")
+    motion = {"constant": "const", "slalom": "slalom"}.get(manoeuvre, f"a{a:+.{1 if a == round(a, 1) else 2}f}")
     return f"{car}_{case.tyre}_{case.pressure}_{case.depth_mm:.1f}mm{load}_{kmh:03.0f}kmh_{motion}_{repeat + 1}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from aqualog.types import FloatArray
 
-__all__ = ["G", "loads_of_wheels", "wheel_loads"]
+__all__ = ["G", "centre_shift", "loads_of_wheels", "wheel_loads"]
 
 G = 9.80665  # [m/s^2]
 
@@ -53,3 +53,16 @@ def wheel_loads(
     """
     loads: FloatArray = np.array(loads_of_wheels(a_x, a_y, mass=mass, l_f=l_f, l_r=l_r, h_cg=h_cg, track=track))
     return loads
+
+
+def centre_shift(mass: float, l_f: float, delta_mass: float, x: float) -> float:
+    """By how much the centre of mass moves rearwards when a mass is added. [m]
+
+    Parameters
+    ----------
+    mass, l_f : float
+        Of the car before: mass [kg] and distance of its centre from the front axle [m].
+    delta_mass, x : float
+        What is added [kg], and where, from the front axle rearwards [m].
+    """
+    return delta_mass * (x - l_f) / (mass + delta_mass)

@@ -1,0 +1,189 @@
+"""Results of a campaign as they are used: runs with their configuration, events, and samples that know of the water."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from aqualog.campaign.batch import Configured, Job, name_of, plan_jobs
+from aqualog.campaign.key import Contents
+from aqualog.campaign.records import Run
+from aqualog.campaign.store import Store
+from aqualog.evaluate.labels import AQUAPLANING, Label, Span
+from aqualog.types import BoolArray, FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["SETTLING_S", "CampaignData", "RunInfo", "RunSamples", "load_results"]
+
+SETTLING_S = 0.3  # [s] after entry and before exit; wheels and centred means need it
+_KEPT = 64  # runs whose samples stay in memory
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """One run of a campaign and what came of it.
+
+    `state` is `done`, `failed` or `to do`; `vehicle` has the run's load; `about` is what `measure` found, empty unless
+    done; `water_from` says how the lane is known: `lane times`, `signal`, `labels`, `dry run`, or empty.
+    """
+
+    index: int
+    name: str
+    run: Run
+    key: str
+    state: str
+    reason: str
+    vehicle: Vehicle
+    about: Mapping[str, Any]
+    water_from: str
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there are results."""
+        return self.state == "done"
+
+    @property
+    def events(self) -> Sequence[Mapping[str, Any]]:
+        """Events as `measure` keeps them."""
+        found: Sequence[Mapping[str, Any]] = self.about.get("events", ())
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class RunSamples:
+    """Samples of one run, arrays (n,), ten a second or fewer; NaN where unknown. Columns as in `measure.Measurement`.
+
+    `on_water` is 1 on the lane without `SETTLING_S` at its ends, 0 off it, NaN in between and where it is not known.
+    """
+
+    frame: pl.DataFrame
+    t: FloatArray
+    on_water: FloatArray
+
+    @property
+    def step_s(self) -> float:
+        """Time between samples. [s]"""
+        return float(self.t[1] - self.t[0]) if self.t.size > 1 else float("nan")
+
+    def array(self, name: str) -> FloatArray:
+        """A column as floats."""
+        if name not in self.frame.columns:
+            return np.full(self.t.size, np.nan)
+        values: FloatArray = self.frame[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        return values
+
+    def bits(self, name: str) -> BoolArray:
+        """A column of bits."""
+        found: BoolArray = self.frame[name].to_numpy().astype(bool)
+        return found
+
+    @property
+    def is_usable(self) -> BoolArray:
+        """Straight driving that regressions can use."""
+        return self.bits_of("reason", 0)
+
+    def bits_of(self, name: str, value: int) -> BoolArray:
+        """Where a column of codes has a value."""
+        found: BoolArray = self.frame[name].to_numpy() == value
+        return found
+
+
+class CampaignData:
+    """A campaign's runs with access to their samples."""
+
+    def __init__(self, configured: Configured, store: Store, runs: Sequence[RunInfo]) -> None:
+        self.configured = configured
+        self.store = store
+        self.runs: tuple[RunInfo, ...] = tuple(runs)
+        self._read = lru_cache(maxsize=_KEPT)(self.store.samples)
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.configured.campaign.name
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys by which the runs can be grouped."""
+        return self.configured.campaign.keys
+
+    @property
+    def done(self) -> tuple[RunInfo, ...]:
+        """Runs with results."""
+        return tuple(r for r in self.runs if r.is_done)
+
+    def samples(self, info: RunInfo) -> RunSamples:
+        """Samples of a run.
+
+        Raises
+        ------
+        LogError
+            If its file in the store is damaged.
+        """
+        frame = self._read(info.key)
+        t: FloatArray = frame["t"].to_numpy()
+        return RunSamples(frame, t, _on_water(info, frame, t, self.labels_of(info)))
+
+    def labels_of(self, info: RunInfo) -> tuple[Label, ...] | None:
+        """Labels of a run's labels file; None without one."""
+        return None if info.run.labels is None else self.configured.labels[info.run.labels]
+
+
+def load_results(configured: Configured, store: Store, jobs: Sequence[Job] | None = None) -> CampaignData:
+    """What the store has of a campaign; runs without results are among the runs, and say why."""
+    jobs = plan_jobs(configured, Contents(store.read_json("contents.json"))) if jobs is None else jobs
+    done, failed = store.keys()
+    of_run = {index: job for job in jobs for index in job.runs}
+    runs = []
+    for index, run in enumerate(configured.campaign.runs):
+        job = of_run[index]
+        state, reason = "to do", job.reason
+        about: Mapping[str, Any] = {}
+        if job.reason:
+            state = "failed"
+        elif job.key in done:
+            state, about = "done", store.about(job.key)
+        elif job.key in failed:
+            state, reason = "failed", store.failure(job.key)
+        name = name_of(configured.campaign, run.logs)
+        runs.append(RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, _water_from(run, about)))
+    return CampaignData(configured, store, runs)
+
+
+def _water_from(run: Run, about: Mapping[str, Any]) -> str:
+    if run.lane is not None:
+        return "lane times"
+    if run.labels is not None:
+        return "labels"
+    if "on_water" in about.get("signals", ()):
+        return "signal"
+    return "dry run" if run.values.get("water_depth_mm") == 0.0 else ""
+
+
+def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[Label, ...] | None) -> FloatArray:
+    if info.water_from == "lane times" and info.run.lane is not None:
+        return _inside([info.run.lane], t)
+    if info.water_from == "labels" and labels is not None:
+        return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)
+    if info.water_from == "signal":
+        wet = frame["on_water"].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        edges = np.flatnonzero(np.diff((wet > 0.5).astype(np.int8)))
+        out: FloatArray = np.where(np.isnan(wet), np.nan, (wet > 0.5).astype(np.float64))
+        for i in edges:
+            out[np.abs(t - 0.5 * (t[i] + t[i + 1])) < SETTLING_S] = np.nan
+        return out
+    return np.zeros(t.size) if info.water_from == "dry run" else np.full(t.size, np.nan)
+
+
+def _inside(spans: Sequence[Span], t: FloatArray) -> FloatArray:
+    out: FloatArray = np.zeros(t.size)
+    for start, end in spans:
+        out[(t > start) & (t < end)] = 1.0
+    for edge in (x for span in spans for x in span):
+        out[np.abs(t - edge) < SETTLING_S] = np.nan
+    return out

@@ -1,0 +1,75 @@
+"""A campaign file with all that it names: read and checked as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from aqualog.align.mapping import SignalMap
+from aqualog.campaign.batch import Configured
+from aqualog.config.campaign import load_campaign
+from aqualog.config.labels import load_labels
+from aqualog.config.settings import load_settings
+from aqualog.config.signal_map import load_signal_map
+from aqualog.config.vehicle import load_vehicle
+from aqualog.detect.stream import Settings
+from aqualog.errors import ConfigError
+
+__all__ = ["configure", "files_of"]
+
+T = TypeVar("T")
+
+
+def configure(
+    path: Path, *, map_file: Path | None = None, dbc: Sequence[Path] = (), thresholds: Path | None = None
+) -> Configured:
+    """Read a campaign file, its table of runs, vehicle files, signal map, labels and a thresholds file.
+
+    Parameters
+    ----------
+    path : Path
+        Campaign file.
+    map_file : Path, optional
+        In place of the campaign's.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of all files in one message.
+    """
+    campaign = load_campaign(path)
+    faults: list[str] = []
+
+    def load(read: Callable[[Path], T], file: Path) -> T | None:
+        try:
+            return read(file)
+        except ConfigError as error:
+            faults.append(error.line())
+            return None
+
+    vehicles = {p: load(load_vehicle, p) for p in dict.fromkeys(r.vehicle for r in campaign.runs)}
+    labels = {p: load(load_labels, p) for p in dict.fromkeys(r.labels for r in campaign.runs if r.labels)}
+    map_path = map_file or campaign.signals
+    signal_map = load(load_signal_map, map_path) if map_path else SignalMap()
+    settings = load(load_settings, thresholds) if thresholds else Settings()
+    faults += [f"{p}: there is no such file" for p in dbc if not p.is_file()]
+    if faults or signal_map is None or settings is None:
+        raise ConfigError("; ".join(faults), where=str(path) if len(faults) > 1 else "")
+    return Configured(
+        campaign,
+        {p: v for p, v in vehicles.items() if v is not None},
+        {p: x for p, x in labels.items() if x is not None},
+        signal_map,
+        tuple(dbc),
+        settings,
+    )
+
+
+def files_of(configured: Configured) -> tuple[Path, ...]:
+    """All files that a campaign reads, which no result may overwrite."""
+    campaign = configured.campaign
+    maps = (p for p in (campaign.table, campaign.signals) if p)
+    logs = (p for r in campaign.runs for p in r.logs)
+    named = dict.fromkeys([campaign.path, *maps, *configured.vehicles, *configured.labels, *configured.dbc, *logs])
+    return tuple(named)

@@ -1,0 +1,108 @@
+"""Work on many items in processes of their own: results as they come, nothing lost by an interrupt or a crash."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Hashable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+__all__ = ["Crashed", "work_on"]
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+class Crashed(Exception):  # noqa: N818 - what became of a task, not an error of ours
+    """The process that worked on an item ended without a word: out of memory, or killed."""
+
+
+def work_on(
+    tasks: Mapping[Name, tuple[Any, ...]],
+    work: Callable[..., Any],
+    *,
+    jobs: int,
+    record: Callable[[Name, Any], None],
+) -> None:
+    """Call `work(*task)` for every task in up to `jobs` processes.
+
+    Parameters
+    ----------
+    tasks : mapping name -> arguments
+        Picklable, as is `work`, a function of a module. It should return failures it expects as values.
+    jobs : int
+        Processes, >= 1. They are spawned: a fork would copy the threads of polars and numba.
+    record : callable
+        Called here with name and result as each is done; the result is `Crashed` if the process ended. An item that
+        was merely in work beside one that crashed is done again, alone.
+
+    An interrupt lets the items in work finish and records them before it is raised.
+    """
+    left = dict(tasks)
+    suspects = _round(left, work, min(jobs, len(left)), record) if left else []
+    while suspects:
+        # one of them has taken the pool down; each gets a process of its own, which tells which
+        name = suspects.pop(0)
+        if name in left and _round({name: left[name]}, work, 1, lambda n, r: _taken(left, record, n, r)):
+            left.pop(name)
+            record(name, Crashed())
+    if left and len(left) < len(tasks):
+        work_on(left, work, jobs=jobs, record=record)
+
+
+def _taken(left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None], name: Name, result: Any) -> None:
+    left.pop(name, None)
+    record(name, result)
+
+
+def _round(
+    left: dict[Name, tuple[Any, ...]], work: Callable[..., Any], jobs: int, record: Callable[[Name, Any], None]
+) -> list[Name]:
+    """Work until all is done or the pool breaks; what is done leaves `left`. Returns those that were in work then."""
+    todo = iter(list(left.items()))
+    pending: dict[Future[Any], Name] = {}
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker) as pool:
+        try:
+            # few in the queue: when a pool breaks, only those that it held are in doubt
+            for name, task in todo:
+                pending[pool.submit(work, *task)] = name
+                if len(pending) >= 2 * jobs:
+                    broken = _collect(pending, left, record)
+                    if broken:
+                        return broken
+            while pending:
+                broken = _collect(pending, left, record)
+                if broken:
+                    return broken
+        except BrokenProcessPool:
+            return [name for name in pending.values() if name in left]
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            for future, name in pending.items():
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    _taken(left, record, name, future.result())
+            raise
+    return []
+
+
+def _collect(
+    pending: dict[Future[Any], Name], left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None]
+) -> list[Name]:
+    """Wait for one or more results; if the pool has broken, the names that were in it."""
+    ready, _ = wait(pending, return_when=FIRST_COMPLETED)
+    in_doubt: list[Name] = []
+    for future in ready:
+        name = pending.pop(future)
+        if isinstance(future.exception(), BrokenProcessPool):
+            in_doubt.append(name)
+        else:
+            _taken(left, record, name, future.result())
+    return [*in_doubt, *pending.values()] if in_doubt else []
+
+
+def _quiet_worker() -> None:
+    """An interrupt is the parent's business; a worker finishes the item that it has in hand."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ["POLARS_MAX_THREADS"] = "1"
