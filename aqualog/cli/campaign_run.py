@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from aqualog.cli.console import Console, told_if_interrupted
+from aqualog.cli.progress import Progress
 from aqualog.errors import ConfigError, ExitCode
 from aqualog.io.write_log import SUFFIXES
 from aqualog.model.campaign import simulate_campaign
@@ -20,16 +21,8 @@ def run_campaign(name: str, folder: Path, *, jobs: int | None, force: bool, cons
     if folder.suffix.lower() in SUFFIXES:
         raise ConfigError("is the name of a log", where=str(folder), expected="a folder for the campaign")
     began = time.monotonic()
-    first: list[int] = []
     with console.steps() as steps:
-
-        def report(done: int, total: int) -> None:
-            if not first:
-                first.append(done)
-            made, seconds = done - first[0], time.monotonic() - began
-            left = f", {(total - done) * seconds / made:.0f} s left" if made > 0 and done < total else ""
-            steps(f"{done} of {total} drives{left}")
-
+        report = Progress(steps, "drives")
         with told_if_interrupted("the drives that are done stay, the same command goes on with the rest"):
             outcome = simulate_campaign(name, folder, jobs=jobs or os.cpu_count() or 1, force=force, report=report)
     for run, reason in outcome.failed.items():

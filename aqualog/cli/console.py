@@ -81,22 +81,22 @@ class Steps:
     """Tells which step is being worked on."""
 
     def __init__(self, mode: str) -> None:
-        self._mode = mode
+        self.mode = mode
         self._width = 0
 
     def __call__(self, text: str) -> None:
         """Begin a step."""
-        if self._mode == "bar":
+        if self.mode == "bar":
             line = f"{clean(text)} ..."
             sys.stderr.write(f"\r{line.ljust(self._width)}")
             sys.stderr.flush()
             self._width = len(line)
-        elif self._mode == "plain":
+        elif self.mode == "plain":
             sys.stderr.write(f"{clean(text)}\n")
 
     def clear(self) -> None:
         """Remove the line."""
-        if self._mode == "bar" and self._width:
+        if self.mode == "bar" and self._width:
             sys.stderr.write(f"\r{' ' * self._width}\r")
             sys.stderr.flush()
 

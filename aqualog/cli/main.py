@@ -9,6 +9,7 @@ import sys
 import typer
 
 from aqualog import __version__
+from aqualog.cli.batch import batch
 from aqualog.cli.calibrate import calibrate
 from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
@@ -35,6 +36,7 @@ app.command(no_args_is_help=True)(inspect)
 app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
 app.command(no_args_is_help=True)(slip_slope)
+app.command(no_args_is_help=True)(batch)
 app.command(no_args_is_help=True)(calibrate)
 app.command(no_args_is_help=True)(evaluate)
 app.command(no_args_is_help=True)(simulate)

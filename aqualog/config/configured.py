@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.batch import Configured
+from aqualog.campaign.records import Campaign, Run
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.settings import load_settings
@@ -16,7 +17,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.stream import Settings
 from aqualog.errors import ConfigError
 
-__all__ = ["configure", "files_of"]
+__all__ = ["configure", "configure_logs", "files_of"]
 
 T = TypeVar("T")
 
@@ -38,7 +39,12 @@ def configure(
     ConfigError
         With all faults of all files in one message.
     """
-    campaign = load_campaign(path)
+    return _configured(load_campaign(path), map_file, dbc, thresholds, where=str(path))
+
+
+def _configured(
+    campaign: Campaign, map_file: Path | None, dbc: Sequence[Path], thresholds: Path | None, *, where: str
+) -> Configured:
     faults: list[str] = []
 
     def load(read: Callable[[Path], T], file: Path) -> T | None:
@@ -55,7 +61,7 @@ def configure(
     settings = load(load_settings, thresholds) if thresholds else Settings()
     faults += [f"{p}: there is no such file" for p in dbc if not p.is_file()]
     if faults or signal_map is None or settings is None:
-        raise ConfigError("; ".join(faults), where=str(path) if len(faults) > 1 else "")
+        raise ConfigError("; ".join(faults), where=where if len(faults) > 1 else "")
     return Configured(
         campaign,
         {p: v for p, v in vehicles.items() if v is not None},
@@ -73,3 +79,25 @@ def files_of(configured: Configured) -> tuple[Path, ...]:
     logs = (p for r in campaign.runs for p in r.logs)
     named = dict.fromkeys([campaign.path, *maps, *configured.vehicles, *configured.labels, *configured.dbc, *logs])
     return tuple(named)
+
+
+def configure_logs(
+    logs: Sequence[Path],
+    vehicle: Path,
+    *,
+    map_file: Path | None = None,
+    dbc: Sequence[Path] = (),
+    thresholds: Path | None = None,
+    lists: Sequence[Path] = (),
+) -> Configured:
+    """Logs without a campaign file as a campaign: each a run of its own, of which nothing more is known.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of all files in one message.
+    """
+    name = logs[0].parent.name or "logs" if logs else "logs"
+    runs = tuple(Run((p,), vehicle, None, None, {}) for p in logs)
+    campaign = Campaign(name, Path(name), map_file, runs, lists[0] if lists else None)
+    return _configured(campaign, map_file, dbc, thresholds, where="")

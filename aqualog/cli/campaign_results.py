@@ -1,0 +1,156 @@
+"""What commands on campaigns share: the campaign as it was typed, its store, and the store brought up to date."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aqualog.cli.console import Console, clean, told_if_interrupted
+from aqualog.cli.evaluate_inputs import is_campaign
+from aqualog.cli.files import expand, list_files, refuse_existing
+from aqualog.cli.progress import Progress
+from aqualog.errors import AqualogError, ConfigError, ExitCode
+
+if TYPE_CHECKING:
+    from aqualog.campaign.batch import BatchOutcome, Configured
+    from aqualog.campaign.samples import CampaignData
+
+__all__ = ["Inputs", "Jobs", "StoreOption", "check_targets", "exit_code", "opened", "results", "store_of"]
+
+Inputs = Annotated[
+    list[str],
+    typer.Argument(
+        help="A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
+        metavar="CAMPAIGN.toml|LOG...",
+        show_default=False,
+    ),
+]
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--store", help="Folder for the results of each log; default beside the campaign file: NAME.store.",
+        metavar="DIR",
+    ),
+]  # fmt: skip
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", help="Logs at a time; default one per core.", min=1, max=1024, metavar="N")
+]
+_TOLD_AT_ONCE = 20
+
+
+def opened(
+    inputs: Sequence[str],
+    *,
+    vehicle: Path | None = None,
+    map_file: Path | None = None,
+    dbc: Sequence[Path] = (),
+    thresholds: Path | None = None,
+) -> Configured:
+    """The campaign behind what was typed, read and checked completely.
+
+    Raises
+    ------
+    ConfigError
+        With all faults in one message; also for logs without a vehicle, and `--vehicle` beside a campaign.
+    """
+    from aqualog.config.configured import configure, configure_logs
+
+    if is_campaign(inputs):
+        if vehicle is not None:
+            raise ConfigError("--vehicle beside a campaign", where=inputs[0], expected="it in the campaign's runs")
+        return configure(Path(inputs[0]), map_file=map_file, dbc=dbc, thresholds=thresholds)
+    if vehicle is None:
+        raise ConfigError("no --vehicle", expected="a vehicle file, or a campaign file that names one")
+    lists = list_files(inputs)
+    return configure_logs(
+        expand(inputs), vehicle, map_file=map_file, dbc=dbc, thresholds=thresholds, lists=tuple(lists)
+    )  # fmt: skip
+
+
+def store_of(configured: Configured, given: Path | None) -> Path:
+    """Folder of the results: the one given, else beside the campaign file.
+
+    Raises
+    ------
+    ConfigError
+        For logs without a campaign file, which have no place of their own.
+    """
+    if given is not None:
+        return given
+    if configured.campaign.path.suffix.lower() != ".toml":
+        raise ConfigError("logs without a campaign file have no place for results", expected="--store DIR")
+    return configured.campaign.path.with_suffix(".store")
+
+
+def check_targets(configured: Configured, targets: Sequence[Path], *, force: bool) -> None:
+    """Refuse results that are in the way of something, or that the campaign itself reads."""
+    from aqualog.config.configured import files_of
+
+    refuse_existing(targets, force=force, sources=files_of(configured))
+
+
+def results(
+    configured: Configured,
+    store: Path | None,
+    *,
+    console: Console,
+    jobs: int | None = None,
+    force: bool = False,
+) -> tuple[CampaignData, BatchOutcome]:
+    """Bring the store up to date and load it; every log that gives nothing is told on stderr.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is none of a store.
+    """
+    with console.steps() as steps:
+        steps("looking at the logs")
+        from aqualog.campaign.batch import run_batch
+        from aqualog.campaign.samples import load_results
+        from aqualog.campaign.store import Store
+
+        place = Store(store_of(configured, store))
+        _check_apart(configured, place.folder)
+        told: list[str] = []
+
+        def tell(name: str, reason: str) -> None:
+            told.append(name)
+            if len(told) <= _TOLD_AT_ONCE:
+                steps.clear()
+                sys.stderr.write(f"error: {clean(reason if name in reason else f'{name}: {reason}')}\n")
+
+        with told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"):
+            outcome = run_batch(
+                configured, place, jobs=jobs or os.cpu_count() or 1, force=force, report=Progress(steps, "logs"),
+                told=tell,
+            )  # fmt: skip
+        steps("loading the results")
+        data = load_results(configured, place)
+    if len(told) > _TOLD_AT_ONCE:
+        sys.stderr.write(f"error: and {len(told) - _TOLD_AT_ONCE} more; all are in {place.folder / 'manifest.json'}\n")
+    return data, outcome
+
+
+def exit_code(outcome: BatchOutcome, data: CampaignData) -> int:
+    """The contract's exit code for what came of the logs."""
+    if not outcome.done:
+        return int(ExitCode.NOTHING_USABLE)
+    is_lossy = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in data.done)
+    return int(ExitCode.PARTIAL) if outcome.failed or is_lossy else int(ExitCode.DONE)
+
+
+def _check_apart(configured: Configured, folder: Path) -> None:
+    from aqualog.config.configured import files_of
+
+    place = folder.resolve()
+    inside = next((p for p in files_of(configured) if p.resolve().is_relative_to(place)), None)
+    if inside is not None:
+        raise ConfigError("holds a source of this campaign", where=str(folder), expected="a folder of its own")
+    if folder.exists() and not os.access(folder, os.W_OK):
+        raise AqualogError("cannot be written", where=str(folder), hint="its permissions, or --store DIR")
