@@ -8,6 +8,7 @@ import signal
 from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from threading import Thread
 from typing import Any, TypeVar
 
 __all__ = ["Crashed", "work_on"]
@@ -103,6 +104,15 @@ def _collect(
 
 
 def _quiet_worker() -> None:
-    """An interrupt is the parent's business; a worker finishes the item that it has in hand."""
+    """An interrupt is the parent's business; a worker finishes what it has in hand, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["POLARS_MAX_THREADS"] = "1"
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Without this, workers of a parent that was killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

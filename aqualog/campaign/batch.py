@@ -23,7 +23,7 @@ from aqualog.workers import Crashed, work_on
 __all__ = ["BatchOutcome", "Configured", "Job", "measure_one", "name_of", "plan_jobs", "run_batch"]
 
 Report = Callable[[int, int, int], None]
-"""Told logs done (of this run), logs to do, and failed ones so far."""
+"""Told logs that are settled, logs in all, and failed ones so far."""
 
 CRASHED = "its process ended without a word: out of memory, or a fault of a reading library"
 _HERE = 4  # so few logs are not worth the start of processes
@@ -164,10 +164,10 @@ def run_batch(
             fail(new[key], outcome, keep=True)
         else:
             made += 1
-        report(made + len(failed), len(new) + len(failed), len(failed))
+        report(kept + made + len(failed), len(todo), len(failed))
 
     try:
-        report(len(failed), len(new) + len(failed), len(failed))
+        report(kept + len(failed), len(todo), len(failed))
         tasks = {k: (store.folder, k, j.logs, j.vehicle, configured) for k, j in new.items()}
         lean = {k: (*t[:4], configured.signal_map, configured.dbc, configured.settings) for k, t in tasks.items()}
         if len(lean) <= _HERE or jobs == 1:

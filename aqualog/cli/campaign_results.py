@@ -123,7 +123,7 @@ def results(
             told.append(name)
             if len(told) <= _TOLD_AT_ONCE:
                 steps.clear()
-                sys.stderr.write(f"error: {clean(reason if name in reason else f'{name}: {reason}')}\n")
+                sys.stderr.write(f"error: {clean(_with_name(name, reason))}\n")
 
         with told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"):
             outcome = run_batch(
@@ -154,3 +154,11 @@ def _check_apart(configured: Configured, folder: Path) -> None:
         raise ConfigError("holds a source of this campaign", where=str(folder), expected="a folder of its own")
     if folder.exists() and not os.access(folder, os.W_OK):
         raise AqualogError("cannot be written", where=str(folder), hint="its permissions, or --store DIR")
+
+
+def _with_name(name: str, reason: str) -> str:
+    """A reason that says of which log it is, once."""
+    short = f"{Path(name).name}: "
+    if name in reason:
+        return reason
+    return f"{name}: {reason.removeprefix(short)}"

@@ -39,29 +39,32 @@ def configure(
     ConfigError
         With all faults of all files in one message.
     """
-    return _configured(load_campaign(path), map_file, dbc, thresholds, where=str(path))
+    faults: list[str] = []
+    campaign = _tried(load_campaign, path, faults)
+    return _configured(campaign, map_file, dbc, thresholds, faults)
+
+
+def _tried(read: Callable[[Path], T], file: Path, faults: list[str]) -> T | None:
+    """What a file says, or None with its faults noted."""
+    try:
+        return read(file)
+    except ConfigError as error:
+        faults.append(error.line())
+        return None
 
 
 def _configured(
-    campaign: Campaign, map_file: Path | None, dbc: Sequence[Path], thresholds: Path | None, *, where: str
+    campaign: Campaign | None, map_file: Path | None, dbc: Sequence[Path], thresholds: Path | None, faults: list[str]
 ) -> Configured:
-    faults: list[str] = []
-
-    def load(read: Callable[[Path], T], file: Path) -> T | None:
-        try:
-            return read(file)
-        except ConfigError as error:
-            faults.append(error.line())
-            return None
-
-    vehicles = {p: load(load_vehicle, p) for p in dict.fromkeys(r.vehicle for r in campaign.runs)}
-    labels = {p: load(load_labels, p) for p in dict.fromkeys(r.labels for r in campaign.runs if r.labels)}
-    map_path = map_file or campaign.signals
-    signal_map = load(load_signal_map, map_path) if map_path else SignalMap()
-    settings = load(load_settings, thresholds) if thresholds else Settings()
+    runs = campaign.runs if campaign else ()
+    vehicles = {p: _tried(load_vehicle, p, faults) for p in dict.fromkeys(r.vehicle for r in runs)}
+    labels = {p: _tried(load_labels, p, faults) for p in dict.fromkeys(r.labels for r in runs if r.labels)}
+    map_path = map_file or (campaign.signals if campaign else None)
+    signal_map = _tried(load_signal_map, map_path, faults) if map_path else SignalMap()
+    settings = _tried(load_settings, thresholds, faults) if thresholds else Settings()
     faults += [f"{p}: there is no such file" for p in dbc if not p.is_file()]
-    if faults or signal_map is None or settings is None:
-        raise ConfigError("; ".join(faults), where=where if len(faults) > 1 else "")
+    if faults or campaign is None or signal_map is None or settings is None:
+        raise ConfigError("; ".join(dict.fromkeys(faults)))
     return Configured(
         campaign,
         {p: v for p, v in vehicles.items() if v is not None},
@@ -100,4 +103,4 @@ def configure_logs(
     name = logs[0].parent.name or "logs" if logs else "logs"
     runs = tuple(Run((p,), vehicle, None, None, {}) for p in logs)
     campaign = Campaign(name, Path(name), map_file, runs, lists[0] if lists else None)
-    return _configured(campaign, map_file, dbc, thresholds, where="")
+    return _configured(campaign, map_file, dbc, thresholds, [])

@@ -1,4 +1,4 @@
-"""How often 95 % intervals cover the truth: PYTHONPATH=tests python tests/calibrate/coverage.py --seeds 200 --first N."""
+"""How often 95 % intervals cover the truth: PYTHONPATH=tests python tests/calibrate/coverage_study.py --seeds 200 --first N."""
 
 import argparse
 from dataclasses import replace
