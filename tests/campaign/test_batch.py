@@ -111,7 +111,8 @@ def test_tables_open_by_themselves(made):
 
 def test_duckdb_reads_the_store(made):
     duckdb = pytest.importorskip("duckdb")
-    n = duckdb.sql(f"select sum(events_joint_cusum) from '{made / 'store' / 'runs.parquet'}'").fetchone()[0]
+    query = f"select sum(events_joint_cusum) from '{made / 'store' / 'runs.parquet'}'"
+    n = duckdb.sql(query).fetchall()[0][0]
     assert n == pl.read_parquet(made / "store" / "runs.parquet")["events_joint_cusum"].sum()
 
 
