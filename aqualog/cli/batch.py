@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.campaign_results import Inputs, Jobs
-from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Signals, Vehicle, Verbose
+from aqualog.cli.options import Dbc, Debug, Force, Inputs, Jobs, Json, Progress, Quiet, Signals, Vehicle, Verbose
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome

@@ -6,9 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from aqualog.cli.console import Console, clean, told_if_interrupted
 from aqualog.cli.evaluate_inputs import is_campaign
@@ -20,26 +18,8 @@ if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome, Configured
     from aqualog.campaign.samples import CampaignData
 
-__all__ = ["Inputs", "Jobs", "StoreOption", "check_targets", "exit_code", "opened", "results", "store_of"]
+__all__ = ["check_targets", "exit_code", "opened", "results", "store_of"]
 
-Inputs = Annotated[
-    list[str],
-    typer.Argument(
-        help="A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
-        metavar="CAMPAIGN.toml|LOG...",
-        show_default=False,
-    ),
-]
-StoreOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--store", help="Folder for the results of each log; default beside the campaign file: NAME.store.",
-        metavar="DIR",
-    ),
-]  # fmt: skip
-Jobs = Annotated[
-    int | None, typer.Option("--jobs", help="Logs at a time; default one per core.", min=1, max=1024, metavar="N")
-]
 _TOLD_AT_ONCE = 20
 
 

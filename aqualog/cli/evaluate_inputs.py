@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
+from aqualog.campaign.loaded import loaded
 from aqualog.campaign.records import Run
 from aqualog.cli.files import expand, list_files
 from aqualog.config.campaign import load_campaign
@@ -108,7 +109,7 @@ def _source(
     return LogSource(
         name="; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs),
         paths=logs,
-        vehicle=vehicles[first.vehicle],
+        vehicle=loaded(vehicles[first.vehicle], first),
         signal_map=signal_map,
         dbc=tuple(dbc),
         labels=tuple(dict.fromkeys(x for labels in named for x in labels)) if named else None,

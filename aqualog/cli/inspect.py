@@ -34,26 +34,46 @@ def inspect(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """List what a log holds, and propose which channel is which signal.
+    """List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix.
 
     Every channel with its rate, unit, range, gaps and faults; how an IMU is mounted; a signal map to start from. The
     proposal is a guess from names, units and data: read it before you use it.
 
+    Of a campaign: faults of all its files at once, logs that are missing, which configurations were driven how often
+    and how fast, and which are missing.
+
     \b
     Examples:
       aqualog inspect drive.mf4
+      aqualog inspect campaign.toml
       aqualog inspect can.mf4 --dbc car.dbc --write-map map.toml
       aqualog inspect wheels.csv imu.csv gps.csv --write-map map.toml
     """
     from aqualog.cli.console import guarded
 
     with guarded(debug=debug):
-        code = _inspect(
-            logs, signals, dbc or [], write_map,
-            as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
-        )  # fmt: skip
+        if any(n.lower().endswith(".toml") for n in logs):
+            code = _campaign(logs, has_log_options=bool(signals or dbc or write_map), as_json=as_json)
+        else:
+            code = _inspect(
+                logs, signals, dbc or [], write_map,
+                as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+            )  # fmt: skip
     if code:
         raise typer.Exit(code)
+
+
+def _campaign(names: list[str], *, has_log_options: bool, as_json: bool) -> int:
+    from aqualog.cli.inspect_campaign import inspect_campaign
+    from aqualog.errors import ConfigError
+
+    if len(names) > 1:
+        raise ConfigError("a campaign file beside other inputs", where=", ".join(names)[:200], expected="it alone")
+    if has_log_options:
+        raise ConfigError(
+            "--signals, --dbc and --write-map are for logs", where=names[0], hint="name the signal map in the file"
+        )
+    return inspect_campaign(Path(names[0]), as_json=as_json)
 
 
 def _inspect(

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["Dbc", "Debug", "Force", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals", "Vehicle", "Verbose"]
+__all__ = [
+    "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals", "StoreOption",
+    "Vehicle", "Verbose",
+]  # fmt: skip
 
 Logs = Annotated[
     list[str],
@@ -37,3 +40,21 @@ Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Errors only on stder
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Tell more on stderr.")]
 Progress = Annotated[str, typer.Option("--progress", help="auto, bar, plain or off.", metavar="MODE")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")]
+Inputs = Annotated[
+    list[str],
+    typer.Argument(
+        help="A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
+        metavar="CAMPAIGN.toml|LOG...",
+        show_default=False,
+    ),
+]
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--store", help="Folder for the results of each log; default beside the campaign file: NAME.store.",
+        metavar="DIR",
+    ),
+]  # fmt: skip
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", help="Logs at a time; default one per core.", min=1, max=1024, metavar="N")
+]

@@ -1,19 +1,32 @@
-"""Campaign files: which logs were driven in which configuration."""
+"""Campaign files: which logs were driven in which configuration.
+
+Everything that can be wrong in the file, in its table of runs and in the files that they name is told at once, before
+any log is opened. A log that is not there is no fault of the file (`aqualog.campaign.logs` tells it): the others can be
+worked on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
 
+from aqualog.campaign.logs import near_name
 from aqualog.campaign.records import Campaign, Run
-from aqualog.config.labels import read_csv
-from aqualog.config.run_faults import RunFaults, RunKey, TableRun, TomlRun
+from aqualog.campaign.run_table import RunTable, as_point, decimal_sign, read_table
+from aqualog.config.labels import load_labels
+from aqualog.config.run_faults import RunFaults, RunKey, TableRun, TomlRun, check_twice
+from aqualog.config.signal_map import load_signal_map
 from aqualog.config.table_faults import LineFaults
 from aqualog.config.toml_file import TableFaults, load_toml
-from aqualog.errors import ConfigError
+from aqualog.config.vehicle import load_vehicle
+from aqualog.errors import ConfigError, LogError
 
-__all__ = ["RUN_KEYS", "RunKey", "load_campaign"]
+__all__ = ["RUN_KEYS", "CampaignFile", "RunKey", "load_campaign", "read_campaign"]
 
 WEAR = ("new", "worn", "very_worn")
 _TOP = ("name", "vehicle", "signals", "run", "runs")
@@ -39,15 +52,28 @@ _ALL = (
 RUN_KEYS = {k.name: k for k in _ALL}
 
 
+@dataclass(frozen=True, slots=True)
+class CampaignFile:
+    """A campaign and where each of its runs stands: `runs.csv: line 4`, or the name of the file alone."""
+
+    campaign: Campaign
+    places: tuple[str, ...]
+
+
 def load_campaign(path: Path) -> Campaign:
-    """Read and check a campaign file. Logs need not exist yet; vehicle, signal map and labels must.
+    """Read and check a campaign file. Logs need not exist yet; vehicle, signal map and labels must, and be right.
 
     Raises
     ------
     ConfigError
-        With all faults of the file, and of its table of runs, in one message.
+        With all faults of the file, of its table of runs and of the files that they name, in one message.
     """
-    document, text = load_toml(path, what="campaign file")
+    return read_campaign(path).campaign
+
+
+def read_campaign(path: Path) -> CampaignFile:
+    """Read and check a campaign file, as `load_campaign`, and keep where each run stands."""
+    document, text = _document(path)
     faults = TableFaults(path, text)
     for name in document:
         if name not in _TOP:
@@ -56,9 +82,12 @@ def load_campaign(path: Path) -> Campaign:
         if name in document and not (isinstance(document[name], str) and document[name].strip()):
             faults.add(name, f"{name} = {str(document[name])[:40]!r} is not a text")
             document.pop(name)
-    base = path.parent
-    signals = _file(document.get("signals"), base, "signals", faults)
-    vehicle = _file(document.get("vehicle"), base, "vehicle", faults)
+        elif name in document and not document[name].isprintable():
+            faults.add(name, f"{name} = {document[name][:40]!r} is not one line of text{_escape_hint(document[name])}")
+            document.pop(name)
+    named = _NamedFiles(path.parent)
+    signals = named.find(document.get("signals"), "signals", faults)
+    vehicle = named.find(document.get("vehicle"), "vehicle", faults)
     tables = document.get("run", [])
     if "run" in document and "runs" in document:
         faults.add("runs", "both [[run]] and runs; expected one of them")
@@ -67,47 +96,88 @@ def load_campaign(path: Path) -> Campaign:
     if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
         faults.add("run", "run is not a list of [[run]] tables")
         tables = []
-    runs: list[Run | None] = []
+    found: list[tuple[Run | None, RunFaults]] = []
+    heads = [i for i, line in enumerate(text.splitlines(), 1) if re.match(r"\s*\[\[\s*[\"']?run[\"']?\s*\]\]", line)]
+    counted = [0]
     for index, one in enumerate(tables):
-        with faults.inside("run", index):
-            runs.append(_run(one, base, vehicle, TomlRun(faults)))
-    table = base / document["runs"] if isinstance(document.get("runs"), str) else None
+        place = f"{path.name}: line {heads[index]}" if len(heads) == len(tables) else path.name
+        sink = TomlRun(faults, index, place, counted)
+        found.append((_run(one, named, vehicle, sink), sink))
+    check_twice(found)
+    table = _beside(path.parent, document["runs"]) if isinstance(document.get("runs"), str) else None
     if table is not None:
         try:
-            runs += _from_table(table, vehicle)
+            found = _from_table(table, named if table.parent == named.base else _NamedFiles(table.parent), vehicle)
         except ConfigError as error:
             faults.add("runs", error.line())
+    if counted[0] > TomlRun.most:
+        faults.add("", f"and {counted[0] - TomlRun.most} more in [[run]] tables")
     faults.raise_if_any()
-    done = tuple(r for r in runs if r is not None)
+    done = [(run, sink.place) for run, sink in found if run is not None]
     if not done:
         raise ConfigError("no run in it", where=str(path), expected="at least one log")
-    return Campaign(str(document.get("name", path.stem)), path, signals, done, table)
+    campaign = Campaign(str(document.get("name", path.stem)), path, signals, tuple(r for r, _ in done), table)
+    return CampaignFile(campaign, tuple(place for _, place in done))
 
 
-def _from_table(path: Path, vehicle: Path | None) -> list[Run | None]:
-    rows = read_csv(path, what="table of runs")
+def _document(path: Path) -> tuple[dict[str, Any], str]:
+    try:
+        return load_toml(path, what="campaign file")
+    except ConfigError as error:
+        if "escape" in error.what.lower() or "Unescaped" in error.what:
+            raise ConfigError(error.what, where=error.where, hint="/ in place of \\ in paths") from error
+        raise
+
+
+def _escape_hint(value: Any) -> str:
+    """A path of Windows in double quotes loses its backslashes with what follows them: `\\temp` holds a tab."""
+    return "; a \\ in quotes is an escape, write / in paths" if re.search(r"[\t\b\n\r\f]", str(value)) else ""
+
+
+def _from_table(path: Path, named: _NamedFiles, vehicle: Path | None) -> list[tuple[Run | None, RunFaults]]:
+    table = read_table(path, key="log")
     faults = LineFaults(path)
-    heading = [name.strip() for name in rows[0]] if rows else []
-    for name in heading:
-        if name not in RUN_KEYS and not name.startswith("x_"):
-            faults.unknown(1, "column", name, RUN_KEYS)
-    for name in {n for n in heading if heading.count(n) > 1}:
-        faults.add(1, f"column {name} stands twice")
-    runs: list[Run | None] = []
-    for line, row in enumerate(rows[1:], 2):
-        if not any(cell.strip() for cell in row):
-            continue
+    heading = table.heading
+    for column, name in enumerate(heading, 1):
+        if not name and any(len(cells) >= column and cells[column - 1] for _, cells in table.rows):
+            faults.add(table.line, f"column {column} has no name")
+        elif name == "x_":
+            faults.add(table.line, "column x_ has no name behind x_")
+        elif name and name not in RUN_KEYS and not name.startswith("x_"):
+            faults.unknown(table.line, "column", name, RUN_KEYS, hint="columns of your own begin with x_")
+    for name in dict.fromkeys(n for n in heading if n and heading.count(n) > 1):
+        faults.add(table.line, f"column {name} stands twice")
+    if heading and "log" not in heading:
+        faults.add(table.line, "no column log; expected one that names the log of each run")
+        faults.raise_if_any()
+    numeric = [i for i, name in enumerate(heading) if name in RUN_KEYS and RUN_KEYS[name].kind == "number"]
+    sign = decimal_sign((c[i] for _, c in table.rows for i in numeric if i < len(c)), table.separator)
+    if sign == "?":
+        faults.add(None, "some numbers have a decimal comma, others a point; expected one sign in all of them")
+    found: list[tuple[Run | None, RunFaults]] = []
+    for line, row in table.rows:
         if len(row) != len(heading):
-            faults.add(line, f"{len(row)} cells, the heading has {len(heading)}")
+            faults.add(line, f"{len(row)} cells, the heading has {len(heading)}{_cells_hint(row, table)}")
             continue
-        known = {n: c.strip() for n, c in zip(heading, row, strict=True) if n in RUN_KEYS or n.startswith("x_")}
-        cells = {n: c for n, c in known.items() if c}
-        runs.append(_run(cells, path.parent, vehicle, TableRun(faults, line)))
+        turned = as_point([row[i] for i in numeric]) if sign != "." else [row[i] for i in numeric]
+        cells = {
+            **dict(zip(heading, row, strict=True)),
+            **{heading[i]: c for i, c in zip(numeric, turned, strict=True)},
+        }
+        known = {n: c for n, c in cells.items() if c and (n in RUN_KEYS or n.startswith("x_"))}
+        sink = TableRun(faults, line, f"{path.name}: line {line}")
+        found.append((_run(known, named, vehicle, sink), sink))
+    check_twice(found)
     faults.raise_if_any()
-    return runs
+    return found
 
 
-def _run(table: Mapping[str, Any], base: Path, vehicle: Path | None, sink: RunFaults) -> Run | None:
+def _cells_hint(row: tuple[str, ...], table: RunTable) -> str:
+    is_comma = table.separator == "," and len(row) > len(table.heading)
+    return " (a decimal comma? then ; between the cells)" if is_comma else ""
+
+
+def _run(table: Mapping[str, Any], named: _NamedFiles, vehicle: Path | None, sink: RunFaults) -> Run | None:
     values: dict[str, float | str] = {}
     for name, value in table.items():
         key = RUN_KEYS.get(name)
@@ -117,22 +187,19 @@ def _run(table: Mapping[str, Any], base: Path, vehicle: Path | None, sink: RunFa
             number = sink.number(name, value, key)
             if number is not None:
                 values[name] = number
-        elif name.startswith("x_") and isinstance(value, int | float):
-            values[name] = str(value)
+        elif name.startswith("x_") and isinstance(value, bool | int | float | date | datetime | time):
+            values[name] = _plain(value)
         elif name == "log":
             continue
         elif not isinstance(value, str) or not value.strip() or not value.isprintable():
-            sink.add(name, f"{name} = {str(value)[:40]!r} is not one line of text")
+            sink.add(name, f"{name} = {str(value)[:40]!r} is not one line of text{_escape_hint(value)}")
         elif name == "wear" and value not in WEAR:
             sink.add(name, f"wear = {value[:40]!r} is not one of {', '.join(WEAR)}")
         elif key is None or key.kind == "text":
             values[name] = value
-    own = _file(table.get("vehicle"), base, "vehicle", sink) or vehicle
-    labels = _file(table.get("labels"), base, "labels", sink)
-    logs = _logs(table.get("log"), base)
-    if not logs:
-        sink.add("log" if "log" in table else "run", "a run names no log")
-        return None
+    own = named.find(table.get("vehicle"), "vehicle", sink) or vehicle
+    labels = named.find(table.get("labels"), "labels", sink)
+    logs = _logs(table.get("log"), named.base, sink)
     if own is None:
         sink.add("run", "no vehicle, neither of the campaign nor of this run")
     start, end = values.get("lane_start_s"), values.get("lane_end_s")
@@ -141,21 +208,91 @@ def _run(table: Mapping[str, Any], base: Path, vehicle: Path | None, sink: RunFa
     lane = (start, end) if isinstance(start, float) and isinstance(end, float) else None
     if lane is not None and not lane[0] < lane[1]:
         sink.add("lane_end_s", f"lane_end_s = {lane[1]:g} is not after lane_start_s = {lane[0]:g}")
-    return None if own is None else Run(logs, own, labels, lane, values)
+    elif lane is not None and lane[1] <= 0.0:
+        sink.add("lane_end_s", f"lane_end_s = {lane[1]:g} is before the log's first sample, from which it counts")
+    return None if own is None or not logs else Run(logs, own, labels, lane, values)
 
 
-def _logs(value: Any, base: Path) -> tuple[Path, ...]:
+def _plain(value: Any) -> str:
+    """A TOML value as a grouping key: 60 and 60.0 are one."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _logs(value: Any, base: Path, sink: RunFaults) -> tuple[Path, ...]:
+    """The files of one drive; () with the fault noted if they cannot be meant."""
     names = value.split(";") if isinstance(value, str) else value
-    if not isinstance(names, list) or not all(isinstance(n, str) and n.strip() and n.isprintable() for n in names):
+    if isinstance(value, str) and not value.strip():
+        names = None
+    if isinstance(names, list) and isinstance(value, str):
+        names = [n for n in names if n.strip()]
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) and n.strip() for n in names):
+        sink.add("log" if value is not None else "run", "a run names no log")
         return ()
-    return tuple(base / n.strip() for n in names)
+    if not all(n.isprintable() for n in names):
+        sink.add("log", f"log = {str(value)[:60]!r} is not printable text{_escape_hint(value)}")
+        return ()
+    paths = tuple(_beside(base, n.strip()) for n in names)
+    for path, name in zip(paths, names, strict=True):
+        wrong = _no_log(path, name.strip())
+        if wrong:
+            sink.add("log", f"log = {name.strip()[:80]!r} {wrong}")
+    bare = [p.name for p in paths]
+    for name in dict.fromkeys(n for n in bare if bare.count(n) > 1):
+        sink.add("log", f"two files of one drive are both called {name[:80]!r}; rename one of them")
+    return paths
 
 
-def _file(name: Any, base: Path, key: str, sink: RunFaults | TableFaults) -> Path | None:
-    """A file that must be there (else the fault is noted); None if it is not named."""
-    if not isinstance(name, str) or not name.strip():
-        return None
+def _no_log(path: Path, name: str) -> str:
+    """Why a name cannot be that of a log; empty if it can, be it there or not."""
+    if os.path.isdir(path):  # noqa: PTH112 - a path that is too long is no fault of the system
+        from aqualog.io.sniff import sniff
+
+        try:
+            sniff(path)
+        except LogError:
+            return "is a folder without a ROS 2 bag; a run names its files one by one"
+    elif any(c in name for c in "*?") and not os.path.exists(path):  # noqa: PTH110
+        return "is a pattern; a run names its files one by one (`aqualog campaign init FOLDER` lists a folder)"
+    elif name.startswith("@") and not os.path.exists(path):  # noqa: PTH110
+        return "is a list; a run names its files one by one"
+    return ""
+
+
+def _beside(base: Path, name: str) -> Path:
+    """A path from a file in `base`; backslashes of Windows are understood elsewhere too."""
     path = base / name
-    if not path.is_file():
-        sink.add(key, f"{key} = {name[:80]!r}: there is no such file")
-    return path
+    return base / name.replace("\\", "/") if "\\" in name and not os.path.exists(path) else path  # noqa: PTH110
+
+
+_CHECKS: dict[str, Callable[[Path], object]] = {
+    "vehicle": load_vehicle, "signals": load_signal_map, "labels": load_labels,
+}  # fmt: skip
+
+
+class _NamedFiles:
+    """Files that a campaign names, each read once to see that it is right."""
+
+    def __init__(self, base: Path) -> None:
+        self.base = base
+        self._seen: set[tuple[str, Path]] = set()
+
+    def find(self, name: Any, key: str, sink: RunFaults | TableFaults) -> Path | None:
+        """The file; None if it is not named. What is wrong with it is noted where it is named first."""
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+            return None
+        path = _beside(self.base, name.strip())
+        if (key, path) in self._seen:
+            return path
+        self._seen.add((key, path))
+        if not os.path.isfile(path):  # noqa: PTH113
+            near = near_name(path)
+            told = f' (did you mean "{near}"?)' if near else ""
+            sink.add(key, f"{key} = {name[:80]!r}: there is no such file{told}")
+            return path
+        try:
+            _CHECKS[key](path)
+        except ConfigError as error:
+            sink.add(key, f"{key} = {name[:80]!r}: {error.line()}")
+        return path

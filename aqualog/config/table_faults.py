@@ -25,20 +25,21 @@ class LineFaults:
         """Note a fault on a line (from 1), or of the file."""
         self._found.append(f"line {line}: {message}" if line else message)
 
-    def unknown(self, line: int | None, what: str, name: str, known: Iterable[str]) -> None:
-        """Note a name that does not exist, with the nearest one that does."""
-        names = sorted(known)
-        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-        self.add(line, f'unknown {what} "{name[:60]}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
+    def unknown(self, line: int | None, what: str, name: str, known: Iterable[str], *, hint: str = "") -> None:
+        """Note a name that does not exist, with the nearest one that does; the hint where none is near."""
+        near = difflib.get_close_matches(name.lower(), sorted(known), n=1, cutoff=0.5)
+        told = f' (did you mean "{near[0]}"?)' if near else f" ({hint})" if hint else ""
+        self.add(line, f'unknown {what} "{name[:60]}"{told}')
 
     def number(self, line: int | None, name: str, text: str, *, low: float, high: float, unit: str) -> float | None:
         """A number within its bounds, or None with the fault noted."""
         try:
-            value = float(text)
+            value = math.nan if "_" in text else float(text)  # Python reads 1_9 as 19
         except ValueError:
             value = math.nan
         if math.isnan(value):
-            self.add(line, f"{name} = {text[:40]!r} is not a number")
+            told = f" (in {unit}, without the unit)" if unit and text.lower().endswith(unit.lower()) else ""
+            self.add(line, f"{name} = {text[:40]!r} is not a number{told}")
             return None
         if not low <= value <= high:
             self.add(line, f"{name} = {value:g} is outside {low:g} ... {high:g} {unit}".rstrip())

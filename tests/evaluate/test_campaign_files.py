@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from aqualog.campaign.records import group_keys
-from aqualog.config.campaign import load_campaign
+from aqualog.config.campaign import load_campaign, read_campaign
 from aqualog.config.labels import load_labels
 from aqualog.errors import ConfigError
 from aqualog.evaluate.labels import Label
@@ -235,3 +235,141 @@ def test_faults_of_labels_are_told_once(tmp_path, text, parts):
         assert part in told, told
     assert told.count("line 1") <= 1
     assert "did you mean" not in told
+
+
+# --- tables as spreadsheets write them ---------------------------------------------------------------------------
+
+PLAIN = "log,tyre,pressure_rear_bar,lane_start_s,lane_end_s,x_driver\na.mf4,s,1.9,1,2.5,Jörg\nb.mf4,,,,,\n"
+GERMAN = PLAIN.replace(",", ";").replace("1.9", "1,9").replace("2.5", "2,5")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        GERMAN.encode(),
+        GERMAN.replace("\n", "\r\n").encode("utf-8-sig"),
+        GERMAN.encode("cp1252"),
+        GERMAN.replace(";", "\t").encode("utf-16"),
+        ("sep=;\r\n" + GERMAN).encode(),
+        GERMAN.replace("\n", ";;\n").encode(),
+        GERMAN.replace("1,9", "1.9").replace("2,5", "2.5").encode(),
+        PLAIN.replace("1.9", '"1,9"').replace("2.5", '"2,5"').encode(),
+        ("\n" + PLAIN + ",,,,,\n\n").encode(),
+    ],
+    ids=[
+        "german",
+        "mark",
+        "code page",
+        "utf-16 tabs",
+        "sep=",
+        "cells behind",
+        "points",
+        "quoted commas",
+        "blank lines",
+    ],
+)
+def test_tables_of_spreadsheets_say_the_same(folder, data):
+    path = written(folder, HEAD + 'runs = "runs.csv"\n', PLAIN)
+    expected = load_campaign(path)
+    (folder / "runs.csv").write_bytes(data)
+    assert load_campaign(path) == expected
+    assert expected.runs[0].values["pressure_rear_bar"] == 1.9
+    assert expected.runs[0].values["x_driver"] == "Jörg"
+
+
+@pytest.mark.parametrize(
+    ("table", "parts"),
+    [
+        ("log;pressure_rear_bar\na;1,9\nb;2.2\n", ["some numbers have a decimal comma, others a point"]),
+        ('log,load_rear_kg\na,"1,200"\n', ["some numbers have a decimal comma"]),
+        ("log,pressure_rear_bar\na,1,9\n", ["line 2: 3 cells, the heading has 2 (a decimal comma?"]),
+        ("log,pressure_rear_bar\na,1.9 bar\n", ["'1.9 bar' is not a number (in bar, without the unit)"]),
+        ("log,load_rear_kg\na,1_9\n", ["'1_9' is not a number"]),
+        ("log,load_rear_kg\na,inf\n", ["outside -5000 ... 50000 kg"]),
+        ("LOG,Tyre\na,s\n", ['unknown column "LOG" (did you mean "log"?)', 'unknown column "Tyre"', "no column log"]),
+        ("log,zzz\na,1\n", ['unknown column "zzz" (columns of your own begin with x_)']),
+        ("log,labels\na,lanes.csv\n", ['there is no such file (did you mean "lane.csv"?)']),
+        ("log,,tyre\na,1,s\n", ["line 1: column 2 has no name"]),
+        ("log,x_,tyre\na,1,s\n", ["column x_ has no name behind x_"]),
+        ("log,tyre,tyre\na,1,s\n", ["column tyre stands twice"]),
+        ('log,x_a\n"a\n.mf4",1\nb.mf4,2,3\n', ["line 2: log = ", "line 4: 3 cells"]),
+        ('log\n"a\n', ["is not CSV"]),
+        ("PK\x03\x04", ["is a spreadsheet"]),
+        ("log\n\0\n", ["is not text"]),
+        ("log,lane_start_s,lane_end_s\na,-9,-1\n", ["lane_end_s = -1 is before the log's first sample"]),
+    ],
+)
+def test_faults_of_tables(folder, table, parts):
+    text = faults(written(folder, HEAD + 'runs = "runs.csv"\n', table))
+    for part in parts:
+        assert part in text, text
+
+
+def test_the_files_that_a_campaign_names_are_checked_with_it(folder):
+    (folder / "bad.toml").write_text("mas = 1500.0\n")
+    (folder / "bad_map.toml").write_text('[signals]\nomega_f = { channel = "x" }\n')
+    (folder / "bad.csv").write_text("start_s,end_s,effect\n2,1,water\n")
+    text = faults(written(folder, """\
+vehicle = "bad.toml"
+signals = "bad_map.toml"
+runs = "runs.csv"
+""", "log,labels,vehicle\na.mf4,bad.csv,bad.toml\nb.mf4,bad.csv,gone.toml\nc.mf4,,gone.toml\n"))  # fmt: skip
+    for part in (
+        'line 1: vehicle = \'bad.toml\'', 'unknown key "mas" (did you mean "mass"?)', "line 2: signals =",
+        'unknown key "omega_f"', "line 2: labels = 'bad.csv'", "end_s = 1 is not after", "line 3: vehicle = 'gone.toml'",
+    ):  # fmt: skip
+        assert part in text, text
+    # each file's faults stand once, where it is named first
+    assert text.count("bad.csv'") == text.count('unknown key "mas"') == text.count("gone.toml") == 1
+
+
+def test_text_in_place_of_numbers_and_paths_of_windows(folder):
+    (folder / "logs").mkdir()
+    (folder / "logs" / "a.mf4").write_text("")
+    text = faults(written(folder, HEAD + '[[run]]\nlog = "logs\\temp.mf4"\npressure_rear_bar = "1,9"\n'))
+    assert "a \\ in quotes is an escape, write / in paths" in text
+    assert 'line 6: pressure_rear_bar = "1,9" is a text, not a number' in text
+    assert "Try: / in place of \\ in paths" in faults(written(folder, HEAD + '[[run]]\nlog = "D:\\logs\\a.mf4"\n'))
+    table = load_campaign(written(folder, HEAD + 'runs = "runs.csv"\n', "log\nlogs\\a.mf4\n"))
+    assert table.runs[0].logs == (folder / "logs/a.mf4",)
+
+
+@pytest.mark.parametrize(
+    ("log", "part"),
+    [
+        ("*.mf4", "is a pattern; a run names its files one by one"),
+        ("@list.txt", "is a list"),
+        ("logs", "is a folder without a ROS 2 bag"),
+        ("x/a.csv;y/a.csv", "two files of one drive are both called 'a.csv'"),
+        (";", "a run names no log"),
+    ],
+)
+def test_names_that_are_no_logs(folder, log, part):
+    (folder / "logs").mkdir()
+    assert part in faults(written(folder, HEAD + 'runs = "runs.csv"\n', f"log\n{log}\n"))
+    assert part in faults(written(folder, HEAD + f'[[run]]\nlog = "{log}"\n'))
+
+
+def test_a_drive_counts_once(folder):
+    def told(rows):
+        return written(folder, HEAD + 'runs = "runs.csv"\n', "log,lane_start_s,lane_end_s\n" + rows)
+
+    assert "line 3: log 'a.mf4' stands in runs.csv: line 2 too" in faults(told("a.mf4,,\n./a.mf4,,\n"))
+    assert "stands in runs.csv: line 2 too" in faults(told("a.mf4,1,2\na.mf4,,\n"))
+    assert "line 3: log 'a.csv' stands" in faults(told("a.csv;b.csv,,\nb.csv;a.csv,,\n"))
+    assert "line 2: the lane overlaps with that in runs.csv: line 3" in faults(told("a.mf4,3,6\na.mf4,1,4\n"))
+    assert len(load_campaign(told("a.mf4,4,6\na.mf4,1,4\n")).runs) == 2
+    # one GNSS log of a day may stand in many drives
+    assert len(load_campaign(told("a.csv;day.csv,,\nb.csv;day.csv,,\n")).runs) == 2
+    text = faults(written(folder, HEAD + '[[run]]\nlog = "a.mf4"\n[[run]]\nlog = "a.mf4"\n'))
+    assert "line 7: log 'a.mf4' stands in campaign.toml: line 4 too" in text
+
+
+def test_where_runs_stand_and_values_of_keys_of_ones_own(folder):
+    read = read_campaign(
+        written(folder, HEAD + '[[run]]\nlog = "a"\nx_v = 60.0\nx_d = 2024-05-01\n[[run]]\nlog = "b"\n')
+    )
+    assert read.places == ("campaign.toml: line 4", "campaign.toml: line 8")
+    assert read.campaign.runs[0].values == {"x_v": "60", "x_d": "2024-05-01"}
+    read = read_campaign(written(folder, HEAD + 'runs = "runs.csv"\n', "log,x_a\n\na,1\nb,2\n"))
+    assert read.places == ("runs.csv: line 3", "runs.csv: line 4")

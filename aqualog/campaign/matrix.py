@@ -1,0 +1,238 @@
+"""The test matrix: which configurations were driven how often, and which are missing.
+
+Keys of the runs are sorted into constants (one value in all runs), factors that were varied, and keys that go with a
+factor (each of its values has one value of theirs, so that their effects cannot be told apart). A configuration is one
+combination of the factors' values. A combination that was never driven is told as missing where it would close a gap:
+where neighbours (next value of one factor, all others alike) were driven along at least two factors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from aqualog.campaign.records import Campaign, Run
+
+__all__ = ["FEW", "TOO_FEW", "Configuration", "Factor", "Gap", "Matrix", "campaign_matrix", "speeds_of"]
+
+TOO_FEW = 3  # runs below which an interval over runs says nothing: with two there is one degree of freedom (D)
+FEW = 5  # below which it is wide: t(0.975) is 4.3 with 3 runs, 2.8 with 5, 2.0 with many (D)
+
+_CONFIGURATION = (
+    "vehicle", "tyre", "wear", "tread_depth_mm", "pressure_rear_bar", "pressure_front_bar", "water_depth_mm",
+    "water_depth_left_mm", "load_front_kg", "load_rear_kg",
+)  # fmt: skip
+_OF_OTHERS = {"wear", "tread_depth_mm", "pressure_front_bar", "water_depth_left_mm"}  # tyre's, rear pressure's, depth's
+_SPEED = "x_speed_kmh"
+
+
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """A key that was varied: its values in order, empty text where a run does not tell it, with the number of runs."""
+
+    key: str
+    values: tuple[str, ...]
+    runs: tuple[int, ...]
+    is_ordered: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """Runs of one configuration. `values` are those of the factors; `speeds` [km/h] the distinct ones, sorted."""
+
+    values: tuple[str, ...]
+    runs: tuple[int, ...]
+    manoeuvres: Mapping[str, int]
+    speeds: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A configuration that was not driven; `beside` counts the neighbours that were."""
+
+    values: tuple[str, ...]
+    beside: int
+
+
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """What was driven. `together` maps a key to the factor that it goes with; `others` are further keys with the number
+    of their values.
+    """
+
+    constants: Mapping[str, str]
+    factors: tuple[Factor, ...]
+    together: Mapping[str, str]
+    others: Mapping[str, int]
+    configurations: tuple[Configuration, ...]
+    gaps: tuple[Gap, ...]
+    notes: tuple[str, ...]
+
+
+def speeds_of(run: Run) -> tuple[float, ...]:
+    """Speeds [km/h] that the campaign file itself tells of a run: its `x_speed_kmh`."""
+    text = str(run.values.get(_SPEED, "")).replace(",", ".")
+    try:
+        value = float(text)
+    except ValueError:
+        return ()
+    return (value,) if math.isfinite(value) else ()
+
+
+def campaign_matrix(campaign: Campaign, speeds: Callable[[int, Run], Sequence[float]] | None = None) -> Matrix:
+    """The matrix of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    speeds : function (index of the run, run) -> speeds in km/h, optional
+        What is known of a run's speed beyond the campaign file, e.g. measured ones; default `speeds_of`.
+    """
+    columns = _columns(campaign.runs)
+    constants = {k: c[0] for k, c in columns.items() if len(set(c)) == 1 and c[0]}
+    varied = {k: c for k, c in columns.items() if len(set(c)) > 1}
+    together = _together(varied)
+    keys = [k for k in varied if k not in together]
+    factors = tuple(_factor(k, varied[k]) for k in keys)
+    cells: dict[tuple[str, ...], list[int]] = {}
+    for index in range(len(campaign.runs)):
+        cells.setdefault(tuple(varied[k][index] for k in keys), []).append(index)
+    ranks = [{v: i for i, v in enumerate(f.values)} for f in factors]
+    order = sorted(cells, key=lambda values: [r[v] for r, v in zip(ranks, values, strict=True)])
+    told = speeds or (lambda _, run: speeds_of(run))
+    configurations = tuple(_configuration(c, cells[c], campaign.runs, told) for c in order)
+    shown = set(_CONFIGURATION) | {"manoeuvre", _SPEED}
+    others = {k: len({r.groups.get(k, "") for r in campaign.runs}) for k in campaign.keys if k not in shown}
+    others = {k: n for k, n in others.items() if k not in ("lane_start_s", "lane_end_s")}
+    return Matrix(
+        constants, factors, together, others, configurations, _gaps(factors, set(cells)), _notes(campaign)
+    )  # fmt: skip
+
+
+def _columns(runs: Sequence[Run]) -> dict[str, list[str]]:
+    """The configuration keys as texts, run by run; keys that no run tells are left out."""
+    groups = [r.groups for r in runs]
+    columns = {k: [g.get(k, "") for g in groups] for k in _CONFIGURATION}
+    return {k: c for k, c in columns.items() if any(c)}
+
+
+def _together(varied: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Keys that are a function of another one that is left as a factor.
+
+    Tyre, depth and so on are hidden behind another key only if each tells the other: a tyre that was driven on one
+    depth alone is still a tyre.
+    """
+    found: dict[str, str] = {}
+    order = list(varied)
+    for key, column in varied.items():
+        for other, theirs in varied.items():
+            if other == key or other in found:
+                continue
+            is_function = len(set(zip(theirs, column, strict=True))) == len(set(theirs))
+            both_ways = is_function and len(set(theirs)) == len(set(column))
+            # of two keys that tell each other, the one that is named first stays
+            is_first = both_ways and order.index(key) < order.index(other)
+            if is_function and not is_first and (both_ways or key in _OF_OTHERS):
+                found[key] = other
+                break
+    # a key may go with one that itself goes with another: the last of the chain is the factor
+    return {k: _end(o, found) for k, o in found.items()}
+
+
+def _end(key: str, found: Mapping[str, str]) -> str:
+    while key in found:
+        key = found[key]
+    return key
+
+
+def _factor(key: str, column: Sequence[str]) -> Factor:
+    counts = Counter(column)
+    numbers = {v: _number(v) for v in counts}
+    is_ordered = all(n is not None for v, n in numbers.items() if v)
+    values = sorted(counts, key=lambda v: (v == "", (numbers[v] or 0.0) if is_ordered else 0.0, v))
+    return Factor(key, tuple(values), tuple(counts[v] for v in values), is_ordered)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _configuration(
+    values: tuple[str, ...],
+    indices: Sequence[int],
+    runs: Sequence[Run],
+    speeds: Callable[[int, Run], Sequence[float]],
+) -> Configuration:
+    manoeuvres = Counter(str(runs[i].values.get("manoeuvre", "")) for i in indices)
+    found = sorted({round(v, 1) for i in indices for v in speeds(i, runs[i])})
+    return Configuration(values, tuple(indices), dict(sorted(manoeuvres.items())), tuple(found))
+
+
+def _gaps(factors: Sequence[Factor], driven: set[tuple[str, ...]]) -> tuple[Gap, ...]:
+    """Combinations that were not driven, with neighbours along two factors or more; most neighbours first."""
+    if len(factors) < 2:
+        return ()
+    steps = [_steps(f) for f in factors]
+    beside: dict[tuple[str, ...], set[tuple[int, str]]] = {}
+    for values in driven:
+        for axis, near in enumerate(steps):
+            for other in near[values[axis]]:
+                candidate = (*values[:axis], other, *values[axis + 1 :])
+                if candidate not in driven:
+                    beside.setdefault(candidate, set()).add((axis, values[axis]))
+    found = [Gap(v, len(near)) for v, near in beside.items() if len({axis for axis, _ in near}) >= 2]
+    ranks = [{v: i for i, v in enumerate(f.values)} for f in factors]
+    return tuple(sorted(found, key=lambda g: (-g.beside, [r[v] for r, v in zip(ranks, g.values, strict=True)])))
+
+
+def _steps(factor: Factor) -> dict[str, tuple[str, ...]]:
+    """Neighbours of each value: the next ones of an ordered factor, any other of names; unknown has none."""
+    known = [v for v in factor.values if v]
+    if not factor.is_ordered:
+        return {v: tuple(o for o in known if o != v) if v else () for v in factor.values}
+    near = {v: tuple(known[j] for j in (i - 1, i + 1) if 0 <= j < len(known)) for i, v in enumerate(known)}
+    return {**near, "": ()}
+
+
+def _notes(campaign: Campaign) -> tuple[str, ...]:
+    """What the runs lack, beyond configurations."""
+    runs = campaign.runs
+    notes = []
+    for key, what in (("tyre", "tyres cannot be compared"), ("water_depth_mm", "neither dry nor wet is known")):
+        blank = sum(key not in r.values for r in runs)
+        if blank:
+            notes.append(f"{_runs(blank, len(runs))} no {key}: {what}")
+    wheres = [r for r in runs if r.lane is None and r.labels is None and r.values.get("water_depth_mm") != 0.0]
+    if wheres:
+        notes.append(
+            f"{_runs(len(wheres), len(runs))} neither lane times nor labels: where these are on water is known only if "
+            "their logs hold the signal on_water"
+        )
+    dry = {_mounted(r) for r in runs if r.values.get("water_depth_mm") == 0.0}
+    wet = dict.fromkeys(_mounted(r) for r in runs if float(r.values.get("water_depth_mm", 0.0)) > 0.0)
+    lacking = [" on ".join(x for x in m if x) for m in wet if m not in dry]
+    if lacking:
+        notes.append(
+            f"no dry run of {_listed(lacking)}: the dry slip slope comes from what is driven before and behind the lane"
+        )
+    return tuple(notes)
+
+
+def _mounted(run: Run) -> tuple[str, str]:
+    return str(run.values.get("tyre", "")), run.vehicle.stem
+
+
+def _runs(count: int, total: int) -> str:
+    if count == total:
+        return "the runs tell"
+    return f"{count} of {total} runs tell{'s' if count == 1 else ''}"
+
+
+def _listed(names: Sequence[str], most: int = 6) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

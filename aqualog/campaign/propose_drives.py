@@ -1,0 +1,248 @@
+"""Logs of a folder, and which of them belong to one drive.
+
+Files of different drives hold the same channels, files of one drive (a logger each) hold different ones. So files are
+sorted into kinds by their channels; what varies in the names within a kind tells drives apart, and files of different
+kinds with the same such words are one drive.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from aqualog.campaign.records import GROUP_NAMES
+from aqualog.campaign.store import MARK
+from aqualog.errors import AqualogError
+from aqualog.io.base import ReadOptions
+from aqualog.io.open_log import open_log
+from aqualog.io.sniff import sniff
+from aqualog.types import ChannelInfo
+
+__all__ = ["Drive", "Found", "LogFile", "drive_name", "group_drives", "is_run_table", "kinds_of", "scan", "tokens"]
+
+SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
+_RUN_COLUMNS = {k for keys in GROUP_NAMES.values() for k in keys} | {
+    "", "log", "labels", "lane_start_s", "lane_end_s", "water_depth_left_mm",
+}  # fmt: skip
+_WORD = re.compile(r"[A-Za-z0-9À-ÿ.,+]+")
+ALIKE = 0.5  # share of common channels from which two files hold the same things
+APART = 0.2  # share up to which they may be loggers of one drive: a speed or a temperature is in both (K)
+
+
+@dataclass(frozen=True, slots=True)
+class LogFile:
+    """A readable log; `name` is its path below the folder, with /."""
+
+    path: Path
+    name: str
+    channels: tuple[ChannelInfo, ...]
+
+    @property
+    def signature(self) -> frozenset[tuple[str, str]]:
+        """Names and units of its channels."""
+        return frozenset((c.path, c.unit) for c in self.channels)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a folder holds: logs, files that could not be read with the reason, and labels files."""
+
+    logs: tuple[LogFile, ...]
+    bad: tuple[tuple[str, str], ...]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Files of one drive; `kinds` are indices into the kinds of files."""
+
+    files: tuple[LogFile, ...]
+    kinds: tuple[int, ...]
+
+
+def scan(
+    folder: Path,
+    *,
+    options: ReadOptions | None = None,
+    leave_out: Iterable[Path] = (),
+    report: Callable[[str], None] = lambda _: None,
+) -> Found:
+    """All logs in a folder and below it, by suffix and content.
+
+    Hidden files, links to folders and stores of results are left out.
+
+    A folder that is a ROS 2 bag is one log. Names that a table of runs cannot hold are told as unreadable.
+    """
+    own = {os.path.realpath(p) for p in leave_out}
+    logs: list[LogFile] = []
+    bad: list[tuple[str, str]] = []
+    labels: list[str] = []
+    paths = [p for p in _walk(folder) if os.path.realpath(p) not in own]
+    for index, path in enumerate(paths):
+        report(f"looking at {index + 1} of {len(paths)} files")
+        name = path.relative_to(folder).as_posix()
+        if path.suffix.lower() in (".csv", ".tsv") and (kind := _table_kind(path)):
+            if kind == "labels":
+                labels.append(name)
+            continue
+        if not name.isprintable() or ";" in name or any(part != part.strip() for part in (name, path.name)):
+            told = "".join(c if c.isprintable() else "\ufffd" for c in name)
+            bad.append((told, "; or signs that do not print or blanks at the end in its name: rename it"))
+            continue
+        try:
+            with open_log(path, options) as log:
+                channels = tuple(log.channels())
+        except AqualogError as error:
+            bad.append((name, error.what))
+            continue
+        if channels:
+            logs.append(LogFile(path, name, channels))
+        else:
+            bad.append((name, "no channel in it; raw CAN frames need --dbc"))
+    return Found(tuple(logs), tuple(bad), tuple(labels))
+
+
+def _walk(folder: Path) -> list[Path]:
+    found: list[Path] = []
+    for where, folders, names in os.walk(folder):
+        here = Path(where)
+        folders[:] = sorted(f for f in folders if not f.startswith(".") and not (here / f / MARK).exists())
+        bags = [f for f in folders if (here / f / "metadata.yaml").exists() and sniff(here / f) == "ros"]
+        found += [here / f for f in bags]
+        folders[:] = [f for f in folders if f not in bags]
+        found += [here / n for n in sorted(names) if not n.startswith(".") and Path(n).suffix.lower() in SUFFIXES]
+    return sorted(found)
+
+
+def _table_kind(path: Path) -> str:
+    """`labels` or `runs` for tables that are no logs, else empty."""
+    try:
+        with path.open("rb") as file:
+            head = file.readline(4096).decode("utf-8-sig", errors="replace")
+    except OSError:
+        return ""
+    names = {cell.strip(' "\r\n') for cell in re.split(r"[,;\t]", head)}
+    if {"start_s", "end_s", "effect"} <= names:
+        return "labels"
+    return "runs" if "log" in names and all(n in _RUN_COLUMNS or n.startswith("x_") for n in names) else ""
+
+
+def is_run_table(path: Path) -> bool:
+    """Whether a CSV file is a table of runs by its heading, and no log."""
+    return _table_kind(path) == "runs"
+
+
+def kinds_of(logs: Sequence[LogFile]) -> tuple[tuple[int, ...], int]:
+    """Kind of each log by its channels, and the number of kinds; the most frequent kind is 0."""
+    signatures = list(dict.fromkeys(log.signature for log in logs))
+    parent = list(range(len(signatures)))
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            i = parent[i]
+        return i
+
+    for i, a in enumerate(signatures):
+        for j in range(i):
+            if root(i) != root(j) and _overlap(a, signatures[j]) >= ALIKE:
+                parent[root(i)] = root(j)
+    index = {s: root(i) for i, s in enumerate(signatures)}
+    raw = [index[log.signature] for log in logs]
+    order = sorted(set(raw), key=lambda k: (-raw.count(k), raw.index(k)))
+    return tuple(order.index(k) for k in raw), len(order)
+
+
+def _overlap(a: frozenset[tuple[str, str]], b: frozenset[tuple[str, str]]) -> float:
+    return len(a & b) / len(a | b)
+
+
+def tokens(name: str) -> tuple[str, ...]:
+    """Words and numbers of a path without its suffix, lower case, in order."""
+    stem = name.rsplit(".", 1)[0] if "." in name.rsplit("/", 1)[-1] else name
+    return tuple(t.lower() for t in _WORD.findall(stem))
+
+
+def group_drives(
+    logs: Sequence[LogFile], kinds: Sequence[int], rivals: Callable[[int, int], bool]
+) -> tuple[tuple[Drive, ...], tuple[str, ...]]:
+    """Drives in the order of their names, and notes on what was put together or left out.
+
+    Parameters
+    ----------
+    logs, kinds : sequences of equal length
+    rivals : function (kind, kind) -> bool
+        Whether files of the two kinds cannot be of one drive, as both measure the wheels.
+    """
+    words = [tokens(log.name) for log in logs]
+    common: dict[int, set[str]] = {}
+    for kind, own in zip(kinds, words, strict=True):
+        common[kind] = common[kind] & set(own) if kind in common else set(own)
+    telling = {w for kind, own in zip(kinds, words, strict=True) for w in own if w not in common[kind]}
+    by_key: dict[tuple[str, ...], list[int]] = {}
+    notes: list[str] = []
+    for i, own in enumerate(words):
+        by_key.setdefault(tuple(w for w in own if w in telling), []).append(i)
+    if len(by_key) > 1:  # nothing in their names tells these from others: at most files of one folder are one drive
+        for i in by_key.pop((), []):
+            by_key.setdefault(("", logs[i].name.rpartition("/")[0]), []).append(i)
+    drives: list[Drive] = []
+    for members in by_key.values():
+        kept = _without_copies(members, logs, kinds, rivals, notes)
+        names = [logs[i].path.name for i in kept]
+        is_one = (
+            len(kept) > 1 and len({kinds[i] for i in kept}) == len(kept) and _are_partners(kept, logs, kinds, rivals)
+        )
+        if is_one and len(set(names)) < len(names):
+            notes.append(f"{', '.join(logs[i].name for i in kept)} may be one drive, but have one name: rename them")
+            is_one = False
+        for several in [kept] if is_one else [[i] for i in kept]:
+            ordered = sorted(several, key=lambda i: (kinds[i], logs[i].name))
+            drives.append(Drive(tuple(logs[i] for i in ordered), tuple(kinds[i] for i in ordered)))
+    return tuple(sorted(drives, key=lambda d: d.files[0].name)), tuple(notes)
+
+
+def drive_name(drive: Drive) -> str:
+    """A name for a drive: its file's, of several files the words that all of their names share."""
+    first = drive.files[0].name
+    if len(drive.files) == 1:
+        return first
+    shared = set.intersection(*(set(tokens(f.name)) for f in drive.files))
+    stem = first.rsplit(".", 1)[0] if "." in first.rsplit("/", 1)[-1] else first
+    return _WORD.sub(lambda m: m[0] if m[0].lower() in shared else "", stem).strip("/_- ") + "."
+
+
+def _rank(path: Path) -> int:
+    """Formats with units and groups first; a bag's folder has no suffix."""
+    return SUFFIXES.index(path.suffix.lower()) if path.suffix.lower() in SUFFIXES else 0
+
+
+def _are_partners(
+    members: Sequence[int], logs: Sequence[LogFile], kinds: Sequence[int], rivals: Callable[[int, int], bool]
+) -> bool:
+    return not any(
+        _overlap(logs[i].signature, logs[j].signature) > APART or rivals(kinds[i], kinds[j])
+        for n, i in enumerate(members)
+        for j in members[:n]
+    )
+
+
+def _without_copies(
+    members: Sequence[int],
+    logs: Sequence[LogFile],
+    kinds: Sequence[int],
+    rivals: Callable[[int, int], bool],
+    notes: list[str],
+) -> list[int]:
+    """The same drive in two formats counts once: names alike but for the suffix, and the wheels or all else in both."""
+    kept: list[int] = []
+    for i in sorted(members, key=lambda i: (_rank(logs[i].path), logs[i].name)):
+        same = [j for j in kept if logs[j].path.with_suffix("") == logs[i].path.with_suffix("")]
+        original = next((j for j in same if kinds[i] == kinds[j] or rivals(kinds[i], kinds[j])), None)
+        if original is None:
+            kept.append(i)
+        else:
+            notes.append(f"{logs[i].name} is left out: it looks like a copy of {logs[original].name}")
+    return kept

@@ -1,0 +1,117 @@
+"""Texts of the proposed files: table of runs, vehicle with nothing set, campaign."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from aqualog.campaign.propose_drives import Drive, tokens
+from aqualog.campaign.propose_names import NameTable
+from aqualog.vehicle import KEYS, POLYNOMIALS
+
+__all__ = ["NEEDED", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
+
+NEEDED = ("mass", "l_f", "l_r", "wheels.r_e_f", "wheels.r_e_r")
+"""Keys without which forces, loads or slip would be those of another car."""
+
+_COLUMNS = (
+    "log", "tyre", "wear", "tread_depth_mm", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",
+    "load_front_kg", "load_rear_kg", "manoeuvre", "lane_start_s", "lane_end_s", "labels",
+)  # fmt: skip
+_IF_KNOWN = ("labels", "wear", "tread_depth_mm", "load_front_kg", "load_rear_kg")
+
+
+def runs_text(drives: Sequence[Drive], table: NameTable, labels: Mapping[int, str], *, base: Path, folder: Path) -> str:
+    """The table of runs, a line per drive; columns to fill are there, blank, if names said nothing.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    table : NameTable
+        A value per drive in each column.
+    labels : mapping index of the drive -> labels file below the folder
+    base, folder : Path
+        Folder of the table; folder of the logs.
+    """
+    columns = [c for c in _COLUMNS if c in table.columns or c not in _IF_KNOWN or (c == "labels" and labels)]
+    columns += [c for c in table.columns if c not in columns]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for index, drive in enumerate(drives):
+        row = {c: values[index] for c, values in table.columns.items()}
+        row["log"] = ";".join(relative(f.path, base) for f in drive.files)
+        if index in labels:
+            row["labels"] = relative(folder / labels[index], base)
+        writer.writerow([row.get(c, "") for c in columns])
+    return text.getvalue()
+
+
+def relative(path: Path, base: Path) -> str:
+    """A path as seen from a folder, with /; absolute on another drive letter.
+
+    Links to folders are followed first: what is above a link is not what is above the folder that it names.
+    """
+    real = Path(os.path.realpath(path.parent)) / path.name
+    try:
+        return Path(os.path.relpath(real, os.path.realpath(base))).as_posix()
+    except ValueError:
+        return real.as_posix()
+
+
+def labels_of(drives: Sequence[Drive], labels: Sequence[str]) -> dict[int, str]:
+    """Labels files of drives: those whose words are the drive's, with `label` or `labels` beside them at most."""
+    by_words = {tuple(w for w in _words(name) if w not in ("label", "labels")): name for name in labels}
+    found = {}
+    for index, drive in enumerate(drives):
+        name = next((by_words[w] for f in drive.files if (w := _words(f.name)) in by_words), None)
+        if name is not None:
+            found[index] = name
+    return found
+
+
+def _words(name: str) -> tuple[str, ...]:
+    """Words of a path, also where points part them: `drive1.labels.csv`."""
+    return tuple(w for t in tokens(name) for w in t.split(".") if w)
+
+
+def vehicle_text(name: str) -> str:
+    """A vehicle file in which nothing is set: every key is there behind #, with unit, bounds and meaning.
+
+    The defaults do not stand in it, so that none of them becomes a value that the user is said to have given.
+    """
+    lines = [
+        "# Nothing of this car is known yet. Take the # away from each key that you know and write its value.",
+        "# SET marks what slip, forces and loads cannot be right without. What is left out takes the value of a",
+        "# mid-size car, and detectors that need it say so.",
+        f"name = {_quoted(name)}",
+        '# drivetrain = ""             # SET  "rwd", "fwd" or "awd"',
+    ]
+    section = ""
+    for key in KEYS.values():
+        if key.section != section:
+            section = key.section
+            lines += ["", f"[{section}]"]
+        mark = "SET  " if key.path in NEEDED else ""
+        left = f"# {key.name} ="
+        lines.append(f"{left:<30}# {mark}[{key.unit}] {key.meaning}; {key.low:g} ... {key.high:g}")
+    for section, meaning in POLYNOMIALS.items():
+        lines += ["", f"# [{section}]  # {meaning}; `aqualog calibrate` writes it"]
+    return "\n".join(lines) + "\n"
+
+
+def campaign_text(name: str, vehicle: str, signals: str | None, runs: str) -> str:
+    """The campaign file; paths are relative to it."""
+    lines = [f"name = {_quoted(name)}", f"vehicle = {_quoted(vehicle)}"]
+    if signals is not None:
+        lines.append(f"signals = {_quoted(signals)}")
+    return "\n".join([*lines, f"runs = {_quoted(runs)}"]) + "\n"
+
+
+def _quoted(text: str) -> str:
+    printable = "".join(c for c in text if c.isprintable())
+    return json.dumps(printable, ensure_ascii=False)  # a JSON string is a TOML basic string
