@@ -56,7 +56,22 @@ def test_detectors_read_no_truth_and_no_labels():
         ["--help"],
         *(
             [c, "--help"]
-            for c in ("detect", "inspect", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate")
+            for c in (
+                "detect",
+                "inspect",
+                "align",
+                "simulate",
+                "figures",
+                "slip-slope",
+                "calibrate",
+                "evaluate",
+                "batch",
+                "bin-slipslope",
+                "bin-resistance",
+                "report",
+                "reproduce",
+                "campaign",
+            )
         ),
     ],
 )

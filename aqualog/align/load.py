@@ -77,6 +77,11 @@ def load_signals(
 
 
 def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:
+    if not channels:
+        return SignalError(
+            "holds no channel" + (f" ({notes[0]})" if notes else ""), where=", ".join(p.name for p in paths),
+            expected="measured signals", hint="`aqualog inspect LOG`; the recording may have ended at once",
+        )  # fmt: skip
     return SignalError(
         f"none of {channels} channels is a signal that aqualog knows by name"
         + (f" ({notes[0]})" if notes else "")
