@@ -1,0 +1,1 @@
+"""What the thesis claims, claim by claim, and what aqualog finds about it."""

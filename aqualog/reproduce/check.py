@@ -1,0 +1,103 @@
+"""One check of one claim: criterion, what was found with its uncertainty, verdict."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from aqualog.errors import ConfigError
+from aqualog.figures.record import Finding
+from aqualog.reproduce.verdict import REPRODUCED, Verdict, of_figure
+
+__all__ = ["Check", "Checks", "Maker", "Plan", "from_finding"]
+
+_CLAIM = re.compile(r"(C\d{1,3})(?: \((.+)\))?")
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A check of a claim.
+
+    `claim` as C7; `part` names what is checked where a claim has several checks; `statement` what this check takes the
+    claim to say, empty for the claim's own. `criterion` is fixed before anything is computed; `found` says in words and
+    numbers what came out, under which conditions. `value` is the number judged, `ci95` its 95 % interval or its range
+    over what was varied, `unit` of both. `source`: what it was computed from.
+
+    Raises
+    ------
+    ConfigError
+        If a check that is not reproduced does not say why (`reason`), or the number or interval mean nothing.
+    """
+
+    claim: str
+    criterion: str
+    found: str
+    verdict: Verdict
+    part: str = ""
+    statement: str = ""
+    value: float | None = None
+    ci95: tuple[float, float] | None = None
+    unit: str = "-"
+    reason: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"check of {self.claim}" + (f" ({self.part})" if self.part else "")
+        if not re.fullmatch(r"C\d{1,3}", self.claim):
+            raise ConfigError(f'"{self.claim}" is no claim', where=where, expected="C1 to C118")
+        if self.verdict != REPRODUCED and not self.reason:
+            raise ConfigError(f"{self.verdict}, without a reason", where=where, expected="what differs, and why")
+        if self.ci95 is not None and not self.ci95[0] <= self.ci95[1]:
+            raise ConfigError(f"interval {self.ci95} is none", where=where, expected="(low, high)")
+        if self.value is not None and math.isnan(self.value):
+            raise ConfigError("the number judged is NaN", where=where, expected="a number, or None where there is none")
+
+
+Checks = tuple[Check, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How checks are made.
+
+    `seeds` of the simulated drives: those that the figures reported are from; `jobs` processes at most; `tell` gets a
+    sentence now and then.
+    """
+
+    seeds: Sequence[int]
+    jobs: int = 1
+    tell: Callable[[str], None] | None = None
+
+    def first(self, n: int) -> tuple[int, ...]:
+        """The first n seeds; fewer if there are fewer."""
+        return tuple(self.seeds[:n])
+
+
+Maker = Callable[[Plan], Checks]
+"""Makes the checks of some claims."""
+
+
+def from_finding(finding: Finding, figure: str) -> Check:
+    """The check that a figure's finding is; `figure` its number.
+
+    A finding in part that gives no reason has its criterion to say what is missing.
+
+    Raises
+    ------
+    ConfigError
+        If the finding is not about a claim.
+    """
+    match = _CLAIM.fullmatch(finding.claim)
+    if match is None:
+        raise ConfigError(
+            f'the finding "{finding.claim}" of figure {figure} is not about a claim', expected="C1, or C1 (part)"
+        )
+    verdict = of_figure(finding.verdict)
+    reason = finding.reason or ("" if verdict == REPRODUCED else "The criterion is not met as a whole; see the number.")
+    value = finding.value if finding.value is not None and math.isfinite(finding.value) else None
+    return Check(
+        claim=match[1], part=match[2] or "", statement=finding.thesis, criterion=finding.criterion,
+        found=finding.found, verdict=verdict, value=value, reason=reason, source=f"figure {figure}",
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Checks of the claims, one module a topic."""

@@ -1,0 +1,216 @@
+"""Slip slope as a sign of water: what it is compared with, and what else lowers it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from aqualog.detect.slip_slope.history import History, Rule, remembered
+from aqualog.detect.slip_slope.watch import Memory
+from aqualog.detect.stream import detect_drive
+from aqualog.evaluate.intervals import wilson
+from aqualog.model.effects import EFFECTS
+from aqualog.model.pools import SCORING_POOL
+from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.surface import SURFACES
+from aqualog.model.term import Model, Term
+from aqualog.model.tyre import TYRES
+from aqualog.reproduce.ablations import variants
+from aqualog.reproduce.check import Check, Checks, Maker, Plan
+from aqualog.reproduce.drawn import drives, made
+from aqualog.reproduce.pass_figures import figures_of
+from aqualog.reproduce.passes import HIGH, LOW, Pass
+from aqualog.reproduce.statistics import bootstrap, share
+from aqualog.reproduce.verdict import NEEDS_DATA, judged
+from aqualog.types import DriveResult
+from aqualog.vehicle import KEYS
+
+__all__ = ["CHECKS", "SEEDS"]
+
+SEEDS = range(11000, 11200)
+_CAR = replace(SCORING_POOL.vehicles[0], given=frozenset({"name", *KEYS}))
+_GAINS = (0.45, 1.8)  # slope of the tyres on the car over that in the vehicle file: soft winter tyres, stiff worn ones
+_DRY_S, _WET_S, _ENTRY = 45.0, 40.0, 25.0  # [s]
+
+
+def _drive(
+    gain: float, seed: int, memory: Memory | None, *, snow: bool = False, seconds: float = _WET_S
+) -> DriveResult:
+    rng = np.random.default_rng([seed, 56])
+    speed = tuple((float(t), float(rng.uniform(70.0, 105.0)) / 3.6) for t in np.arange(0.0, seconds + 8.0, 8.0))
+    lanes = (Lane(_ENTRY, seconds, surface=SURFACES["snow"]),) if snow else ()
+    scenario = Scenario(
+        _CAR, TYRES["worn_summer"], TYRES["worn_summer"], duration_s=seconds, seed=seed, speed=speed, lanes=lanes
+    )
+    model = Model((Term(EFFECTS["slip_stiffness"], {"gain": gain}, None),))
+    d = made("reference", seed, scenario, _CAR, model)
+    return detect_drive(d.signals, d.vehicle, memory=memory)
+
+
+def _drops(result: DriveResult, after: float = 0.0) -> bool:
+    return any(e.detector == "slip_slope_drop" and e.start_s >= after for e in result.events)
+
+
+def _history(plan: Plan) -> Checks:
+    """C56: reference from the vehicle file against the largest slope of the configuration's history."""
+    false: dict[str, int] = {"file": 0, "max": 0, "robust": 0}
+    missed = dict(false)
+    n = 0
+    for gain in _GAINS:
+        for seed in plan.first(4):
+            n += 1
+            dry = _drive(gain, seed, None, seconds=_DRY_S)
+            rules: tuple[Rule, ...] = ("max", "robust")
+            # the file's own slope is taken away, so that the first drive tells the slope of these tyres by itself
+            learnt = _learn(gain, seed)
+            memories: dict[str, Memory | None] = {"file": None, **{r: Memory(learnt, rule=r) for r in rules}}
+            false["file"] += int(_drops(dry))
+            for name, memory in memories.items():
+                if name != "file":
+                    false[name] += int(_drops(_drive(gain, seed + 1, memory, seconds=_DRY_S)))
+                missed[name] += int(not _drops(_drive(gain, seed + 2, memory, snow=True), _ENTRY))
+    wrong = {k: false[k] + missed[k] for k in false}
+    whole = wrong["max"] <= 0.1 * 2 * n and wrong["file"] >= 3 * max(wrong["max"], 1)
+    return (
+        Check(
+            "C56",
+            "tyres of 0.45 and 1.8 times the file's slope: with the largest of the history at most 10 % of the dry "
+            "and snow drives judged wrongly, with the file's slope at least three times as many; in part: fewer",
+            f"false drops on dry road {false['file']} (file), {false['max']} (largest of the history), "
+            f"{false['robust']} (upper quartile of its means, the default) of {n} drives; snow missed "
+            f"{missed['file']}, {missed['max']}, {missed['robust']} of {n}",
+            judged(whole=whole, part=wrong["max"] < wrong["file"]),
+            value=wrong["max"] / (2 * n),
+            ci95=wilson(wrong["max"], 2 * n),
+            reason="" if whole else "See the numbers.",
+            source="simulated drives of one car",
+        ),
+    )
+
+
+def _learn(gain: float, seed: int) -> History:
+    car = replace(_CAR, given=_CAR.given - {"tyre.slip_slope_f", "tyre.slip_slope_r"})
+    rng = np.random.default_rng([seed, 57])
+    speed = tuple((float(t), float(rng.uniform(70.0, 105.0)) / 3.6) for t in np.arange(0.0, _DRY_S + 8.0, 8.0))
+    scenario = Scenario(
+        car, TYRES["worn_summer"], TYRES["worn_summer"], duration_s=_DRY_S, seed=seed + 500, speed=speed
+    )
+    d = made("history", seed, scenario, car, Model((Term(EFFECTS["slip_stiffness"], {"gain": gain}, None),)))
+    return remembered(History(), _CAR.name, detect_drive(d.signals, d.vehicle).slopes)
+
+
+_YIELDING = ("snow_entry", "snow", "deep_snow", "gravel")
+
+
+def _not_unique(plan: Plan) -> Checks:
+    """C57: roads that yield lower the slope; what the drop alone and the joint detector make of them."""
+    rows = {}
+    for name in _YIELDING:
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 6 if name == "snow_entry" else 3)]
+        rows[name] = (len(found), *(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")))
+    n, drops, joint = (sum(r[i] for r in rows.values()) for i in range(3))
+    whole = drops >= 0.5 * n and joint <= 0.05 * n
+    return (
+        Check(
+            "C57",
+            "drives on snow, deep snow and gravel: the drop alone reports at least half of them, joint detector 1 at "
+            "most 5 %; in part: joint at most a fifth of the drop",
+            f"drop alone {share(drops, n)}, joint detector 1 {share(joint, n)} of the drives ("
+            + ", ".join(f"{k.replace('_', ' ')} {r[1]} and {r[2]} of {r[0]}" for k, r in rows.items())
+            + ")",
+            judged(whole=whole, part=joint <= 0.2 * drops and drops > 0),
+            value=drops / n,
+            ci95=wilson(drops, n),
+            reason=""
+            if whole
+            else "On a steady drive the traction is too even to tell a slope, so that the drop is "
+            "often not seen; what is seen is not taken for water.",
+            source="drawn situations",
+        ),
+    )
+
+
+def _unchanged(plan: Plan) -> Checks:
+    """C58: a damp road and dry ice must not be reported; that their slope is that of dry road is put in, not found."""
+    rows = {}
+    for name in ("damp", "ice"):
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 8)]
+        rows[name] = (*(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")), len(found))
+    false = sum(r[0] for r in rows.values())
+    joint = sum(r[1] for r in rows.values())
+    n = sum(r[2] for r in rows.values())
+    whole = false <= 0.05 * n and joint == 0
+    return (
+        Check(
+            "C58",
+            "drives on damp road and on dry ice: a drop of the slope in at most 5 %, no joint warning; in part: no "
+            "joint warning",
+            f"drop reported in {share(false, n)} of the drives (damp {rows['damp'][0]} of {rows['damp'][2]}, dry ice "
+            f"{rows['ice'][0]} of {rows['ice'][2]}), joint warning in {joint}",
+            judged(whole=whole, part=joint == 0),
+            part="detection",
+            value=false / n,
+            ci95=wilson(false, n),
+            reason=""
+            if whole
+            else "So little friction is left on ice that the brush bends at the traction of driving: the "
+            "line through its points is flatter though the slope at zero is not.",
+            source="drawn situations",
+        ),
+        Check(
+            "C58",
+            "slip slope on damp asphalt and dry ice against dry asphalt, the same tyre",
+            "the simulator's damp road and dry ice have the slope of the dry one by assumption",
+            NEEDS_DATA,
+            part="road",
+            reason="What a road does to a tyre's slope is measured, not computed: drives of one tyre over dry, damp "
+            "and icy stretches at the same temperature.",
+            source="none",
+        ),
+    )
+
+
+def _pressure_and_tread(plan: Plan) -> Checks:
+    """C118: share of the slope that is lost between 70 and 102 km/h."""
+    seeds = plan.first(8)
+
+    def lost(p: Pass, fast: float) -> list[float]:
+        out = []
+        for seed in seeds:
+            slow_, fast_ = (figures_of(replace(p, kmh=v), seed).slope_rr for v in (70.0, fast))
+            if math.isfinite(slow_) and math.isfinite(fast_):
+                out.append(1.0 - fast_ / slow_)
+        return out
+
+    base = Pass(70.0, wiggles=True)
+    low, high = lost(base, 102.0), lost(replace(base, p=HIGH), 102.0)
+    winter = lost(replace(base, tyre="new_winter", p=LOW), 110.0)
+    ratio = float(np.mean(high) / np.mean(low))
+    less, none = ratio < 0.7, abs(float(np.mean(winter))) < 0.05
+    whole = less and none
+    interval = bootstrap(np.array([low, high]).T, lambda x: float(x[:, 1].mean() / x[:, 0].mean()))
+    return (
+        Check(
+            "C118",
+            "worn summer tyres, 1.3 mm, 70 to 102 km/h: relative reduction at high pressure below 0.7 of that at "
+            "low; new winter tyres lose less than 5 % to 110 km/h; in part: one of both",
+            f"reduction {100 * np.mean(low):.0f} % at low and {100 * np.mean(high):.0f} % at high pressure; new "
+            f"winter {100 * np.mean(winter):+.1f} % ({100 * min(winter):+.1f} to {100 * max(winter):+.1f} %, "
+            f"{len(winter)} runs)",
+            judged(whole=whole, part=less or none),
+            value=ratio,
+            ci95=(min(interval), max(interval)),
+            reason="" if whole else "See the numbers.",
+            source="simulated passes; measured ones would be a campaign's",
+        ),
+    )
+
+
+CHECKS: tuple[tuple[tuple[str, ...], Maker], ...] = (
+    (("C56",), _history),
+    (("C57",), _not_unique),
+    (("C58",), _unchanged),
+    (("C118",), _pressure_and_tread),
+)

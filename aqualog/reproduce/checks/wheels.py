@@ -1,0 +1,239 @@
+"""Wheels that leave the road's speed: acceleration difference, sign of the speed difference, sums, moving variance."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from aqualog.detect import cusum, ewvar, minor_spin_down, spin
+from aqualog.evaluate.intervals import wilson
+from aqualog.features.stream import FeatureStream
+from aqualog.notation import WHEELS
+from aqualog.reproduce.check import Check, Checks, Maker, Plan
+from aqualog.reproduce.drawn import WATER, Score, Taken, detected, drives, score, threshold_for
+from aqualog.reproduce.statistics import bootstrap, ratio_of_counts, share
+from aqualog.reproduce.verdict import judged
+from aqualog.types import BoolArray, FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["CHECKS", "SEEDS"]
+
+SEEDS = range(11000, 11200)
+_DT = 0.01
+_PER_WATER, _PER_OTHER = 6, 3  # seeds of each situation
+_SHAKEN = ("rough_asphalt", "gravel", "kerbs_and_holes", "gear_shifts", "dry_cruise", "damp", "motorway")
+
+
+def _acceleration_difference(plan: Plan) -> Checks:
+    """C24: against straight lines of wheel speed and velocity, whose derivatives are known without a computer."""
+    rng = np.random.default_rng(plan.seeds[0])
+    car = Vehicle(name="test", given=frozenset({"mass"}))
+    worst = 0.0
+    n, cases = 400, 200
+    t = np.arange(n) * _DT
+    for _ in range(cases):
+        v_0, a_x = rng.uniform(20.0, 40.0), rng.uniform(-2.0, 2.0)
+        v = v_0 + a_x * t
+        rates = rng.uniform(-15.0, 15.0, 4)  # [m/s^2] of the rims beyond the car's, for the last half second
+        columns = {"v_x": v, "a_x": np.full(n, a_x), "yaw_rate": np.zeros(n), "a_y": np.zeros(n)}
+        for w, rate in zip(WHEELS, rates, strict=True):
+            rim = v + rate * np.clip(t - 3.5, 0.0, None)
+            columns[f"omega_{w}"] = rim / car.r_e(w)
+        f = FeatureStream(car, _DT, columns).push(columns)
+        for w, rate in zip(WHEELS, rates, strict=True):
+            worst = max(worst, float(abs(f[f"a_w_delta_{w}"][380] - rate)))
+    return (
+        Check(
+            "C24",
+            "wheels that run away from the car at up to 15 m/s^2 while it accelerates at up to 2: difference within "
+            "0.3 m/s^2 of the true one 0.3 s later; in part: within 1",
+            f"largest deviation {worst:.3f} m/s^2 over {4 * cases} wheels",
+            judged(whole=worst < 0.3, part=worst < 1.0),
+            value=worst,
+            unit="m/s^2",
+            reason="a_x is taken to be the kinematic acceleration: an accelerometer would show a grade of 5 % as 0.49 "
+            "m/s^2 on every wheel."
+            if worst < 0.3
+            else "The estimate of the car's acceleration leans on wheels that leave it.",
+            source="straight lines of speed",
+        ),
+    )
+
+
+def _starts(bits: BoolArray) -> list[int]:
+    """Samples at which a bit goes on."""
+    return [int(k) for k in np.flatnonzero(np.diff(np.concatenate([[False], bits]).astype(np.int8)) > 0)]
+
+
+def _sign_of_speed(plan: Plan) -> Checks:
+    """C25: detections by the sums with and without the sign of the speed difference, against the true slip."""
+    right, wrong = {"with": 0, "without": 0}, {"with": 0, "without": 0}
+    water = drives(WATER, plan, _PER_WATER)
+    for d in water:
+        result = detected(d)
+        for track in result.tracks:
+            if track.detector not in ("spin_down", "spin_up"):
+                continue
+            sign = 1.0 if track.detector == "spin_up" else -1.0
+            a = result.features[f"a_w_delta_{track.wheel}"].to_numpy()
+            _, plain, _ = cusum.scan(spin.SpinParams.make(sign, d.signals.dt).cusum, cusum.initial_state(), sign * a)
+            for name, bits in (("with", track.active), ("without", plain)):
+                for k in _starts(bits):
+                    slip = sign * d.truth[f"slip_{track.wheel}"][k]
+                    right[name] += int(slip > 0.0)
+                    wrong[name] += int(slip < 0.0)
+    n = {k: right[k] + wrong[k] for k in right}
+    shares = {k: wrong[k] / max(n[k], 1) for k in n}
+    whole = n["with"] > 20 and shares["with"] < 0.05 and shares["without"] > 5.0 * max(shares["with"], 0.01)
+    return (
+        Check(
+            "C25",
+            "detections of the sums whose wheel truly slips the other way (the end of the opposite event): below 5 % "
+            "with the sign, at least five times as many without it; in part: fewer with it",
+            f"with the sign {share(wrong['with'], n['with'])}, without {share(wrong['without'], n['without'])} of "
+            f"the detections, in {len(water)} drives on water",
+            judged(whole=whole, part=shares["with"] < shares["without"]),
+            value=shares["with"],
+            ci95=wilson(wrong["with"], n["with"]),
+            reason="" if whole else "See the numbers.",
+            source="drawn situations, true slip",
+        ),
+    )
+
+
+def _sums(d: Taken) -> dict[str, FloatArray]:
+    """Largest over the wheels of -a_w_delta where the wheel is slower than the car, and of its sum."""
+    result = detected(d)
+    direct = np.zeros(d.t.size)
+    summed = np.zeros(d.t.size)
+    p = spin.SpinParams.make(-1.0, d.signals.dt).cusum._replace(g_max=20.0)
+    for w in WHEELS:
+        if f"a_w_delta_{w}" not in result.features.columns:
+            continue
+        a = np.nan_to_num(-result.features[f"a_w_delta_{w}"].to_numpy())
+        slower = result.features[f"v_w_delta_{w}"].to_numpy() < 0.0
+        direct = np.maximum(direct, np.where(slower, a, 0.0))
+        g, _, _ = cusum.scan(p, cusum.initial_state(), a)
+        summed = np.maximum(summed, np.where(slower, g, 0.0))
+    return {"direct": direct, "summed": summed}
+
+
+def _summed_up(plan: Plan) -> Checks:
+    """C26: false alarms of both at the recall that the sum has at its threshold."""
+    water = [(d, _sums(d)) for d in drives(WATER, plan, _PER_WATER)]
+    other = [(d, _sums(d)) for d in drives(_SHAKEN, plan, _PER_OTHER)]
+
+    def of(name: str, threshold: float) -> Score:
+        return score([(d, s[name] > threshold) for d, s in water], [(d, s[name] > threshold) for d, s in other])
+
+    threshold = spin.SpinParams.make(-1.0, _DT).cusum.h
+    wanted = of("summed", threshold)
+    grids = {"summed": np.geomspace(0.2, 15.0, 30), "direct": np.geomspace(1.0, 60.0, 30)}
+    best = {
+        name: threshold_for(wanted.recall, [float(x) for x in grid], partial(of, name)) for name, grid in grids.items()
+    }
+    (limit_sum, by_sum), (limit, direct) = best["summed"], best["direct"]
+    whole = by_sum.episodes > 20 and direct.false > 0 and by_sum.false <= 0.5 * direct.false
+    return (
+        Check(
+            "C26",
+            "both with the sign of the speed difference, episodes of full aquaplaning; each at its largest threshold "
+            f"with the recall that the sum has at {threshold:g} m/s: the sum has at most half of the false alarms of "
+            "the direct threshold; in part: fewer",
+            f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}; direct, beyond {limit:.1f} m/s^2: "
+            f"{direct.in_words()}",
+            judged(whole=whole, part=by_sum.false < direct.false),
+            value=by_sum.false / max(direct.false, 1),
+            ci95=ratio_of_counts(by_sum.false, direct.false),
+            reason=""
+            if whole
+            else "Simulated wheels without contact leave the car's speed far faster than those on any dry road here, "
+            "so that a direct threshold set with hindsight tells them as well; what noise there is has been "
+            "low-passed over 0.03 s before either.",
+            source="drawn situations",
+        ),
+    )
+
+
+def _moving_variance(plan: Plan) -> Checks:
+    """C30: the recursion against the weighted variance written out, and white noise against its factor."""
+    rng = np.random.default_rng(plan.seeds[0])
+    worst = factor = 0.0
+    for alpha in rng.uniform(0.01, 0.6, 40):
+        x = rng.normal(rng.uniform(-5.0, 5.0), 3.0, 400)
+        mean, var, _ = ewvar.scan(ewvar.EwvarParams(alpha, alpha), ewvar.initial_state(), x)
+        weights = alpha * (1.0 - alpha) ** np.arange(x.size - 1, -1, -1.0)
+        weights[0] /= alpha  # the first sample is the first mean
+        centre = float(np.sum(weights * x))
+        worst = max(worst, abs(mean[-1] - centre), abs(var[-1] - float(np.sum(weights * (x - centre) ** 2))))
+    for alpha, beta in ((0.05, 0.05), (0.02, 0.1), (0.1, 0.02)):
+        x = rng.normal(0.0, 2.0, 1_000_000)
+        _, var, _ = ewvar.scan(ewvar.EwvarParams(alpha, beta), ewvar.initial_state(), x)
+        factor = max(factor, abs(float(var[1000:].mean()) / 4.0 / ((1.0 - beta) * 2.0 / (2.0 - alpha)) - 1.0))
+    whole = worst < 1e-11 and factor < 0.01
+    return (
+        Check(
+            "C30",
+            "with alpha = beta the weighted mean and variance within 1e-11; with alpha and beta apart the variance "
+            "of white noise times (1 - beta) 2 / (2 - alpha) within 1 %",
+            f"{worst:.1e} over 40 series of 400; {100 * factor:.2f} % over three pairs of weights and 1e6 samples",
+            judged(whole=whole),
+            value=worst,
+            unit="(m/s^2)^2",
+            reason="" if whole else "The recursion differs.",
+            source="random numbers, second derivation",
+        ),
+    )
+
+
+def _variance_difference(plan: Plan) -> Checks:
+    """C31: against two variances taken apart; what both axles see alike; and on a rough road."""
+    rng = np.random.default_rng(plan.seeds[0])
+    p = minor_spin_down.MinorParams.make(_DT)._replace(var_min=np.inf)
+
+    def both(front: FloatArray, rear: FloatArray) -> FloatArray:
+        n = front.size
+        delta, _, _, _ = minor_spin_down.scan(
+            p, minor_spin_down.initial_state(), front, rear, np.zeros(n), np.full(n, 25.0), np.ones(n, dtype=bool)
+        )
+        return delta
+
+    worst = common = 0.0
+    for _ in range(20):
+        front, rear = rng.normal(0.0, rng.uniform(0.5, 5.0), 800), rng.normal(0.0, rng.uniform(0.5, 5.0), 800)
+        apart = [ewvar.scan(p.ew, ewvar.initial_state(), x)[1] for x in (front, rear)]
+        worst = max(worst, float(np.abs(both(front, rear) - (apart[0] - apart[1])).max()))
+        common = max(common, float(np.abs(both(front, front)).max()))
+    ratios = []
+    for d in drives(("rough_asphalt",), plan, 8):
+        result = detected(d)
+        for track in result.tracks:
+            if track.detector == "minor_spin_down":
+                level = result.features[f"variance_{track.wheel}"].to_numpy()[500:]
+                ratios.append(float(np.nanmean(track.statistic[500:]) / np.nanmean(level)))
+    left = float(np.mean(np.abs(ratios)))
+    exact = worst < 1e-11 and common == 0.0
+    return (
+        Check(
+            "C31",
+            "difference equal to that of two variances within 1e-11, nothing for the same signal on both axles; on "
+            "broken asphalt less than half of the variance is left (mean); in part: the former",
+            f"{worst:.1e} over 20 pairs of series, {common:g} for the same signal; on broken asphalt "
+            f"{100 * left:.0f} % left ({100 * min(ratios):.0f} to {100 * max(ratios):.0f} % over {len(ratios)} sides)",
+            judged(whole=exact and left < 0.5, part=exact),
+            value=left,
+            ci95=bootstrap(np.abs(ratios)),
+            reason="" if exact and left < 0.5 else "The axles do not shake alike.",
+            source="random numbers; drawn situations",
+        ),
+    )
+
+
+CHECKS: tuple[tuple[tuple[str, ...], Maker], ...] = (
+    (("C24",), _acceleration_difference),
+    (("C25",), _sign_of_speed),
+    (("C26",), _summed_up),
+    (("C30",), _moving_variance),
+    (("C31",), _variance_difference),
+)
