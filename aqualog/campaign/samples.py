@@ -74,7 +74,8 @@ class RunSamples:
         """A column as floats."""
         if name not in self.frame.columns:
             return np.full(self.t.size, np.nan)
-        values: FloatArray = self.frame[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        # nulls become NaN on the way to numpy
+        values: FloatArray = self.frame.get_column(name).to_numpy().astype(np.float64)
         return values
 
     def bits(self, name: str) -> BoolArray:

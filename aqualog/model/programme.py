@@ -112,6 +112,9 @@ def _drives() -> Iterator[_Drive]:
     def accelerated(case: _Case, speeds: tuple[int, ...], a: tuple[float, ...], figures: str) -> Iterator[_Drive]:
         return ((case, v, x, 0, "acceleration", figures) for v in speeds for x in a)
 
+    def third(case: _Case, figures: str) -> Iterator[_Drive]:
+        return ((case, v, 0.0, 2, "constant", figures) for v in BINNED)
+
     def binned(case: _Case, figures: str, speeds: tuple[int, ...] = BINS) -> Iterator[_Drive]:
         return (
             (case, v, a, 0, "acceleration" if a else "constant", figures) for v in speeds for a in REGRESSED
@@ -165,6 +168,13 @@ def _drives() -> Iterator[_Drive]:
         for front, rear in ((270.0, 0.0), (0.0, 270.0)):
             yield from binned(_Case(pressure=pressure, depth_mm=1.2, load_front=front, load_rear=rear), "2.20")
     yield from binned(_Case("very_worn_summer", depth_mm=0.8), "2.16", (95, 105))
+    # a third pass where there were two, since two tell no interval
+    for depth in (0.6, 0.8, 1.1, 1.3, 2.0):
+        yield from third(_Case("very_worn_summer", depth_mm=depth), "2.11,2.12,2.13")
+    for depth in (1.1, 2.0):
+        yield from third(_Case("new_summer", depth_mm=depth), "2.12")
+    for pressure in ("medium", "high"):
+        yield from third(_Case(pressure=pressure), "2.14")
 
 
 def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures: str, seed: int) -> Run:

@@ -3,8 +3,10 @@
 import csv
 import json
 import tomllib
+from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aqualog.config.vehicle import load_vehicle
@@ -12,7 +14,7 @@ from aqualog.errors import ConfigError
 from aqualog.io.open_log import open_log
 from aqualog.model import campaign
 from aqualog.model.campaign import simulate_campaign
-from aqualog.model.programme import PROGRAMMES, thesis
+from aqualog.model.programme import APPROACH_S, PROGRAMMES, RUN_OUT_S, thesis
 from aqualog.vehicle import Vehicle, vehicle_toml
 
 CONTRACT = {
@@ -49,6 +51,33 @@ def test_programme_of_the_thesis():
     shown = {f for r in runs for f in r.figures.split(",")}
     # 2.1 is a sketch, 2.2 is analytic, 2.24 a diagram, 2.18 and 2.20 are regressions of the same drives
     assert {f"2.{n}" for n in range(3, 26)} - {"2.24"} <= shown
+
+
+def test_each_configuration_of_the_slope_figures_has_five_passes_a_bin():
+    """Figs 2.17-2.20: passes whose speed over the lane's middle is in the middle of a bin, at different accelerations."""
+    passes = Counter()
+    for r in thesis():
+        s = r.scenario
+        over_lane = 0.5 * (s.duration_s + APPROACH_S - RUN_OUT_S)
+        middle = np.interp(over_lane, [p[0] for p in s.speed], [p[1] for p in s.speed]) * 3.6
+        if s.vehicle.drivetrain == "rwd" and r.water_depth and abs(middle % 10.0 - 5.0) < 0.5:
+            case = (s.tyre_rear.name, s.p_rear, round(r.water_depth * 1e3, 1), s.load_front, s.load_rear)
+            passes[case, int(middle // 10)] += 1
+    depths = [("worn_summer", 1.9e5, h, 0.0, 0.0) for h in (0.6, 0.8, 1.1, 1.2, 1.3, 2.0)]
+    pressures = [("worn_summer", p, 1.2, 0.0, 0.0) for p in (2.3e5, 2.8e5)]
+    winter = [("new_winter", 1.9e5, h, 0.0, 0.0) for h in (1.3, 2.0)]
+    loads = [("worn_summer", p, 1.2, *x) for p in (1.9e5, 2.3e5) for x in ((270.0, 0.0), (0.0, 270.0))]
+    for case in depths + pressures + winter + loads:
+        for speed_bin in range(6, 12):
+            assert passes[case, speed_bin] >= 5, (case, speed_bin)
+
+
+def test_names_tell_drives_apart_and_old_ones_stay():
+    names = [r.name for r in thesis()]
+    assert names[0] == "rwd_worn_summer_low_1.3mm_060kmh_const_1"
+    assert "rwd_worn_summer_low_1.2mm_rear270_060kmh_a+0.5_1" in names
+    assert "rwd_worn_summer_low_1.2mm_rear270_065kmh_a+0.25_1" in names
+    assert 387 < len(names) < 900
 
 
 def test_campaign_is_what_the_contract_says(tmp_path, programme):

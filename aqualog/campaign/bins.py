@@ -1,0 +1,246 @@
+"""Cells of a campaign: samples by configuration, wheel or side, road and speed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.campaign.measure import REASONS
+from aqualog.campaign.records import Campaign, Run, group_keys
+from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.errors import ConfigError
+from aqualog.notation import SIDES, WHEELS
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = [
+    "DEFAULT_KEYS", "DEPTH_KEYS", "KMH", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells", "check_plan",
+    "driven_of", "free_of", "group_of", "plan", "pooled", "road_of",
+]  # fmt: skip
+
+KMH = 1.0 / 3.6  # [m/s]
+ROADS = ("wet", "dry", "both")
+DEFAULT_KEYS = ("tyre", "pressure_rear_bar", "water_depth_mm", "load_front_kg", "load_rear_kg")
+DEPTH_KEYS = ("water_depth_mm", "water_depth_left_mm")
+SIDE = "side"
+_APART = 10_000_000  # between the steps of two wheels of one run, which are no neighbours
+
+Group = tuple[tuple[str, float | str | None], ...]
+"""Keys with their values; None where a run does not tell it."""
+
+
+class Picked(NamedTuple):
+    """Columns (n,) of a run and a wheel, `v_x` among them, and samples that do not count, by reason."""
+
+    columns: dict[str, FloatArray]
+    without: dict[str, BoolArray] = {}  # noqa: RUF012 - never written to
+
+
+class Pool(NamedTuple):
+    """Samples of several runs, arrays (n,): `run` index and `step` ascending, and columns by name."""
+
+    run: NDArray[np.int64]
+    step: NDArray[np.int64]
+    columns: dict[str, FloatArray]
+
+    def part(self, which: BoolArray) -> Pool:
+        """Some of the samples."""
+        return Pool(self.run[which], self.step[which], {k: x[which] for k, x in self.columns.items()})
+
+    @property
+    def runs(self) -> int:
+        """Runs that have samples."""
+        return int(np.unique(self.run).size)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How samples are put into cells: `keys` of the configuration, whether by side instead of by wheel, width of the
+    speed bins [km/h], `road` as in `ROADS`.
+    """
+
+    keys: tuple[str, ...]
+    by_side: bool = False
+    width_kmh: float = 10.0
+    road: str = "wet"
+
+    @property
+    def roads(self) -> tuple[str, ...]:
+        """Roads that are told."""
+        return ("wet", "dry") if self.road == "both" else (self.road,)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Samples of one configuration on one road at one place; `place` is a wheel, `left`, `right` or empty (the car).
+
+    `low_kmh` and `high_kmh` are NaN for all speeds; `infos` are the runs that have samples here.
+    """
+
+    group: Group
+    place: str
+    road: str
+    low_kmh: float
+    high_kmh: float
+    pool: Pool
+    infos: tuple[RunInfo, ...] = field(default=(), compare=False)
+
+
+def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0, road: str = "wet") -> Plan:
+    """Check what was said after --by, before any log is read.
+
+    Without any name: the keys of `DEFAULT_KEYS` in which the runs differ. Different cars are never put together.
+
+    Raises
+    ------
+    ConfigError
+        On keys that no run tells, and on a road or width that makes no sense.
+    """
+    if road not in ROADS:
+        raise ConfigError(f'--road "{road}"', expected=" ".join(ROADS))
+    if not 1.0 <= width_kmh <= 100.0:
+        raise ConfigError(f"--bin-width {width_kmh:g}", expected="1 to 100 km/h")
+    names = [n for n in by if n != SIDE]
+    keys = group_keys(names, campaign.keys) if names else ()
+    if not by:
+        keys = tuple(k for k in DEFAULT_KEYS if _differs(campaign.runs, k))
+    if "vehicle" not in keys and _differs(campaign.runs, "vehicle"):
+        keys = ("vehicle", *keys)
+    return Plan(keys, SIDE in by, width_kmh, road)
+
+
+def plan(data: CampaignData, by: Sequence[str], *, width_kmh: float = 10.0, road: str = "wet") -> Plan:
+    """`check_plan` of a campaign with results."""
+    return check_plan(data.configured.campaign, by, width_kmh=width_kmh, road=road)
+
+
+def _differs(runs: Sequence[Run], key: str) -> bool:
+    return len({_value(r, key) for r in runs}) > 1
+
+
+def _value(run: Run, key: str) -> float | str | None:
+    return run.vehicle.stem if key == "vehicle" else run.values.get(key)
+
+
+def group_of(info: RunInfo, keys: Sequence[str]) -> Group:
+    """A run's values of the keys."""
+    return tuple((k, _value(info.run, k)) for k in keys)
+
+
+def driven_of(info: RunInfo) -> tuple[str, ...]:
+    """Driven wheels of a run's car."""
+    return info.vehicle.driven
+
+
+def free_of(info: RunInfo) -> tuple[str, ...]:
+    """Wheels that are not driven; of an all-wheel-drive car the front ones, which meet the water first."""
+    return tuple(w for w in WHEELS if w[0] == info.vehicle.watched_axle)
+
+
+def road_of(samples: RunSamples, road: str) -> BoolArray:
+    """Samples on the watered lane, or off it."""
+    here: BoolArray = samples.on_water == (1.0 if road == "wet" else 0.0)
+    return here
+
+
+def cells(
+    data: CampaignData,
+    plan: Plan,
+    *,
+    wheels: Callable[[RunInfo], Sequence[str]],
+    columns: Callable[[RunInfo, RunSamples, str], Picked | str],
+    road: str,
+    by_speed: bool = True,
+    keys: tuple[str, ...] | None = None,
+    only_usable: bool = True,
+) -> tuple[list[Cell], Counter[str]]:
+    """Cells of one road, in order of configuration, place and speed; and samples left out by reason.
+
+    Parameters
+    ----------
+    data, plan
+    wheels : callable
+        Wheels of a run's car that count; `("",)` for the car as a whole.
+    columns : callable
+        What of a run and a wheel is used, or why nothing. Samples with a NaN are left out.
+    road : str
+        `wet` or `dry`.
+    by_speed : bool
+        In bins of speed, or all speeds together.
+    keys : tuple of str, optional
+        Other keys than the plan's.
+    only_usable : bool
+        Straight driving without brakes only.
+    """
+    keys = plan.keys if keys is None else keys
+    left_out: Counter[str] = Counter()
+    parts: dict[tuple[Group, str], list[tuple[RunInfo, int, NDArray[np.int64], dict[str, FloatArray]]]] = {}
+    for info in data.done:
+        samples = data.samples(info)
+        on_road = road_of(samples, road)
+        if np.isnan(samples.on_water).all():
+            left_out["on or off the water is not known"] += int(samples.t.size)
+        reason = samples.array("reason").astype(np.int64)
+        good = on_road & (reason == 0) if only_usable else on_road
+        if only_usable:
+            for code in np.unique(reason[on_road & (reason > 0)]):
+                left_out[REASONS[code]] += int(np.count_nonzero(on_road & (reason == code)))
+        if not good.any():
+            continue
+        for number, wheel in enumerate(wheels(info)):
+            found = columns(info, samples, wheel)
+            if isinstance(found, str):
+                left_out[found] += int(np.count_nonzero(good))
+                continue
+            left = good.copy()
+            for why, which in found.without.items():
+                left_out[why] += int(np.count_nonzero(left & which))
+                left &= ~which
+            whole = left & np.all([np.isfinite(x) for x in found.columns.values()], axis=0)
+            left_out["a signal is missing"] += int(np.count_nonzero(left & ~whole))
+            index = np.flatnonzero(whole)
+            if index.size:
+                step = index + number * _APART
+                place = _place(wheel, by_side=plan.by_side)
+                part = (info, info.index, step, {k: x[index] for k, x in found.columns.items()})
+                parts.setdefault((group_of(info, keys), place), []).append(part)
+    out = []
+    for (group, place), pieces in sorted(parts.items(), key=lambda item: _order(item[0])):
+        pool = pooled([(i, step, c) for _, i, step, c in pieces])
+        infos = {info.index: info for info, *_ in pieces}
+        for low, high, here in _by_speed(pool, plan.width_kmh) if by_speed else [(math.nan, math.nan, pool)]:
+            runs = tuple(infos[i] for i in np.unique(here.run))
+            out.append(Cell(group, place, road, low, high, here, runs))
+    return out, Counter({k: n for k, n in left_out.items() if n})
+
+
+def pooled(pieces: Sequence[tuple[int, NDArray[np.int64], dict[str, FloatArray]]]) -> Pool:
+    """Samples of (run, step, columns), by run and step."""
+    run = np.concatenate([np.full(step.size, i, dtype=np.int64) for i, step, _ in pieces])
+    step = np.concatenate([s for _, s, _ in pieces])
+    order = np.lexsort((step, run))
+    names = pieces[0][2].keys()
+    return Pool(run[order], step[order], {k: np.concatenate([c[k] for *_, c in pieces])[order] for k in names})
+
+
+def _by_speed(pool: Pool, width_kmh: float) -> Iterator[tuple[float, float, Pool]]:
+    number = np.floor(pool.columns["v_x"] / KMH / width_kmh).astype(np.int64)
+    for k in np.unique(number):
+        yield float(k * width_kmh), float((k + 1) * width_kmh), pool.part(number == k)
+
+
+def _place(wheel: str, *, by_side: bool) -> str:
+    return next(s for s, ws in SIDES.items() if wheel in ws) if by_side and wheel else wheel
+
+
+def _order(item: tuple[Group, str]) -> tuple[tuple[tuple[int, float, str], ...], str]:
+    group, place = item
+    ranked = tuple(
+        (2, 0.0, "") if x is None else (0, x, "") if isinstance(x, float) else (1, 0.0, x) for _, x in group
+    )  # fmt: skip
+    return ranked, place

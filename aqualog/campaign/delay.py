@@ -1,0 +1,115 @@
+"""By how much the reference velocity of a campaign is late, from dry driving at different accelerations."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.campaign.bins import pooled, road_of
+from aqualog.campaign.regress import NOWHERE, Design, Interval, estimate
+from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.notation import WHEELS
+from aqualog.types import FloatArray
+
+__all__ = ["Delay", "delays", "source_of"]
+
+LEAST_RUNS = 3
+HALF_MAX = 0.03  # [s] known worse than that, the delay stays open: at 90 km/h 0.1 % of slip per m/s^2
+LATEST = 1.0  # [s]
+U_MIN = 1e-3  # [1/s] a / v: 0.03 m/s^2 at 100 km/h
+_V_UNIT = 30.0  # [m/s]
+
+Source = tuple[str, str]
+"""Vehicle file and what the slip is against."""
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """Delay of v_x against the wheels of one car, late positive. [s]
+
+    `value` and `ci`: NaN where not told, then `reason` says why, and a slope has to be told together with the delay.
+    """
+
+    vehicle: str
+    value: float
+    ci: Interval
+    runs: int
+    samples: int
+    reason: str = ""
+
+    @property
+    def told(self) -> bool:
+        """Whether there is a value."""
+        return not self.reason
+
+    @property
+    def half(self) -> float:
+        """Half of the 95 % interval. [s]"""
+        return 0.5 * (self.ci[1] - self.ci[0])
+
+
+def source_of(info: RunInfo) -> Source:
+    """What runs must share to have one delay."""
+    return info.run.vehicle.stem, str(info.about.get("slip_against", "none"))
+
+
+def delays(data: CampaignData) -> dict[Source, Delay]:
+    """Delays of all cars whose slip is against a measured velocity.
+
+    v(t - tau) = v - a tau: a late reference adds tau a / v to every slip. On dry road the free wheels' slip is that and
+    an offset of the run (radii, scale of v_x), and what radii grow by with v^2. On all-wheel drive the mean slip of the
+    wheels also goes with their mean traction, and both are told together, if the data can. The noise of a / v (free
+    wheels) or of the traction is given back.
+    """
+    members: dict[Source, list[RunInfo]] = {}
+    for info in data.done:
+        if source_of(info)[1] == "v_x":
+            members.setdefault(source_of(info), []).append(info)
+    return {source: _delay(data, source[0], infos) for source, infos in members.items()}
+
+
+def _delay(data: CampaignData, name: str, infos: list[RunInfo]) -> Delay:
+    pieces = []
+    awd = infos[0].vehicle.drivetrain == "awd"
+    wheels = [w for w in WHEELS if awd or w not in infos[0].vehicle.driven]
+    for info in infos:
+        samples = data.samples(info)
+        u = samples.array("a_over_v")
+        slip = _mean([samples.array(f"slip_{w}") for w in wheels])
+        mu = _mean([samples.array(f"mu_{w}") for w in wheels]) if awd else np.zeros_like(u)
+        v = samples.array("v_x") / _V_UNIT
+        good = road_of(samples, "dry") & samples.is_usable & np.isfinite(u + slip + mu + v)
+        index = np.flatnonzero(good)
+        if index.size:
+            pieces.append((info.index, index, {"u": u[index], "slip": slip[index], "mu": mu[index], "v": v[index]}))
+    runs = len(pieces)
+    if runs < LEAST_RUNS:
+        reason = f"{runs} runs with dry, straight driving against v_x, at least {LEAST_RUNS} needed"
+        return Delay(name, math.nan, NOWHERE, runs, sum(p[1].size for p in pieces), reason)
+    pool = pooled(pieces)
+    c = pool.columns
+    columns, scatters = [c["u"], np.ones_like(c["u"]), c["v"] ** 2], [False, True, False]
+    if awd:
+        # the brush's curve, s = k mu (1 + mu / 3 mu_max ...), would pass for a delay: both grow with the acceleration
+        columns, scatters = [*columns, c["mu"], c["mu"] ** 2], [*scatters, True, False]
+    noisy = tuple(i == (3 if awd else 0) for i in range(len(columns)))
+    design = Design(np.stack(columns), c["slip"], pool.run, pool.step, tuple(scatters), noisy)
+    found = estimate(design, robust=True)
+    tau, ci = float(found.value[0]), found.interval(0)
+    half = 0.5 * (ci[1] - ci[0])
+    reason = ""
+    if not float(np.ptp(c["u"])) > U_MIN:
+        reason = "no accelerations in the dry driving"
+    elif not half <= HALF_MAX:
+        with_slope = " apart from the slope" if awd else ""
+        reason = f"known to +-{half:.3f} s only{with_slope}: the accelerations of the dry driving differ too little"
+    elif not abs(tau) <= LATEST:
+        reason = f"{tau:+.2f} s is no delay of a velocity: check the clocks (`aqualog align`)"
+    return Delay(name, tau if not reason else math.nan, ci if not reason else NOWHERE, runs, c["u"].size, reason)
+
+
+def _mean(columns: list[FloatArray]) -> FloatArray:
+    mean: FloatArray = np.mean(columns, axis=0)
+    return mean

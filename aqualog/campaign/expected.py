@@ -1,0 +1,193 @@
+"""What the model of tyre and water expects of a run's wheels: speed of full aquaplaning, contact and slip slope."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.campaign.loaded import loads_of
+from aqualog.campaign.samples import RunInfo
+from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, P_NOMINAL
+from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
+from aqualog.notation import SIDES, WHEELS
+from aqualog.physics.contact import contact_share, slip_stiffness_ratio
+from aqualog.physics.hydroplaning import full_aquaplaning_speed
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.rolling import load_factor, pressure_factor
+from aqualog.physics.tyre_brush import brush_force
+from aqualog.physics.water import residual_film
+from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Expected", "expected", "expected_of_runs", "full_speed_of"]
+
+_S_MAX = 0.2  # [-] slips within which a traction is looked for
+_TOLD_BY = (
+    "tyre", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm", "water_depth_left_mm", "load_front_kg",
+    "load_rear_kg",
+)  # fmt: skip
+NO_WEDGE = 1e5  # [m/s] from here on there is no speed of full aquaplaning
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Of one wheel at one speed: `contact` L [-], `slope` C_s / F_z [-], `slope_dry` [-]; NaN and `reason` where a run
+    does not tell enough.
+    """
+
+    contact: float = float("nan")
+    slope: float = float("nan")
+    slope_dry: float = float("nan")
+    reason: str = ""
+
+
+def expected(
+    info: RunInfo, wheel: str, v: float, *, wet: bool = True, mu_range: tuple[float, float] | None = None
+) -> Expected:
+    """Expectation for a wheel of a run at constant speed on even water.
+
+    Parameters
+    ----------
+    info : RunInfo
+        Must tell tyre (one of the model's), and on water the depth and the pressures.
+    wheel : str
+    v : float
+        [m/s]
+    wet : bool
+        On the lane or off it.
+    mu_range : (float, float), optional
+        Traction over which the measured slope was told: the slopes are then those of the brush's chord, since its curve
+        bends (E22); a fit over 0.03 to 0.26 gives a tenth less than the slope at no slip.
+
+    Returns
+    -------
+    Expected
+
+    L = 1 - (v / v_full)^n; on the rear axle in the water that the front wheel of its side leaves. Slope: the vehicle
+    file's, times the factors of tyre, pressure and load, and L^2 (2.2). The contact does not
+    fluctuate here: the mean of L^2 over uneven water is less near full aquaplaning. Load transfer by the acceleration
+    is left out.
+    """
+    tyre = TYRES.get(str(info.run.values.get("tyre", "")))
+    if tyre is None:
+        return Expected(reason=f"the model does not know the tyre {info.run.values.get('tyre', 'that is not given')}")
+    p = _pressure(info, wheel)
+    if p is None:
+        return Expected(reason="the tyre pressure is not given")
+    car = info.vehicle
+    nominal = car.slip_slope_f if wheel[0] == "f" else car.slip_slope_r
+    dry = nominal * tyre.slip_slope_factor * float(pressure_factor(np.array(p), p_ref=P_REFERENCE, p_nominal=P_NOMINAL))
+    F_z = _load(car, wheel)
+    before = F_z - 0.5 * G * loads_of(info.run)[0 if wheel[0] == "f" else 1]
+    dry *= float(load_factor(np.array(F_z), F_z_ref=before, sensitivity=tyre.load_sensitivity))
+    mu_max = car.mu_max * tyre.mu_factor
+    chord_dry = _chord(dry, 1.0, mu_max, mu_range)
+    if not wet:
+        return Expected(1.0, chord_dry, chord_dry)
+    found = _contact(info, wheel, v, tyre)
+    if isinstance(found, str):
+        return Expected(slope_dry=chord_dry, reason=found)
+    slope = _chord(dry, found, mu_max * tyre.wet_friction, mu_range)
+    reason = "" if np.isfinite(slope) else "the contact that is left cannot carry such a traction"
+    return Expected(found, slope, chord_dry, reason)
+
+
+def _chord(slope: float, L: float, mu_max: float, mu_range: tuple[float, float] | None) -> float:
+    """Slope of the brush between two tractions; at no slip without them. NaN where the contact cannot carry them."""
+    if mu_range is None:
+        return slope * float(slip_stiffness_ratio(np.array(L)))
+    s = np.linspace(-_S_MAX, _S_MAX, 2001)
+    carried = brush_force(s, np.ones_like(s), mu=mu_max, C_s=slope, L=L)
+    low, high = mu_range
+    if not carried[0] <= low < high <= carried[-1]:
+        return float("nan")
+    at_low, at_high = np.interp([low, high], carried, s)
+    return float((high - low) / (at_high - at_low))
+
+
+def expected_of_runs(
+    infos: Sequence[RunInfo],
+    wheels: Sequence[str],
+    v: float,
+    *,
+    wet: bool = True,
+    mu_range: tuple[float, float] | None = None,
+) -> Expected:
+    """Mean over runs and wheels of one cell, or why not; runs of one configuration are worked out once."""
+    different = {
+        (repr(i.vehicle), *(i.run.values.get(k) for k in _TOLD_BY)): i for i in infos
+    }.values()  # fmt: skip
+    all_of_them = [
+        expected(i, w, v, wet=wet, mu_range=mu_range) for i in different for w in wheels if w in i.vehicle.driven
+    ]
+    if not all_of_them:
+        return Expected(reason="no driven wheel")
+    reason = next((e.reason for e in all_of_them if e.reason), "")
+    contact, slope, dry = np.mean([(e.contact, e.slope, e.slope_dry) for e in all_of_them], axis=0)
+    return Expected(float(contact), float(slope), float(dry), reason)
+
+
+def full_speed_of(info: RunInfo, wheel: str) -> float | str:
+    """Speed at which the model lifts a wheel off the road, or why that is not known. [m/s] Infinite without a wedge.
+
+    For a rear wheel by bisection, because what the front wheel leaves depends on the speed.
+    """
+    tyre = TYRES.get(str(info.run.values.get("tyre", "")))
+    if tyre is None:
+        return "the model does not know the tyre"
+    at_top = _contact(info, wheel, 100.0, tyre)
+    if isinstance(at_top, str):
+        return at_top
+    if at_top > 0.0:
+        return float("inf")
+    low, high = 1.0, 100.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        found = _contact(info, wheel, middle, tyre)
+        low, high = (low, middle) if not isinstance(found, str) and found <= 0.0 else (middle, high)
+    return high
+
+
+def _contact(info: RunInfo, wheel: str, v: float, tyre: Tyre) -> float | str:
+    side = next(s for s, wheels in SIDES.items() if wheel in wheels)
+    depth = info.run.values.get("water_depth_mm")
+    if side == "left":
+        depth = info.run.values.get("water_depth_left_mm", depth)
+    if not isinstance(depth, float):
+        return "the water depth is not given"
+    film = depth * 1e-3
+    if wheel[0] == "r":
+        front = _share(info, "f" + wheel[1], v, film, tyre)
+        if isinstance(front, str):
+            return front
+        film = float(residual_film(np.array(film), np.array(front), h_track=tyre.h_track))
+    return _share(info, wheel, v, film, tyre)
+
+
+def _share(info: RunInfo, wheel: str, v: float, film: float, tyre: Tyre) -> float | str:
+    p = _pressure(info, wheel)
+    if p is None:
+        return "the tyre pressure is not given"
+    F_z = np.array([_load(info.vehicle, wheel)])
+    v_full = full_aquaplaning_speed(
+        np.array([film]), F_z, p=p, tread_capacity=tyre.tread_capacity, v_anchor=tyre.v_anchor, h_anchor=H_ANCHOR,
+        p_anchor=P_ANCHOR, F_z_anchor=F_Z_ANCHOR, h_bulk=tyre.h_bulk, h_onset=tyre.h_onset,
+        exponent=tyre.contact_exponent,
+    )  # fmt: skip
+    if float(v_full[0]) > NO_WEDGE:
+        return 1.0
+    return float(contact_share(np.array([v]), v_full, exponent=tyre.contact_exponent)[0])
+
+
+def _load(car: Vehicle, wheel: str) -> float:
+    """Static load of a wheel. [N]"""
+    zero: FloatArray = np.zeros(1)
+    loads = wheel_loads(zero, zero, mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg, track=car.track)
+    return float(loads[WHEELS.index(wheel), 0])
+
+
+def _pressure(info: RunInfo, wheel: str) -> float | None:
+    bar = info.run.values.get("pressure_front_bar" if wheel[0] == "f" else "pressure_rear_bar")
+    return bar * 1e5 if isinstance(bar, float) else None

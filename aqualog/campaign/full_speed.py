@@ -1,0 +1,194 @@
+"""Speed of full aquaplaning of a configuration: from the slip slope, from minor spin-downs, from full ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.campaign.bins import DEPTH_KEYS, KMH, Group, Plan, group_of
+from aqualog.campaign.regress import NOWHERE, Interval
+from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.slip_slope import SlopeRow, SlopeTable
+from aqualog.campaign.spin_downs import Pass, passes
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["FullSpeed", "fit_contact", "fit_half", "full_speeds"]
+
+MINOR_BELOW = 20.0 * KMH  # [m/s] thesis 2.1 (C17): minor spin-downs begin so far below full aquaplaning
+DRAWS = 400
+SEED = 20_240  # of the draws of runs; another one moves an interval's ends by a tenth of its width
+LEAST_BINS = 3
+LEAST_PASSES = 6
+LEAST_EACH = 3  # passes with and without; fewer make an interval that is too narrow
+SIGMA_MIN = 0.01  # [-] of a slope ratio: a bin is not better than that
+DROP_MIN = 0.85  # [-] a slope that keeps more than that does not tell where it ends
+EXTRAPOLATED = 1.5  # times the fastest bin: beyond, the curve is a guess
+_EXPONENTS = np.linspace(2.0, 8.0, 13)
+_SPEEDS = np.arange(50.0, 250.5, 0.5) * KMH
+_WIDTHS = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.5, 9.5, 14.0]) * KMH
+
+
+@dataclass(frozen=True, slots=True)
+class FullSpeed:
+    """Speed of full aquaplaning of a configuration.
+
+    `way`: `slip_slope`, `minor_spin_down`, `spin_down`; `place` is a wheel, or `free` for the free wheels together.
+    `v` with `ci` [m/s]; NaN where not told, an upper end that is infinite is open. `exponent` n of the contact's curve,
+    NaN for the other ways. `rests_on`: bins or passes. `reason` why there is no value.
+    """
+
+    group: Group
+    place: str
+    way: str
+    v: float = math.nan
+    ci: Interval = NOWHERE
+    exponent: float = math.nan
+    rests_on: str = ""
+    reason: str = ""
+
+
+def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[FullSpeed, ...]:
+    """Of all configurations that have water, by all three ways.
+
+    Intervals: 2.5 and 97.5 % of 400 repetitions with the runs (not samples, not bins) drawn anew.
+    """
+    rng = np.random.default_rng(SEED)
+    by_wheel: dict[tuple[Group, str], list[SlopeRow]] = {}
+    for row in (r for r in table.rows if r.road == "wet"):
+        by_wheel.setdefault((row.group, row.wheel), []).append(row)
+    dry = {(r.group, r.wheel): r for r in table.dry}
+    found = [
+        _from_slopes(group, wheel, rows, dry.get((tuple(x for x in group if x[0] not in DEPTH_KEYS), wheel)), rng)
+        for (group, wheel), rows in by_wheel.items()
+    ]
+    by_group: dict[Group, list[Pass]] = {}
+    for p in passes(data):
+        by_group.setdefault(group_of(p.info, plan.keys), []).append(p)
+    for group, members in by_group.items():
+        found += [_from_passes(group, members, way, rng) for way in ("minor_spin_down", "spin_down")]
+    return tuple(found)
+
+
+def _from_slopes(
+    group: Group, wheel: str, rows: Sequence[SlopeRow], dry: SlopeRow | None, rng: np.random.Generator
+) -> FullSpeed:
+    """(a): slope over dry slope = L(v)^2 with L = 1 - (v / v_full)^n, over the bins; (2.2)."""
+    bare = (group, wheel, "slip_slope")
+    if dry is None or not dry.reliable or dry.parts is None:
+        return FullSpeed(*bare, reason="no dry slope with an interval of this configuration")
+    told = [r for r in rows if r.reliable and r.parts is not None]
+    on = f"{len(told)} bins"
+    if len(told) < LEAST_BINS:
+        return FullSpeed(*bare, rests_on=on, reason=f"a slope with an interval in {on}, at least {LEAST_BINS} needed")
+    v = np.array([r.v_mean for r in told])
+    ratio = np.array([r.slope / dry.slope for r in told])
+    sigma = np.array([max((r.slope_ci[1] - r.slope_ci[0]) / dry.slope / 4.0, SIGMA_MIN) for r in told])
+    on += f", {3.6 * v[0]:.0f} to {3.6 * v[-1]:.0f} km/h, slope down to {100 * ratio.min():.0f} % of the dry one"
+    runs = np.unique(np.concatenate([p.parts.run for p in (*told, dry) if p.parts is not None]))
+    times = rng.multinomial(runs.size, np.full(runs.size, 1.0 / runs.size), size=DRAWS).astype(np.float64)
+    k_dry = _again(dry, runs, times)
+    ratios = np.stack([k_dry / _again(r, runs, times) for r in told], axis=1)
+    speeds, _ = fit_contact(v, ratios, sigma)
+    best, exponent = fit_contact(v, ratio[None], sigma)
+    low, high = (float(x) for x in np.nanquantile(speeds, (0.025, 0.975)))
+    top = float(_SPEEDS[-1])
+    limit = min(EXTRAPOLATED * float(v[-1]), top)
+    ci = (low, high if high < limit else math.inf)
+    if ratio.min() > DROP_MIN:
+        return FullSpeed(*bare, ci=(low, math.inf), rests_on=on, reason="the slope hardly falls: no end in sight")
+    if float(best[0]) >= limit:
+        reason = f"beyond {3.6 * limit:.0f} km/h: too far from the fastest bin"
+        return FullSpeed(*bare, ci=(low, math.inf), rests_on=on, reason=reason)
+    return FullSpeed(*bare, float(best[0]), ci, float(exponent[0]), on)
+
+
+def _again(row: SlopeRow, runs: FloatArray, times: FloatArray) -> FloatArray:
+    """1 / slope (b,) of a row with the runs drawn `times` (b, r)."""
+    assert row.parts is not None
+    return row.parts.again(times[:, np.searchsorted(runs, row.parts.run)])
+
+
+def fit_contact(v: FloatArray, ratio: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit slope ratio = (1 - (v / v_full)^n)^2.
+
+    Parameters
+    ----------
+    v : array (m,)
+        [m/s]
+    ratio : array (b, m)
+        Slope over dry slope, one fit per row. [-] Bins that are NaN or not positive in a row do not count there.
+    sigma : array (m,)
+        Standard deviations. [-]
+
+    Returns
+    -------
+    v_full, n : array (b,)
+        v_full in steps of 0.5 km/h up to 250 km/h, n in 2 ... 8. NaN where fewer than two bins count.
+    """
+    share = v[None, None] / _SPEEDS[:, None, None]
+    expected = np.maximum(1.0 - share ** _EXPONENTS[None, :, None], 0.0) ** 2
+    flat = expected.reshape(-1, v.size)
+    good = np.isfinite(ratio) & (ratio > 0.0)
+    y = np.where(good, np.minimum(ratio, 2.0), 0.0)
+    w = good / sigma**2
+    loss = (w @ (flat * flat).T) - 2.0 * ((w * y) @ flat.T)
+    at = np.argmin(loss, axis=1)
+    enough = good.sum(axis=1) >= 2
+    v_full = np.where(enough, _SPEEDS[at // _EXPONENTS.size], np.nan)
+    return v_full, np.where(enough, _EXPONENTS[at % _EXPONENTS.size], np.nan)
+
+
+def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random.Generator) -> FullSpeed:
+    """(b), (c): speed at which half of the passes have an event of the free wheels."""
+    bare = (group, "free", way)
+    v = np.array([p.v_mean for p in members])
+    early = way == "minor_spin_down"
+    # a wheel that stops at once has no minor spin-downs, and is beyond their beginning all the same
+    hit = np.array([any(p.full.values()) or (early and any(p.minor.values())) for p in members])
+    what = "minor or full spin-downs" if early else "full spin-downs"
+    on = f"{int(hit.sum())} of {hit.size} passes with {what}, {3.6 * v.min():.0f} to {3.6 * v.max():.0f} km/h"
+    if hit.size < LEAST_PASSES:
+        return FullSpeed(*bare, rests_on=on, reason=f"{hit.size} passes, at least {LEAST_PASSES} needed")
+    above = MINOR_BELOW if early else 0.0
+    if hit.all() or not hit.any():
+        word = "all passes have" if hit.all() else "no pass has"
+        open_ci = (math.nan, float(v.min()) + above) if hit.all() else (float(v.max()), math.inf)
+        return FullSpeed(*bare, ci=NOWHERE if early else open_ci, rests_on=on, reason=f"{word} {what}")
+    fewer = min(int(hit.sum()), int((~hit).sum()))
+    if fewer < LEAST_EACH:
+        which = "with" if hit.sum() < hit.size - hit.sum() else "without"
+        return FullSpeed(*bare, rests_on=on, reason=f"{fewer} passes {which} {what}, at least {LEAST_EACH} needed")
+    times = rng.multinomial(hit.size, np.full(hit.size, 1.0 / hit.size), size=DRAWS).astype(np.float64)
+    best = fit_half(v, hit, np.ones((1, hit.size)))
+    low, high = (float(x) for x in np.nanquantile(fit_half(v, hit, times), (0.025, 0.975)))
+    if not float(v.min()) - 5.0 * KMH <= float(best[0]) <= float(v.max()) + 5.0 * KMH:
+        return FullSpeed(*bare, rests_on=on, reason="half of the passes are reached outside the speeds driven")
+    return FullSpeed(*bare, float(best[0]) + above, (low + above, high + above), rests_on=on)
+
+
+def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:
+    """Speed (b,) at which half of the passes have an event: logistic curve of greatest likelihood.
+
+    Parameters
+    ----------
+    v : array (m,)
+        Mean speed of each pass. [m/s]
+    hit : bool array (m,)
+    times : array (b, m)
+        How often each pass counts, one fit per row.
+
+    The width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly have a speed too: the
+    middle of the gap. NaN where a row has passes of one kind only.
+    """
+    z = (v[None, None] - _SPEEDS[:, None, None]) / _WIDTHS[None, :, None]
+    log_p = -np.logaddexp(0.0, np.where(hit, -z, z)).reshape(-1, v.size)
+    likelihood = times @ log_p.T
+    both = (times @ hit > 0.0) & (times @ ~hit > 0.0)
+    # of equal ones the middle: passes that separate cleanly leave a gap
+    near = likelihood >= likelihood.max(axis=1, keepdims=True) - 1e-3
+    speed = np.repeat(_SPEEDS, _WIDTHS.size)
+    middle = (near @ speed) / near.sum(axis=1)
+    return np.where(both, middle, np.nan)

@@ -1,0 +1,255 @@
+"""Slip slope over speed: one row per configuration, driven wheel, road and bin of speed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, Pool, cells, driven_of
+from aqualog.campaign.delay import Delay, Source, delays, source_of
+from aqualog.campaign.expected import Expected, expected_of_runs
+from aqualog.campaign.regress import ATTENUATION_MAX, NOWHERE, Design, Estimate, Interval, RunParts, estimate
+from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.notation import SIDES
+from aqualog.types import FloatArray
+
+__all__ = ["LIMITS", "Limits", "SlopeRow", "SlopeTable", "fit_slope", "slip_slopes", "too_few_runs"]
+
+S_MAX = 0.10  # [-] a wheel that slips more spins; less would cut off what a small contact shows (0.3 over 3 is 0.1)
+WIND_UP = 0.30  # [-] traction beyond which the curve bends, as `aqualog slip-slope` has it
+SLOPE_MAX = 300.0  # [-] no tyre has more
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Least that a slope rests on: `runs` for an interval, `samples`, and `mu_range` (5 to 95 % of the traction)."""
+
+    runs: int = 3
+    samples: int = 20
+    mu_range: float = 0.02
+
+
+LIMITS = Limits()
+
+
+def too_few_runs(runs: int, limits: Limits) -> str:
+    """Why there is no interval."""
+    word = "run" if runs == 1 else "runs"
+    return f"{runs} {word}: the scatter from run to run is not known, at least {limits.runs} needed"
+
+
+@dataclass(frozen=True, slots=True)
+class SlopeRow:
+    """A cell's slope.
+
+    `slope` C_s / F_z [-], `slope_ci`; `intercept` slip without traction [-], `intercept_ci`; `r2` share of the slip's
+    variance that the line explains; `mu_range` 5 to 95 %; `attenuation` share of 1 / slope that the noise of the
+    traction would have taken (given back); `scatter` standard deviation of the slope from run to run, relative; `dof`
+    of the interval. `reliable`: an interval, told. `reason` why there is no slope or no interval. `slope_dry` with
+    interval and runs: same configuration and wheel off the lane, all speeds. `contact_ratio` sqrt(slope / slope_dry)
+    (2.2). `expected`: the model. NaN where not told.
+    """
+
+    group: Group
+    wheel: str
+    road: str
+    low_kmh: float
+    high_kmh: float
+    runs: int
+    samples: int
+    mu_range: Interval
+    v_mean: float = math.nan
+    slope: float = math.nan
+    slope_ci: Interval = NOWHERE
+    intercept: float = math.nan
+    intercept_ci: Interval = NOWHERE
+    r2: float = math.nan
+    attenuation: float = math.nan
+    scatter: float = math.nan
+    dof: float = math.nan
+    reliable: bool = False
+    reason: str = ""
+    slope_dry: float = math.nan
+    slope_dry_ci: Interval = NOWHERE
+    runs_dry: int = 0
+    contact_ratio: float = math.nan
+    contact_ratio_ci: Interval = NOWHERE
+    expected: Expected = field(default_factory=Expected)
+    parts: RunParts | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def told(self) -> bool:
+        """Whether there is a slope."""
+        return math.isfinite(self.slope)
+
+
+@dataclass(frozen=True, slots=True)
+class SlopeTable:
+    """Rows, the dry references (all speeds) among them as `dry`, delays of v_x by car, samples left out by reason."""
+
+    plan: Plan
+    rows: tuple[SlopeRow, ...]
+    dry: tuple[SlopeRow, ...]
+    delays: tuple[Delay, ...]
+    left_out: Mapping[str, int]
+    robust: bool
+
+
+def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits: Limits = LIMITS) -> SlopeTable:
+    """Slopes of all cells.
+
+    The dry reference of a row is that of its configuration without the water's depth: what the same runs drive before
+    and behind the lane counts too.
+
+    A slope is told where 0 is outside the interval of 1 / slope. Where few are, they are a choice of the lucky ones: on
+    made data (`tests/campaign/slope_coverage.py`) the intervals told hold the truth in 83 of 100 cells with three runs,
+    in 92 to 95 with five where most cells are told, and in 66 where the traction hardly varies. `expected` is the
+    model's chord over the same traction, because the brush bends the line by a tenth (E22).
+
+    Thesis: section 2.3, Figs 2.16 to 2.20; (2.2) for the contact ratio.
+    """
+    late = delays(data)
+    left_out: Counter[str] = Counter()
+
+    def columns(info: RunInfo, samples: RunSamples, wheel: str) -> Picked | str:
+        slip, mu = samples.array(f"slip_{wheel}"), samples.array(f"mu_{wheel}")
+        if np.isnan(slip).all():
+            return "no slip: neither v_x nor a free wheel on the wheel's side"
+        if np.isnan(mu).all():
+            return "no traction: no torque of the driven wheels"
+        without = {
+            "the wheel spins": samples.bits(f"spin_{wheel}") | (np.abs(slip) > S_MAX),
+            f"traction beyond {WIND_UP:g}": np.abs(mu) > WIND_UP,
+        }
+        u = samples.array("a_over_v") if source_of(info) in late else np.zeros_like(slip)
+        return Picked({"v_x": samples.array("v_x"), "slip": slip, "mu": mu, "u": u}, without)
+
+    def of(road: str, keys: tuple[str, ...], *, by_speed: bool) -> list[SlopeRow]:
+        found, without = cells(
+            data, plan, wheels=driven_of, columns=columns, road=road, by_speed=by_speed, keys=keys
+        )  # fmt: skip
+        if by_speed:
+            left_out.update(without)
+        return [_row(c, late, limits, robust=robust) for c in found]
+
+    dry_keys = tuple(k for k in plan.keys if k not in DEPTH_KEYS)
+    dry = of("dry", dry_keys, by_speed=False)
+    reference = {(r.group, r.wheel): r for r in dry}
+    rows = [
+        _with_dry(r, reference.get((tuple((k, v) for k, v in r.group if k not in DEPTH_KEYS), r.wheel)))
+        for road in plan.roads
+        for r in of(road, plan.keys if road == "wet" else dry_keys, by_speed=True)
+    ]
+    return SlopeTable(plan, tuple(rows), tuple(dry), tuple(late.values()), dict(left_out), robust)
+
+
+def _row(cell: Cell, late: Mapping[Source, Delay], limits: Limits, *, robust: bool) -> SlopeRow:
+    pool = cell.pool
+    mu = pool.columns["mu"]
+    v = float(np.mean(pool.columns["v_x"]))
+    low, high = (float(x) for x in np.quantile(mu, (0.05, 0.95)))
+    wheels = SIDES.get(cell.place, (cell.place,))
+    model = expected_of_runs(cell.infos, wheels, v, wet=cell.road == "wet", mu_range=(low, high))
+    bare = SlopeRow(
+        cell.group, cell.place, cell.road, cell.low_kmh, cell.high_kmh, pool.runs, mu.size, (low, high), v,
+        expected=model,
+    )  # fmt: skip
+    return fit_slope(bare, pool, [late.get(source_of(i)) for i in cell.infos], limits, robust=robust)
+
+
+def fit_slope(
+    bare: SlopeRow, pool: Pool, late: Sequence[Delay | None], limits: Limits = LIMITS, *, robust: bool = False
+) -> SlopeRow:
+    """Fill in the slope of a row.
+
+    Parameters
+    ----------
+    bare : SlopeRow
+        With counts.
+    pool : Pool
+        Columns `mu`, `slip`, `u` (a / v) and `v_x`.
+    late : sequence of Delay or None
+        Of each run, in order; None: the slip is not against v_x.
+    """
+    mu, slip, u = (pool.columns[n] for n in ("mu", "slip", "u"))
+    if mu.size < limits.samples:
+        return replace(bare, reason=f"{mu.size} samples, at least {limits.samples} needed")
+    if not bare.mu_range[1] - bare.mu_range[0] >= limits.mu_range:
+        return replace(
+            bare, reason=f"the traction varies by {bare.mu_range[1] - bare.mu_range[0]:.3f} only (5 to 95 %), at least "
+            f"{limits.mu_range:g} needed",
+        )  # fmt: skip
+    tau = np.array([d.value if d is not None and d.told else 0.0 for d in late])
+    half_tau = max((d.half for d in late if d is not None and d.told), default=0.0)
+    is_open = any(d is not None and not d.told for d in late)
+    place = np.searchsorted(np.unique(pool.run), pool.run)
+    slip = slip - tau[place] * u
+    columns, scatters, noisy = [mu, np.ones_like(mu)], [True, True], [True, False]
+    if is_open and np.ptp(u) > 0.0:
+        columns, scatters, noisy = [*columns, u], [*scatters, False], [*noisy, False]
+    found = estimate(
+        Design(np.stack(columns), slip, pool.run, pool.step, tuple(scatters), tuple(noisy)), robust=robust
+    )  # fmt: skip
+    return _told(bare, found, columns, slip, half_tau * _shared(mu, u), limits, is_open=is_open)
+
+
+def _told(
+    bare: SlopeRow, found: Estimate, columns: list[FloatArray], slip: FloatArray, late_half: float, limits: Limits, *,
+    is_open: bool,
+) -> SlopeRow:  # fmt: skip
+    k = float(found.value[0])
+    half = math.hypot(float(found.half[0]), late_half)
+    low, high = k - half, k + half
+    open_word = ", the delay of v_x being open" if is_open else ""
+    few = found.runs < limits.runs
+    reason = ""
+    if found.attenuation > ATTENUATION_MAX:
+        reason = f"{100.0 * min(found.attenuation, 1.0):.0f} % of the variation of the traction is noise"
+    elif not few and not low > 0.0 < high:
+        reason = (
+            f"1 / slope is {k:.3f} with a 95 % interval of {low:.3f} ... {high:.3f}, which holds 0{open_word}"
+            if high > 0.0 else f"slip falls with traction (1 / slope is {k:.3f})"
+        )  # fmt: skip
+    elif not k > 1.0 / SLOPE_MAX:
+        reason = f"1 / slope is {k:.4f}: less than a tyre has{open_word}"
+    line = found.value @ np.stack(columns)
+    total = float(np.sum((slip - slip.mean()) ** 2))
+    r2 = 1.0 - float(np.sum((slip - line) ** 2)) / total if total > 0.0 else math.nan
+    row = replace(bare, r2=r2, attenuation=found.attenuation, dof=float(found.dof[0]))
+    if reason:
+        return replace(row, reason=reason)
+    row = replace(
+        row, parts=found.parts, slope=1.0 / k, intercept=float(found.value[1]), scatter=float(found.scatter[0]) / k
+    )
+    if few:
+        return replace(row, reason=too_few_runs(found.runs, limits))
+    return replace(row, slope_ci=(1.0 / high, 1.0 / low), intercept_ci=found.interval(1), reliable=True)
+
+
+def _shared(mu: FloatArray, u: FloatArray) -> float:
+    """Error of 1 / slope per error of the delay: slope of a / v over the traction, within and between the runs."""
+    x = mu - mu.mean()
+    return abs(float(np.mean(x * u)) / float(np.mean(x * x)))
+
+
+def _with_dry(row: SlopeRow, dry: SlopeRow | None) -> SlopeRow:
+    if dry is None or not dry.told:
+        return row
+    row = replace(row, slope_dry=dry.slope, slope_dry_ci=dry.slope_ci, runs_dry=dry.runs)
+    if not row.told or row.road != "wet":
+        return row
+    ratio = row.slope / dry.slope
+    if not (row.reliable and dry.reliable):
+        return replace(row, contact_ratio=math.sqrt(ratio))
+    # both intervals as shares of their slopes, taken to be independent
+    down, up = (
+        math.hypot(math.log(row.slope_ci[i] / row.slope), math.log(dry.slope_ci[1 - i] / dry.slope)) for i in (0, 1)
+    )
+    return replace(
+        row, contact_ratio=math.sqrt(ratio),
+        contact_ratio_ci=(math.sqrt(ratio) * math.exp(-0.5 * down), math.sqrt(ratio) * math.exp(0.5 * up)),
+    )  # fmt: skip

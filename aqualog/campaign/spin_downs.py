@@ -1,0 +1,111 @@
+"""Minor spin-downs over speed: how often, in how many passes, how deep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of
+from aqualog.campaign.regress import Interval
+from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.evaluate.intervals import poisson, wilson
+
+__all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
+
+LEAST_S = 0.5  # [s] on the lane that make a pass
+FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; shorter dips come back by themselves
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """One run over the watered lane: mean speed [m/s], time and way on it, and per free wheel: `minor` spin-downs begun
+    there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against car.
+    """
+
+    info: RunInfo
+    v_mean: float
+    seconds: float
+    metres: float
+    minor: dict[str, int]
+    full: dict[str, int]
+    deepest: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SpinDownRow:
+    """A bin of speed: `passes`, `events` of minor spin-downs begun on the lane, `per_s` and `per_100_m` with `per_s_ci`
+    (counts, Poisson; exact), `share` of the passes with at least one (Wilson), passes with a `full` spin-down, in which
+    minor ones have no place, `deepest` slip: median of the passes' deepest [-]. Bins are of the pass's mean speed.
+    """
+
+    group: Group
+    wheel: str
+    low_kmh: float
+    high_kmh: float
+    passes: int
+    seconds: float
+    events: int
+    per_s: float
+    per_s_ci: Interval
+    per_100_m: float
+    share: float
+    share_ci: Interval
+    full: int
+    deepest: float
+
+
+def passes(data: CampaignData) -> list[Pass]:
+    """All runs with at least half a second on the lane."""
+    found = []
+    for info in data.done:
+        samples = data.samples(info)
+        wet = (samples.on_water == 1.0) & np.isfinite(samples.array("v_x"))
+        if np.count_nonzero(wet) * samples.step_s < LEAST_S:
+            continue
+        v = samples.array("v_x")[wet]
+        t = samples.t
+        start, end = float(t[wet][0]), float(t[wet][-1])
+        wheels = free_of(info)
+        seconds = float(np.count_nonzero(wet)) * samples.step_s
+        deepest = {w: float(np.nanmin(np.append(samples.array(f"slip_min_{w}")[wet], np.nan))) if
+                   np.isfinite(samples.array(f"slip_min_{w}")[wet]).any() else math.nan for w in wheels}  # fmt: skip
+        minor, full = (
+            {w: sum(e["detector"] == d and e["wheel"] == w and start <= e["start_s"] <= end for e in info.events)
+             for w in wheels} for d in ("minor_spin_down", "spin_down")
+        )  # fmt: skip
+        full = {w: n if deepest[w] <= FULL_SLIP else 0 for w, n in full.items()}
+        mean = float(v.mean())
+        found.append(Pass(info, mean, seconds, mean * seconds, minor, full, deepest))
+    return found
+
+
+def minor_spin_downs(data: CampaignData, plan: Plan) -> tuple[SpinDownRow, ...]:
+    """Rows per configuration, free wheel and bin of the pass's mean speed. Thesis: Figs 2.3 and 2.4 (C14 to C19)."""
+    members: dict[tuple[Group, str, int], list[Pass]] = {}
+    for p in passes(data):
+        number = int(p.v_mean / KMH // plan.width_kmh)
+        for wheel in p.minor:
+            members.setdefault((group_of(p.info, plan.keys), wheel, number), []).append(p)
+    return tuple(_row(key, found, plan.width_kmh) for key, found in sorted(members.items(), key=lambda x: _order(x[0])))
+
+
+def _row(key: tuple[Group, str, int], found: Sequence[Pass], width: float) -> SpinDownRow:
+    group, wheel, number = key
+    events = sum(p.minor[wheel] for p in found)
+    seconds, metres = sum(p.seconds for p in found), sum(p.metres for p in found)
+    low, high = poisson(events)
+    hit = sum(p.minor[wheel] > 0 for p in found)
+    depths = [p.deepest[wheel] for p in found if math.isfinite(p.deepest[wheel])]
+    return SpinDownRow(
+        group, wheel, number * width, (number + 1) * width, len(found), seconds, events, events / seconds,
+        (low / seconds, high / seconds), 100.0 * events / metres, hit / len(found), wilson(hit, len(found)),
+        sum(p.full[wheel] > 0 for p in found), float(np.median(depths)) if depths else math.nan,
+    )  # fmt: skip
+
+
+def _order(key: tuple[Group, str, int]) -> tuple[tuple[str, ...], str, int]:
+    group, wheel, number = key
+    return tuple(f"{v:012.4f}" if isinstance(v, float) else str(v) for _, v in group), wheel, number

@@ -1,0 +1,135 @@
+"""`bin-slipslope` and `bin-resistance`: from a campaign file to tables, JSON and files."""
+
+import csv
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from aqualog.cli.bin_resistance import bin_resistance
+from aqualog.cli.bin_slipslope import bin_slipslope
+from aqualog.model.log import write_simulation
+from aqualog.model.programme import SEDAN
+from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.simulate import simulate
+from aqualog.vehicle import vehicle_toml
+
+app = typer.Typer()
+app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
+app.command("bin-resistance", no_args_is_help=True)(bin_resistance)
+
+SLOPE_KEYS = {"runs", "samples", "slope", "slope_ci95", "intercept", "r2", "wheel", "v_low_kmh", "v_high_kmh"}
+
+
+def invoke(*args):
+    return CliRunner().invoke(app, [str(a) for a in args])
+
+
+def drive(a, seed, kmh=85.0):
+    v, duration = kmh / 3.6, 10.0
+    speed = ((0.0, v - 5.0 * a), (duration, v + 5.0 * a))
+    return Scenario(
+        SEDAN, duration_s=duration, seed=seed, speed=speed, lanes=(Lane(3.0, 7.5, depth_left=8e-4, depth_right=1.3e-3),)
+    )
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("c")
+    (folder / "car.toml").write_text(vehicle_toml(SEDAN))
+    rows = ["log,tyre,water_depth_mm,water_depth_left_mm,pressure_front_bar,pressure_rear_bar,lane_start_s,lane_end_s"]
+    for seed, a in enumerate((0.0, 0.2, 0.4, 0.6, 0.8, 1.0), start=1):
+        name = f"a{a:.1f}.parquet"
+        write_simulation(folder / name, simulate(drive(a, seed)), suffix=".parquet", comment="made")
+        rows.append(f"{name},worn_summer,1.3,0.8,1.9,1.9,3.0,7.5")
+    (folder / "runs.csv").write_text("\n".join(rows) + "\n")
+    (folder / "campaign.toml").write_text('name = "made"\nvehicle = "car.toml"\nruns = "runs.csv"\n')
+    return folder / "campaign.toml"
+
+
+def test_slopes_as_the_contract_says(campaign):
+    done = invoke("bin-slipslope", campaign, "--by", "tyre,pressure,water-depth", "--json", "--jobs", 1, "-q")
+    assert done.exit_code == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["by"] == ["tyre", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm"]
+    rows = document["rows"]
+    assert all(SLOPE_KEYS | set(document["by"]) <= set(r) for r in rows)
+    assert {r["wheel"] for r in rows} == {"rl", "rr"}
+    (row,) = (r for r in rows if r["wheel"] == "rr" and r["v_low_kmh"] == 80.0)
+    assert row["runs"] == 6
+    assert row["reliable"]
+    low, high = row["slope_ci95"]
+    assert low < row["slope"] < high
+    # the brush's chord at the contact that is left; the contact fluctuates and lowers its mean
+    assert row["slope"] == pytest.approx(row["expected_slope"], rel=0.2)
+    assert row["slope"] < row["slope_dry"]
+    (delay,) = document["delays"]
+    assert delay["delay_s"] == pytest.approx(0.09, abs=0.02)  # 0.1 s of v_x, less what the wheels' own path takes
+    assert {"slip_slope", "minor_spin_down", "spin_down"} == {f["way"] for f in document["full_aquaplaning"]}
+    assert all(f["reason"] for f in document["full_aquaplaning"] if f["v_full_kmh"] is None)
+    assert document["minor_spin_downs"]
+
+
+def test_tables_and_files(campaign, tmp_path):
+    done = invoke("bin-slipslope", campaign, "--road", "both", "--robust", "-o", tmp_path / "s.csv", "--jobs", 1)
+    assert done.exit_code == 0, done.stderr
+    assert "Speed of full aquaplaning" in done.stdout
+    assert "v_x is late by" in done.stdout
+    rows = list(csv.DictReader((tmp_path / "s.csv").open()))
+    assert {r["road"] for r in rows} == {"wet", "dry"}
+    assert {"slope_low", "slope_high", "contact_ratio_low"} <= set(rows[0])
+    again = invoke("bin-slipslope", campaign, "-o", tmp_path / "s.csv", "--jobs", 1)
+    assert again.exit_code == 2
+    assert "exists already" in again.stderr
+    done = invoke("bin-slipslope", campaign, "--by", "side", "-o", tmp_path / "s.parquet", "--jobs", 1)
+    assert done.exit_code == 0, done.stderr
+    assert set(pl.read_parquet(tmp_path / "s.parquet")["side"]) == {"left", "right"}
+
+
+def test_resistance_as_the_contract_says(campaign, tmp_path):
+    done = invoke("bin-resistance", campaign, "--json", "--jobs", 1, "-o", tmp_path / "r.csv", "-q")
+    assert done.exit_code == 0, done.stderr
+    document = json.loads(done.stdout)
+    (row,) = (r for r in document["rows"] if r["v_low_kmh"] == 80.0)
+    low, high = row["delta_a_x_ci95"]
+    assert low < row["delta_a_x"] < high
+    assert 0.05 < row["delta_a_x"] < 0.4
+    assert document["less_own_dry_level"]
+    assert (tmp_path / "r.csv").read_text().count("\n") == len(document["rows"]) + 1
+    text = invoke("bin-resistance", campaign, "--road", "both", "--as-measured", "--jobs", 1)
+    assert text.exit_code == 0
+    assert "Resistance measure" in text.stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["--by", "tire"], "no run tells it"),
+        (["--road", "damp"], "--road"),
+        (["-o", "x.xlsx"], "no format of a table"),
+    ],
+)
+def test_faults_are_told_before_any_work(campaign, args, said):
+    for command in ("bin-slipslope", "bin-resistance"):
+        done = invoke(command, campaign, *args)
+        assert done.exit_code == 2
+        assert said in done.stderr
+        assert not Path("x.xlsx").exists()
+
+
+def test_water_that_nobody_tells_is_told(campaign, tmp_path):
+    logs = sorted(campaign.parent.glob("a*.parquet"))
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    for log in logs[:2]:
+        frame = pl.read_parquet(log)
+        frame.select([c for c in frame.columns if not c.startswith(("on_water", "true_", "water_"))]).write_parquet(
+            bare / log.name
+        )
+    car = tmp_path / "car.toml"
+    car.write_text(vehicle_toml(SEDAN))
+    done = invoke("bin-resistance", *sorted(bare.iterdir()), "--vehicle", car, "--store", tmp_path / "s", "--jobs", 1)
+    assert "on or off the water is not known" in done.stdout
