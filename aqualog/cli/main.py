@@ -10,13 +10,18 @@ import typer
 
 from aqualog import __version__
 from aqualog.cli.batch import batch
+from aqualog.cli.bin_resistance import bin_resistance
+from aqualog.cli.bin_slipslope import bin_slipslope
 from aqualog.cli.calibrate import calibrate
+from aqualog.cli.campaign import campaign_app
 from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
 from aqualog.cli.detect import detect
 from aqualog.cli.evaluate import evaluate
 from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
+from aqualog.cli.report import report
+from aqualog.cli.reproduce import reproduce
 from aqualog.cli.simulate import simulate
 from aqualog.cli.slip_slope import slip_slope
 
@@ -37,10 +42,15 @@ app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
 app.command(no_args_is_help=True)(slip_slope)
 app.command(no_args_is_help=True)(batch)
+app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
+app.command("bin-resistance", no_args_is_help=True)(bin_resistance)
+app.command(no_args_is_help=True)(report)
 app.command(no_args_is_help=True)(calibrate)
 app.command(no_args_is_help=True)(evaluate)
 app.command(no_args_is_help=True)(simulate)
 app.command(no_args_is_help=True)(figures)
+app.command(no_args_is_help=True)(reproduce)
+app.add_typer(campaign_app, name="campaign")
 
 
 def _version(value: bool) -> None:

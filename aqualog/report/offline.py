@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ __all__ = ["TEMPLATES", "content_policy", "environment", "json_island", "plotly_
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def environment(folder: Path) -> Environment:
-    """Templates of a folder; everything that is put into one is escaped unless it is Markup."""
+@cache
+def environment(*folders: Path) -> Environment:
+    """Templates of folders, compiled once; everything that is put into one is escaped unless it is Markup."""
     return Environment(
-        loader=FileSystemLoader(folder),
+        loader=FileSystemLoader(folders),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -37,10 +39,20 @@ def plotly_js() -> str:
     return str(get_plotlyjs()).replace("\r\n", "\n").replace("\r", "\n")
 
 
-def content_policy(scripts: Iterable[str]) -> str:
-    """Content security policy: nothing is fetched, and only these very scripts run."""
+def content_policy(scripts: Iterable[str], *, loads: bool = False) -> str:
+    """Content security policy: nothing is fetched, and only these very scripts run.
+
+    Parameters
+    ----------
+    scripts : iterable of str
+        Texts of the scripts in the page.
+    loads : bool
+        Whether these scripts may load further ones themselves, as pages that share one plotly.js do. A page on a disk
+        has no origin: `'self'` names nothing there in some browsers and the whole disk in others. So trust goes by who
+        asks: a script element that stands in the document stays forbidden.
+    """
     digests = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
-    allowed = " ".join(f"'sha256-{d}'" for d in digests)
+    allowed = " ".join([*(f"'sha256-{d}'" for d in digests), *(["'strict-dynamic'"] if loads else [])])
     # plotly sets style attributes and style elements; data: and blob: are for its "save as picture"
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "

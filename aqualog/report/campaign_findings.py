@@ -1,0 +1,158 @@
+"""What a campaign's page shows of regressions: curves over speed per configuration, and speeds of full aquaplaning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from aqualog.campaign.bins import Group, Plan, group_of
+from aqualog.campaign.full_speed import FullSpeed, full_speeds
+from aqualog.campaign.regress import NOWHERE, Interval
+from aqualog.campaign.resistance import MeanRow, ResistanceTable, resistances
+from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
+
+__all__ = ["Curve", "Findings", "Point", "find", "groups_of", "resistance_curves", "slope_curves"]
+
+KMH = 3.6
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One bin of speed. `value` NaN where it is not told, then `reason` says why; `reliable`: `ci` is told too."""
+
+    low_kmh: float
+    high_kmh: float
+    v_kmh: float
+    value: float
+    ci: Interval
+    runs: int
+    samples: int
+    reliable: bool
+    reason: str
+    expected: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Values of one configuration at one place (wheel, side; empty: the car), by speed; `dry` level with interval."""
+
+    group: Group
+    place: str
+    points: tuple[Point, ...]
+    dry: float = math.nan
+    dry_ci: Interval = NOWHERE
+    dry_runs: int = 0
+
+    @property
+    def told(self) -> bool:
+        """Whether any bin has a value."""
+        return any(math.isfinite(p.value) for p in self.points)
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """All of it. `groups`: configurations of all runs, in order; `left_out` samples by reason, per kind of regression;
+    `notes` what a reader should know of the regressions.
+    """
+
+    plan: Plan
+    groups: tuple[Group, ...]
+    slopes: tuple[Curve, ...] = ()
+    resistance: tuple[Curve, ...] = ()
+    full: tuple[FullSpeed, ...] = ()
+    left_out: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    robust: bool = False
+
+
+def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report = lambda _: None) -> Findings:
+    """Run the regressions of a campaign.
+
+    Parameters
+    ----------
+    data : CampaignData
+    plan : Plan
+        Configurations and bins.
+    robust : bool
+        Weights of Huber.
+    report : callable
+        Told each step.
+    """
+    report("slip slopes")
+    slopes = slip_slopes(data, plan, robust=robust)
+    report("resistance")
+    resistance = resistances(data, plan, robust=robust)
+    report("speeds of full aquaplaning")
+    return Findings(
+        plan,
+        groups_of(data, plan.keys),
+        slope_curves(slopes),
+        resistance_curves(resistance),
+        full_speeds(data, plan, slopes),
+        {"slip slope": slopes.left_out, "resistance": resistance.left_out},
+        _delay_notes(slopes),
+        robust,
+    )
+
+
+def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
+    """Configurations of all runs, sorted: numbers, then texts, then what is not given."""
+    found = {group_of(info, keys) for info in data.runs}
+    return tuple(sorted(found, key=lambda g: [_rank(v) for _, v in g]))
+
+
+def _rank(value: float | str | None) -> tuple[int, float, str]:
+    if value is None:
+        return 2, 0.0, ""
+    return (1, 0.0, value) if isinstance(value, str) else (0, value, "")
+
+
+def slope_curves(table: SlopeTable) -> tuple[Curve, ...]:
+    """Rows on water as curves, each with the dry level of its configuration."""
+    rows: dict[tuple[Group, str], list[SlopeRow]] = {}
+    for r in table.rows:
+        if r.road == "wet":
+            rows.setdefault((r.group, r.wheel), []).append(r)
+    return tuple(
+        Curve(group, place, tuple(_slope_point(r) for r in own), own[0].slope_dry, own[0].slope_dry_ci, own[0].runs_dry)
+        for (group, place), own in rows.items()
+    )
+
+
+def resistance_curves(table: ResistanceTable) -> tuple[Curve, ...]:
+    """Rows on water as curves."""
+    rows: dict[tuple[Group, str], list[MeanRow]] = {}
+    for r in table.rows:
+        if r.road == "wet":
+            rows.setdefault((r.group, r.place), []).append(r)
+    return tuple(Curve(group, place, tuple(_mean_point(r) for r in own)) for (group, place), own in rows.items())
+
+
+def _slope_point(r: SlopeRow) -> Point:
+    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
+    return Point(
+        r.low_kmh, r.high_kmh, v, r.slope, r.slope_ci, r.runs, r.samples, r.reliable, r.reason, r.expected.slope
+    )  # fmt: skip
+
+
+def _mean_point(r: MeanRow) -> Point:
+    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
+    return Point(r.low_kmh, r.high_kmh, v, r.value, r.ci, r.runs, r.samples, r.reliable, r.reason)
+
+
+def _speed(v_mean: float, low_kmh: float, high_kmh: float) -> float:
+    """Mean speed of the bin's samples, its middle where there is none. [km/h]"""
+    return KMH * v_mean if math.isfinite(v_mean) else 0.5 * (low_kmh + high_kmh)
+
+
+def _delay_notes(table: SlopeTable) -> tuple[str, ...]:
+    told = [
+        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms late against the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
+        f"{1e3 * d.ci[1]:+.0f} ms), taken off every slip"
+        for d in table.delays
+        if d.told
+    ]
+    return (*told, *(f"{d.vehicle}: delay of v_x not told ({d.reason})" for d in table.delays if not d.told))

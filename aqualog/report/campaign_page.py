@@ -1,0 +1,107 @@
+"""The page of a campaign: quality, matrix, regressions, detections and runs, filtered together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from markupsafe import Markup
+
+from aqualog import __version__
+from aqualog.campaign.samples import CampaignData
+from aqualog.report.campaign_answers import RESISTANCE_LEVEL, answers_of, headline, off_water, summaries
+from aqualog.report.campaign_data import page_data
+from aqualog.report.campaign_findings import Findings
+from aqualog.report.campaign_labels import cut, key_title
+from aqualog.report.campaign_quality import Problem, problems_of
+from aqualog.report.campaign_runs import BEHIND_S, RunFacts
+from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island
+
+__all__ = ["render_campaign_page", "script_of"]
+
+_SCRIPTS = ("loader.js", "campaign_state.js", "campaign_figures.js", "campaign_tables.js")
+
+
+def render_campaign_page(
+    data: CampaignData, findings: Findings, facts: Sequence[RunFacts | None], pages: Sequence[str]
+) -> str:
+    """The page as HTML; the same text for the same results.
+
+    Parameters
+    ----------
+    data : CampaignData
+    findings : Findings
+    facts : sequence
+        Of each run.
+    pages : sequence of str
+        Address of each run's page.
+
+    plotly.js is not in it: `plotly.min.js` beside it serves all pages.
+    """
+    answers = answers_of(findings)
+    problems = problems_of(data, findings.plan.keys)
+    script = script_of(_SCRIPTS)
+    return environment(TEMPLATES).get_template("campaign.html.j2").render(
+        title=cut(data.name, 200),
+        version=__version__,
+        policy=content_policy([script], loads=True),
+        # Markup only for the package's own files and what json_island has escaped
+        css=Markup(_text("page.css") + _text("slope.css") + _text("campaign.css")),
+        script=Markup(script),
+        data=json_island(page_data(data, findings, answers, facts, problems, pages)),
+        level="open",
+        headline=headline(data, findings),
+        summaries=summaries(answers),
+        off_water=off_water(facts),
+        has_losses=any(p.weight == "loss" for p in problems),
+        quality_line=_quality_line(problems),
+        level_text=f"{RESISTANCE_LEVEL:g}",
+        behind=f"{BEHIND_S:g}",
+        made=_made(data, findings),
+    )  # fmt: skip
+
+
+@cache
+def script_of(names: tuple[str, ...]) -> str:
+    """Scripts as one that leaves nothing behind in the page's global names."""
+    return '"use strict";\n(function () {\n' + "\n".join(_text(n) for n in names) + "})();\n"
+
+
+def _text(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def _quality_line(problems: Sequence[Problem]) -> str:
+    words = {"loss": "with data missing", "limit": "where something cannot be judged", "note": "to know"}
+    counts = {w: sum(p.weight == w for p in problems) for w in words}
+    told = [f"{n} {words[w]}" for w, n in counts.items() if n]
+    return f"{'; '.join(told)}; each opens to its runs" if told else "nothing to tell: no log is damaged or lacking"
+
+
+def _made(data: CampaignData, findings: Findings) -> list[str]:
+    """Versions, settings, counts."""
+    plan = findings.plan
+    keys = ", ".join(key_title(k) for k in plan.keys) or "none: all runs together"
+    cars = sorted({r.vehicle.name for r in data.done})
+    versions = sorted({str(r.about["tool_version"]) for r in data.done})
+    measured = f"; logs measured with {', '.join(versions)}" if versions and versions != [__version__] else ""
+    lines = [
+        f"aqualog {__version__}{measured}; campaign {cut(data.name)}; cars: {cut(', '.join(cars), 200) or 'none'}.",
+        f"Configurations: {keys}. Runs that differ in other keys only are pooled. Speed bins of {plan.width_kmh:g} "
+        "km/h.",
+        "Slip slope: slip on traction with an intercept, the slope's and the intercept's scatter from run to run in "
+        "the model, noise of the traction given back"
+        + (", Huber's weights" if findings.robust else "")
+        + "; intervals with the run, not the sample, as the unit (95 %).",
+        "Full aquaplaning: from the slip slope (slope / dry slope = L², L = 1 − (v / v_full)ⁿ); from minor spin-downs "
+        "(speed at which half of the passes have one, plus 20 km/h); from spin-downs (half of the passes). Intervals: "
+        "runs drawn anew.",
+        f"Resistance {RESISTANCE_LEVEL:g} m/s² and half of the dry slope: straight lines between the bins that have "
+        "an interval; the interval is where the ends of the band pass. Of several wheels, the one with the lowest "
+        "speed.",
+    ]  # fmt: skip
+    for kind, reasons in findings.left_out.items():
+        if reasons:
+            told = ", ".join(f"{n} ({cut(why)})" for why, n in sorted(reasons.items(), key=lambda x: -x[1]))
+            lines.append(f"Samples (10 a second) left out, {kind}: {told}.")
+    return [*lines, *(cut(n, 300) for n in findings.notes)]

@@ -1,0 +1,129 @@
+"""What a reader must know of a campaign's runs before trusting its numbers, grouped and counted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from aqualog.campaign.bins import Group, group_of
+from aqualog.campaign.matrix import TOO_FEW
+from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.report.campaign_labels import cut, group_text
+from aqualog.report.wording import detector_name
+
+__all__ = ["MOST_KINDS", "Problem", "problems_of"]
+
+MOST_KINDS = 25  # of notes that have a line of their own
+_NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One kind of problem. `weight`: `loss` (data or runs are missing), `limit` (something cannot be judged) or `note`;
+    `means` says what follows; `runs` are (index, what of this run).
+    """
+
+    weight: str
+    title: str
+    means: str
+    runs: tuple[tuple[int, str], ...]
+
+
+_Test = Callable[[RunInfo], str]
+
+
+def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
+    """All kinds that occur, losses first, then by number of runs."""
+    found = [
+        _all(data.runs, "loss", "without results", "they count nowhere", lambda r: "" if r.is_done else _why(r)),
+        _of_done(data, "loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
+        _of_done(data, "loss", "samples lost in damaged files", "", lambda r: _count(r, "lost_in_files", "lost")),
+        _of_done(data, "loss", "samples dropped", "not used", lambda r: _count(r, "dropped_samples", "dropped")),
+        _of_done(data, "loss", "time jumps", "the clock of the log is not even", lambda r: _count(r, "time_jumps", "")),
+        _of_done(data, "loss", "clock faults", "same time twice, steps back, resets, wrapped counters, pauses", _clock),
+        _of_done(
+            data, "limit", "lane not known", "neither lane times, labels, a signal on_water nor a dry run: they count "
+            "in no figure over speed", lambda r: "" if r.water_from else "no lane",
+        ),
+        *_unavailable(data),
+        *_few(data, keys),
+        *_notes(data),
+    ]  # fmt: skip
+    order = ("loss", "limit", "note")
+    return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -len(p.runs))))
+
+
+def _all(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:
+    hits = tuple((r.index, cut(text, 300)) for r in runs if (text := test(r)))
+    return Problem(weight, title, means, hits)
+
+
+def _of_done(data: CampaignData, weight: str, title: str, means: str, test: _Test) -> Problem:
+    return _all(data.done, weight, title, means, test)
+
+
+def _why(r: RunInfo) -> str:
+    return r.reason or r.state
+
+
+def _q(r: RunInfo, name: str) -> int:
+    return int(r.about["quality"].get(name, 0))
+
+
+def _count(r: RunInfo, name: str, word: str) -> str:
+    n = _q(r, name)
+    return f"{n} {word}".rstrip() if n else ""
+
+
+def _clock(r: RunInfo) -> str:
+    names = ("duplicates", "back_steps", "resets", "wraps", "pauses")
+    return ", ".join(f"{_q(r, n)} {n.replace('_', ' ')}" for n in names if _q(r, n))
+
+
+def _unavailable(data: CampaignData) -> list[Problem]:
+    """One problem per detector and what it lacks."""
+    found: dict[tuple[str, str, str], list[tuple[int, str]]] = {}
+    for r in data.done:
+        for state in ("unavailable", "limited"):
+            for detector, missing in r.about[state].items():
+                at = (state, detector, ", ".join(missing))
+                found.setdefault(at, []).append((r.index, ""))
+    out = []
+    for (state, detector, missing), runs in found.items():
+        title = f"{detector_name(detector)} {'not judged' if state == 'unavailable' else 'judged in part'}"
+        out.append(Problem("limit", title, cut(f"needs {missing}" if missing else "", 200), tuple(runs)))
+    return out
+
+
+def _few(data: CampaignData, keys: Sequence[str]) -> list[Problem]:
+    """Configurations on water whose runs are too few for an interval."""
+    groups: dict[Group, list[RunInfo]] = {}
+    for r in data.done:
+        groups.setdefault(group_of(r, keys), []).append(r)
+    hits = [
+        (r.index, f"{group_text(g)}: {len(runs)} run{'s' if len(runs) > 1 else ''}")
+        for g, runs in groups.items()
+        if len(runs) < TOO_FEW and ("water_depth_mm", 0.0) not in g
+        for r in runs
+    ]
+    title = f"configuration with fewer than {TOO_FEW} runs"
+    return [Problem("limit", title, "values without intervals, if any", tuple(sorted(hits)))]
+
+
+def _notes(data: CampaignData) -> list[Problem]:
+    """Notes of the logs; those that differ in numbers only are one kind, and the rarest kinds are put together."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for r in data.done:
+        for note in dict.fromkeys(map(str, r.about["notes"])):
+            found.setdefault(_NUMBER.sub("…", note), []).append((r.index, note))
+    kinds = sorted(found.values(), key=lambda hits: -len(hits))
+    out = [_note(hits) for hits in kinds[:MOST_KINDS]]
+    rest = [(i, cut(note, 200)) for hits in kinds[MOST_KINDS:] for i, note in hits]
+    return [*out, Problem("note", "other notes", "", tuple(sorted(rest)))]
+
+
+def _note(hits: Sequence[tuple[int, str]]) -> Problem:
+    same = len({note for _, note in hits}) == 1
+    title = hits[0][1] if same else _NUMBER.sub("…", hits[0][1])
+    return Problem("note", cut(title, 240), "", tuple((i, "" if same else cut(note, 200)) for i, note in hits))

@@ -1,0 +1,214 @@
+"""The report of a campaign in headless Chromium, from a disk and without a network: filters act on all, links work."""
+
+import pytest
+from campaign_case import load_case, make_case
+from test_browser import browser, click, requests, severe, wait_for  # noqa: F401 - browser is a fixture
+
+from aqualog.campaign.bins import plan
+from aqualog.report.campaign_findings import find
+from aqualog.report.campaign_folder import write_report
+
+pytestmark = pytest.mark.browser
+
+PILL = "//button[contains(@class, 'pill') and text()='{}']"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    data = load_case(make_case(tmp_path_factory.mktemp("case")))
+    out = tmp_path_factory.mktemp("report") / "out"
+    write_report(data, find(data, plan(data, ())), out)
+    return out
+
+
+def opened(browser, path, fragment=""):  # noqa: F811
+    for kind in ("browser", "performance"):
+        browser.get_log(kind)
+    browser.get("about:blank")
+    browser.get(path.as_uri() + fragment)
+    wait_for(lambda: browser.execute_script("return !!document.body.dataset.ready"))
+    return browser
+
+
+@pytest.fixture
+def page(browser, folder):  # noqa: F811
+    return opened(browser, folder / "index.html")
+
+
+def pick(page, text):
+    from selenium.webdriver.common.by import By
+
+    page.execute_script("arguments[0].click()", page.find_element(By.XPATH, PILL.format(text)))
+
+
+def texts(page, selector):
+    return page.execute_script(
+        "return Array.from(document.querySelectorAll(arguments[0])).map(e => e.textContent)", selector
+    )
+
+
+def shown(page, selector):
+    """Scroll something into view and wait until its figure is drawn."""
+    page.execute_script("document.querySelector(arguments[0]).scrollIntoView()", selector)
+    wait_for(lambda: page.execute_script("return !!document.querySelector(arguments[0] + ' .main-svg')", selector))
+
+
+def traces(page, kind):
+    """Names of what all panels of a kind draw."""
+    script = """
+      return Array.from(document.querySelectorAll('#' + arguments[0] + ' .js-plotly-plot'))
+        .flatMap(p => p.data.filter(t => t.meta === 'values').map(t => t.name))"""
+    return page.execute_script(script, kind)
+
+
+def test_all_is_drawn_without_errors_or_requests(page):
+    for selector in ("#slopes", "#resistance", "#full", "#detections"):
+        shown(page, selector)
+    assert page.execute_script("return document.querySelectorAll('.main-svg').length") >= 4
+    assert len(texts(page, "#runs tbody tr")) == 15
+    assert requests(page) == []
+    assert severe(page) == []
+
+
+def test_filter_acts_on_figures_matrix_tables_and_count(page):
+    shown(page, "#resistance")
+    assert {"0.8 mm", "1.3 mm"} <= set(traces(page, "resistance"))
+    cells = texts(page, "#matrix td.cell button")
+    pick(page, "0.8 mm")
+    shown(page, "#resistance")
+    assert set(traces(page, "resistance")) == {"0.8 mm"}
+    assert len(texts(page, "#runs tbody tr")) == 6
+    assert texts(page, "#filter-state") == ["6 of 15 runs, 1 of 4 configurations"]
+    assert len(texts(page, "#answers tbody tr")) == 1
+    assert texts(page, "#matrix td.cell button") != cells
+    assert texts(page, "#detections-table tbody tr:first-child td")[0].endswith("/ 6")
+    click(page, "#reset")
+    assert len(texts(page, "#runs tbody tr")) == 15
+
+
+def test_wheels_and_pooled_groups_are_told(page):
+    before = texts(page, "#runs tbody tr td:nth-child(4)")
+    pick(page, "RL")
+    after = texts(page, "#runs tbody tr td:nth-child(4)")
+    assert sum(map(int, after)) < sum(map(int, before))
+    shown(page, "#slopes")
+    assert texts(page, "#slopes-key")[0].startswith("RL")
+    assert page.execute_script("return document.getElementById('pooled').hidden")
+    pick(page, "n0")  # an own column, by which nothing is split
+    assert not page.execute_script("return document.getElementById('pooled').hidden")
+    assert "rest on runs that the filters leave out" in texts(page, "#pooled")[0]
+
+
+def test_matrix_cell_filters_and_lets_go(page):
+    button = "document.querySelector('#matrix td.cell button')"
+    full = len(texts(page, "#runs tbody tr"))
+    page.execute_script(f"{button}.click()")
+    assert 0 < len(texts(page, "#runs tbody tr")) < full
+    page.execute_script("document.querySelector('#matrix td.cell button[aria-pressed=true]').click()")
+    assert len(texts(page, "#runs tbody tr")) == full
+
+
+def test_filters_open_over_the_page_and_jumps_land(page):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    page.set_window_size(1366, 768)
+    page.execute_script("document.documentElement.style.scrollBehavior = 'auto'")
+    top = "return document.querySelector('#runs-section').getBoundingClientRect().top"
+    before = page.execute_script("return document.querySelector('#filter-place').offsetHeight")
+    page.find_element(By.LINK_TEXT, "runs").click()
+    wait_for(
+        lambda: (
+            0.0 <= page.execute_script(top) < 80.0
+            or page.execute_script("return innerHeight + scrollY >= document.documentElement.scrollHeight - 2")
+        )
+    )
+    click(page, "#open-filters")
+    box = page.execute_script("return document.querySelector('#filter-body').getBoundingClientRect().toJSON()")
+    assert 0.0 <= box["top"] < box["bottom"] <= 768.0
+    assert page.execute_script("return document.querySelector('#filter-place').offsetHeight") == before
+    page.find_element(By.TAG_NAME, "body").send_keys(Keys.ESCAPE)
+    assert not page.execute_script("return document.querySelector('#filter-body').classList.contains('floating')")
+    page.set_window_size(1400, 2000)
+    assert severe(page) == []
+
+
+def test_search_sort_and_problems(page):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    search = page.find_element(By.ID, "search")
+    search.send_keys("0.8 V110")
+    assert len(texts(page, "#runs tbody tr")) == 3
+    search.clear()
+    search.send_keys(" ")
+    head = page.find_element(By.XPATH, "//table[@id='runs']//th[text()='Lane [km/h]']")
+    head.send_keys(Keys.ENTER)
+    head.send_keys(Keys.ENTER)
+    assert head.get_attribute("aria-sort") == "descending"
+    speeds = [float(t) if t != "–" else -1.0 for t in texts(page, "#runs tbody tr td:nth-child(3)")]
+    assert speeds == sorted(speeds, reverse=True)
+    page.execute_script("document.querySelector('#problem-list details').open = true")
+    wait_for(lambda: texts(page, "#problem-list li"))
+    assert "bad.mf4" in texts(page, "#problem-list li")[0]
+    page.execute_script("document.querySelector('#problem-list details button').click()")
+    assert len(texts(page, "#runs tbody tr")) == 1
+
+
+def test_run_opens_and_the_way_back_keeps_the_filter(page, folder):
+    pick(page, "1.3 mm")
+    page.execute_script("document.querySelector('.jump a:last-child').click()")
+    rows = len(texts(page, "#runs tbody tr"))
+    page.execute_script("document.querySelector('#runs tbody tr:nth-child(4) a').click()")
+    wait_for(lambda: "/runs/" in page.current_url)
+    wait_for(lambda: page.execute_script("return document.body.dataset.ready === 'true'"))
+    assert "110_0" in texts(page, "h1")[0]
+    assert page.execute_script("return document.querySelectorAll('#plots .scatterlayer .trace').length") > 8
+    assert len(texts(page, "#events tbody tr")) > 0
+    assert texts(page, "#command")[0].startswith("aqualog detect logs/d1.3_v110_0.parquet --vehicle car.toml")
+    page.back()
+    wait_for(lambda: page.execute_script("return !!document.body.dataset.ready"))
+    assert len(texts(page, "#runs tbody tr")) == rows
+    assert requests(page) == []
+    assert severe(page) == []
+
+
+def test_names_do_nothing(page, folder):
+    for selector in ("#slopes", "#resistance", "#full"):
+        shown(page, selector)
+    assert page.execute_script("return document.images.length") == 0
+    runs = sorted((folder / "runs").iterdir())
+    opened(page, next(r for r in runs if r.name.startswith("0015")))
+    assert page.execute_script("return document.images.length") == 0
+    assert "<img src=x onerror=alert(3)>" in texts(page, "h1")[0]
+    assert severe(page) == []
+
+
+def test_script_that_stands_in_the_page_does_not_run(browser, folder, tmp_path):  # noqa: F811
+    html = (folder / "index.html").read_text()
+    (tmp_path / "evil.js").write_text("document.title = 'caught'")
+    evil = (
+        "<script>document.title = 'caught'</script><script src='evil.js'></script><i onclick='document.title=1'>x</i>"
+    )
+    (tmp_path / "index.html").write_text(html.replace("<footer>", f"{evil}<footer>"))
+    opened(browser, tmp_path / "index.html")
+    browser.execute_script("document.querySelector('i').click()")
+    assert "case" in browser.title
+    assert len([e for e in browser.get_log("browser") if "Content Security" in e["message"]]) >= 3
+
+
+def test_without_plotly_the_page_says_so(browser, folder, tmp_path):  # noqa: F811
+    (tmp_path / "index.html").write_text((folder / "index.html").read_text())
+    opened(browser, tmp_path / "index.html")
+    assert not browser.execute_script("return document.getElementById('no-plotly').hidden")
+    assert len(texts(browser, "#runs tbody tr")) == 15
+    pick(browser, "0.8 mm")
+    assert len(texts(browser, "#runs tbody tr")) == 6
+
+
+def test_paper_shows_every_panel_and_the_screen_comes_back(page):
+    page.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    drawn = "return document.querySelectorAll('.panel .main-svg').length > 0 && !document.querySelector('.panel:empty')"
+    assert page.execute_script(drawn)
+    page.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert severe(page) == []
