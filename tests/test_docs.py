@@ -27,8 +27,12 @@ def test_signals(name):
 
 
 @pytest.mark.parametrize(
-    "command", ["detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate"]
-)
+    "command",
+    [
+        "detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate", "batch",
+        "bin-slipslope", "bin-resistance", "report", "reproduce", "campaign",
+    ],
+)  # fmt: skip
 def test_commands(command):
     assert f"`{command} " in README
 
@@ -72,3 +76,11 @@ def test_effects(effect):
     assert f"| `{effect.name}` | {effect.target} |" in README
     for p in effect.parameters:
         assert f"`{p.name}` [{p.unit}] ({p.neutral:g})" in README
+
+
+def test_keys_of_a_campaign():
+    from aqualog.campaign.records import GROUP_NAMES
+    from aqualog.config.campaign import RUN_KEYS
+
+    for name in (*RUN_KEYS, *GROUP_NAMES):
+        assert f"`{name}`" in README, name
