@@ -17,3 +17,6 @@ def real_logs() -> Path:
     if not REAL_LOGS.is_dir():
         pytest.skip(f"no measured drives at {REAL_LOGS}")
     return REAL_LOGS
+
+
+from headless import browser  # noqa: E402, F401 - a fixture, from a module on the path set above

@@ -57,8 +57,12 @@ def test_quiet_says_nothing(tmp_path):
     ("words", "said"),
     [
         (["3.12"], "3.11"),
-        (["2.1"], "of chapter 2 there are 2.8, 2.9, 2.21"),
-        (["x"], "all, 2, 3 or one of 2.8"),
+        (["2.26"], "2.1 to 2.25"),
+        (["2.3"], "made from the runs of a campaign"),
+        (["3.1", "--format", "html,gif"], "html,csv,png,svg"),
+        (["3.1", "--store", "s"], "--store without --campaign"),
+        (["2.3", "--campaign", "runs.csv"], "is no campaign file"),
+        (["x"], "all, 2, 3 or one of 2.1 to 2.25"),
         (["3.1", "9"], "'9'"),
     ],
 )

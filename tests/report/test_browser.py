@@ -1,56 +1,14 @@
 """The page in headless Chromium without a network: it draws, zooms, resets, and nothing in a name runs."""
 
-import json
-import os
-import shutil
 import time
 
 import fake_result as fake
 import pytest
+from headless import PATIENCE, click, requests, severe, wait_for
 
 from aqualog.report.page import write_page
 
 pytestmark = pytest.mark.browser
-
-FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,2000",
-)  # fmt: skip
-PATIENCE = 60.0  # [s] a loaded machine draws slowly
-
-
-def absent():
-    """What stands in the way of opening a browser, or nothing."""
-    names = {"chromium": ("chromium", "chromium-browser", "google-chrome"), "chromedriver": ("chromedriver",)}
-    return [what for what, found in names.items() if not any(shutil.which(n) for n in found)]
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    missing = absent()
-    if missing:
-        reason = f"{' and '.join(missing)} not found"
-        if os.environ.get("CI"):
-            pytest.fail(f"{reason}, and the browser tests must run in CI")
-        pytest.skip(reason)
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = next(
-        p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))
-    )
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    options.unhandled_prompt_behavior = "ignore"
-    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-    driver.execute_cdp_cmd("Network.enable", {})
-    offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
-    driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture
@@ -69,15 +27,6 @@ def show(browser, tmp_path):
     return opened
 
 
-def wait_for(condition, seconds=PATIENCE):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return
-        time.sleep(0.05)
-    pytest.fail("the page did not get there in time")
-
-
 def x_range(browser):
     return browser.execute_script("return document.getElementById('plots')._fullLayout.xaxis.range.slice()")
 
@@ -91,27 +40,10 @@ def points(browser, row, name):
     return browser.execute_script(script, row, name)
 
 
-def click(browser, selector):
-    from selenium.webdriver.common.by import By
-
-    browser.find_element(By.CSS_SELECTOR, selector).click()
-
-
 def visible_groups(browser):
     script = """return document.getElementById('plots')._fullData
       .filter(t => t.visible === true && t.legendgroup).map(t => t.legendgroup)"""
     return set(browser.execute_script(script))
-
-
-def requests(browser):
-    """Addresses that were asked for beside the page itself."""
-    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
-    urls = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    return [u for u in urls if not u.startswith(("file:", "data:", "blob:"))]
-
-
-def severe(browser):
-    return [e for e in browser.get_log("browser") if e["level"] == "SEVERE" or "Content Security" in e["message"]]
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 from campaign_case import load_case, make_case
-from test_browser import browser, click, requests, severe, wait_for  # noqa: F401 - browser is a fixture
+from headless import click, requests, severe, wait_for
 
 from aqualog.campaign.bins import plan
 from aqualog.report.campaign_findings import find
@@ -21,7 +21,7 @@ def folder(tmp_path_factory):
     return out
 
 
-def opened(browser, path, fragment=""):  # noqa: F811
+def opened(browser, path, fragment=""):
     for kind in ("browser", "performance"):
         browser.get_log(kind)
     browser.get("about:blank")
@@ -31,7 +31,7 @@ def opened(browser, path, fragment=""):  # noqa: F811
 
 
 @pytest.fixture
-def page(browser, folder):  # noqa: F811
+def page(browser, folder):
     return opened(browser, folder / "index.html")
 
 
@@ -184,7 +184,7 @@ def test_names_do_nothing(page, folder):
     assert severe(page) == []
 
 
-def test_script_that_stands_in_the_page_does_not_run(browser, folder, tmp_path):  # noqa: F811
+def test_script_that_stands_in_the_page_does_not_run(browser, folder, tmp_path):
     html = (folder / "index.html").read_text()
     (tmp_path / "evil.js").write_text("document.title = 'caught'")
     evil = (
@@ -197,7 +197,7 @@ def test_script_that_stands_in_the_page_does_not_run(browser, folder, tmp_path):
     assert len([e for e in browser.get_log("browser") if "Content Security" in e["message"]]) >= 3
 
 
-def test_without_plotly_the_page_says_so(browser, folder, tmp_path):  # noqa: F811
+def test_without_plotly_the_page_says_so(browser, folder, tmp_path):
     (tmp_path / "index.html").write_text((folder / "index.html").read_text())
     opened(browser, tmp_path / "index.html")
     assert not browser.execute_script("return document.getElementById('no-plotly').hidden")
