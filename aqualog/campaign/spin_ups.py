@@ -16,7 +16,7 @@ from aqualog.types import BoolArray
 __all__ = ["SPINNING", "events_of", "is_spinning", "spin_ups"]
 
 LIMITS = Limits(samples=3)
-SPINNING = 0.05  # [-] slip of a rim that has left the road's speed; a rolling one on water stays below 0.03
+SPINNING = 0.10  # [-] slip from which a brush of slope 30 and friction 1 slides as a whole: 3 mu / C (D)
 
 
 def spin_ups(data: CampaignData, plan: Plan, *, residual: bool = False, limits: Limits = LIMITS) -> tuple[MeanRow, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.figures.record import Axis, Line, Panel, Sheet
+from aqualog.figures.record import Axis, Line, Note, Panel, Sheet
 from aqualog.report.theme import GRID, INK, MUTED
 from aqualog.types import FloatArray
 
@@ -49,12 +49,43 @@ def _line(line: Line, *, is_solid: bool) -> dict[str, Any]:
     }  # fmt: skip
     if is_solid and line.z is not None:
         trace["z"] = rounded(line.z)
+    if line.low is not None and line.high is not None:
+        trace["error_y"] = {
+            "type": "data", "symmetric": False, "array": _bars(line.high - line.y),
+            "arrayminus": _bars(line.y - line.low), "color": line.colour, "thickness": 1.2, "width": 3,
+        }  # fmt: skip
+    if line.is_filled:
+        trace |= {"fill": "tozeroy", "fillcolor": _pale(line.colour)}
     if line.group:
         trace["legendgroup"] = line.group
     if line.count is not None:
         trace["customdata"] = rounded(line.count)
         trace["hovertemplate"] = "%{customdata} samples<extra>%{fullData.name}</extra>"
     return trace
+
+
+def _bars(lengths: FloatArray) -> list[float]:
+    """Lengths of bars; none where there is no interval, since plotly draws null as it likes."""
+    return [0.0 if v is None else max(v, 0.0) for v in rounded(lengths)]
+
+
+def _pale(colour: str) -> str:
+    """A colour as it fills an area."""
+    if not colour.startswith("#"):
+        return GRID
+    r, g, b = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({r},{g},{b},0.25)"
+
+
+def _note(note: Note) -> dict[str, Any]:
+    words = {"x": note.x, "y": note.y, "text": note.text, "font": {"size": note.size, "color": note.colour}}
+    if note.tail is None:
+        return words | {"showarrow": False}
+    x, y = note.tail
+    return words | {
+        "showarrow": True, "ax": x, "ay": y, "axref": "x", "ayref": "y", "arrowhead": 2, "arrowwidth": 1.4,
+        "arrowcolor": note.colour,
+    }  # fmt: skip
 
 
 def _sizes(line: Line, *, is_solid: bool) -> float | list[float]:
@@ -124,6 +155,7 @@ def _layout(panel: Panel) -> dict[str, Any]:
             "yref": "container",
             "yanchor": "bottom",
             "font": {"size": 11},
+            "itemsizing": "constant",
         },
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "hovermode": "closest",
@@ -131,6 +163,11 @@ def _layout(panel: Panel) -> dict[str, Any]:
     if panel.z is None:
         layout["xaxis"] = _axis(panel.x)
         layout["yaxis"] = _axis(panel.y)
+        layout["annotations"] = [_note(n) for n in panel.notes]
+        if panel.is_diagram:
+            layout |= {"showlegend": False, "hovermode": False}
+            for axis in ("xaxis", "yaxis"):
+                layout[axis] |= {"visible": False}
         return layout
     layout["height"] += 60
     layout["margin"] = {"l": 0, "r": 0, "t": 20, "b": legend}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -18,23 +18,29 @@ from aqualog.types import FloatArray
 __all__ = ["document", "figure_csv"]
 
 Column = tuple[str, FloatArray]
+Cells = tuple[str, list[str]]
 
 
 def figure_csv(figure: Figure) -> str:
     """What is drawn, side by side: columns of x and, behind them, of the lines over it; units in the header.
 
     Lines over the same x share its column. Columns end where their line ends; a cell is empty where a line is broken.
-    Columns of one of several panels begin with its letter.
+    Columns of one of several panels begin with its letter. The runs of a campaign that it rests on stand behind.
     """
     columns: list[Column] = []
     for i, panel in enumerate(figure.panels):
         letter = f"({chr(ord('a') + i)}) " if len(figure.panels) > 1 else ""
         columns += [(letter + name, values) for name, values in _columns(panel)]
+    cells: list[Cells] = [(name, ["" if v is None else repr(v) for v in rounded(values)]) for name, values in columns]
+    if figure.runs is not None:
+        cells += [
+            ("run used [-]", [r for r, _ in figure.runs.used]),
+            ("shown as [-]", [s for _, s in figure.runs.used]),
+        ]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([name for name, _ in columns])
-    cells = [["" if v is None else repr(v) for v in rounded(values)] for _, values in columns]
-    writer.writerows(zip_longest(*cells, fillvalue=""))
+    writer.writerow([name for name, _ in cells])
+    writer.writerows(zip_longest(*(values for _, values in cells), fillvalue=""))
     return text.getvalue()
 
 
@@ -43,7 +49,7 @@ def _columns(panel: Panel) -> list[Column]:
     shown: FloatArray | None = None
     for line in panel.lines:
         if line.z is None and shown is not None and np.array_equal(line.x, shown):
-            columns.append((f"{line.name}: {panel.y.title}", line.y))
+            columns += [(f"{line.name}: {panel.y.title}", line.y), *_ends(line, panel)]
             continue
         shown = line.x if line.z is None else None
         columns += _of_line(line, panel)
@@ -58,7 +64,7 @@ def _columns(panel: Panel) -> list[Column]:
 
 def _of_line(line: Line, panel: Panel) -> list[Column]:
     if line.z is None:
-        columns = [(panel.x.title, line.x), (f"{line.name}: {panel.y.title}", line.y)]
+        columns = [(panel.x.title, line.x), (f"{line.name}: {panel.y.title}", line.y), *_ends(line, panel)]
     else:
         of = f"{line.name}: "
         columns = [(of + panel.x.title, line.x), (of + panel.y.title, line.y)]
@@ -69,8 +75,16 @@ def _of_line(line: Line, panel: Panel) -> list[Column]:
     return columns
 
 
-def document(figures: Sequence[Figure], files: Sequence[str]) -> dict[str, Any]:
-    """Figures with their findings, and the files that were written."""
+def _ends(line: Line, panel: Panel) -> list[Column]:
+    """Ends of the intervals."""
+    ends = (("low", line.low), ("high", line.high))
+    return [(f"{line.name}, 95 % {n}: {panel.y.title}", x) for n, x in ends if x is not None]
+
+
+def document(
+    figures: Sequence[Figure], files: Sequence[str], not_made: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Figures with their findings and runs, the files that were written, and why a figure was not made."""
     return {
         "schema_version": 1,
         "tool_version": __version__,
@@ -81,12 +95,19 @@ def document(figures: Sequence[Figure], files: Sequence[str]) -> dict[str, Any]:
                 "findings": [
                     {
                         "claim": c.claim, "thesis": c.thesis, "criterion": c.criterion, "found": c.found,
-                        "value": c.value, "verdict": c.verdict, "reason": c.reason,
+                        "value": c.value, "ci95": None if c.ci95 is None else list(c.ci95), "unit": c.unit or None,
+                        "verdict": c.verdict, "reason": c.reason,
                     }
                     for c in f.findings
                 ],
+                "runs": None if f.runs is None else {
+                    "campaign": f.runs.campaign,
+                    "used": [{"run": r, "shown_as": s} for r, s in f.runs.used],
+                    "left_out": [{"reason": why, "runs": n} for why, n in f.runs.left_out],
+                },
             }
             for f in figures
         ],
+        "not_made": [{"figure": number, "reason": why} for number, why in (not_made or {}).items()],
         "files": list(files),
     }  # fmt: skip

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.figures.record import Axis, Figure, Finding, Table, judged, seconds
-from aqualog.figures.scene_panels import bit_panel, feature_lines, panel, speed_panel
+from aqualog.figures.drive import DriveRun
+from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged, seconds
+from aqualog.figures.scene_panels import WHEEL_WORDS, bit_panel, feature_lines, panel, speed_panel
 from aqualog.figures.scene_study import MANY, SOME, SceneRun, in_runs, runs, share, spread
 from aqualog.report.theme import wheel_colour
 
-__all__ = ["make"]
+__all__ = ["make", "panels"]
 
 NUMBER = "2.8"
 _AFTER_EXIT = 0.5  # [s] the contact comes back
@@ -55,28 +56,33 @@ def _c28(all_runs: tuple[SceneRun, ...]) -> tuple[Finding, Table]:
     return finding, table
 
 
+def panels(r: DriveRun, front: str = "fr", rear: str = "rr") -> tuple[Panel, ...]:
+    """Speeds, acceleration differences of a front and a rear wheel, and the detection bits of both."""
+    words = {w: WHEEL_WORDS[w] for w in (front, rear)}
+    differences = {n: (r.feature(f"a_w_delta_{w}"), wheel_colour(w), "solid") for w, n in words.items()}
+    bits = {
+        f"spin-down {words[front]}": (2.0, r.active("spin_down", front), wheel_colour(front)),
+        f"spin-up {words[rear]}": (1.0, r.active("spin_up", rear), wheel_colour(rear)),
+    }
+    return (
+        speed_panel(r),
+        panel(r, "Acceleration differences", _ACCELERATION, feature_lines(r, differences)),
+        bit_panel(r, "Detection bits", "detection", bits),
+    )
+
+
 def make() -> Figure:
     """Speeds, acceleration differences front and rear right, detection bits of one run; C28 over all runs."""
     all_runs = runs(NUMBER)
     finding, table = _c28(all_runs)
     r = all_runs[0]
-    names = {"fr": "front right", "rr": "rear right"}
-    differences = {n: (r.feature(f"a_w_delta_{w}"), wheel_colour(w), "solid") for w, n in names.items()}
-    bits = {
-        "spin-down front right": (2.0, r.active("spin_down", "fr"), wheel_colour("fr")),
-        "spin-up rear right": (1.0, r.active("spin_up", "rr"), wheel_colour("rr")),
-    }
     return Figure(
         NUMBER,
         "spin-down of a front and spin-up of a rear wheel, with detection",
         f"Rear-wheel drive, worn summer tyres, low pressure, 0.8 mm right and less left, 118 km/h with 0.5 m/s^2 from "
         f"the entry at {r.entry:g} s on. Drawn: seed {r.seed}; judged over seeds {all_runs[0].seed} to "
         f"{all_runs[-1].seed}, which differ in sensor noise and in how the contact fluctuates along the lane.",
-        (
-            speed_panel(r),
-            panel(r, "Acceleration differences", _ACCELERATION, feature_lines(r, differences)),
-            bit_panel(r, "Detection bits", "detection", bits),
-        ),
+        panels(r),
         (finding,),
         (table,),
     )

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from aqualog.detect.minor_spin_down import MinorParams
-from aqualog.figures.record import Axis, Figure, Finding, Table, judged, seconds
+from aqualog.figures.drive import DriveRun
+from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged, seconds
 from aqualog.figures.scene_panels import feature_lines, panel, speed_panel
 from aqualog.figures.scene_study import (
     MANY,
@@ -29,7 +30,7 @@ from aqualog.model.thesis_scenes import scene
 from aqualog.report.theme import MUTED, THRESHOLD, wheel_colour
 from aqualog.types import FloatArray
 
-__all__ = ["make"]
+__all__ = ["make", "panels"]
 
 NUMBER = "2.9"
 _DIP, _LARGE = -0.015, -0.10  # [-] slip of a minor spin-down: beyond the first, not beyond the second
@@ -155,24 +156,31 @@ def _c32(rough: tuple[SceneRun, ...]) -> Finding:
     )  # fmt: skip
 
 
+def panels(r: DriveRun, side: str = "r") -> tuple[Panel, ...]:
+    """Speeds of a side's wheels, and their variances with the difference."""
+    front, rear = f"f{side}", f"r{side}"
+    lines = {
+        "difference": (r.feature(f"variance_{front}") - r.feature(f"variance_{rear}"), THRESHOLD, "solid"),
+        "front": (r.feature(f"variance_{front}"), wheel_colour(front), "dashdot"),
+        "rear": (r.feature(f"variance_{rear}"), wheel_colour(rear), "dashdot"),
+        "limit of the difference": (np.full(r.t.size, _LIMITS.delta_min), MUTED, "dot"),
+    }
+    word = "right" if side == "r" else "left"
+    return speed_panel(r, (front, rear)), panel(r, f"Variances, {word}", _VARIANCE, feature_lines(r, lines))
+
+
 def make() -> Figure:
     """Speeds of the right wheels, variances front and rear and their difference of one run; claims over all runs."""
     all_runs = runs(NUMBER)
     c33, table = _c33(all_runs)
     r = all_runs[0]
-    lines = {
-        "difference": (_difference(r), THRESHOLD, "solid"),
-        "front": (r.feature("variance_fr"), wheel_colour("fr"), "dashdot"),
-        "rear": (r.feature("variance_rr"), wheel_colour("rr"), "dashdot"),
-        "limit of the difference": (np.full(r.t.size, _LIMITS.delta_min), MUTED, "dot"),
-    }
     return Figure(
         NUMBER,
         "variances of the acceleration differences under minor spin-downs",
         f"Rear-wheel drive, worn summer tyres, low pressure, 0.8 mm right and less left, 104 km/h, entry at "
         f"{r.entry:g} s. Drawn: seed {r.seed}; judged over seeds {all_runs[0].seed} to {all_runs[-1].seed}, which "
         f"differ in sensor noise and in how the contact fluctuates along the lane.",
-        (speed_panel(r, ("fr", "rr")), panel(r, "Variances, right", _VARIANCE, feature_lines(r, lines))),
+        panels(r),
         (c33, _c29(all_runs), _c32(_rough())),
         (table,),
     )

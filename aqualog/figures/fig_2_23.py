@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.figures.record import Axis, Figure, Finding, Table, judged
+from aqualog.figures.drive import DriveRun
+from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged
 from aqualog.figures.scene_panels import feature_lines, panel, speed_panel, tie_rod_panels
 from aqualog.figures.scene_study import MANY, SOME, SceneRun, in_runs, known, residual, runs, scatter, share, spread
 from aqualog.report.theme import INK, MUTED
 
-__all__ = ["make"]
+__all__ = ["make", "panels"]
 
 NUMBER = "2.23"
 _TIMES = 4.0  # dry scatters that a rise must exceed: the drift of the tie-rod detector (K)
@@ -112,15 +113,24 @@ def _c59(all_runs: tuple[SceneRun, ...]) -> Finding:
     )
 
 
+def panels(r: DriveRun) -> tuple[Panel, ...]:
+    """Steering and lateral acceleration, front wheel speeds, tie rods."""
+    steering = {
+        "road-wheel angle in deg": (np.degrees(r.signal("steer_angle")), MUTED, "solid"),
+        "lateral acceleration": (r.feature("a_y_slow"), INK, "solid"),
+    }
+    return (
+        panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)),
+        speed_panel(r, ("fl", "fr")),
+        *tie_rod_panels(r),
+    )
+
+
 def make() -> Figure:
     """Steering, front wheel speeds and both tie rods of one run; C63 and C59 over all runs."""
     all_runs = runs(NUMBER)
     c63, table = _c63(all_runs)
     r = all_runs[0]
-    steering = {
-        "road-wheel angle in deg": (np.degrees(r.signal("steer_angle")), MUTED, "solid"),
-        "lateral acceleration": (r.feature("a_y_slow"), INK, "solid"),
-    }
     return Figure(
         NUMBER,
         "tie-rod forces in a slalom, single wheels and both aquaplane",
@@ -128,11 +138,7 @@ def make() -> Figure:
         f"from 26 s on, both from 27.1 to 29 s. The polynomial is from a dry slalom of the same car at another speed. "
         f"Drawn: seed {r.seed}; judged over seeds {all_runs[0].seed} to {all_runs[-1].seed}, which differ in sensor "
         f"noise and in how the contact fluctuates along the lane.",
-        (
-            panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)),
-            speed_panel(r, ("fl", "fr")),
-            *tie_rod_panels(r),
-        ),
+        panels(r),
         (c63, _c59(all_runs)),
         (table,),
     )

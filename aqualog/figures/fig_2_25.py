@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.figures.record import Axis, Figure, Finding, Table, judged, seconds
+from aqualog.figures.drive import DriveRun
+from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged, seconds
 from aqualog.figures.scene_panels import bit_panel, feature_lines, panel, speed_panel
 from aqualog.figures.scene_study import MANY, SOME, SceneRun, in_runs, runs, spread, stretches
 from aqualog.report.theme import INK, MUTED, THRESHOLD, WHEEL_COLOURS
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["make"]
+__all__ = ["make", "panels"]
 
 NUMBER = "2.25"
 _COLOURS = (*WHEEL_COLOURS.values(), "#E69F00")
@@ -40,7 +41,7 @@ class Times(NamedTuple):
     cross: float
 
 
-def _bit(r: SceneRun, k: int) -> BoolArray:
+def _bit(r: DriveRun, k: int) -> BoolArray:
     return np.asarray(r.feature(f"criterion_{k}") > 0.5)
 
 
@@ -218,11 +219,8 @@ def _c77(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Finding:
     )  # fmt: skip
 
 
-def make() -> Figure:
-    """Speeds, bits of the criteria and the sum of one run; C72 to C77 over all runs."""
-    all_runs = runs(NUMBER)
-    times = [_times(r) for r in all_runs]
-    r = all_runs[0]
+def panels(r: DriveRun) -> tuple[Panel, ...]:
+    """Speeds, bits of the criteria, and the sum with its terms."""
     total, threshold = r.statistic("joint_cusum")
     bits = {f"{k}: {_WORDS[k]}": (float(k), _bit(r, k), c) for k, c in zip(_WORDS, _COLOURS, strict=True)}
     terms = {
@@ -237,6 +235,18 @@ def make() -> Figure:
     }  # fmt: skip
     below = {"warning": (np.where(r.active("joint_cusum"), -0.15, np.nan), MUTED, "solid")}
     warning = [replace(line, width=6.0) for line in feature_lines(r, below)]
+    return (
+        speed_panel(r),
+        bit_panel(r, "Criteria of joint detector 1", "criterion", bits),
+        panel(r, "Sum of joint detector 2", Axis("scaled sum"), [*feature_lines(r, lines), *warning]),
+    )
+
+
+def make() -> Figure:
+    """Speeds, bits of the criteria and the sum of one run; C72 to C77 over all runs."""
+    all_runs = runs(NUMBER)
+    times = [_times(r) for r in all_runs]
+    r = all_runs[0]
     table = Table(
         "First time after the entry [s]",
         ("seed", "criterion 2", "criterion 4", "criterion 1", "criterion 5", "sum rises", "sum active"),
@@ -253,11 +263,7 @@ def make() -> Figure:
         f"known from an earlier dry drive; thresholds are the default ones. Drawn: seed {r.seed}; judged over seeds "
         f"{all_runs[0].seed} to {all_runs[-1].seed}, which differ in sensor noise and in how the contact fluctuates "
         f"along the lane.",
-        (
-            speed_panel(r),
-            bit_panel(r, "Criteria of joint detector 1", "criterion", bits),
-            panel(r, "Sum of joint detector 2", Axis("scaled sum"), [*feature_lines(r, lines), *warning]),
-        ),
+        panels(r),
         (
             _c72(all_runs), _c73(all_runs, times), _c74(all_runs, times), _c75(times), _c76(all_runs, times),
             _c77(all_runs, times),

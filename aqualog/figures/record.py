@@ -9,8 +9,8 @@ from typing import Literal
 from aqualog.types import FloatArray
 
 __all__ = [
-    "BORNE_OUT", "IN_PART", "NOT_BORNE_OUT", "Axis", "Figure", "Finding", "Line", "Panel", "Sheet", "Table", "Verdict",
-    "judged", "seconds", "stem_of",
+    "BORNE_OUT", "IN_PART", "NOT_BORNE_OUT", "Axis", "Figure", "Finding", "Line", "Note", "Panel", "RunsUsed", "Sheet",
+    "Table", "Verdict", "judged", "seconds", "stem_of",
 ]  # fmt: skip
 
 Verdict = Literal["borne out", "in part", "not borne out"]
@@ -41,8 +41,9 @@ class Axis:
 class Line:
     """One line or cloud of points, arrays (n,); NaN breaks it.
 
-    `z` in panels of three dimensions; `count` samples behind each point, which sets its size. `group` lines are shown
-    and hidden together, `in_legend` the one that is listed.
+    `low` and `high` (n,) are the ends of an interval about `y`, drawn as a bar; NaN where there is none. `is_filled`:
+    the area down to zero. `z` in panels of three dimensions; `count` samples behind each point, which sets its size.
+    `group` lines are shown and hidden together, `in_legend` the one that is listed.
     """
 
     name: str
@@ -50,6 +51,9 @@ class Line:
     y: FloatArray
     z: FloatArray | None = None
     count: FloatArray | None = None
+    low: FloatArray | None = None
+    high: FloatArray | None = None
+    is_filled: bool = False
     colour: str = "@ink"
     dash: str = "solid"
     width: float = 2.0
@@ -73,8 +77,20 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True)
+class Note:
+    """Words at a point; with `tail` an arrow comes from there."""
+
+    text: str
+    x: float
+    y: float
+    tail: tuple[float, float] | None = None
+    size: int = 12
+    colour: str = "@ink"
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
-    """One plot; of three dimensions if it has an axis `z`."""
+    """One plot; of three dimensions if it has an axis `z`. `is_diagram`: boxes and arrows, without scales."""
 
     title: str
     x: Axis
@@ -82,6 +98,23 @@ class Panel:
     lines: tuple[Line, ...]
     z: Axis | None = None
     sheets: tuple[Sheet, ...] = ()
+    notes: tuple[Note, ...] = ()
+    is_diagram: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RunsUsed:
+    """Which runs of a campaign a figure rests on: rows of (run, shown as), and how many were left out, by reason."""
+
+    campaign: str
+    used: tuple[tuple[str, str], ...]
+    left_out: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """In one sentence."""
+        out = "; ".join(f"{n} {why}" for why, n in self.left_out)
+        return f"{len(self.used)} runs of the campaign {self.campaign}" + (f"; left out: {out}" if out else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +128,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A claim of the thesis, the criterion it is judged by, and what was found; `value` the number judged, if one."""
+    """A claim of the thesis, the criterion it is judged by, and what was found.
+
+    `value` is the number judged, if one, `ci95` its interval with the run as the unit, `unit` that of both.
+    """
 
     claim: str
     thesis: str
@@ -104,11 +140,15 @@ class Finding:
     verdict: Verdict
     reason: str = ""
     value: float | None = None
+    ci95: tuple[float, float] | None = None
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of the thesis with its findings. `caption` tells settings, in aqualog's words."""
+    """A figure of the thesis with its findings. `caption` tells settings, in aqualog's words; `runs` those behind it,
+    if it is made from a campaign.
+    """
 
     number: str
     title: str
@@ -116,6 +156,7 @@ class Figure:
     panels: tuple[Panel, ...]
     findings: tuple[Finding, ...]
     tables: tuple[Table, ...] = ()
+    runs: RunsUsed | None = None
 
     @property
     def stem(self) -> str:

@@ -15,12 +15,13 @@ from aqualog.detect.slip_slope.history import History, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
 from aqualog.errors import FitError
+from aqualog.figures.drive import DriveRun
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.sketch import KMH, slalom_angle
 from aqualog.model.thesis_scenes import scene
-from aqualog.types import BoolArray, DriveResult, FloatArray, Signals
+from aqualog.types import BoolArray, FloatArray, Signals
 from aqualog.vehicle import Vehicle
 
 __all__ = [
@@ -56,61 +57,16 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class SceneRun:
-    """One drive of a scene; `t` (n,) [s]."""
+class SceneRun(DriveRun):
+    """One drive of a scene; entry and exit are those of its lanes."""
 
     seed: int
     scenario: Scenario
-    result: DriveResult
-    t: FloatArray
 
     @property
-    def entry(self) -> float:
-        """Beginning of the first lane. [s]"""
-        return self.scenario.lanes[0].start
-
-    @property
-    def exit(self) -> float:
-        """End of the last lane. [s]"""
-        return self.scenario.lanes[-1].end
-
-    def signal(self, name: str) -> FloatArray:
-        """A measured signal, or the truth by which a drive is judged (`true_slip_fr`), array (n,)."""
-        return self.result.signals.array(name)
-
-    def feature(self, name: str) -> FloatArray:
-        """A feature of the detectors, array (n,)."""
-        return np.asarray(self.result.features[name].to_numpy(), dtype=np.float64)
-
-    def within(self, start: float, end: float) -> BoolArray:
-        """Samples from one time to another, bool array (n,)."""
-        return (self.t >= start - 1e-9) & (self.t < end - 1e-9)
-
-    def on_lane(self) -> BoolArray:
-        """Samples from entry to exit, bool array (n,)."""
-        return self.within(self.entry, self.exit)
-
-    def active(self, detector: str, wheel: str | None = None) -> BoolArray:
-        """Detection bit of a detector, of one wheel or of any, array (n,)."""
-        bits = np.zeros(self.t.size, dtype=bool)
-        for track in self.result.tracks:
-            if track.detector == detector and wheel in (None, track.wheel):
-                bits |= track.active
-        return bits
-
-    def statistic(self, detector: str) -> tuple[FloatArray, float]:
-        """Statistic (n,) of a detector of the whole car, and its threshold."""
-        track = next(t for t in self.result.tracks if t.detector == detector)
-        return track.statistic, track.threshold
-
-    def events(self, detector: str, wheel: str | None = None) -> list[float]:
-        """Times at which its events begin. [s]"""
-        return [e.start_s for e in self.result.events if e.detector == detector and wheel in (None, e.wheel)]
-
-    def after_entry(self, bits: BoolArray) -> float:
-        """Time from the entry to the first sample on the lane in which a bit is set; NaN if there is none. [s]"""
-        at = np.flatnonzero(bits & self.on_lane())
-        return float(self.t[at[0]] - self.entry) if at.size else float("nan")
+    def velocity(self) -> FloatArray:
+        """The true velocity, array (n,). [m/s]"""
+        return self.signal("true_v_x")
 
 
 @lru_cache(maxsize=8)
@@ -160,7 +116,8 @@ def run_of(scenario: Scenario, car: Known) -> SceneRun:
     """A drive under all detectors."""
     signals = as_signals(simulate(scenario), vehicle=car.vehicle)
     result = detect_drive(signals, car.vehicle, memory=car.memory)
-    return SceneRun(scenario.seed, scenario, result, signals.array("t"))
+    lanes = scenario.lanes
+    return SceneRun(result, signals.array("t"), lanes[0].start, lanes[-1].end, scenario.seed, scenario)
 
 
 @lru_cache(maxsize=1)

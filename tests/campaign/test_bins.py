@@ -253,7 +253,7 @@ def test_traction_during_spin_ups():
     for info in data.done:
         samples = data._samples[info.index]
         spun = pl.when((pl.col("t") > 5) & (pl.col("t") < 6) & (pl.col("v_x") > 90 * KMH))
-        frame = samples.frame.with_columns(spun.then(0.08).otherwise(pl.col("slip_min_rl")).alias("slip_min_rl"))
+        frame = samples.frame.with_columns(spun.then(0.15).otherwise(pl.col("slip_min_rl")).alias("slip_min_rl"))
         data._samples[info.index] = RunSamples(frame, samples.t, samples.on_water)
     rows = spin_ups(data, plan(data, ["tyre"]))
     assert {r.place for r in rows} == {"rl"}
