@@ -15,7 +15,7 @@ from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import LIMITS, Limits, too_few_runs
 from aqualog.types import FloatArray
 
-__all__ = ["MeanRow", "ResistanceTable", "mean_of_cell", "resistances"]
+__all__ = ["MeanRow", "ResistanceTable", "dry_level", "mean_of_cell", "resistances"]
 
 DRY_S = 1.0  # [s] of dry driving before the lane that a run's own level needs
 
@@ -80,7 +80,7 @@ def resistances(
             return "no resistance measure: no torque of the driven wheels, or no a_x"
         level = 0.0
         if relative:
-            found = _dry_level(samples, delta)
+            found = dry_level(samples, delta)
             if found is None:
                 return f"less than {DRY_S:g} s of dry driving before the lane"
             level = found
@@ -95,7 +95,7 @@ def resistances(
     return ResistanceTable(plan, tuple(rows), relative, dict(left_out), robust)
 
 
-def _dry_level(samples: RunSamples, delta: FloatArray) -> float | None:
+def dry_level(samples: RunSamples, delta: FloatArray) -> float | None:
     """Mean over usable dry samples before the lane (of a dry run: all); None with less than a second of them."""
     wet = np.flatnonzero(samples.on_water == 1.0)
     before = np.arange(delta.size) < (wet[0] if wet.size else delta.size)

@@ -26,7 +26,7 @@ _SHOWN = (-1.0, 2.0)  # [m/s^2]
 
 
 def _c37(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Finding]:
-    pool = pool_of(evidence, runs, resistance_of(evidence))
+    pool = pool_of(evidence, runs, resistance_of())
     if pool is None:
         return []
     v = pool.columns["v_x"]

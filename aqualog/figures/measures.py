@@ -10,6 +10,7 @@ import numpy as np
 
 from aqualog.campaign.bins import Pool, pooled
 from aqualog.campaign.regress import Design, estimate
+from aqualog.campaign.resistance import dry_level
 from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.figures.evidence import KMH, Evidence
 from aqualog.types import BoolArray, FloatArray
@@ -21,7 +22,6 @@ __all__ = [
 
 LEAST_RUNS = 3  # for an interval
 LEAST_BIN = 3  # samples of a bin that is drawn
-LEAST_DRY_S = 1.0  # of dry road before the water, for the run's own level
 _APART = 10_000_000  # between the steps of two wheels of one run, which are no neighbours
 TEN = 10 * KMH  # [m/s] the step that gradients are told over
 
@@ -101,17 +101,17 @@ def pool_of(evidence: Evidence, runs: Sequence[RunInfo], columns: Columns) -> Po
     return pooled(pieces) if pieces else None
 
 
-def resistance_of(evidence: Evidence) -> Columns:
+def resistance_of() -> Columns:
     """Resistance measure on water less the run's own level on the dry road before it. [m/s^2]
 
-    A run with less than `LEAST_DRY_S` of dry road before the water keeps its measure as it is.
+    A run with less than a second of dry road before the water has none, as in `campaign.resistance`.
     """
 
-    def columns(info: RunInfo, samples: RunSamples) -> tuple[BoolArray, FloatArray]:
+    def columns(_: RunInfo, samples: RunSamples) -> tuple[BoolArray, FloatArray]:
         y = samples.array("delta_a_x")
-        dry = (samples.on_water == 0.0) & samples.is_usable & np.isfinite(y) & (samples.t < evidence.of(info).entry)
-        level = float(np.mean(y[dry])) if np.count_nonzero(dry) * samples.step_s >= LEAST_DRY_S else 0.0
-        return (samples.on_water == 1.0) & samples.is_usable, y - level
+        level = dry_level(samples, y)
+        wet: BoolArray = (samples.on_water == 1.0) & samples.is_usable
+        return (wet, y - level) if level is not None else (np.zeros_like(wet), y)
 
     return columns
 

@@ -51,7 +51,7 @@ def measured(evidence: Evidence, wish: Wish, number: str, needs: str) -> Resista
     selected = choose(
         evidence.data.runs, wish, campaign=evidence.name, number=number, is_of_use=evidence.has_resistance, needs=needs
     )
-    columns = resistance_of(evidence)
+    columns = resistance_of()
     pools = {x.name: pool for x in selected.levels if (pool := pool_of(evidence, x.runs, columns)) is not None}
     return Resistance(selected, pools)
 

@@ -159,7 +159,7 @@ def test_constants_are_the_runs_own_dry_level():
     e = evidence()
     info = next(r for r in e.data.done if not e.has_resistance(r))
     samples = e.data.samples(info)
-    which, y = measures.resistance_of(e)(info, samples)
+    which, y = measures.resistance_of()(info, samples)
     delta = samples.array("delta_a_x")
     before = (samples.on_water == 0) & samples.is_usable & np.isfinite(delta) & (samples.t < e.of(info).entry)
     assert before.sum() > 10
