@@ -29,9 +29,8 @@ def _c53(found: Slopes) -> Sequence[Finding]:
     if slow is None or over_all is None:
         return ()
     is_less, is_flatter = slow[0].high < 1.0, over_all[1].is_above
-    alike = near is None or near[0].low <= 1.0 <= near[0].high or (
-        near[0].low >= 1.0 - _SAME and near[0].high <= 1.0 + _SAME
-    )  # fmt: skip
+    # an interval that holds 1 may be wide: alike is what lies near 1 as a whole
+    alike = near is None or (near[0].low >= 1.0 - _SAME and near[0].high <= 1.0 + _SAME)
     middle = f"; {levels[1].name} over {levels[0].name}: {near[0].words(2)}" if near is not None else ""
     whole = is_less and is_flatter and alike
     lacking = [
@@ -46,8 +45,8 @@ def _c53(found: Slopes) -> Sequence[Finding]:
             "much less, and the curves meet at high speed.",
             f"highest over lowest pressure below {_SLOW_KMH:g} km/h: interval below 1 (value); the fall per 10 km/h "
             "is less: "
-            f"interval of the difference above 0; the second pressure's ratio holds 1 or is within {_SAME:.0%} of "
-            "it; in "
+            f"interval of the difference above 0; the second pressure's ratio is within {_SAME:.0%} of 1 "
+            "with its whole interval; in "
             "part: the first or the second",
             f"{levels[-1].name} over {levels[0].name}: {slow[0].words(2)} below {_SLOW_KMH:g} km/h, fall per 10 km/h "
             "less "

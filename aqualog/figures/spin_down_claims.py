@@ -120,18 +120,19 @@ def before_full(found: Sequence[Pass]) -> list[Finding]:
     away = (full - first) / KMH
     low, high = (float(x) / KMH for x in np.nanquantile(fulls - firsts, (0.025, 0.975)))
     lo, hi = _BEFORE - _BEFORE_TOL, _BEFORE + _BEFORE_TOL
-    whole = lo <= away <= hi
+    whole = lo <= low and high <= hi
     return [
         Finding(
             "C17", "Minor spin-downs occur from 20 km/h below the speed of full aquaplaning on.",
             "speed at which half of the passes have a full spin-down less that at which half have a minor one: "
             f"{lo:g} to "
-            f"{hi:g} km/h; in part: its interval reaches into that",
+            f"{hi:g} km/h, with its whole interval; in part: its interval reaches into that",
             f"full at {full / KMH:.0f} km/h, minor from {first / KMH:.0f} km/h on: {away:.0f} km/h ({len(found)} "
             "passes)",
             judged(whole=whole, part=low <= hi and high >= lo),
             "" if whole else
-            "How far below they begin is set by how the contact fluctuates along the lane.",
+            "How far below they begin is set by how the contact fluctuates along the lane, and full spin-downs come "
+            "sooner than the even contact ends.",
             away, (low, high), "km/h",
         )
     ]  # fmt: skip

@@ -5,8 +5,8 @@ import re
 from dataclasses import replace
 
 import pytest
+from headless import requests, severe, wait_for
 from straight_drive import AWD, RWD, drive
-from test_browser import browser, requests, severe, wait_for  # noqa: F401 - browser is a fixture
 
 from aqualog.detect.slip_slope.direct import slip_slopes
 from aqualog.report.slope_page import render_slope_page, write_slope_page
@@ -70,7 +70,7 @@ def test_delay_and_reasons_are_on_the_page():
 
 
 @pytest.mark.browser
-def test_browser_draws_it_without_requests(browser, found, tmp_path):  # noqa: F811
+def test_browser_draws_it_without_requests(browser, found, tmp_path):
     path = tmp_path / "page.html"
     write_slope_page(found, path, title=HOSTILE)
     for kind in ("browser", "performance"):

@@ -303,7 +303,7 @@ CASES = [
     ("C45", lambda p, _: {"delta_a": 0.3 - 1e-6 * (p.p - 1.9e5) - 1e-4 * (p.load_front + p.load_rear)}, REPRODUCED),
     ("C45", lambda p, _: {"delta_a": 0.3 + 1e-6 * (p.p - 1.9e5) - 1e-4 * (p.load_front + p.load_rear)}, DIFFERENCE),
     ("C45", lambda p, _: {"delta_a": 0.3}, NOT_REPRODUCED),
-    ("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0}, REPRODUCED),
+    ("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0}, DIFFERENCE),
     ("C48", lambda p, _: {"slope_rr": 28.0 if p.h else 30.0}, DIFFERENCE),
     ("C48", lambda p, _: {"slope_rr": 30.0}, NOT_REPRODUCED),
     ("C50", lambda p, s: {"slope_rr": 20.0 + s}, REPRODUCED),
@@ -398,3 +398,10 @@ def test_shares_come_with_their_interval(verdict, monkeypatch):
     (check,) = MAKERS["C14"](Plan(SEEDS))
     assert check.value == 0.25
     assert check.ci95 == wilson(1, 4)
+
+
+def test_C48_asks_how_far_below_full_aquaplaning_it_was(verdict, monkeypatch):
+    from aqualog.reproduce.checks import slip_slope
+
+    monkeypatch.setattr(slip_slope, "_full_speed", lambda p: p.kmh + 22.0)
+    assert verdict("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0}) == REPRODUCED

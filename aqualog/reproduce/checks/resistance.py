@@ -108,7 +108,8 @@ def _c12(table: Table) -> Checks:
             f"with speed {grows_v}, with depth {grows_h}; resistance ranges over "
             + ", ".join(f"{k} {x:.3f}" for k, x in span.items()) + " m/s^2",
             judged(whole=grows and mainly, part=grows), value=shift, ci95=ci, unit="mm",
-            reason="The torque holds the drag of the film that the tread throws, too."
+            reason="That the wedge carries its load in front is assumed. The torque holds the drag of the film that "
+            "the tread throws, too."
             + ("" if grows and mainly else " Not all of depth, speed, pressure and load rank as said."),
             source=SOURCE + ", very worn summer tyres",
         ),

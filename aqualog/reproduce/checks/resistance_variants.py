@@ -96,7 +96,8 @@ def _c42(table: Table) -> Checks:
             "with a difference: less",
             "; ".join(f"{k}: {level[k]:.3f} m/s^2, {said(scaled(gradient[k]), n)} 1e-3 m/s^2 per km/h" for k in names)
             + f"; larger level over that of very worn {told(value, ci, 2)}",
-            judged(whole=below(0.5), part=below(1.0)), value=value, ci95=ci, reason=SHAPE,
+            judged(whole=below(0.5), part=below(1.0)), value=value, ci95=ci,
+            reason=SHAPE + " That deep treads take up water is assumed.",
             source=SOURCE + ", low pressure, 1.3 mm",
         ),
     )  # fmt: skip

@@ -163,7 +163,8 @@ def _c23(table: Table) -> Checks:
             f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s^2, 102 to 126 km/h)",
             judged(whole=whole, part=apart),
             value=a if np.isfinite(a) else None, ci95=ci if np.isfinite(a) else None,
-            reason=SHAPE if whole else SHAPE + " The tracks of the front wheels leave little of the difference.",
+            reason=SHAPE + " That the left track has less water is put in."
+            if whole else SHAPE + " The tracks of the front wheels leave little of the difference.",
             source=SOURCE + ", high pressure",
         ),
     )  # fmt: skip

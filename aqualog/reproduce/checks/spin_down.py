@@ -129,9 +129,10 @@ def _c17(table: Table) -> Checks:
     there = np.isfinite(value)
     return (
         Check(
-            "C17", "difference of the speeds reached by half of the passes 15 to 25 km/h; with a difference: 10 to 30",
+            "C17", "difference of the speeds reached by half of the passes 15 to 25 km/h with its whole interval; with "
+            "a difference: its value 10 to 30",
             f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h",
-            judged(whole=bool(there and 15.0 <= value <= 25.0), part=bool(there and 10.0 <= value <= 30.0)),
+            judged(whole=bool(there and ci[0] >= 15.0 and ci[1] <= 25.0), part=bool(there and 10.0 <= value <= 30.0)),
             value=value if there else None, ci95=ci if np.all(np.isfinite(ci)) else None, unit="km/h",
             reason=SHAPE, source=SOURCE,
         ),
