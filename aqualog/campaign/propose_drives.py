@@ -119,6 +119,8 @@ def _walk(folder: Path) -> list[Path]:
 
 def _table_kind(path: Path) -> str:
     """`labels` or `runs` for tables that are no logs, else empty."""
+    if not path.is_file():  # a pipe would never end
+        return ""
     try:
         with path.open("rb") as file:
             head = file.readline(4096).decode("utf-8-sig", errors="replace")

@@ -176,9 +176,13 @@ def write_table(out: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     import polars as pl
 
     from aqualog.cli.files import write_whole
+    from aqualog.report.campaign_csv import safe_cell
     from aqualog.report.campaign_document import flat_rows
 
-    frame = pl.DataFrame(flat_rows(rows), infer_schema_length=None)
+    plain = flat_rows(rows)
+    if out.suffix.lower() == ".csv":
+        plain = [{k: safe_cell(v) if isinstance(v, str) else v for k, v in row.items()} for row in plain]
+    frame = pl.DataFrame(plain, infer_schema_length=None)
     if out.suffix.lower() == ".parquet":
         write_whole(out, frame.write_parquet)
     else:

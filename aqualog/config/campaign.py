@@ -115,7 +115,7 @@ def read_campaign(path: Path) -> CampaignFile:
     faults.raise_if_any()
     done = [(run, sink.place) for run, sink in found if run is not None]
     if not done:
-        raise ConfigError("no run in it", where=str(path), expected="at least one log")
+        raise ConfigError("no run in it", where=str(table or path), expected="at least one log")
     campaign = Campaign(str(document.get("name", path.stem)), path, signals, tuple(r for r, _ in done), table)
     return CampaignFile(campaign, tuple(place for _, place in done))
 
@@ -253,6 +253,8 @@ def _no_log(path: Path, name: str) -> str:
             sniff(path)
         except LogError:
             return "is a folder without a ROS 2 bag; a run names its files one by one"
+    elif os.path.exists(path) and not os.path.isfile(path):  # noqa: PTH110, PTH113
+        return "is a device or a pipe, no log"
     elif any(c in name for c in "*?") and not os.path.exists(path):  # noqa: PTH110
         return "is a pattern; a run names its files one by one (`aqualog campaign init FOLDER` lists a folder)"
     elif name.startswith("@") and not os.path.exists(path):  # noqa: PTH110

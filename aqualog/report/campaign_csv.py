@@ -13,7 +13,7 @@ from aqualog.detect.needs import DETECTORS
 from aqualog.report.campaign_findings import Curve, Findings
 from aqualog.report.campaign_runs import RunFacts
 
-__all__ = ["tables_of"]
+__all__ = ["safe_cell", "tables_of"]
 
 _DIGITS = 6
 Row = Sequence[object]
@@ -76,12 +76,12 @@ def _values(group: Group) -> list[object]:
 def _csv(heading: Row, rows: Iterable[Row]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([_cell(c) for c in heading])
-    writer.writerows([_cell(c) for c in row] for row in rows)
+    writer.writerow([safe_cell(c) for c in heading])
+    writer.writerows([safe_cell(c) for c in row] for row in rows)
     return out.getvalue()
 
 
-def _cell(value: object) -> str:
+def safe_cell(value: object) -> str:
     """A cell that no spreadsheet takes for a formula; empty for what is no number."""
     if isinstance(value, float):
         return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""

@@ -15,6 +15,7 @@ from aqualog.report.wording import detector_name
 __all__ = ["MOST_KINDS", "Problem", "problems_of"]
 
 MOST_KINDS = 25  # of notes that have a line of their own
+_LANE_SLACK_S = 1.0  # [s] clocks of a lane and of a log
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 
 
@@ -46,12 +47,21 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
             data, "limit", "lane not known", "neither lane times, labels, a signal on_water nor a dry run: they count "
             "in no figure over speed", lambda r: "" if r.water_from else "no lane",
         ),
+        _of_done(data, "limit", "lane behind the log's end", "it counts as far as the log goes", _lane_beyond),
         *_unavailable(data),
         *_few(data, keys),
         *_notes(data),
     ]  # fmt: skip
     order = ("loss", "limit", "note")
     return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -len(p.runs))))
+
+
+def _lane_beyond(info: RunInfo) -> str:
+    """A lane that ends, or even begins, when the log is over: it belongs to another log, or to another clock."""
+    lane, end = info.run.lane, info.about["duration_s"]
+    if lane is None or lane[1] <= end + _LANE_SLACK_S:
+        return ""
+    return f"lane from {lane[0]:g} to {lane[1]:g} s, the log ends at {end:.1f} s"
 
 
 def _all(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:

@@ -17,7 +17,7 @@ from aqualog.reproduce.verdict import VERDICTS
 __all__ = ["claims_csv", "counts_of", "document"]
 
 _HEADER = (
-    "claim", "where", "kind", "statement", "verdict", "part", "criterion", "found", "value", "ci95_low", "ci95_high",
+    "claim", "where", "kind", "statement", "verdict", "part", "criterion", "found", "value", "low", "high",
     "unit", "check_verdict", "reason", "source",
 )  # fmt: skip
 
@@ -52,13 +52,13 @@ def document(
 def _check(check: Check) -> dict[str, Any]:
     return {
         "part": check.part, "statement": check.statement, "criterion": check.criterion, "found": check.found,
-        "value": check.value, "ci95": list(check.ci95) if check.ci95 else None, "unit": check.unit,
+        "value": check.value, "interval": list(check.ci95) if check.ci95 else None, "unit": check.unit,
         "verdict": check.verdict, "reason": check.reason, "source": check.source,
     }  # fmt: skip
 
 
 def claims_csv(conclusions: Sequence[Conclusion]) -> str:
-    """A line per check."""
+    """A line per check; `low` and `high` are its 95 % interval, or the range that `found` or `source` names."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_HEADER)

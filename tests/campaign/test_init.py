@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+import os
 import shutil
 
 import numpy as np
@@ -11,13 +12,14 @@ from conftest import ROOT
 from typer.testing import CliRunner
 
 from aqualog.align.load import load_signals
-from aqualog.campaign.propose_drives import drive_name, group_drives, kinds_of, scan
+from aqualog.campaign.propose_drives import drive_name, group_drives, is_run_table, kinds_of, scan
 from aqualog.campaign.propose_names import read_names
 from aqualog.campaign.store import MARK
 from aqualog.cli.campaign import campaign_app
 from aqualog.config.campaign import load_campaign
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
+from aqualog.errors import ConfigError
 
 SAMPLE = ROOT / "sample_logs" / "lane_drive.mf4"
 CAR = ROOT / "sample_logs" / "vehicle.toml"
@@ -364,3 +366,13 @@ def test_folders_with_odd_names_and_links(tmp_path):
     assert run(tmp_path / "logs", "-o", tmp_path / "link" / "campaign.toml", "--vehicle", CAR).exit_code == 0
     (only,) = load_campaign(tmp_path / "link" / "campaign.toml").runs
     assert only.logs[0].is_file()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_a_pipe_that_is_called_like_a_table_does_not_stop_it(tmp_path):
+    os.mkfifo(tmp_path / "runs.csv")
+    assert not is_run_table(tmp_path / "runs.csv")
+    (tmp_path / "campaign.toml").write_text('vehicle = "c.toml"\n[[run]]\nlog = "runs.csv"\n')
+    (tmp_path / "c.toml").write_text('name = "c"\n')
+    with pytest.raises(ConfigError, match="device or a pipe"):
+        load_campaign(tmp_path / "campaign.toml")

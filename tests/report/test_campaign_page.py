@@ -351,3 +351,13 @@ def test_values_in_words():
     assert group_text(group) == "worn · 1.3 mm · x"
     assert page_names(["a", "a"])[0] != page_names(["a", "a"])[1]
     assert Path(page_names([LONG])[0]).suffix == ".html"
+
+
+def test_a_lane_behind_the_end_of_its_log_is_a_problem(case):
+    info = case.done[0]
+    end = info.about["duration_s"]
+    late = replace(info, run=replace(info.run, lane=(end + 5.0, end + 8.0)))
+    data = SimpleNamespace(runs=(late,), done=(late,), keys=case.keys, configured=case.configured)
+    found = [p for p in problems_of(data, case.keys) if "behind the log's end" in p.title]
+    assert found[0].runs == ((info.index, f"lane from {end + 5.0:g} to {end + 8.0:g} s, the log ends at {end:.1f} s"),)
+    assert not [p for p in problems_of(case, case.keys) if "behind the log's end" in p.title]
