@@ -15,7 +15,7 @@ from aqualog.vehicle import KEYS, POLYNOMIALS
 
 __all__ = ["NEEDED", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
 
-NEEDED = ("mass", "l_f", "l_r", "wheels.r_e_f", "wheels.r_e_r")
+NEEDED = ("drivetrain", "mass", "l_f", "l_r", "wheels.r_e_f", "wheels.r_e_r")
 """Keys without which forces, loads or slip would be those of another car."""
 
 _COLUMNS = (

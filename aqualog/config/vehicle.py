@@ -33,8 +33,8 @@ def load_vehicle(path: Path) -> Vehicle:
     values: dict[str, Any] = {"name": str(document.pop("name", path.stem))}
     if isinstance(values.get("name"), str) and not values["name"].isprintable():
         faults.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
+    given = {"name", *(n for n in ("drivetrain",) if n in document)}
     drivetrain = document.pop("drivetrain", "rwd")
-    given = {"name"}
     if not isinstance(drivetrain, str) or drivetrain not in _SPLIT:
         faults.add("drivetrain", f'drivetrain = {drivetrain!r} is not one of "rwd", "fwd", "awd"')
         drivetrain = "rwd"

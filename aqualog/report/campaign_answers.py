@@ -97,7 +97,8 @@ def _lowest(found: Sequence[Number]) -> Number:
     told = [n for n in found if math.isfinite(n.v)]
     if told:
         return min(told, key=lambda n: n.v)
-    return max(found, key=lambda n: n.low if math.isfinite(n.low) else -math.inf) if found else NOTHING
+    # of speeds that are only bounded below, the lowest bound holds for the car
+    return min(found, key=lambda n: n.low if math.isfinite(n.low) else math.inf) if found else NOTHING
 
 
 def headline(data: CampaignData, findings: Findings) -> str:

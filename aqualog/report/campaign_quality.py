@@ -48,12 +48,24 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
             "in no figure over speed", lambda r: "" if r.water_from else "no lane",
         ),
         _of_done(data, "limit", "lane behind the log's end", "it counts as far as the log goes", _lane_beyond),
+        _of_done(data, "limit", "vehicle file does not give the drivetrain", "rear-wheel drive is taken",
+                 lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
+        _of_done(data, "limit", "slip-slope drop without a dry slope", "it finds a drop only against what the drive "
+                 "itself has shown; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
         *_unavailable(data),
         *_few(data, keys),
         *_notes(data),
     ]  # fmt: skip
     order = ("loss", "limit", "note")
     return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -len(p.runs))))
+
+
+def _no_dry_slope(info: RunInfo) -> str:
+    """A vehicle file without the dry slope of a driven axle: the defaults are no knowledge."""
+    axles = sorted({w[0] for w in info.vehicle.driven})
+    if "slip_slope_drop" in info.about["unavailable"]:
+        return ""
+    return "" if any(f"tyre.slip_slope_{a}" in info.vehicle.given for a in axles) else info.run.vehicle.name
 
 
 def _lane_beyond(info: RunInfo) -> str:

@@ -87,7 +87,7 @@ def _unset(vehicles: Mapping[str, Vehicle]) -> list[str]:
     """Keys of the vehicle files for which a value of no particular car stands in."""
     unset = {name: [k for k in NEEDED if k not in v.given] for name, v in vehicles.items()}
     return [
-        f"{name} does not give {', '.join(keys)}: values of a mid-size car are taken"
+        f"{name} does not give {', '.join(keys)}: a mid-size car with rear-wheel drive is taken"
         for name, keys in unset.items()
         if keys
     ]

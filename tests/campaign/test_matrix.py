@@ -152,7 +152,7 @@ def test_the_command_shows_the_matrix(folder):
     for part in (
         "wet: 9 runs in 3 configurations", "all there, 0.0 MB", "car, rwd, 1500 kg", "same in all runs: vehicle = car",
         "! 1 of 3 configurations with fewer than 3 runs", "~ 1 of 3 configurations with fewer than 5 runs",
-        "5 of 9 runs tell neither lane times", "    b, 1.3\n", "car.toml does not give l_f, l_r, wheels.r_e_f",
+        "5 of 9 runs tell neither lane times", "    b, 1.3\n", "car.toml does not give drivetrain, l_f, l_r, wheels.r_e_f",
     ):  # fmt: skip
         assert part in out.output, out.output
     document = json.loads(CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml"), "--json"]).stdout)

@@ -1,6 +1,6 @@
 // Figures over speed: one panel per configuration without the key that the colours stand for.
 const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6BB3", "#8C6D31"];
-const DASHES = { rr: "dot", right: "dot", fl: "longdash", fr: "dashdot" }; // else solid
+const RIGHT = ["rr", "fr", "right"]; // thin with diamonds; else thick with dots
 const DASH_NAMES = { rr: "┈┈┈", right: "┈┈┈", fl: "━ ━", fr: "━ ┈" };
 const WAYS = {
   slip_slope: ["from the slip slope", "#0072B2", "circle"],
@@ -145,7 +145,7 @@ function digits(v) { return v === null ? "–" : Math.abs(v) >= 10 ? v.toFixed(1
 function tracesOf(curve, unit, colourText, isFirst) {
   const [g, place, points] = curve, colour = colourOf(g), told = points.filter(function (p) { return p[3] !== null; });
   const name = plotText([colourText, placeName(place)].filter(Boolean).join(" ") || "mean"), id = plotText(colourText);
-  const dash = DASHES[place] || "solid";
+  const isRight = RIGHT.includes(place), dot = isRight ? "diamond" : "circle";
   const [bx, by] = band(told);
   const traces = [{
     type: "scatter", mode: "none", x: bx, y: by, fill: "toself", fillcolor: see(colour, 0.16), hoverinfo: "skip",
@@ -154,8 +154,8 @@ function tracesOf(curve, unit, colourText, isFirst) {
     type: "scatter", mode: "lines+markers", name: plotText(colourText), legendgroup: id, meta: "values",
     showlegend: isFirst,
     x: told.map(function (p) { return p[2]; }), y: told.map(function (p) { return p[3]; }),
-    line: { color: colour, width: 2, dash: dash },
-    marker: { color: colour, size: 7, symbol: told.map(function (p) { return p[4] === null ? "circle-open" : "circle"; }) },
+    line: { color: colour, width: isRight ? 1.1 : 2.4 },
+    marker: { color: colour, size: 7, symbol: told.map(function (p) { return p[4] === null ? dot + "-open" : dot; }) },
     error_y: {
       type: "data", symmetric: false, thickness: 1, width: 3, color: colour,
       array: told.map(function (p) { return p[5] === null ? 0 : p[5] - p[3]; }),
