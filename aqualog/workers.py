@@ -5,13 +5,16 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from threading import Thread
+from contextlib import contextmanager
+from threading import Thread, current_thread, main_thread
 from typing import Any, TypeVar
 
-__all__ = ["Crashed", "work_on"]
+__all__ = ["Crashed", "most_processes", "work_on"]
+
+_PER_CORE = 4  # more processes than this many a core only take memory
 
 Name = TypeVar("Name", bound=Hashable)
 
@@ -34,7 +37,8 @@ def work_on(
     tasks : mapping name -> arguments
         Picklable, as is `work`, a function of a module. It should return failures it expects as values.
     jobs : int
-        Processes, >= 1. They are spawned: a fork would copy the threads of polars and numba.
+        Processes, >= 1; no more than `most_processes` are made. They are spawned: a fork would copy the threads of
+        polars and numba.
     record : callable
         Called here with name and result as each is done; the result is `Crashed` if the process ended. An item that
         was merely in work beside one that crashed is done again, alone.
@@ -42,7 +46,7 @@ def work_on(
     An interrupt lets the items in work finish and records them before it is raised.
     """
     left = dict(tasks)
-    suspects = _round(left, work, min(jobs, len(left)), record) if left else []
+    suspects = _round(left, work, min(jobs, len(left), most_processes()), record) if left else []
     while suspects:
         # one of them has taken the pool down; each gets a process of its own, which tells which
         name = suspects.pop(0)
@@ -51,6 +55,11 @@ def work_on(
             record(name, Crashed())
     if left and len(left) < len(tasks):
         work_on(left, work, jobs=jobs, record=record)
+
+
+def most_processes() -> int:
+    """Most processes that are made on this machine, whatever is asked for."""
+    return _PER_CORE * (os.cpu_count() or 1)
 
 
 def _taken(left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None], name: Name, result: Any) -> None:
@@ -68,7 +77,8 @@ def _round(
         try:
             # few in the queue: when a pool breaks, only those that it held are in doubt
             for name, task in todo:
-                pending[pool.submit(work, *task)] = name
+                with _no_interrupt():
+                    pending[pool.submit(work, *task)] = name
                 if len(pending) >= 2 * jobs:
                     broken = _collect(pending, left, record)
                     if broken:
@@ -103,9 +113,33 @@ def _collect(
     return [*in_doubt, *pending.values()] if in_doubt else []
 
 
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Let an interrupt wait until the end of the block.
+
+    A process started within inherits that, and is not torn from its imports by one; nor is what it reads from here cut
+    off, which the mask alone does not ensure: a thread of a library may take the signal for the main thread.
+    """
+    if not hasattr(signal, "pthread_sigmask") or current_thread() is not main_thread():
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
 def _quiet_worker() -> None:
     """An interrupt is the parent's business; a worker finishes what it has in hand, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     os.environ["POLARS_MAX_THREADS"] = "1"
     Thread(target=_end_with_parent, daemon=True).start()
 

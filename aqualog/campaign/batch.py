@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
+
+from polars.exceptions import PanicException
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
-from aqualog.campaign.key import Contents, result_key
+from aqualog.campaign.key import Contents, Seen, change_since, result_key
 from aqualog.campaign.loaded import loaded
 from aqualog.campaign.measure import Measurement, measure
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.store import Store
 from aqualog.campaign.tables import write_tables
 from aqualog.detect.stream import Settings
-from aqualog.errors import AqualogError
+from aqualog.errors import AqualogError, ConfigError, FitError, LogError, SignalError
 from aqualog.evaluate.labels import Label
 from aqualog.vehicle import Vehicle
 from aqualog.workers import Crashed, work_on
 
-__all__ = ["BatchOutcome", "Configured", "Job", "measure_one", "name_of", "plan_jobs", "run_batch"]
+__all__ = ["BatchOutcome", "Configured", "Fault", "Job", "measure_one", "name_of", "plan_jobs", "run_batch"]
 
 Report = Callable[[int, int, int], None]
 """Told logs that are settled, logs in all, and failed ones so far."""
@@ -43,13 +47,29 @@ class Configured:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A log with the car that drove it, and the runs (by index) that it serves. `reason` if it cannot be worked on."""
+    """A log with the car that drove it, and the runs (by index) that it serves. `reason` if it cannot be worked on.
+
+    `seen` is the state of its files, and of the databases, for whose content `key` stands.
+    """
 
     key: str
     logs: tuple[Path, ...]
     vehicle: Vehicle
     runs: tuple[int, ...]
     reason: str = ""
+    seen: Seen = ()
+
+
+class Fault(NamedTuple):
+    """Why a log gave nothing.
+
+    `is_proven` by its content, so that only a change makes it worth another try; `ends_batch` where the store, not the
+    log, is at fault.
+    """
+
+    reason: str
+    is_proven: bool = False
+    ends_batch: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +114,37 @@ def _job(
     try:
         key = result_key(contents, logs, car, configured.signal_map, configured.dbc, configured.settings)
     except OSError as error:
-        missing = next((p for p in logs if not p.exists()), logs[0])
-        what = "there is no such file" if not missing.exists() else error.strerror or str(error)
-        return Job("", logs, car, tuple(indices), f"{missing}: {what}")
-    return Job(key, logs, car, tuple(indices))
+        what = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror or str(error)
+        return Job("", logs, car, tuple(indices), f"{error.filename or logs[0]}: {what}")
+    return Job(key, logs, car, tuple(indices), seen=contents.seen((*logs, *configured.dbc)))
+
+
+class _Plan(NamedTuple):
+    """Jobs against the store: to measure by key, how many are there, failed before and why, and damaged files."""
+
+    new: Mapping[str, Job]
+    kept: int
+    failed: Sequence[tuple[Job, str]]
+    damaged: Sequence[str]
+
+
+def _compared(todo: Sequence[Job], store: Store, *, force: bool) -> _Plan:
+    done, known_failed = store.keys()
+    damaged = [k for k in sorted(done & {j.key for j in todo}) if not store.is_sound(k)]
+    done = set() if force else done - set(damaged)
+    new: dict[str, Job] = {}
+    kept = 0
+    failed = []
+    for job in todo:
+        if job.reason:
+            failed.append((job, job.reason))
+        elif job.key in done or job.key in new:
+            kept += 1
+        elif job.key in known_failed and not force:
+            failed.append((job, store.failure(job.key)))
+        else:
+            new[job.key] = job
+    return _Plan(new, kept, failed, damaged)
 
 
 def run_batch(
@@ -125,83 +172,149 @@ def run_batch(
     told : callable
         Told name and reason of every log that gives nothing, at once.
 
-    A log that fails leaves the others alone; that it failed is kept too, so that only a change of it, of its
-    configuration or of aqualog makes it be tried again. An interrupt loses nothing that is finished.
+    A log that fails leaves the others alone; if its content is at fault that is kept too, so that only a change of it,
+    of its configuration or of aqualog makes it be tried again. An interrupt loses nothing that is finished. A damaged
+    result counts as none. Where there is nothing to measure, the store may be read-only or in use by another batch.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is none of a store.
+    AqualogError
+        If it cannot be written or another batch writes there; what is finished stays.
     """
-    store.prepare()
+    store.check()
     contents = Contents(store.read_json("contents.json"))
     todo = plan_jobs(configured, contents)
-    if contents.has_changed:
-        store.write_json("contents.json", contents.known)
-    done_keys, failed_keys = (set(), set()) if force else store.keys()
-    failed: dict[str, str] = {}
-    made = 0
+    plan = _compared(todo, store, force=force)
+    with store.held(must=bool(plan.new)) as is_held:
+        if plan.new:
+            plan = _compared(todo, store, force=force)  # another batch may have been at work until now
+            for key in plan.damaged:
+                store.drop(key)
+        if is_held and contents.has_changed:
+            store.write_json("contents.json", contents.known)
+        tally = _Tally(configured, store, len(todo), plan, report, told)
+        try:
+            _work(configured, store, plan.new, jobs, tally.record)
+        except BaseException:
+            with suppress(AqualogError):  # what has ended the batch is what the user should know
+                write_tables(configured, store, todo)
+            raise
+        if is_held:
+            write_tables(configured, store, todo)
+    return BatchOutcome(tally.made, plan.kept, tally.failed)
 
-    def fail(job: Job, reason: str, *, keep: bool) -> None:
-        name = name_of(configured.campaign, job.logs)
-        failed[name] = reason
-        if keep:
-            store.put_failure(job.key, reason)
-        told(name, reason)
 
-    new: dict[str, Job] = {}
-    kept = 0
-    for job in todo:
-        if job.reason:
-            fail(job, job.reason, keep=False)
-        elif job.key in done_keys or job.key in new:
-            kept += 1
-        elif job.key in failed_keys:
-            fail(job, store.failure(job.key), keep=False)
-        else:
-            new[job.key] = job
+class _Tally:
+    """What has come of the logs so far."""
 
-    def record(key: str, outcome: str | Crashed) -> None:
-        nonlocal made
+    def __init__(
+        self, configured: Configured, store: Store, total: int, plan: _Plan, report: Report,
+        told: Callable[[str, str], None],
+    ) -> None:  # fmt: skip
+        self.made = 0
+        self.failed: dict[str, str] = {}
+        self._configured, self._store, self._total, self._plan = configured, store, total, plan
+        self._report, self._told = report, told
+        for job, reason in plan.failed:
+            self._fail(job, reason)
+        self._tell()
+
+    def record(self, key: str, outcome: Fault | Crashed | None) -> None:
+        """Take the outcome of a job.
+
+        Raises
+        ------
+        AqualogError
+            If the store is at fault.
+        """
+        job = self._plan.new[key]
         if isinstance(outcome, Crashed):
-            fail(new[key], CRASHED, keep=False)  # next time there may be more memory
-        elif outcome:
-            fail(new[key], outcome, keep=True)
+            self._fail(job, CRASHED)  # next time there may be more memory
+        elif outcome is None:
+            self.made += 1
+        elif outcome.ends_batch:
+            raise AqualogError(outcome.reason)
         else:
-            made += 1
-        report(kept + made + len(failed), len(todo), len(failed))
+            if outcome.is_proven:
+                self._store.put_failure(key, outcome.reason)
+            self._fail(job, outcome.reason)
+        self._tell()
 
-    try:
-        report(kept + len(failed), len(todo), len(failed))
-        tasks = {k: (store.folder, k, j.logs, j.vehicle, configured) for k, j in new.items()}
-        lean = {k: (*t[:4], configured.signal_map, configured.dbc, configured.settings) for k, t in tasks.items()}
-        if len(lean) <= _HERE or jobs == 1:
-            for key, task in lean.items():
-                record(key, measure_one(*task))
-        else:
-            work_on(lean, measure_one, jobs=jobs, record=record)
-    finally:
-        write_tables(configured, store, todo)
-    return BatchOutcome(made, kept, failed)
+    def _fail(self, job: Job, reason: str) -> None:
+        name = name_of(self._configured.campaign, job.logs)
+        self.failed[name] = reason
+        self._told(name, reason)
+
+    def _tell(self) -> None:
+        self._report(self._plan.kept + self.made + len(self.failed), self._total, len(self.failed))
+
+
+def _work(
+    configured: Configured,
+    store: Store,
+    new: Mapping[str, Job],
+    jobs: int,
+    record: Callable[[str, Fault | Crashed | None], None],
+) -> None:
+    shared = (configured.signal_map, configured.dbc, configured.settings)
+    tasks = {k: (store.folder, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
+    if len(tasks) > _HERE and jobs > 1:
+        work_on(tasks, measure_one, jobs=jobs, record=record)
+        return
+    for key, task in tasks.items():
+        record(key, measure_one(*task))
 
 
 def measure_one(
     folder: Path,
     key: str,
+    seen: Seen,
     logs: tuple[Path, ...],
     vehicle: Vehicle,
     signal_map: SignalMap,
     dbc: tuple[Path, ...],
     settings: Settings,
-) -> str:
-    """Measure one log into the store; empty, or why it gave nothing."""
+) -> Fault | None:
+    """Measure one log into the store; none, or why it gave nothing."""
     try:
         measurement = _measured(logs, vehicle, signal_map, dbc, settings)
+        found = None
+    except (Exception, PanicException) as error:
+        found = _fault(error, logs)
+    changed = change_since((*logs, *dbc), seen)
+    if changed:
+        return Fault(changed)  # whatever was read, it is not what the key stands for
+    if found is not None:
+        return found
+    try:
         Store(folder).put(key, measurement)
     except AqualogError as error:
-        return error.line()
-    except OSError as error:
-        return f"{error.filename or ', '.join(map(str, logs))}: {error.strerror or error}"
-    except MemoryError:
-        return "not enough memory"
+        return Fault(error.line(), ends_batch=True)
     except Exception as error:
-        return f"aqualog failed ({type(error).__name__}: {str(error)[:200]}). Try: `aqualog detect` on it with --debug"
-    return ""
+        return Fault(_told(error, logs))
+    return None
+
+
+def _fault(error: BaseException, logs: Sequence[Path]) -> Fault:
+    """Only what the reading itself says of a log is proven; a disk, memory or aqualog at fault may be well again."""
+    behind: BaseException | None = error
+    while behind is not None:
+        if isinstance(behind, OSError | MemoryError):
+            return Fault(_told(error, logs))
+        behind = behind.__cause__ or behind.__context__
+    return Fault(_told(error, logs), is_proven=isinstance(error, LogError | SignalError | ConfigError | FitError))
+
+
+def _told(error: BaseException, logs: Sequence[Path]) -> str:
+    if isinstance(error, AqualogError):
+        return error.line()
+    if isinstance(error, OSError):
+        return f"{error.filename or ', '.join(map(str, logs))}: {error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return "not enough memory"
+    return f"aqualog failed ({type(error).__name__}: {str(error)[:200]}). Try: `aqualog detect` on it with --debug"
 
 
 def _measured(

@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
+import stat
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from aqualog.align.mapping import SignalMap
 from aqualog.detect.stream import Settings
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Contents", "code_stamp", "result_key"]
+__all__ = ["Contents", "Seen", "change_since", "code_stamp", "result_key"]
 
-_BEHIND = ("physics", "io", "align", "features", "detect", "campaign/measure.py", "units.py", "notation.py")
+Seen = tuple[tuple[str, int, int], ...]
+"""Files with size and time of change."""
+
+_BEHIND = (
+    "physics", "io", "align", "features", "calibrate", "detect", "campaign/measure.py", "compiled.py", "errors.py",
+    "intervals.py", "notation.py", "types.py", "units.py", "vehicle.py",
+)  # fmt: skip
 _LENGTH = 32  # hexadecimal digits of a key: 128 bit
 
 
 class Contents:
     """Hashes of files, remembered as long as size and time of change stay; `known` maps path -> [size, mtime, hash]."""
 
-    def __init__(self, known: dict[str, list[int | str]] | None = None) -> None:
-        self.known = dict(known or {})
+    def __init__(self, known: Any = None) -> None:
+        # it comes from a file: what is not as it should be is not known
+        self.known: dict[str, list[int | str]] = (
+            {k: v for k, v in known.items() if _is_entry(v)} if isinstance(known, dict) else {}
+        )
         self.has_changed = False
 
     def of(self, path: Path) -> str:
@@ -30,13 +43,14 @@ class Contents:
         Raises
         ------
         OSError
-            If it cannot be read.
+            If it cannot be read, also for a device or a pipe, which has no end or no content of its own.
         """
         if path.is_dir():
-            parts = [f"{p.relative_to(path)}:{self.of(p)}" for p in sorted(path.rglob("*")) if p.is_file()]
-            return _hash(parts)
+            return _hash(f"{p.relative_to(path)}:{self.of(p)}" for p in _files(path))
         state = path.stat()
-        name = str(path.resolve())
+        if not stat.S_ISREG(state.st_mode):
+            raise OSError(errno.EINVAL, "is a device or a pipe; expected a log", str(path))
+        name = os.path.realpath(path)
         entry = self.known.get(name)
         if entry and entry[:2] == [state.st_size, state.st_mtime_ns]:
             return str(entry[2])
@@ -45,6 +59,25 @@ class Contents:
         self.known[name] = [state.st_size, state.st_mtime_ns, digest]
         self.has_changed = True
         return digest
+
+    def seen(self, paths: Iterable[Path]) -> Seen:
+        """The files behind `paths`, in the state in which they were hashed."""
+        files = [f for p in paths for f in _files(p)]
+        entries = (self.known.get(os.path.realpath(f), [-1, -1]) for f in files)
+        return tuple((str(f), int(e[0]), int(e[1])) for f, e in zip(files, entries, strict=True))
+
+
+def change_since(paths: Sequence[Path], seen: Seen) -> str:
+    """What has become of files since they were hashed; empty if their content is still what the key stands for."""
+    try:
+        states = [(str(f), f.stat()) for p in paths for f in _files(p)]
+    except OSError as error:
+        return f"{error.filename}: {error.strerror} while it was read"
+    now = tuple((name, state.st_size, state.st_mtime_ns) for name, state in states)
+    if now == seen:
+        return ""
+    name = min(set(now) ^ set(seen), default=(", ".join(map(str, paths)),))[0]
+    return f"{name}: changed while it was read. Try: run the batch again"
 
 
 def result_key(
@@ -72,6 +105,14 @@ def code_stamp() -> str:
         p for name in _BEHIND for p in ([package / name] if name.endswith(".py") else (package / name).rglob("*.py"))
     ]
     return _hash(f"{p.relative_to(package)}:{hashlib.sha256(p.read_bytes()).hexdigest()}" for p in sorted(paths))
+
+
+def _files(path: Path) -> list[Path]:
+    return [p for p in sorted(path.rglob("*")) if p.is_file()] if path.is_dir() else [path]
+
+
+def _is_entry(entry: Any) -> bool:
+    return isinstance(entry, list) and [type(x) for x in entry] == [int, int, str]
 
 
 def _told(vehicle: Vehicle) -> str:

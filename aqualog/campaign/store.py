@@ -6,27 +6,49 @@ STORE/runs.parquet          a row per run        (made anew by every batch)
 STORE/events.parquet        a row per event      (as above)
 STORE/manifest.json         state of every log   (as above)
 STORE/contents.json         hashes of the logs by size and time of change
+STORE/lock                  held by the batch that writes here; readers need none
 """
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from aqualog.campaign.measure import Measurement
-from aqualog.errors import ConfigError, LogError
-from aqualog.io.whole import write_text, write_whole
+from aqualog.errors import AqualogError, ConfigError, LogError
+from aqualog.io.whole import only_here, write_text, write_whole
+from aqualog.notation import WHEELS
 
 __all__ = ["MARK", "Store"]
 
 MARK = "aqualog_store.json"
 _METADATA_KEY = "aqualog"
-_OWN = ("samples", "failed", "pages", "runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK)
+_SCHEMA = 1
+_LOCK = "lock"
+_FOLDERS = ("samples", "failed")
+_FILES = ("runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK, _LOCK)
+_ORPHAN = re.compile(r"\..{1,40}-\w{8}\.(parquet|json)\.tmp", re.DOTALL)
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
+# what readers of the store rely on
+_COLUMNS = frozenset(
+    ["t", "v_x", "a_x", "a_over_v", "delta_a_x", "reason"]
+    + [f"{n}_{w}" for n in ("slip", "slip_min", "slip_max", "mu", "spin", "minor") for w in WHEELS]
+)
+_PARTS: Mapping[str, type] = {
+    "start_ns": object, "duration_s": float, "sample_rate_hz": float, "distance_m": object, "v_min": object,
+    "v_max": object, "slip_against": str, "traction": str, "signals": list, "events": list, "unavailable": dict,
+    "limited": dict, "quality": dict, "notes": list,
+}  # fmt: skip
 
 
 class Store:
@@ -41,23 +63,81 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def prepare(self) -> None:
-        """Make the folder, and refuse one that holds something else.
+    def check(self) -> None:
+        """Refuse a folder that is none of a store; one that is not there will do.
 
         Raises
         ------
         ConfigError
         """
-        if self.folder.exists() and not self.folder.is_dir():
+        if not self.folder.exists():
+            if self.folder.is_symlink():
+                raise ConfigError("is a link to nothing", where=str(self.folder), expected="a folder for the results")
+            return
+        if not self.folder.is_dir():
             raise ConfigError("is a file", where=str(self.folder), expected="a folder for the results")
-        if self.folder.is_dir() and not (self.folder / MARK).exists() and any(self.folder.iterdir()):
-            raise ConfigError(
-                "holds other files", where=str(self.folder), expected="an empty folder, or one of `aqualog batch`"
-            )
-        for name in ("samples", "failed"):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        self._check_parts()
         if not (self.folder / MARK).exists():
-            write_text(self.folder / MARK, json.dumps({"schema_version": 1}) + "\n")
+            if any(p.name != _LOCK and not _is_orphan(p) for p in self.folder.iterdir()):
+                raise ConfigError(
+                    "holds other files", where=str(self.folder), expected="an empty folder, or one of `aqualog batch`"
+                )
+            return
+        mark = self.read_json(MARK)
+        version = mark.get("schema_version") if isinstance(mark, dict) else None
+        if version != _SCHEMA:
+            raise ConfigError(
+                f"is a store of schema_version {version}", where=str(self.folder / MARK),
+                expected=f"schema_version {_SCHEMA}", hint="another folder for this version's results",
+            )  # fmt: skip
+
+    def _check_parts(self) -> None:
+        for name in _FOLDERS:
+            path = self.folder / name
+            if os.path.lexists(path) and not path.is_dir():
+                raise ConfigError("is no folder", where=str(path), expected="the store's folder", hint="remove it")
+        for name in _FILES:
+            path = self.folder / name
+            if path.is_dir():
+                raise ConfigError("is a folder", where=str(path), expected="the store's file", hint="remove it")
+
+    @contextmanager
+    def held(self, *, must: bool) -> Iterator[bool]:
+        """Make the folder ready and keep other batches out; within, whether that could be done.
+
+        Parameters
+        ----------
+        must : bool
+            Whether there is something to write; if not, a store that is only read may be in use or read-only.
+
+        Raises
+        ------
+        AqualogError
+            If it must be held and another batch holds it, or it cannot be written.
+        """
+        with ExitStack() as stack:
+            is_held = False
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                stack.enter_context(only_here(self.folder / _LOCK))
+                self._make()
+                is_held = True
+            except BlockingIOError as error:
+                if must:
+                    raise AqualogError(
+                        f"is in use by another batch (process {error.strerror})", where=str(self.folder),
+                        hint="wait until it is done, or --store DIR",
+                    ) from error  # fmt: skip
+            except OSError as error:
+                if must:
+                    raise self._unwritable(error) from error
+            yield is_held
+
+    def _make(self) -> None:
+        if not (self.folder / MARK).exists():
+            write_text(self.folder / MARK, json.dumps({"schema_version": _SCHEMA}) + "\n")
+        for name in _FOLDERS:
+            (self.folder / name).mkdir(exist_ok=True)
         self._sweep()
 
     @property
@@ -80,17 +160,22 @@ class Store:
         return _stems(self.folder / "samples", ".parquet"), _stems(self.folder / "failed", ".json")
 
     def put(self, key: str, measurement: Measurement) -> None:
-        """Keep the result of a log, whole."""
+        """Keep the result of a log, whole.
+
+        Raises
+        ------
+        AqualogError
+            If the store cannot be written; this and the methods below that write.
+        """
         metadata = {_METADATA_KEY: json.dumps(measurement.about, ensure_ascii=True, separators=(",", ":"))}
-        write_whole(
-            self.samples_path(key),
-            lambda p: measurement.samples.write_parquet(p, metadata=metadata, compression="zstd", statistics=False),
-        )
-        self._failure_path(key).unlink(missing_ok=True)
+        with self._told():
+            _write_frame(self.samples_path(key), measurement.samples, metadata=metadata, statistics=False)
+            self._failure_path(key).unlink(missing_ok=True)
 
     def put_failure(self, key: str, reason: str) -> None:
         """Keep why a log gave nothing."""
-        write_text(self._failure_path(key), json.dumps({"reason": reason}) + "\n")
+        with self._told():
+            write_text(self._failure_path(key), json.dumps({"reason": reason}) + "\n")
 
     def failure(self, key: str) -> str:
         """Why a log gave nothing."""
@@ -99,10 +184,18 @@ class Store:
         except (OSError, ValueError, KeyError, TypeError):
             return "failed, and the reason cannot be read"
 
-    def forget(self, key: str) -> None:
-        """Remove what is kept of a log."""
-        self.samples_path(key).unlink(missing_ok=True)
-        self._failure_path(key).unlink(missing_ok=True)
+    def drop(self, key: str) -> None:
+        """Remove a log's file, a damaged one."""
+        with self._told():
+            self.samples_path(key).unlink(missing_ok=True)
+
+    def is_sound(self, key: str) -> bool:
+        """Whether a log's file can be read as far as its metadata and columns tell."""
+        try:
+            self.about(key)
+        except LogError:
+            return False
+        return True
 
     def about(self, key: str) -> Mapping[str, Any]:
         """What was found in a log.
@@ -115,26 +208,33 @@ class Store:
         path = self.samples_path(key)
         try:
             found: Mapping[str, Any] = json.loads(pl.read_parquet_metadata(path)[_METADATA_KEY])
-        except (OSError, ValueError, KeyError, pl.exceptions.PolarsError) as error:
-            raise LogError(
-                "is damaged", where=str(path), expected="a file that `aqualog batch` has written",
-                hint="remove it; the next batch makes it again",
-            ) from error  # fmt: skip
+            is_whole = _is_about(found) and pl.read_parquet_schema(path).keys() >= _COLUMNS
+        except (OSError, ValueError, KeyError, *_UNREADABLE) as error:
+            raise _damaged(path) from error
+        if not is_whole:
+            raise _damaged(path)
         return found
 
     def samples(self, key: str) -> pl.DataFrame:
-        """Samples of a log.
+        """Samples of a log. A file whose data are damaged is removed, so that the next batch makes it again.
 
         Raises
         ------
         LogError
-            If its file is damaged.
+            If its file is damaged or cannot be read.
         """
         path = self.samples_path(key)
         try:
-            return pl.read_parquet(path, hive_partitioning=False)
-        except (OSError, pl.exceptions.PolarsError) as error:
-            raise LogError("is damaged", where=str(path), hint="remove it; the next batch makes it again") from error
+            frame = pl.read_parquet(path, hive_partitioning=False)
+        except OSError as error:
+            raise LogError(f"cannot be read ({error.strerror or error})", where=str(path)) from error
+        except _UNREADABLE as error:
+            with suppress(OSError):  # a store that is only read
+                path.unlink()
+            raise _damaged(path) from error
+        if not set(frame.columns) >= _COLUMNS:
+            raise _damaged(path)
+        return frame
 
     def read_json(self, name: str) -> Any:
         """A JSON file of the store; None where it is not there or damaged."""
@@ -145,15 +245,36 @@ class Store:
 
     def write_json(self, name: str, document: Any) -> None:
         """A JSON file of the store, whole."""
-        write_text(self.folder / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        with self._told():
+            write_text(self.folder / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
     def write_table(self, name: str, frame: pl.DataFrame) -> None:
         """A table of the store, whole."""
-        write_whole(self.folder / name, lambda p: frame.write_parquet(p, compression="zstd"))
+        with self._told():
+            _write_frame(self.folder / name, frame)
 
     def holds(self, path: Path) -> bool:
         """Whether a path lies in this store."""
-        return path.resolve().is_relative_to(self.folder.resolve())
+        return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(self.folder))
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """A fault in writing is the store's, not that of the log whose result it is."""
+        try:
+            yield
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def _unwritable(self, error: OSError) -> AqualogError:
+        if error.errno in _NO_ROOM:
+            return AqualogError(
+                f"{error.strerror}".lower(), where=str(self.folder), expected="room for the results",
+                hint="make room, or --store DIR; the same command goes on with the rest",
+            )  # fmt: skip
+        file = error.filename2 or error.filename or self.folder
+        return AqualogError(
+            f"cannot be written ({error.strerror or error})", where=str(file), hint="its permissions, or --store DIR"
+        )
 
     def _failure_path(self, key: str) -> Path:
         return self.folder / "failed" / f"{key}.json"
@@ -162,7 +283,39 @@ class Store:
         """Remove what a killed process has left half-written."""
         for folder in (self.folder, self.folder / "samples", self.folder / "failed"):
             for orphan in folder.glob(".*.tmp"):
-                orphan.unlink(missing_ok=True)
+                if _is_orphan(orphan):
+                    orphan.unlink(missing_ok=True)
+
+
+def _is_orphan(path: Path) -> bool:
+    # the names that `write_whole` gives
+    return _ORPHAN.fullmatch(path.name) is not None
+
+
+def _write_frame(path: Path, frame: pl.DataFrame, **options: Any) -> None:
+    # into memory first: then a disk that is full is an OSError with its number
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, compression="zstd", **options)
+    write_whole(path, lambda temporary: _put(temporary, buffer))
+
+
+def _put(path: Path, buffer: io.BytesIO) -> None:
+    path.write_bytes(buffer.getbuffer())
+
+
+def _is_about(found: Any) -> bool:
+    if not isinstance(found, dict) or not found.keys() >= _PARTS.keys():
+        return False
+    if not all(isinstance(found[name], kind) for name, kind in _PARTS.items()):
+        return False
+    return all(isinstance(e, dict) and "detector" in e and isinstance(e.get("evidence"), dict) for e in found["events"])
+
+
+def _damaged(path: Path) -> LogError:
+    return LogError(
+        "is damaged", where=str(path), expected="a file that `aqualog batch` has written",
+        hint="the same command once more, which makes it again",
+    )  # fmt: skip
 
 
 def _stems(folder: Path, suffix: str) -> set[str]:

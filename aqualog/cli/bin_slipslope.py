@@ -122,7 +122,7 @@ def _bin_slipslope(
     check_table(out)
     configured = opened(inputs, vehicle=vehicle, map_file=map_file, dbc=dbc)
     check_plan(configured.campaign, split(by), width_kmh=width, road=road)
-    check_targets(configured, [out] if out is not None else [], force=force)
+    check_targets(configured, [out] if out is not None else [], force=force, store=store)
     data, outcome = results(configured, store, console=console, jobs=jobs)
     if not outcome.done:
         return exit_code(outcome, data)

@@ -12,7 +12,7 @@ from aqualog.cli.console import Console, clean, told_if_interrupted
 from aqualog.cli.evaluate_inputs import is_campaign
 from aqualog.cli.files import expand, list_files, refuse_existing
 from aqualog.cli.progress import Progress
-from aqualog.errors import AqualogError, ConfigError, ExitCode
+from aqualog.errors import ConfigError, ExitCode
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome, Configured
@@ -67,10 +67,27 @@ def store_of(configured: Configured, given: Path | None) -> Path:
     return configured.campaign.path.with_suffix(".store")
 
 
-def check_targets(configured: Configured, targets: Sequence[Path], *, force: bool) -> None:
-    """Refuse results that are in the way of something, or that the campaign itself reads."""
+def check_targets(
+    configured: Configured, targets: Sequence[Path], *, force: bool, store: Path | None = None
+) -> None:  # fmt: skip
+    """Refuse results that are in the way of something, that the campaign itself reads, or that lie in a store.
+
+    Parameters
+    ----------
+    store : Path, optional
+        Folder of the results as it was typed, for one that is not there yet.
+
+    Raises
+    ------
+    ConfigError
+    """
     from aqualog.config.configured import files_of
 
+    places = [store] if store is not None else []
+    if configured.campaign.path.suffix.lower() == ".toml":
+        places.append(store_of(configured, None))
+    for target in targets:
+        _refuse_in_store(target, places)
     refuse_existing(targets, force=force, sources=files_of(configured))
 
 
@@ -88,7 +105,13 @@ def results(
     ------
     ConfigError
         If the folder is none of a store.
+    AqualogError
+        If logs must be measured and the store cannot be written, or another batch writes there.
     """
+    from aqualog.workers import most_processes
+
+    if jobs is not None and jobs > most_processes():
+        console.note(f"--jobs {jobs}: {most_processes()} processes are the most on this machine")
     with console.steps() as steps:
         steps("looking at the logs")
         from aqualog.campaign.batch import run_batch
@@ -126,14 +149,21 @@ def exit_code(outcome: BatchOutcome, data: CampaignData) -> int:
 
 
 def _check_apart(configured: Configured, folder: Path) -> None:
+    from aqualog.campaign.store import Store
     from aqualog.config.configured import files_of
 
-    place = folder.resolve()
-    inside = next((p for p in files_of(configured) if p.resolve().is_relative_to(place)), None)
-    if inside is not None:
+    place = Store(folder)
+    if any(place.holds(p) for p in files_of(configured)):
         raise ConfigError("holds a source of this campaign", where=str(folder), expected="a folder of its own")
-    if folder.exists() and not os.access(folder, os.W_OK):
-        raise AqualogError("cannot be written", where=str(folder), hint="its permissions, or --store DIR")
+
+
+def _refuse_in_store(target: Path, places: Sequence[Path]) -> None:
+    from aqualog.campaign.store import Store
+
+    above = [p for p in Path(os.path.realpath(target)).parents if Store(p).exists]
+    inside = next((p for p in [*above, *places] if Store(p).holds(target)), None)
+    if inside is not None:
+        raise ConfigError("lies in a store of results", where=str(target), expected=f"a place outside {inside}")
 
 
 def _with_name(name: str, reason: str) -> str:

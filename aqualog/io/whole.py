@@ -1,13 +1,15 @@
-"""Results that are there whole or not at all."""
+"""Results that are there whole or not at all, and folders that one process at a time writes."""
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["write_text", "write_whole"]
+__all__ = ["only_here", "write_text", "write_whole"]
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
@@ -32,6 +34,50 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 def write_text(path: Path, text: str) -> None:
     """A text file, there whole or not at all."""
     write_whole(path, lambda temporary: _put(temporary, text))
+
+
+@contextmanager
+def only_here(lock: Path) -> Iterator[None]:
+    """Hold a lock file. The system releases it when the process ends, however it does, where there is `flock`.
+
+    Raises
+    ------
+    BlockingIOError
+        If another process holds it; its `strerror` is that process's number.
+    OSError
+        If the file cannot be written.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        handle = _made_here(lock)
+    else:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.read(handle, 20).decode("ascii", "replace").strip()
+            os.close(handle)
+            if isinstance(error, BlockingIOError):
+                raise BlockingIOError(error.errno, holder, str(lock)) from error
+            raise
+    try:
+        os.ftruncate(handle, 0)
+        os.write(handle, f"{os.getpid()}\n".encode())
+        yield
+    finally:
+        os.close(handle)
+        if os.name == "nt":
+            lock.unlink(missing_ok=True)
+
+
+def _made_here(lock: Path) -> int:
+    """A lock where there is no `flock`: the file itself, which a killed process leaves behind."""
+    try:
+        return os.open(lock, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError as error:
+        holder = lock.read_text(encoding="ascii", errors="replace").strip()
+        raise BlockingIOError(errno.EAGAIN, f"{holder}; if it has ended, remove {lock}", str(lock)) from error
 
 
 def _put(path: Path, text: str) -> None:
