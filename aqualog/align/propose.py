@@ -53,9 +53,14 @@ class _Rule:
     bonus: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     fallback_unit: str = ""
+    may_rest: bool = False  # constant in many a drive, as a brake that nobody treads on
 
 
 _WHEEL_WORDS = ("wheel", "whl", "rad", "radgeschw", "radgeschwindigkeit", "raddrehzahl", "wss", "ws", "omega", "wspd")
+_TIE_RODS = ("spurstange", "spurstangenkraft", "tie rod", "tierod")
+_SIDES = {"fl": ("left", "links", "l", "li"), "fr": ("right", "rechts", "r", "re")}
+_LANE_WORDS = ("nass", "nassbahn", "wet", "on water", "onwater", "lichtschranke", "light barrier")
+_LANE_FLAGS = {"flag", "state", "status", "sensor", "valid"}  # of a state these words may be the name
 _RULES = (
     _Rule("v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "v", "vx", "spd"), ("speed",),
           ("gps", "gnss", "optical", "correvit", "reference", "referenz", "vx"),
@@ -69,7 +74,8 @@ _RULES = (
     _Rule("yaw_rate", ("yaw", "gier", "yawrate", "gierrate"), ("angular_speed",), ("rate",), ("acceleration",)),
     _Rule("steering_wheel_angle", ("steer", "steering", "lenk", "lenkrad", "lenkradwinkel", "lwi", "swa"),
           ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
-    _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",), ("pressure", "druck")),
+    _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",), ("pressure", "druck"),
+          may_rest=True),
     _Rule("torque_f", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("rear", "hinten", "steer", "motor")),
     _Rule("torque_r", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("front", "vorne", "steer", "motor")),
     _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
@@ -109,6 +115,9 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
             f"pressure_{wheel}",
             _wheel_candidates(usable, wheel, ("tire", "tyre", "tpms", "reifen"), ("pressure",)),
         )
+    for wheel in ("fl", "fr"):
+        _keep_best(found, f"tie_rod_{wheel}", _wheel_candidates(usable, wheel, _TIE_RODS, ("force",), _SIDES[wheel]))
+    _keep_best(found, "on_water", [p for c in usable if (p := _lane_candidate(c, usable)) is not None])
     speed = _speed(found, usable)
     for rule in _RULES:
         candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
@@ -160,28 +169,39 @@ def _address(channel: Channel, channels: Sequence[Channel]) -> str:
     return channel.info.path if same == 1 else channel_id(channel.info)
 
 
-def _proposal(symbol: str, channel: Channel, channels: Sequence[Channel], score: float, unit: str = "") -> Proposal:
+def _proposal(
+    symbol: str, channel: Channel, channels: Sequence[Channel], score: float, unit: str = "", *, may_rest: bool = False
+) -> Proposal:
     own = channel.info.unit
     entry = Entry(symbol, (_address(channel, channels),), own if own and is_unit(own) else (unit or None))
-    reason = "name and unit" if own else "name; THE FILE GIVES NO UNIT, add it"
+    if own:
+        reason = "name and unit"
+    elif unit:
+        reason = f"name; the file gives no unit: {unit} by its kind, check it"
+    else:
+        reason = "name; THE FILE GIVES NO UNIT, add it"
     finite = channel.values[np.isfinite(channel.values)]
     if finite.size > 10 and finite.min() == finite.max():
-        return Proposal(entry, f"{reason}, but it is constant", score - 5.0)
+        return Proposal(entry, f"{reason}, but it is constant", score - (1.0 if may_rest else 5.0))
     return Proposal(entry, reason, score)
 
 
 def _wheel_candidates(
-    channels: Sequence[Channel], wheel: str, words: tuple[str, ...], dimensions: tuple[str, ...]
+    channels: Sequence[Channel],
+    wheel: str,
+    words: tuple[str, ...],
+    dimensions: tuple[str, ...],
+    more_positions: tuple[str, ...] = (),
 ) -> list[Proposal]:
     result = []
     for channel in channels:
         name = words_of(channel.info.name)
         joined = " ".join(name)
-        has_position = any(p in name if " " not in p else p in joined for p in _POSITIONS[wheel])
+        has_position = any(p in name if " " not in p else p in joined for p in (*_POSITIONS[wheel], *more_positions))
         has_word = set(words) & set(words_of(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
         if not has_position or not has_word or set(name) & _NOT_A_VALUE or _dimension(channel) not in (*dimensions, ""):
             continue
-        symbol = {"speed": "omega", "torque": "torque", "pressure": "pressure"}[dimensions[0]]
+        symbol = {"speed": "omega", "force": "tie_rod"}.get(dimensions[0], dimensions[0])
         score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (_dimension(channel) == "")
         result.append(_proposal(f"{symbol}_{wheel}", channel, channels, score))
     return result
@@ -200,7 +220,23 @@ def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Pr
     if dimension not in rule.dimensions and not is_clear:
         return None
     score = 2.0 + len(set(rule.bonus) & path_words) + _has(rule.bonus, words)
-    return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit)
+    return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit, may_rest=rule.may_rest)
+
+
+def _lane_candidate(channel: Channel, channels: Sequence[Channel]) -> Proposal | None:
+    """A channel that is 0 or 1 and is called after a wet lane or the light barriers at its ends."""
+    words = words_of(channel.info.name)
+    named = _has(_LANE_WORDS, words) or any(w in " ".join(words) for w in _LANE_WORDS if " " in w)
+    if not named or set(words) & (_NOT_A_VALUE - _LANE_FLAGS) or channel.info.unit == "%":
+        return None
+    finite = channel.values[np.isfinite(channel.values)]
+    if _dimension(channel) not in ("", "ratio") or not finite.size or not np.isin(finite, (0.0, 1.0)).all():
+        return None
+    is_gate = _has(("lichtschranke", "barrier"), words)
+    reason = "name; 0 or 1: check that it is 1 on the whole lane" + (", not at its gates only" if is_gate else "")
+    plain = _proposal("on_water", channel, channels, 2.0 - 0.5 * is_gate, "bool", may_rest=True)
+    reason += ", but it is constant in the drive looked at" if finite.min() == finite.max() else ""
+    return replace(plain, reason=reason, entry=replace(plain.entry, unit="bool"))  # - in one log, nothing in another
 
 
 # --- the data's word ---------------------------------------------------------------------------------------------

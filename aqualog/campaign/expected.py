@@ -1,9 +1,11 @@
-"""What the model of tyre and water expects of a run's wheels: speed of full aquaplaning, contact and slip slope."""
+"""What the model of tyre and water expects of a run's wheels, and what its brush makes of a slope that was measured."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,14 +18,25 @@ from aqualog.physics.contact import contact_share, slip_stiffness_ratio
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.rolling import load_factor, pressure_factor
-from aqualog.physics.tyre_brush import brush_force
+from aqualog.physics.tyre_brush import brush_parts
 from aqualog.physics.water import residual_film
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Expected", "expected", "expected_of_runs", "full_speed_of"]
+__all__ = [
+    "LINEAR",
+    "Expected",
+    "contact_of",
+    "expected",
+    "expected_of_runs",
+    "friction_of",
+    "full_speed_of",
+    "tangent_of",
+]
 
-_S_MAX = 0.2  # [-] slips within which a traction is looked for
+LINEAR = (math.inf, math.inf)  # friction (dry, wet) of a brush that never slides: a slope is the tangent then (2.2)
+_THETA = np.linspace(0.0, 2.5, 1001)  # C |s| / (3 mu F_z); at a slope of 28 and mu 0.8 a slip of 0.2
+_L = np.linspace(0.02, 1.0, 197)
 _TOLD_BY = (
     "tyre", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm", "water_depth_left_mm", "load_front_kg",
     "load_rear_kg",
@@ -33,8 +46,8 @@ NO_WEDGE = 1e5  # [m/s] from here on there is no speed of full aquaplaning
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """Of one wheel at one speed: `contact` L [-], `slope` C_s / F_z [-], `slope_dry` [-]; NaN and `reason` where a run
-    does not tell enough.
+    """Of one wheel at one speed: `contact` L [-]; `slope` and `slope_dry`, slip slopes over F_z: the brush's chord over
+    the traction asked for, its tangent without one [-]; NaN and `reason` where a run does not tell enough.
     """
 
     contact: float = float("nan")
@@ -98,13 +111,82 @@ def _chord(slope: float, L: float, mu_max: float, mu_range: tuple[float, float] 
     """Slope of the brush between two tractions; at no slip without them. NaN where the contact cannot carry them."""
     if mu_range is None:
         return slope * float(slip_stiffness_ratio(np.array(L)))
-    s = np.linspace(-_S_MAX, _S_MAX, 2001)
-    carried = brush_force(s, np.ones_like(s), mu=mu_max, C_s=slope, L=L)
+    return slope * float(_shares(np.array([L]), mu_max, mu_range)[0])
+
+
+def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
+    """Chord of the shortened contact over the tangent of the full one, (m,); NaN where L cannot carry the traction, or
+    the range is none.
+
+    Depends on the traction over the friction only: the brush's force over mu F_z is a function of C s / (3 mu F_z).
+    """
     low, high = mu_range
-    if not carried[0] <= low < high <= carried[-1]:
-        return float("nan")
-    at_low, at_high = np.interp([low, high], carried, s)
-    return float((high - low) / (at_high - at_low))
+    if not math.isfinite(mu_max):
+        return slip_stiffness_ratio(L)
+    carried = _carried() if L is _L else _carried_by(L)
+    found = np.full(L.size, np.nan)
+    if not low < high:
+        return found
+    for i, row in enumerate(carried):
+        if max(-low, high) <= mu_max * row[-1]:
+            at_low, at_high = (math.copysign(float(np.interp(abs(x) / mu_max, row, _THETA)), x) for x in mu_range)
+            found[i] = (high - low) / (3.0 * mu_max * (at_high - at_low))
+    return found
+
+
+def _carried_by(L: FloatArray) -> FloatArray:
+    """Force over mu F_z (m, n) of contacts L at the slips `_THETA`."""
+    stuck, slid = brush_parts(_THETA[None, :], L[:, None])
+    return np.asarray(stuck + slid, dtype=np.float64)
+
+
+@lru_cache(maxsize=1)
+def _carried() -> FloatArray:
+    return _carried_by(_L)
+
+
+def tangent_of(chord: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
+    """Slip slope at no slip of a full contact whose regression over `mu_range` gave `chord`. [-] NaN if it slides."""
+    return np.asarray(chord / _shares(np.ones(1), mu_max, mu_range)[0], dtype=np.float64)
+
+
+def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
+    """Contact L of which the brush's chord over `mu_range` is `share` of the full contact's tangent.
+
+    Parameters
+    ----------
+    share : array
+        Slope on water over the dry tangent (`tangent_of`), > 0. [-]
+    mu_max : float
+        Friction on the wet road; infinite for (2.2) itself, L = sqrt(share). [-]
+    mu_range : (float, float)
+        Traction over which the slope was regressed, low < high. [-]
+
+    Returns
+    -------
+    L : like share
+        At least the contact that carries the traction at all. Above 1, which is scatter, L grows with sqrt(share), so
+        that a mean over many is not cut. NaN where no contact carries the traction.
+
+    Inverse of the chord by a table in steps of 0.005. A brush with a rigid carcass and even friction is assumed; (2.2),
+    L^2, is its limit at small traction, since the contact that is left bends sooner than the full one (2.1).
+    """
+    known = _shares(_L, mu_max, mu_range)
+    good = np.isfinite(known)
+    if not good.any():
+        return np.full_like(share, np.nan)
+    L = np.interp(share, known[good], _L[good])
+    return np.asarray(np.where(share > known[-1], np.sqrt(np.maximum(share / known[-1], 1.0)), L), dtype=np.float64)
+
+
+def friction_of(infos: Sequence[RunInfo]) -> tuple[float, float]:
+    """Friction of the tread (dry, wet), mean of the runs: the vehicle file's mu_max times the model's factors of the
+    tyre; of a tyre that the model does not know, those of its worn summer tyre. [-]
+    """
+    tyres = [TYRES.get(str(i.run.values.get("tyre", "")), Tyre("unknown")) for i in infos]
+    dry = [i.vehicle.mu_max * t.mu_factor for i, t in zip(infos, tyres, strict=True)]
+    wet = [x * t.wet_friction for x, t in zip(dry, tyres, strict=True)]
+    return float(np.mean(dry)), float(np.mean(wet))
 
 
 def expected_of_runs(

@@ -88,7 +88,7 @@ _RULES = (
           _date, "date (and time of day) such as 2024-05-01 or 20240501_1015"),
     _rule(r"(?<!\d)([0-2]\d|3[01])\.(0[1-9]|1[0-2])\.(20\d\d)(?!\d)",
           lambda m: {"x_date": f"{m[3]}-{m[2]}-{m[1]}"}, "date such as 01.05.2024"),
-    _rule(rf"{_N}{_S}(?:km/?h|kmph|kph){_E}", _scaled(("x_speed_kmh",), 1.0, 1.0, 400.0), "number before km/h"),
+    _rule(rf"{_N}{_S}(?:km[-/_ ]?h|kmph|kph){_E}", _scaled(("x_speed_kmh",), 1.0, 1.0, 400.0), "number before km/h"),
     _rule(rf"{_N}{_S}mph{_E}", _scaled(("x_speed_kmh",), 1.609344, 1.0, 400.0), "number before mph"),
     _rule(rf"{_B}v{_S}(\d{{2,3}}){_E}", _scaled(("x_speed_kmh",), 1.0, 10.0, 400.0), "v and a number: km/h"),
     _rule(rf"{_B}(?:profil(?:tiefe)?|tread|td|pt){_S}{_N}{_S}(?:mm)?{_E}", _scaled(("tread_depth_mm",), 1.0, 0.1, 20.0),
@@ -97,6 +97,10 @@ _RULES = (
           "number before mm and tread or Profil"),
     _rule(rf"{_B}(?:wasser|water|wt|wh|wd)?(?:tiefe|hoehe|höhe|depth|film)?{_S}{_N}{_S}mm{_E}",
           _scaled(("water_depth_mm",), 1.0, 0.0, 50.0), "number before mm: water depth"),
+    _rule(rf"{_B}w[ht](\d\d){_E}", _scaled(("water_depth_mm",), 0.1, 0.0, 9.9),
+          "WH or WT and two digits: tenths of mm of water"),
+    _rule(rf"{_B}(?:w[ht]|wasser(?:tiefe|hoehe|höhe)){_S}(\d(?:[.,p]\d+)?){_E}",
+          _scaled(("water_depth_mm",), 1.0, 0.0, 50.0), "number after WH, WT, Wassertiefe or Wasserhöhe: mm of water"),
     _rule(rf"{_N}{_S}mm{_E}", _scaled(("water_depth_mm",), 1.0, 0.0, 50.0), "number before mm: water depth"),
     _rule(rf"{_B}h(\d\d){_E}", _scaled(("water_depth_mm",), 0.1, 0.0, 9.9), "h and two digits: tenths of mm of water"),
     _rule(rf"{_B}h{_S}(\d+[.,p]\d+){_E}", _scaled(("water_depth_mm",), 1.0, 0.0, 50.0), "h and a number: mm of water"),
@@ -114,7 +118,10 @@ _RULES = (
     _rule(rf"\+?{_N}{_S}kg{_S}{_REAR}{_E}", _kg("load_rear_kg"), "number before kg and rear"),
     _rule(rf"\+?{_N}{_S}kg{_E}", _kg("x_load_kg"),
           "number before kg; the axle is not said: write it as load_front_kg, load_rear_kg"),
-    _rule(rf"{_B}(?-i:a)(\+\d+(?:[.,]\d+)?|-\d+[.,]\d+){_E}", _acceleration, "a, sign and number: acceleration"),
+    _rule(rf"{_B}(?-i:a)(\+\d+(?:[.,]\d+)?|-?\d+[.,]\d+){_E}", _acceleration,
+          "a and a number with sign or decimals: acceleration"),
+    _rule(rf"{_B}(?:beschl(?:eunigung)?|acc(?:el(?:eration)?)?){_S}([+-]?\d+[.,]\d+){_E}", _acceleration,
+          "Beschl or acc and a decimal number: acceleration"),
     _rule(rf"{_B}(?:rep|wdh|wiederholung|repeat){_S}(\d{{1,3}}){_E}", lambda m: {"x_repeat": str(int(m[1]))},
           "number after rep or Wdh"),
     _rule(rf"{_B}(?:run|lauf|fahrt|nr|no|versuch|trial|messung|drive){_S}(\d{{1,5}}){_E}",
@@ -141,6 +148,8 @@ _TYRES = {
     "slick", "michelin", "conti", "continental", "pirelli", "goodyear", "bridgestone", "hankook", "dunlop", "nokian",
     "yokohama", "toyo", "falken", "vredestein", "kumho",
 }  # fmt: skip
+_SHORT = {"wr": "winter", "sr": "summer", "gjr": "all-season"}  # Winterreifen, Sommerreifen, Ganzjahresreifen
+_SHORT_TYRE = re.compile(r"(wr|sr|gjr)([A-Za-z]?\d{0,2})", re.IGNORECASE)
 _TYRE = re.compile(r"(?:reifen|tyre|tire|pneu)([A-Za-z0-9]{0,12})", re.IGNORECASE)
 
 
@@ -230,6 +239,9 @@ def _apply_words(words: list[str], found: dict[str, str], rules: dict[str, list[
             tyre.append(low)
         elif low in _VERY and following in _WEAR:
             tyre.append(low)
+        elif short := _SHORT_TYRE.fullmatch(low):
+            tyre += [_SHORT[short[1]], *([short[2]] if short[2] else [])]
+            is_named = True
         elif (
             low in _TYRES
             or ((match := _TYRE.fullmatch(low)) and match[1])

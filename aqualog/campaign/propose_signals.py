@@ -6,12 +6,13 @@ bear other names in other drives become a list in order of preference. What cann
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from aqualog.align.mapping import Entry, SignalMap, matching
 from aqualog.align.overview import overview, rotated_channels
-from aqualog.align.propose import Proposal, propose_map
+from aqualog.align.propose import Proposal, propose_map, words_of
 from aqualog.campaign.propose_drives import Drive, LogFile
 from aqualog.errors import AqualogError
 from aqualog.io.base import ReadOptions
@@ -29,7 +30,8 @@ MOST_MISSING = 0.1  # share of drives that may lack a signal that the map names:
 class MapProposal:
     """A map for all drives. `needed` says whether one is: not if all channels bear canonical names.
 
-    `left_out` maps signals that only some drives hold to the reason; `notes` are differences between drives.
+    `left_out` maps signals that only some drives hold to the reason; `notes` are differences between drives;
+    `unmapped` are the channels, `name [unit]`, that are no signal.
     """
 
     signal_map: SignalMap
@@ -37,6 +39,7 @@ class MapProposal:
     left_out: Mapping[str, str]
     notes: tuple[str, ...]
     found: tuple[str, ...]
+    unmapped: tuple[str, ...] = ()
 
     @property
     def needed(self) -> bool:
@@ -137,9 +140,43 @@ def _joined(
         notes.append(
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
         )
+    unmapped = _unmapped(drives, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
+    speeds = [n for n in unmapped if "[" not in n and {"speed", "velocity"} & set(words_of(n)) and _is_road_speed(n)]
     if "v_x" not in found and "v_x" not in left_out:
-        notes.append("no v_x: slip is told against the free wheels, not against the road")
-    return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found))
+        hint = (
+            f"; {', '.join(speeds[:3])} may be it, but the file gives no unit: map it with its unit" if speeds else ""
+        )
+        notes.append(f"no v_x: slip is told against the free wheels, not against the road{hint}")
+    return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found), unmapped)
+
+
+_NO_ROAD_SPEED = {"wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad"}
+
+
+def _is_road_speed(name: str) -> bool:
+    return not _NO_ROAD_SPEED & set(words_of(name))
+
+
+def _unmapped(drives: Sequence[Drive], mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Channels of any drive that no name of the map means; by their path where the name alone would be doubtful."""
+    seen: dict[tuple[frozenset[tuple[str, str]], ...], None] = {}
+    told: dict[str, None] = {}
+    for drive in drives:
+        key = tuple(f.signature for f in drive.files)
+        if key in seen:
+            continue
+        seen[key] = None
+        infos = [c for f in drive.files for c in f.channels]
+        used: set[tuple[str, str]] = set()
+        for wanted in mapped:  # of several names the first that hits is the one that is read
+            hits = next(filter(None, (matching(infos, name) for name in wanted)), [])
+            used |= {(c.file, c.path) for c in hits}
+        names = Counter(c.name for c in infos)
+        for info in infos:
+            if (info.file, info.path) not in used:
+                name = info.name if names[info.name] == 1 else info.path
+                told[f"{name} [{info.unit}]" if info.unit else name] = None
+    return tuple(told)
 
 
 def _by_name(symbol: str, proposal: Proposal) -> Proposal:

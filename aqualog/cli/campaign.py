@@ -12,7 +12,7 @@ import typer
 from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Verbose
 
 if TYPE_CHECKING:
-    from aqualog.campaign.propose_drives import Drive, Found
+    from aqualog.campaign.propose_drives import Drive, Found, LogFile
     from aqualog.campaign.propose_names import NameTable
     from aqualog.campaign.propose_signals import MapProposal
 
@@ -106,8 +106,9 @@ def _init(
         del targets["vehicle.toml"]
     refuse_existing([out, *targets.values()], force=force, sources=[*dbc, *([vehicle] if vehicle else [])])
 
-    from aqualog.campaign.propose_drives import drive_name, group_drives, is_run_table, kinds_of, scan
+    from aqualog.campaign.propose_drives import Drive, drive_name, group_drives, is_run_table, kinds_of, scan
     from aqualog.campaign.propose_files import labels_of, relative
+    from aqualog.campaign.propose_left import broken_logs, without_twins
     from aqualog.campaign.propose_names import read_names
     from aqualog.campaign.propose_signals import measures_wheels, propose_signals
     from aqualog.io.base import ReadOptions
@@ -125,11 +126,17 @@ def _init(
         if not found.logs:
             told = "; ".join(f"{name}: {why}" for name, why in found.bad[:5])
             raise ConfigError(f"no log that can be read{f' ({told})' if told else ''}", where=str(folder))
-        kinds, count = kinds_of(found.logs)
+        steps("looking for copies")
+        logs, twins = without_twins(found.logs)
+        kinds, count = kinds_of(logs)
         steps("grouping files into drives")
-        wheels = [measures_wheels(found.logs[kinds.index(k)], options) if count > 1 else True for k in range(count)]
-        drives, notes = group_drives(found.logs, kinds, lambda a, b: wheels[a] and wheels[b])
+        wheels = [measures_wheels(logs[kinds.index(k)], options) if count > 1 else True for k in range(count)]
+        drives, notes = group_drives(logs, kinds, lambda a, b: wheels[a] and wheels[b])
         signals = propose_signals(drives, options, steps)
+    broken = broken_logs(folder, found.bad)
+    notes = (*twins, *notes, *_broken_notes(found, broken))
+    # a broken log is a run that failed: with its row every batch says so
+    drives = tuple(sorted((*drives, *(Drive((f,), (0,)) for f in broken)), key=lambda d: d.files[0].name))
     table = read_names([drive_name(d) for d in drives])
     labels = labels_of(drives, found.labels)
     texts = _texts(folder, out, vehicle, drives, table, labels, signals)
@@ -155,7 +162,7 @@ def _texts(
     signals: MapProposal,
 ) -> dict[Path, str]:
     """What is to be written; the campaign file last, so that it never names a file that is not there."""
-    from aqualog.campaign.propose_files import campaign_text, relative, runs_text, vehicle_text
+    from aqualog.campaign.propose_files import campaign_text, relative, runs_text, unmapped_text, vehicle_text
     from aqualog.config.signal_map import map_text
 
     base = out.parent
@@ -165,6 +172,7 @@ def _texts(
         comments = [f"proposed for {len(drives)} drives in {name}: check every line"]
         comments += [f"not in all drives, so left out: {s} = {why}" for s, why in signals.left_out.items()]
         texts[base / "map.toml"] = map_text(signals.signal_map, comments=comments, remarks=signals.remarks)
+        texts[base / "map.toml"] += unmapped_text(signals.unmapped)
     if vehicle is None:
         texts[base / "vehicle.toml"] = vehicle_text(name)
         car = "vehicle.toml"
@@ -172,6 +180,14 @@ def _texts(
         car = relative(vehicle, base)
     texts[out] = campaign_text(name, car, "map.toml" if signals.needed else None, "runs.csv")
     return texts
+
+
+def _broken_notes(found: Found, broken: tuple[LogFile, ...]) -> list[str]:
+    kept = {f.name for f in broken}
+    return [
+        *(f"cannot be read, but is in runs.csv (failed in a batch): {n}: {why}" for n, why in found.bad if n in kept),
+        *(f"left out: {n}: {why}" for n, why in found.bad if n not in kept),
+    ]
 
 
 def _labels_notes(names: tuple[str, ...], used: dict[int, str]) -> list[str]:
@@ -189,11 +205,14 @@ def _print(
     notes: tuple[str, ...],
     dbc: list[Path],
 ) -> None:
+    from aqualog.campaign.propose_files import blanks
     from aqualog.cli.console import clean
     from aqualog.report.text import table as text_table
 
     several = sum(len(d.files) > 1 for d in drives)
-    lines = [f"logs: {len(found.logs)}; drives: {len(drives)}" + (f", {several} of several files" if several else "")]
+    unreadable = f", {len(found.bad)} cannot be read" if found.bad else ""
+    heading = f"logs: {len(found.logs) + len(found.bad)}{unreadable}; drives: {len(drives)}"
+    lines = [heading + (f", {several} of several files" if several else "")]
     columns = list(table.columns)
     rows = [
         (_short(" + ".join(f.name for f in d.files)), *(table.columns[c][i] or "-" for c in columns))
@@ -204,6 +223,8 @@ def _print(
     lines += ["", "read from the names:"] if columns else ["", "the names say nothing about how the car was driven"]
     lines += [f"  {c}: {rule}" for c, rule in table.rules.items()]
     lines += [f"  same in all names, left out: {', '.join(table.dropped)}"] if table.dropped else []
+    empty = blanks(table, len(drives))
+    lines += ["", "to fill in:", *(f"  {c}: {n} of {len(drives)} blank" for c, n in empty.items())] if empty else []
     if signals.needed:
         lines += ["", "signals (map.toml):"]
         for symbol, entry in signals.signal_map.entries.items():
@@ -212,12 +233,23 @@ def _print(
     own = [s for s in signals.found if s not in signals.signal_map.entries]
     lines += ["", f"signals with their canonical names: {', '.join(own)}"] if own else []
     lines += [f"  not in all drives, left out: {s} = {why}" for s, why in signals.left_out.items()]
-    told = [*signals.notes, *notes, *table.notes, *(f"left out: {n}: {why}" for n, why in found.bad)]
+    lines += ["", _unmapped_line(signals)] if signals.unmapped else []
+    told = [*signals.notes, *notes, *table.notes]
     if "on_water" not in signals.found:
-        told.append("no signal on_water: fill in lane_start_s and lane_end_s, or labels, of wet runs")
+        told.append(
+            "no signal on_water: fill in lane_start_s and lane_end_s, or labels, of wet runs, "
+            "or map the channel that tells it: on_water = ..."
+        )
     lines += ["", "notes:", *(f"  {n}" for n in told)] if told else []
     lines += ["", f"written: {', '.join(str(p) for p in texts)}", *_next(out, texts, dbc)]
     sys.stdout.write(clean("\n".join(lines) + "\n"))
+
+
+def _unmapped_line(signals: MapProposal) -> str:
+    names = signals.unmapped
+    if signals.needed:
+        return f"channels that are not mapped: {len(names)}, named at the end of map.toml"
+    return f"channels that are no signal: {len(names)} ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''})"
 
 
 def _short(text: str) -> str:
@@ -247,6 +279,7 @@ def _document(
     notes: tuple[str, ...],
 ) -> dict[str, Any]:
     from aqualog import __version__
+    from aqualog.campaign.propose_files import blanks
 
     return {
         "schema_version": 1,
@@ -263,6 +296,8 @@ def _document(
             for s, e in signals.signal_map.entries.items()
         },
         "canonical": [s for s in signals.found if s not in signals.signal_map.entries],
+        "blank": blanks(table, len(drives)),
+        "unmapped": list(signals.unmapped),
         "left_out": {**dict(found.bad), **signals.left_out},
         "notes": [*signals.notes, *notes, *table.notes],
     }

@@ -60,7 +60,7 @@ def _c10() -> Finding:
 
 
 def _measured(found: Slopes) -> tuple[list[Line], list[Finding]]:
-    """Slope over dry slope of the campaign's bins, and whether L from it falls with speed as the model's does."""
+    """Square of the contact of the campaign's bins, and whether it falls with speed as the model's does."""
     lines: list[Line] = []
     falls: dict[str, Effect] = {}
     level = found.levels[0]
@@ -73,7 +73,7 @@ def _measured(found: Slopes) -> tuple[list[Line], list[Finding]]:
         )  # fmt: skip
         lines.append(
             Line(
-                f"measured, {wheel}", np.array([0.5 * (r.low_kmh + r.high_kmh) for r in rows]),
+                f"measured L^2, {wheel}", np.array([0.5 * (r.low_kmh + r.high_kmh) for r in rows]),
                 np.array([r.contact_ratio**2 for r in rows]), low=low, high=high, colour=wheel_colour(wheel),
                 mode="markers", size=8.0,
             )

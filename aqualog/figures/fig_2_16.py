@@ -28,8 +28,7 @@ _MU = Axis("traction coefficient")
 
 
 def _c48(rows: Sequence[SlopeRow]) -> list[Finding]:
-    ratios = {r.wheel: (r.contact_ratio**2, tuple(x * x for x in r.contact_ratio_ci)) for r in rows
-              if math.isfinite(r.contact_ratio)}  # fmt: skip
+    ratios = {r.wheel: r.over_dry for r in rows if math.isfinite(r.contact_ratio)}
     told = {w: (x, ci) for w, (x, ci) in ratios.items() if all(map(math.isfinite, ci))}
     if not told:
         return []
@@ -133,9 +132,8 @@ def make(evidence: Evidence) -> Figure:
                 "Slip slope [-]",
                 ("wheel", "dry", "water", "water over dry", "95 %", "runs"),
                 tuple(
-                    (r.wheel, f"{r.slope_dry:.1f}", f"{r.slope:.1f}", f"{r.contact_ratio**2:.2f}",
-                     f"{r.contact_ratio_ci[0]**2:.2f} to "
-                     f"{r.contact_ratio_ci[1]**2:.2f}" if r.reliable else "–", str(r.runs))
+                    (r.wheel, f"{r.slope_dry:.1f}", f"{r.slope:.1f}", f"{r.over_dry[0]:.2f}",
+                     "{:.2f} to {:.2f}".format(*r.over_dry[1]) if r.reliable else "–", str(r.runs))
                     for r in rows
                 ),
             ),

@@ -19,6 +19,18 @@ __all__ = ["SCHEMA_VERSION", "flat_rows", "resistance_document", "slope_document
 
 SCHEMA_VERSION = 1
 
+_DEFINITIONS = {
+    "slope": "slope of the regression of F_x / F_z over slip within mu_range (5 to 95 % of the traction driven): a "
+    "chord; C_s / F_z, the tangent at no slip, is more",
+    "slope_dry": "the same off the water, all speeds together, within mu_range_dry",
+    "expected_slope": "the model's chord over mu_range",
+    "contact_ratio": "share L of the contact length whose brush has slope as its chord over mu_range, with "
+    "friction_wet and the tangent that belongs to slope_dry; sqrt(slope / slope_dry), (2.2), is its limit at small "
+    "traction; above 1 is scatter",
+    "reliable": "told, with an interval whose ends are within a factor of 3, by a line that explains more than a "
+    "constant",
+}  # fmt: skip
+
 
 def slope_document(
     name: str,
@@ -30,6 +42,7 @@ def slope_document(
     """Slopes, dry references, delays of v_x, speeds of full aquaplaning, spin-ups, minor spin-downs."""
     return {
         **_head(name, slopes.plan.keys, slopes.plan.width_kmh, slopes.left_out, robust=slopes.robust),
+        "definitions": dict(_DEFINITIONS),
         "rows": [_slope_row(r) for r in slopes.rows],
         "dry": [_slope_row(r) for r in slopes.dry],
         "delays": [
@@ -63,7 +76,7 @@ def flat_rows(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _flat(key: str, x: Any) -> list[tuple[str, Any]]:
-    if not (isinstance(x, list) or key.endswith(("_ci95", "_ci95_kmh")) or key == "mu_range"):
+    if not (isinstance(x, list) or key.endswith(("_ci95", "_ci95_kmh")) or key.startswith("mu_range")):
         return [(key, x)]
     stem = key.replace("_ci95", "")
     low, high = x if isinstance(x, list) else (None, None)
@@ -84,7 +97,9 @@ def _slope_row(r: SlopeRow) -> dict[str, Any]:
         "intercept_ci95": _pair(r.intercept_ci), "r2": _number(r.r2), "mu_range": _pair(r.mu_range),
         "attenuation": _number(r.attenuation), "scatter": _number(r.scatter), "dof": _number(r.dof),
         "reliable": r.reliable, "reason": r.reason or None, "slope_dry": _number(r.slope_dry),
-        "slope_dry_ci95": _pair(r.slope_dry_ci), "runs_dry": r.runs_dry, "contact_ratio": _number(r.contact_ratio),
+        "slope_dry_ci95": _pair(r.slope_dry_ci), "runs_dry": r.runs_dry, "mu_range_dry": _pair(r.mu_range_dry),
+        "friction_dry": _number(r.friction[0]), "friction_wet": _number(r.friction[1]),
+        "contact_ratio": _number(r.contact_ratio),
         "contact_ratio_ci95": _pair(r.contact_ratio_ci), "expected_contact_ratio": _number(r.expected.contact),
         "expected_slope": _number(r.expected.slope), "expected_slope_dry": _number(r.expected.slope_dry),
         "expected_reason": r.expected.reason or None,
@@ -94,8 +109,9 @@ def _slope_row(r: SlopeRow) -> dict[str, Any]:
 def _speed(f: FullSpeed) -> dict[str, Any]:
     low, high = f.ci
     return {
-        **_place(f.group, f.place), "way": f.way, "v_full_kmh": _number(3.6 * f.v),
-        "v_full_ci95_kmh": _pair((3.6 * low, 3.6 * high)), "exponent": _number(f.exponent),
+        **_place(f.group, f.place), "way": f.way, "event": f.event, "defines": f.defines,
+        "v_full_kmh": _number(3.6 * f.v), "v_full_ci95_kmh": _pair((3.6 * low, 3.6 * high)),
+        "exponent": _number(f.exponent),
         "rests_on": f.rests_on or None, "reason": f.reason or None,
     }  # fmt: skip
 

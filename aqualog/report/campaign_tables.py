@@ -20,8 +20,8 @@ _TITLES = {
     "load_front_kg": "kg f", "load_rear_kg": "kg r", "tread_depth_mm": "tread",
 }  # fmt: skip
 _WAYS = {
-    "slip_slope": "slip slope (2.2)",
-    "minor_spin_down": "minor spin-downs + 20",
+    "slip_slope": "slip slope",
+    "minor_spin_down": "minor spin-downs",
     "spin_down": "full spin-downs",
 }
 _NOTHING = "no samples on such a road, or on or off the water is not known"
@@ -36,12 +36,13 @@ def slope_text(
     """Tables for a terminal."""
     keys = _titles(slopes.plan.keys)
     header = (
-        *keys, "wheel", "road", "km/h", "runs", "samples", "slope", "95 %", "/ dry", "contact", "95 %", "model slope",
-        "contact", "lost %",
+        *keys, "wheel", "road", "km/h", "runs", "samples", "mu", "slope", "95 %", "/ dry", "contact", "95 %",
+        "model slope", "contact", "lost %",
     )  # fmt: skip
     blocks = [
-        "Slip slope C_s/F_z; contact = sqrt(slope / dry slope); lost = share of 1/slope that noise of the traction\n"
-        "would have taken, given back",
+        "Slope of the regression of F_x/F_z over slip within mu (5 to 95 % of the traction driven), a chord: C_s/F_z\n"
+        "at no slip is more. Model slope: its chord over the same mu. Contact: L of the brush with such a chord.\n"
+        "Lost: share of 1/slope that noise of the traction would have taken, given back",
         table(header, [_slope_cells(r, slopes.plan.keys) for r in slopes.rows]) if slopes.rows else _NOTHING,
         _reasons([(_where(r.group, r.wheel, r.road, r.low_kmh, r.high_kmh), r.reason) for r in slopes.rows]),
         *_dry_block(slopes),
@@ -49,7 +50,8 @@ def slope_text(
     ]
     if speeds:
         rows = [_speed_cells(f) for f in speeds]
-        blocks += ["Speed of full aquaplaning", table((*keys, "wheel", "from", "km/h", "95 %", "rests on"), rows)]
+        header = (*keys, "wheel", "from", "event", "km/h", "95 %", "rests on")
+        blocks += ["Speed of full aquaplaning: three events, told side by side", table(header, rows)]
     if spin_ups:
         header = (*keys, "wheel", "km/h", "runs", "samples", "mu", "95 %", "without resistance")
         rows = [_spin_up_cells(u, left) for u, left in spin_ups]
@@ -84,23 +86,23 @@ def _dry_block(slopes: SlopeTable) -> list[str]:
     if not slopes.dry:
         return ["no dry driving in these configurations: no contact ratio"]
     keys = tuple(k for k, _ in slopes.dry[0].group)
-    rows = [(*_values(r.group), r.wheel, _told(r.slope), _ends(r.slope_ci), str(r.runs), _told(r.expected.slope))
-            for r in slopes.dry]  # fmt: skip
-    return [table((*_titles(keys), "wheel", "dry slope, all speeds", "95 %", "runs", "model slope"), rows)]
+    rows = [(*_values(r.group), r.wheel, _ends(r.mu_range, 2), _told(r.slope), _ends(r.slope_ci), str(r.runs),
+             _told(r.expected.slope)) for r in slopes.dry]  # fmt: skip
+    return [table((*_titles(keys), "wheel", "mu", "dry slope, all speeds", "95 %", "runs", "model slope"), rows)]
 
 
 def _slope_cells(r: SlopeRow, keys: Sequence[str]) -> tuple[str, ...]:
     ratio = r.slope / r.slope_dry if r.told else math.nan
     return (
         *_values(r.group, keys), r.wheel, r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
-        _told(r.slope), _ends(r.slope_ci), _told(ratio, 2), _told(r.contact_ratio, 2), _ends(r.contact_ratio_ci, 2),
-        _told(r.expected.slope), _told(r.expected.contact, 2), _told(100 * r.attenuation),
+        _ends(r.mu_range, 2), _told(r.slope), _ends(r.slope_ci), _told(ratio, 2), _told(r.contact_ratio, 2),
+        _ends(r.contact_ratio_ci, 2), _told(r.expected.slope), _told(r.expected.contact, 2), _told(100 * r.attenuation),
     )  # fmt: skip
 
 
 def _speed_cells(f: FullSpeed) -> tuple[str, ...]:
     ends = _ends((3.6 * f.ci[0], 3.6 * f.ci[1]), 0)
-    return (*_values(f.group), f.place, _WAYS[f.way], _told(3.6 * f.v, 0), ends, f.reason or f.rests_on)
+    return (*_values(f.group), f.place, _WAYS[f.way], f.event, _told(3.6 * f.v, 0), ends, f.reason or f.rests_on)
 
 
 def _spin_up_cells(u: MeanRow, left: MeanRow) -> tuple[str, ...]:
@@ -158,7 +160,7 @@ def _reasons(rows: Sequence[tuple[str, str]]) -> str:
         return ""
     lines = [f"  {found[0]}" + (f" (and {len(found) - 1} more like it)" if len(found) > 1 else "")
              for found in places.values()]  # fmt: skip
-    return "\n".join(["not told, or without an interval:", *lines])
+    return "\n".join(["not told, or not reliable:", *lines])
 
 
 def _kind(reason: str) -> str:

@@ -71,6 +71,17 @@ def first(name, other="zzz.mf4"):
         ("20240501_080kmh", {"x_date": "2024-05-01", "x_speed_kmh": "80"}),
         ("Wdh03", {"x_repeat": "3"}),
         ("Lauf12", {"x_run": "12"}),
+        ("WR", {"tyre": "winter"}),
+        ("SR_neu", {"tyre": "summer_neu", "wear": "new"}),
+        ("WR2_GJR", {"tyre": "winter_2_all-season"}),
+        ("WH2.0", {"water_depth_mm": "2"}),
+        ("WT2", {"water_depth_mm": "2"}),
+        ("WH08", {"water_depth_mm": "0.8"}),
+        ("WT13mm", {"water_depth_mm": "13"}),
+        ("070 km-h", {"x_speed_kmh": "70"}),
+        ("070km-h", {"x_speed_kmh": "70"}),
+        ("beschl1,0", {"x_acceleration": "1", "manoeuvre": "acceleration"}),
+        ("a1.0", {"x_acceleration": "1", "manoeuvre": "acceleration"}),
         ("sommer/neu/v080", {"tyre": "sommer_neu", "wear": "new", "x_speed_kmh": "80"}),
     ],
 )
@@ -110,17 +121,23 @@ def table(path, heading, columns, separator=","):
 
 
 T = np.arange(0.0, 20.0, 0.05)
+COUNT = itertools.count(1)
 SPEED = 20.0 + 3.0 * np.sin(0.5 * T)
 WHEELS = ("Raddrehzahl_VL", "Raddrehzahl_VR", "Raddrehzahl_HL", "Raddrehzahl_HR")
 
 
+def unlike():
+    """Added to samples: of two files that are made none is a copy of the other."""
+    return np.append(np.zeros(T.size - 1), 1e-4 * next(COUNT))
+
+
 def wheels(path, names=WHEELS, unit="U/min", factor=60.0 / (2.0 * np.pi)):
-    omega = SPEED / 0.317 * factor
+    omega = SPEED / 0.317 * factor + unlike()
     table(path, ["Zeit [s]", *(f"{n} [{unit}]" for n in names)], [T, omega, omega, omega, omega], ";")
 
 
 def imu(path):
-    table(path, ["Zeit [s]", "Laengsbeschl [g]"], [T, 1.5 * np.cos(0.5 * T) / 9.80665], ";")
+    table(path, ["Zeit [s]", "Laengsbeschl [g]"], [T, 1.5 * np.cos(0.5 * T) / 9.80665 + unlike()], ";")
 
 
 def drives(folder):
@@ -209,7 +226,7 @@ def test_own_names_and_units_become_a_campaign_that_loads_and_signals_that_are_r
 def test_canonical_names_need_no_map_and_a_vehicle_file_none_to_fill(tmp_path):
     for i in (1, 2):
         (tmp_path / "logs").mkdir(exist_ok=True)
-        shutil.copy(SAMPLE, tmp_path / "logs" / f"drive_{i}.mf4")
+        (tmp_path / "logs" / f"drive_{i}.mf4").write_bytes(SAMPLE.read_bytes() + b"\0" * 8 * i)
     out = tmp_path / "campaign.toml"
     result = run(tmp_path / "logs", "-o", out, "--vehicle", CAR, "--json")
     assert result.exit_code == 0, result.output
@@ -273,10 +290,14 @@ def test_bad_files_are_told_and_left_out(tmp_path):
     out = tmp_path / "campaign.toml"
     result = run(logs, "-o", out)
     assert result.exit_code == 3, result.output
-    for name in ("empty.mf4", "junk.mf4", "cut.mf4", "a;b.mf4", "notes.csv"):
+    for name in ("a;b.mf4", "notes.csv"):
         assert f"left out: {name}: " in result.output, result.output
+    broken = ("cut.mf4", "empty.mf4", "junk.mf4")
+    for name in broken:
+        assert f"cannot be read, but is in runs.csv (failed in a batch): {name}: " in result.output, result.output
     assert "lane_drive.csv is left out: it looks like a copy of lane_drive.mf4" in result.output
-    (only,) = load_campaign(out).runs
+    *failed, only = load_campaign(out).runs
+    assert tuple(r.logs[0].name for r in failed) == broken
     assert only.logs[0].name == "lane_drive.mf4"
     assert only.labels is not None
 
@@ -376,3 +397,84 @@ def test_a_pipe_that_is_called_like_a_table_does_not_stop_it(tmp_path):
     (tmp_path / "c.toml").write_text('name = "c"\n')
     with pytest.raises(ConfigError, match="device or a pipe"):
         load_campaign(tmp_path / "campaign.toml")
+
+
+def german(path, wet):
+    """A drive of a German logger with a lane, a brake that rests and channels that are no signal."""
+    names = [f"{n} [U/min]" for n in WHEELS]
+    omega = [SPEED / 0.317 * 60.0 / (2.0 * np.pi) + unlike()] * 4
+    more = {"Nassbahn": wet, "Bremsdruck [bar]": 0.0 * T, "Spurstange_VL [kN]": np.sin(T), "Spurstange_VR [kN]": np.cos(T),
+            "Oeltemperatur [degC]": 80.0 + T, "Zaehler": T}  # fmt: skip
+    table(path, ["Zeit [s]", *names, *more], [T, *omega, *more.values()], ";")
+
+
+def test_a_lane_a_brake_and_tie_rods_are_found_and_what_is_left_is_told(tmp_path):
+    lane = ((T > 5.0) & (T < 8.0)).astype(float)
+    german(tmp_path / "nass_1.csv", lane)
+    german(tmp_path / "trocken_12.csv", 0.0 * T)
+    result = run(tmp_path, "-o", tmp_path / "c.toml", "--vehicle", CAR)
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "map.toml").read_text()
+    entries = load_signal_map(tmp_path / "map.toml").entries
+    for symbol, channel, unit in (
+        ("on_water", "Nassbahn", "bool"),
+        ("brake_pressure", "Bremsdruck", "bar"),
+        ("tie_rod_fl", "Spurstange_VL", "kN"),
+        ("tie_rod_fr", "Spurstange_VR", "kN"),
+    ):
+        assert (entries[symbol].channel, entries[symbol].unit) == ((channel,), unit)
+    assert text.endswith("# not mapped, 2 channels:\n#   Oeltemperatur [degC]\n#   Zaehler\n")
+    assert "channels that are not mapped: 2, named at the end of map.toml" in result.output
+    assert "no signal on_water" not in result.output
+    signals = load_signals(
+        [tmp_path / "nass_1.csv"], vehicle=load_vehicle(CAR), signal_map=load_signal_map(tmp_path / "map.toml")
+    )
+    assert abs(signals.frame["on_water"].cast(float).mean() - lane.mean()) < 0.01
+    assert abs(signals.frame["tie_rod_fr"].to_numpy()).max() > 990.0
+
+
+def test_a_channel_called_wet_that_is_not_0_or_1_is_no_lane(tmp_path):
+    german(tmp_path / "d1.csv", 0.5 * T)
+    result = run(tmp_path, "-o", tmp_path / "c.toml")
+    assert "on_water" not in load_signal_map(tmp_path / "map.toml").entries
+    assert "or map the channel that tells it: on_water = ..." in result.output
+
+
+def test_many_channels_without_a_signal_are_counted_and_the_first_named(tmp_path):
+    heading = ["Zeit [s]", *(f"{n} [U/min]" for n in WHEELS), *(f"K{i}" for i in range(70))]
+    table(tmp_path / "d1.csv", heading, [T, *[60.0 * SPEED] * 4, *[T] * 70], ";")
+    assert run(tmp_path, "-o", tmp_path / "c.toml").exit_code == 0
+    lines = (tmp_path / "map.toml").read_text().splitlines()
+    assert "# not mapped, 70 channels:" in lines
+    assert lines[-2:] == ["#   K59", "#   and 10 more"]
+
+
+def test_a_copy_byte_for_byte_is_left_out_whatever_it_is_called(tmp_path):
+    wheels(tmp_path / "d1.csv")
+    wheels(tmp_path / "d2.csv")
+    shutil.copy(tmp_path / "d1.csv", tmp_path / "d1 - Kopie.csv")
+    result = run(tmp_path, "-o", tmp_path / "c.toml")
+    assert result.exit_code == 0, result.output
+    assert "d1 - Kopie.csv is left out: byte for byte d1.csv" in result.output
+    assert [r.logs[0].name for r in load_campaign(tmp_path / "c.toml").runs] == ["d1.csv", "d2.csv"]
+
+
+def test_blanks_are_counted_and_a_broken_log_keeps_its_row(tmp_path):
+    wheels(tmp_path / "ReifenA_1.3mm_1.csv")
+    wheels(tmp_path / "ReifenA_2.csv")
+    (tmp_path / "ReifenA_1.3mm_3.csv").write_text("Zeit [s];Raddrehzahl_VL [U/min]\n")
+    result = run(tmp_path, "-o", tmp_path / "c.toml")
+    assert result.exit_code == 3, result.output
+    assert "\n  water_depth_mm: 1 of 3 blank\n  manoeuvre: 3 of 3 blank\n" in result.output, result.output
+    assert "tyre: " not in result.output.partition("to fill in:")[2].partition("signals")[0]
+    rows = rows_of(tmp_path / "runs.csv")
+    assert [r["log"] for r in rows] == ["ReifenA_1.3mm_1.csv", "ReifenA_1.3mm_3.csv", "ReifenA_2.csv"]
+    assert rows[1]["water_depth_mm"] == "1.3"
+
+
+def test_a_position_without_a_unit_is_in_degrees_and_a_speed_without_one_is_named(tmp_path):
+    heading = ["Zeit [s]", *(f"{n} [U/min]" for n in WHEELS), "GPS Latitude", "GPS Speed"]
+    table(tmp_path / "d1.csv", heading, [T, *[60.0 * SPEED] * 4, 48.0 + 1e-3 * T, SPEED], ";")
+    result = run(tmp_path, "-o", tmp_path / "c.toml")
+    assert "latitude = GPS Latitude [deg]  (name; the file gives no unit: deg by its kind, check it)" in result.output
+    assert "GPS Speed may be it, but the file gives no unit: map it with its unit" in result.output
