@@ -30,9 +30,9 @@ def compiled(function: Callable[..., Any]) -> Any:
     # uninstallation does not remove, and that hide an editable one
     own, config.CACHE_DIR = config.CACHE_DIR, config.CACHE_DIR or _user_cache()
     try:
-        dispatcher = njit(cache=True, error_model="numpy")(function)
+        dispatcher = njit(cache=True, error_model="numpy", nogil=True)(function)
     except RuntimeError:
-        return njit(function, error_model="numpy")
+        return njit(function, error_model="numpy", nogil=True)
     finally:
         config.CACHE_DIR = own
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)

@@ -8,6 +8,7 @@ from conftest import ROOT
 from aqualog.config.scenario import SCENARIO_KEYS
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.effects import EFFECTS
+from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.tyre import TYRE_KEYS
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.vehicle import KEYS
@@ -76,6 +77,12 @@ def test_effects(effect):
     assert f"| `{effect.name}` | {effect.target} |" in README
     for p in effect.parameters:
         assert f"`{p.name}` [{p.unit}] ({p.neutral:g})" in README
+
+
+@pytest.mark.parametrize("effect", list(EMPIRICAL.values()), ids=lambda e: e.name)
+def test_functions_of_a_model(effect):
+    t = effect.table
+    assert f"| `{effect.name}` | {effect.target} | `knots`: {t.x} [{t.x_unit}], value [{t.unit}] (none) |" in README
 
 
 def test_keys_of_a_campaign():

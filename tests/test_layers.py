@@ -13,7 +13,7 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
     "errors", "compiled", "workers", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "calibrate",
-    "detect", "rivals", "model", "evaluate", "campaign", "report", "figures", "reproduce", "config", "cli",
+    "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "report", "figures", "reproduce", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")

@@ -25,6 +25,7 @@ from aqualog.cli.options import (
 
 if TYPE_CHECKING:
     from aqualog.detect.slip_slope.watch import Memory
+    from aqualog.model.term import Model
     from aqualog.types import DriveResult
 
 __all__ = ["detect"]
@@ -82,6 +83,14 @@ def detect(
             metavar="FILE",
         ),
     ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model",
+            help="Model file (TOML), as `aqualog diagnose` writes it: effects that the car is known to have.",
+            metavar="FILE",
+        ),
+    ] = None,
     fail_on_event: Annotated[
         bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
     ] = False,
@@ -104,13 +113,15 @@ def detect(
       aqualog detect can.mf4 --dbc car.dbc --signals map.toml --json
       aqualog detect drive.mcap --vehicle car.toml --write drive_detected.mf4
       aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
+      aqualog detect drive.mf4 --vehicle car.toml --model model.toml
     """
     from aqualog.cli.console import guarded
 
     with guarded(debug=debug):
         code = _detect(
             logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference, thresholds,
-            fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+            model, fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose,
+            progress=progress,
         )  # fmt: skip
     if code:
         raise typer.Exit(code)
@@ -128,6 +139,7 @@ def _detect(
     configuration: str,
     reference: str,
     thresholds_file: Path | None,
+    model_file: Path | None,
     *,
     fail_on_event: bool,
     as_json: bool,
@@ -158,11 +170,16 @@ def _detect(
     )  # fmt: skip
     console, paths = setup.console, setup.paths
     vehicle = setup.vehicle
+    given = [p for p in (thresholds_file, model_file) if p is not None]
     if history_file is not None:
-        others = [thresholds_file] if thresholds_file is not None else []
-        refuse_existing([history_file], force=True, sources=[*setup.sources, *targets, *others])
-    if thresholds_file is not None:
-        refuse_existing(targets, force=force, sources=[thresholds_file])
+        refuse_existing([history_file], force=True, sources=[*setup.sources, *targets, *given])
+    if given:
+        refuse_existing(targets, force=force, sources=given)
+    model = None
+    if model_file is not None:
+        from aqualog.config.model import load_model
+
+        model = load_model(model_file)
     with console.steps() as steps:
         from aqualog.align.load import load_signals
         from aqualog.detect.stream import detect_drive
@@ -175,22 +192,32 @@ def _detect(
         steps("detecting")
         # what an earlier look at this very drive has left is not what it is compared with
         key = drive_key(loaded) if history_file else ""
+        told: tuple[str, ...] = ()
+        if model is not None:
+            from aqualog.diagnose.extended import extended_inputs
+
+            loaded, vehicle, told = extended_inputs(loaded, vehicle, model)
         # what takes long of a short drive is the compiler; of a long one it is the drive
         with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
             known = replace(memory, history=memory.history.without(key))
             result = detect_drive(loaded, vehicle, settings=settings, memory=known)
+        result = replace(result, notes=(*told, *result.notes))
+        terms = _model_document(model)
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
         steps("writing")
         if out is not None:
-            _write_results(result, out, name, title)
+            _write_results(result, out, name, title, terms)
         if write is not None:
             _write_log(result, write)
         if history_file is not None:
             update_history(history_file, lambda h: remembered(h, memory.name(vehicle), result.slopes, drive=key))
-    _print(result, name, as_json=as_json)
+    _print(result, name, terms, as_json=as_json)
     if vehicle_file is None:
         console.note("no --vehicle: a default RWD car is taken, and what needs its mass is not judged")
+    if terms is not None:
+        effects = ", ".join(t["effect"] for t in terms) or "no effect"
+        console.note(f"model {model_file}: the detectors know of {effects}; signals and features are as it has them")
     if history_file is not None:
         console.note(_history_told(memory, vehicle, result, history_file))
     if configuration and history_file is None:
@@ -234,6 +261,21 @@ def _history_told(memory: Memory, vehicle: Any, result: DriveResult, path: Path)
     return f"{text}; the name is new, known are {shown}"
 
 
+def _model_document(model: Model | None) -> list[dict[str, Any]] | None:
+    """The terms that the detectors knew; null without a model file."""
+    if model is None:
+        return None
+    return [
+        {
+            "effect": t.effect.name,
+            "where": t.where,
+            "parameters": dict(t.values),
+            **({"knots": [list(k) for k in t.knots]} if t.knots else {}),
+        }
+        for t in model.terms
+    ]
+
+
 def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
     """Stop with one line if no detector can run."""
     from aqualog.detect.needs import DETECTORS, check_needs
@@ -253,14 +295,14 @@ def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
     )
 
 
-def _write_results(result: DriveResult, out: Path, name: str, title: str) -> None:
+def _write_results(result: DriveResult, out: Path, name: str, title: str, model: Any) -> None:
     from aqualog.cli.files import write_text, write_whole
     from aqualog.io.write_log import write_log
     from aqualog.report.document import document, result_groups
     from aqualog.report.page import write_page
 
     out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(document(result, log=name), indent=1, allow_nan=False) + "\n"
+    text = json.dumps({**document(result, log=name), "model": model}, indent=1, allow_nan=False) + "\n"
     write_text(out / "events.json", text)
     t_ns, start_ns = _times(result)
     groups = result_groups(result)
@@ -285,11 +327,12 @@ def _write_log(result: DriveResult, path: Path) -> None:
     write_whole(path, lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=start_ns))
 
 
-def _print(result: DriveResult, name: str, *, as_json: bool) -> None:
+def _print(result: DriveResult, name: str, model: Any, *, as_json: bool) -> None:
     if as_json:
         from aqualog.report.document import document
 
-        sys.stdout.write(json.dumps(document(result, log=name), indent=1, allow_nan=False) + "\n")
+        whole = {**document(result, log=name), "model": model}
+        sys.stdout.write(json.dumps(whole, indent=1, allow_nan=False) + "\n")
         return
     from aqualog.cli.console import clean
     from aqualog.report.text import event_table

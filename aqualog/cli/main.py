@@ -17,6 +17,7 @@ from aqualog.cli.campaign import campaign_app
 from aqualog.cli.clock import align
 from aqualog.cli.convert import convert
 from aqualog.cli.detect import detect
+from aqualog.cli.diagnose import diagnose
 from aqualog.cli.evaluate import evaluate
 from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
@@ -46,6 +47,7 @@ app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
 app.command("bin-resistance", no_args_is_help=True)(bin_resistance)
 app.command(no_args_is_help=True)(report)
 app.command(no_args_is_help=True)(calibrate)
+app.command(no_args_is_help=True)(diagnose)
 app.command(no_args_is_help=True)(evaluate)
 app.command(no_args_is_help=True)(simulate)
 app.command(no_args_is_help=True)(figures)

@@ -62,7 +62,7 @@ _J_V, _J_W = N_STATES, N_STATES + 4
 # recorded columns; those of wheels take four places
 _SCALARS = (
     "v_x", "v_y", "yaw_rate", "psi", "position", "y_lat", "a_x", "a_y", "steer_angle", "drive_torque", "brake_torque",
-    "grade", "lane_front", "lane_rear", "drag",
+    "grade", "lane_front", "lane_rear", "drag", "nudge",
 )  # fmt: skip
 _WHEELS = (
     "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
@@ -85,6 +85,9 @@ MAX_INTEGRAL = 0.2  # of the weight, as force
 RUN_AWAY = 1.5  # driven wheels this much faster than the car make a driver lift
 
 
+NO_TORQUE: FloatArray = np.zeros((1, 4))
+
+
 class Controls(NamedTuple):
     """What driver and car do; arrays (n + 1,) at every time step."""
 
@@ -105,10 +108,18 @@ class Controls(NamedTuple):
     scatter: float
     antilock: bool = False  # the brakes let go of a wheel that is about to lock
     kicks: bool = False  # the road has kerbs or holes
+    follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`; 0: runs free
 
 
-def run(n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road, controls: Controls) -> FloatArray:
-    """`integrate` with its inputs packed: records are plain memory, tuples of arrays cost a count at every access."""
+def run(
+    n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road, controls: Controls,
+    applied: FloatArray = NO_TORQUE,
+) -> FloatArray:  # fmt: skip
+    """`integrate` with its inputs packed: records are plain memory, tuples of arrays cost a count at every access.
+
+    `applied` (n + 1, 4) [N m]: torque at each wheel on top of the driver's, scaled by the plant's `torque_gain`; one
+    row holds for the whole drive.
+    """
     fields = controls._asdict()
     settings = {name: float(x) for name, x in fields.items() if np.ndim(x) == 0} | {"dt": float(dt)}
     setting = np.zeros(1, dtype=[(name, np.float64) for name in settings])
@@ -117,7 +128,7 @@ def run(n: int, dt: float, every: int, y0: FloatArray, plant: Plant, road: Road,
     series = np.zeros(n + 1, dtype=[(name, np.float64) for name, x in fields.items() if np.ndim(x) == 1])
     for name in series.dtype.names or ():
         series[name] = fields[name]
-    rows: FloatArray = integrate(n, float(dt), every, y0, *flat(plant), road, setting, series)
+    rows: FloatArray = integrate(n, float(dt), every, y0, *flat(plant), road, setting, series, applied)
     return rows
 
 
@@ -193,11 +204,12 @@ def _track(track, position, ds):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released):  # type: ignore[no-untyped-def]
+def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released, applied, step):  # type: ignore[no-untyped-def]
     """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is `recorded`.
 
     `track` (m, 3) holds the stretch and the film left by the left and right front wheel, `released` (4,) the share of
-    each wheel's brake torque that the antilock system holds off.
+    each wheel's brake torque that the antilock system holds off; row `step` of `applied` (m, 4) is the torque that is
+    applied to each wheel.
     """
     v_x, v_y, yaw_rate, position = y[V_X], y[V_Y], y[YAW_RATE], y[S]
     wheelbase = p.l_f + p.l_r
@@ -374,6 +386,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
 
         # the wheel's balance of torques
         torque = 0.5 * (1.0 - split_rear if front else split_rear) * drive + (0.5 if front else -0.5) * exc * r_l
+        torque += applied[step, i] * p.torque_gain
         braking = q.brake_split * brake_total * (1.0 - released[i])
         water_torque = film_force * r_l + shift
         resisting = _rolling_force(F_z, r_w) * r_l + water_torque + q.brake_drag
@@ -432,7 +445,8 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
     # specific force: what an accelerometer shows; a trailer is pulled along
     a_x = (sum_x - drag) / (p.mass + p.towed_mass)
     a_y = sum_y / p.mass
-    f[V_X] = a_x - slope_down / p.mass + yaw_rate * v_y
+    nudge = s.follow * (c.v_target - v_x)
+    f[V_X] = a_x - slope_down / p.mass + yaw_rate * v_y + nudge
     f[V_Y] = a_y - yaw_rate * v_x
     f[YAW_RATE] = moment / p.I_zz
     f[PSI] = yaw_rate
@@ -444,7 +458,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
     if recorded:
         out[0], out[1], out[2], out[3], out[4], out[5] = v_x, v_y, yaw_rate, y[PSI], position, y[Y_LAT]
         out[6], out[7], out[8], out[9], out[10], out[11] = a_x, a_y, steer, drive, brake_total, grade
-        out[12], out[13], out[14] = lane_front, lane_rear, drag
+        out[12], out[13], out[14], out[15] = lane_front, lane_rear, drag, nudge
 
 
 @compiled
@@ -464,7 +478,7 @@ def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # type: ignore[no-untyped-def]
+def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls, applied):  # type: ignore[no-untyped-def]
     """March `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
 
     ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part that is given,
@@ -494,7 +508,8 @@ def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # t
     written = -1
     for k in range(n + 1):
         t = k * dt
-        _rhs(t, y, f, jac, row, recorded, p, wheels, extra, r, s, controls[k], track, released)
+        step = min(k, applied.shape[0] - 1)
+        _rhs(t, y, f, jac, row, recorded, p, wheels, extra, r, s, controls[k], track, released, applied, step)
         if k % every == 0:
             rows[k // every] = row
         if k == n:
@@ -511,7 +526,9 @@ def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls):  # t
             antilock(released, releasing, row, omega_at, v_at, r_at, dt)
         _solve(f, jac, h, k1)
         y1 = y + dt * k1
-        _rhs(t + dt, y1, f, unused, row, silent, p, wheels, extra, r, s, controls[k + 1], track, released)
+        step = min(k + 1, applied.shape[0] - 1)
+        then = controls[k + 1]
+        _rhs(t + dt, y1, f, unused, row, silent, p, wheels, extra, r, s, then, track, released, applied, step)
         for i in range(N_STATES):
             rest[i] = f[i] - 2.0 * k1[i]
         _solve(rest, jac, h, k2)

@@ -22,7 +22,16 @@ from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.physics.steering import STEERING, kingpin_moment, steering_torque, tie_rod_force
 from aqualog.types import FloatArray
 
-__all__ = ["STEP_S", "TRUTH_SYMBOLS", "Simulation", "assemble", "drive_truth", "run_kernel", "simulate"]
+__all__ = [
+    "STEP_S",
+    "TRUTH_SYMBOLS",
+    "Simulation",
+    "assemble",
+    "drive_truth",
+    "run_kernel",
+    "simulate",
+    "steering_columns",
+]
 
 BASE = Model()
 STEP_S = 1e-3
@@ -214,7 +223,7 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
         columns[f"angle_{w}"] = wheels["angle"][i]
         columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
     rod_wheels = {n: of_wheels(n) for n in ("aligning", "braking", "wave_drag")}
-    columns |= _steering(wheels | rod_wheels, plant, scenario)
+    columns |= steering_columns(wheels | rod_wheels, plant, scenario)
     if scenario.lanes:
         columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
     v_w = np.array(wheels["omega"]) * np.array(of_wheels("r_e"))
@@ -231,7 +240,7 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
     }
 
 
-def _steering(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
+def steering_columns(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
     """Forces in the tie rods and torque at the steering.
 
     A vehicle file with a polynomial says how the dry car's rods are; what the water adds comes on top.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 from aqualog.errors import ConfigError
@@ -11,7 +12,9 @@ from aqualog.model.plant import Plant
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import Sensors
 
-__all__ = ["Effect", "Model", "Parameter", "Setup", "Term"]
+__all__ = ["Effect", "Knots", "Model", "Parameter", "Setup", "Table", "Term"]
+
+Knots = tuple[tuple[float, float], ...]
 
 
 class Setup(NamedTuple):
@@ -41,6 +44,37 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Table:
+    """A function that an effect has instead of parameters: knots with a straight line between neighbours.
+
+    Over `x` [x_unit], within `x_low` ... `x_high`; values in `unit`, within `low` ... `high`. `apply` is pure and adds
+    the function to what the setup has already; beyond its ends the function is constant.
+    """
+
+    x: str
+    x_unit: str
+    x_low: float
+    x_high: float
+    unit: str
+    low: float
+    high: float
+    apply: Callable[[Setup, Knots, str | None], Setup]
+
+    def fault(self, knots: Knots) -> str | None:
+        """What is wrong with knots, in words; None: nothing."""
+        if len(knots) < 2:
+            return f"{len(knots)} knots, at least 2 are needed"
+        for x, value in knots:
+            if not self.x_low <= x <= self.x_high:
+                return f"a knot at {x:g} is outside {self.x_low:g} ... {self.x_high:g} {self.x_unit}"
+            if not self.low <= value <= self.high:
+                return f"a value of {value:g} is outside {self.low:g} ... {self.high:g} {self.unit}"
+        if any(b[0] <= a[0] for a, b in pairwise(knots)):
+            return f"the knots do not rise in {self.x}"
+        return None
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """One physical effect that a model may have.
 
@@ -57,21 +91,25 @@ class Effect:
     places: tuple[str, ...] = ()
     default: str | None = None
     twins: tuple[str, ...] = ()
+    table: Table | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
     """An effect with values; parameters that are not named keep their neutral value.
 
+    `knots` (x, value) are for an effect with a table; none, or all values zero: neutral.
+
     Raises
     ------
     ConfigError
-        If a parameter or place does not belong to the effect, or a value is outside its physical bounds.
+        If a parameter, place or table does not belong to the effect, or a value is outside its physical bounds.
     """
 
     effect: Effect
     values: Mapping[str, float] = field(default_factory=dict)
     where: str | None = None
+    knots: Knots = ()
 
     def __post_init__(self) -> None:
         known = {p.name: p for p in self.effect.parameters}
@@ -86,6 +124,12 @@ class Term:
                 f"{self.effect.name} cannot sit at {self.where}",
                 expected=", ".join(self.effect.places) or "no place: it acts on the whole car",
             )
+        if self.knots:
+            if self.effect.table is None:
+                raise ConfigError(f"{self.effect.name} has no table of knots")
+            fault = self.effect.table.fault(self.knots)
+            if fault is not None:
+                raise ConfigError(f"{self.effect.name}: {fault}")
 
     @property
     def place(self) -> str | None:
@@ -95,7 +139,10 @@ class Term:
     def apply(self, setup: Setup) -> Setup:
         """The setup with this effect in it."""
         values = {p.name: float(self.values.get(p.name, p.neutral)) for p in self.effect.parameters}
-        return self.effect.apply(setup, values, self.place)
+        setup = self.effect.apply(setup, values, self.place)
+        if self.effect.table is None or all(value == 0.0 for _, value in self.knots):
+            return setup
+        return self.effect.table.apply(setup, self.knots, self.place)
 
 
 @dataclass(frozen=True, slots=True)

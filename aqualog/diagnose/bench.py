@@ -1,0 +1,122 @@
+"""Residuals and signatures of all drives, weighed by their noise: what every test and fit works on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant"]
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """One drive's residual under a model: `residual` (C, n), `mask` (n,), step `dt` [s], `coordinates` (n,) each."""
+
+    residual: FloatArray
+    mask: BoolArray
+    dt: float
+    channels: tuple[str, ...]
+    coordinates: Mapping[str, FloatArray]
+    noise: Noise
+
+    def whitened(self, x: FloatArray) -> FloatArray:
+        """A residual-shaped array (C, n) as unit innovations, flat; inner products are twice log-likelihoods."""
+        return np.asarray(whitened(spectra(bridged(x, self.mask)[None]), self.noise)[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """Drives with their residuals (C, n) and the columns of signatures (K, C, n): one for each free parameter.
+
+    `owner` (K,) is the hypothesis of a column, `columns[i]` the columns of hypothesis i.
+    """
+
+    drives: tuple[Drive, ...]
+    asked: tuple[Hypothesis, ...]
+    residuals: tuple[FloatArray, ...]
+    signatures: tuple[FloatArray, ...]
+    prepared: tuple[Spectra, ...]
+    columns: tuple[tuple[int, ...], ...]
+    prior: FloatArray  # (K,) standard deviation of each parameter
+    low: FloatArray  # (K,) bounds of its change
+    high: FloatArray
+    smallest: FloatArray
+    tolerance: FloatArray  # (K,) by which each may be off without being worth a word
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return self.prior.size
+
+
+def make_bench(
+    drives: Sequence[Drive],
+    asked: Sequence[Hypothesis],
+    residuals: Sequence[FloatArray],
+    signatures: Sequence[Sequence[FloatArray]],
+    present_values: Mapping[tuple[int, str], float],
+) -> Bench:
+    """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
+    columns: list[tuple[int, ...]] = []
+    prior, low, high, smallest, tolerance = [], [], [], [], []
+    k = 0
+    for i, h in enumerate(asked):
+        columns.append(tuple(range(k, k + len(h.free))))
+        k += len(h.free)
+        for name in h.free:
+            p = h.parameter(name)
+            now = present_values[i, name]
+            prior.append(p.sigma)
+            low.append(p.low - now)
+            high.append(p.high - now)
+            smallest.append(p.smallest)
+            tolerance.append(h.tolerance(name))
+    flat = [np.concatenate(list(s)) for s in signatures]
+    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
+    return Bench(
+        tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
+        np.array(low), np.array(high), np.array(smallest), np.array(tolerance),
+    )  # fmt: skip
+
+
+def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
+    """Inner products in a metric that forgives what every parameter may be off by.
+
+    No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
+    enough samples any of it is significant. The covariance of the residual is that of the noise plus that of all these
+    deviations, I + X S^2 X'; by Woodbury its inverse takes A (S^-2 + A' A)^-1 A' off.
+    """
+    k = np.flatnonzero((bench.tolerance > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+    inner = gram[np.ix_(k, k)] + np.diag(bench.tolerance[k] ** -2.0)
+    return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
+
+
+def gram_of(
+    bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray], keep: Sequence[int] | None = None
+) -> FloatArray:
+    """Whitened inner products of the columns (all or those to `keep`), the residual last, summed over drives."""
+    total: FloatArray | float = 0.0
+    for drive, ready, noise, residual in zip(bench.drives, bench.prepared, noises, residuals, strict=True):
+        if keep is not None:
+            ready = ready.of(keep)
+        columns = whitened(ready, noise)
+        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)
+        rows = np.concatenate([columns, y])
+        total = total + rows @ rows.T
+    return np.asarray(total)
+
+
+def noises_after(bench: Bench, residuals: Sequence[FloatArray], theta: Mapping[int, float]) -> list[Noise]:
+    """Noise of each drive's residual once the columns with these values have been taken away."""
+    return [
+        fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
+        for d, r, s in zip(bench.drives, residuals, bench.signatures, strict=True)
+    ]

@@ -1,0 +1,172 @@
+"""Residual channels by physics: the same function of signals, measured or simulated.
+
+The residual of a channel is what it shows of the measured signals minus what it shows of the simulated ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.notation import WHEELS
+from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
+from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["BLOCK_S", "CHANNELS", "Kind", "block_means", "channel_values", "channels_of", "contrasts"]
+
+BLOCK_S = 0.1  # [s] what is slower than 5 Hz; faster it is springs, teeth and buses
+
+
+class Kind(NamedTuple):
+    """What a channel is: title and unit for the page, and what it compares."""
+
+    title: str
+    unit: str
+    meaning: str
+
+
+_SLIP = "rim speed of the wheel on the centre line, less the reference velocity"
+CHANNELS: dict[str, Kind] = {
+    "force_balance": Kind("Force balance", "m/s^2", "accelerometer against torque and resistance"),
+    "kinematic": Kind("Kinematic", "m/s^2", "accelerometer against the acceleration of the wheels or the velocity"),
+    **{f"slip_{w}": Kind(f"Slip {w}", "m/s", _SLIP) for w in WHEELS},
+    "axle_slip": Kind("Slip between axles", "m/s", "rim speed of the driven axle less the other one's"),
+    "side_slip_f": Kind("Slip between front wheels", "m/s", "rim speed left less right, curves taken out"),
+    "side_slip_r": Kind("Slip between rear wheels", "m/s", "rim speed left less right, curves taken out"),
+    "lateral": Kind("Lateral", "m/s^2", "lateral accelerometer against v_x times yaw rate"),
+    "tie_rod_fl": Kind("Tie rod left", "N", "tie-rod force against the forces of the front wheel"),
+    "tie_rod_fr": Kind("Tie rod right", "N", "tie-rod force against the forces of the front wheel"),
+}
+
+
+def channels_of(present: frozenset[str], vehicle: Vehicle) -> tuple[str, ...]:
+    """Channels that a log with these signals has."""
+    wheels = all(f"omega_{w}" in present for w in WHEELS)
+    out = []
+    if "a_x" in present:
+        if all(f"torque_{w}" in present for w in vehicle.driven):
+            out.append("force_balance")
+        if wheels or "v_x" in present:
+            out.append("kinematic")
+    if wheels:
+        out += [f"slip_{w}" for w in WHEELS] if "v_x" in present else ["axle_slip", "side_slip_f", "side_slip_r"]
+    # without a steering angle the gyro leads the simulation, and its noise would be on both sides
+    if {"a_y", "yaw_rate", "steer_angle"} <= present and (wheels or "v_x" in present):
+        out.append("lateral")
+    out += [n for n in ("tie_rod_fl", "tie_rod_fr") if n in present and "force_balance" in out]
+    return tuple(out)
+
+
+def contrasts(channels: tuple[str, ...]) -> FloatArray:
+    """Combinations of channels (C, C) that share as little noise as may be, as rows.
+
+    The accelerometer is in the force balance and in the kinematic channel; their difference compares wheels with torque
+    and has none of its noise. A reference velocity is in the slip of all four wheels; it is left in their mean alone.
+    """
+    out = np.eye(len(channels))
+    at = {c: i for i, c in enumerate(channels)}
+    if {"force_balance", "kinematic"} <= set(at):
+        out[at["kinematic"], at["force_balance"]] = -1.0
+    four = [at[f"slip_{w}"] for w in WHEELS if f"slip_{w}" in at]
+    if len(four) == 4:
+        out[np.ix_(four, four)] = [[0.25, 0.25, 0.25, 0.25], [0.5, 0.5, -0.5, -0.5], [1, -1, 0, 0], [0, 0, 1, -1]]
+    if {"tie_rod_fl", "tie_rod_fr"} <= set(at):
+        rods = [at["tie_rod_fl"], at["tie_rod_fr"]]
+        out[np.ix_(rods, rods)] = [[0.5, 0.5], [1.0, -1.0]]
+    return out
+
+
+def channel_values(
+    columns: Mapping[str, FloatArray], channels: tuple[str, ...], vehicle: Vehicle, *, dt: float
+) -> FloatArray:
+    """Channels of signals as means over blocks of 0.1 s.
+
+    Parameters
+    ----------
+    columns : mapping of array (n,)
+        Canonical signals; of a simulation also `nudge`, the acceleration that drew its speed to the measured one.
+    channels : tuple of str
+        Of `CHANNELS`.
+    vehicle : Vehicle
+        Radii and distances by which wheels are compared: the file's, for both sides.
+    dt : float
+        Step of the signals. [s]
+
+    Returns
+    -------
+    values : array (C, m)
+        NaN where a signal is missing. `force_balance` is the accelerometer itself: what the torque explains of it is
+        on the simulated side. ISO 8855 signs.
+    """
+    mean = {n: block_means(x, dt) for n, x in columns.items()}
+    step = max(BLOCK_S, dt)
+    # as a speed, so that it passes the same differences as the wheels'
+    drawn = block_means(np.cumsum(columns["nudge"]) * dt, dt) if "nudge" in columns else 0.0
+    wheels = _centre_line(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
+    v_x = mean.get("v_x")
+    out = []
+    for name in channels:
+        if name == "force_balance":
+            x = mean["a_x"]
+        elif name == "kinematic":
+            x = mean["a_x"] - np.gradient(_speed(wheels, v_x) - drawn, step)
+        elif name == "lateral":
+            x = mean["a_y"] - _speed(None if v_x is not None else wheels, v_x) * mean["yaw_rate"]
+        elif name.startswith("tie_rod"):
+            x = mean[name]
+        else:
+            assert wheels is not None
+            x = _slip_channel(name, wheels, v_x, vehicle)
+        out.append(x)
+    return np.array(out)
+
+
+def _speed(wheels: FloatArray | None, v_x: FloatArray | None) -> FloatArray:
+    """Mean of the wheels, or else the reference velocity. [m/s]"""
+    if wheels is not None:
+        return np.asarray(wheels.mean(axis=0))
+    assert v_x is not None
+    return v_x
+
+
+def _slip_channel(name: str, wheels: FloatArray, v_x: FloatArray | None, vehicle: Vehicle) -> FloatArray:
+    front: FloatArray = 0.5 * (wheels[0] + wheels[1])
+    rear: FloatArray = 0.5 * (wheels[2] + wheels[3])
+    left, right = (wheels[0], wheels[1]) if name == "side_slip_f" else (wheels[2], wheels[3])
+    if name == "axle_slip":
+        return np.asarray(front - rear if vehicle.drivetrain == "fwd" else rear - front)
+    if name.startswith("side_slip"):
+        return np.asarray(left - right)
+    assert v_x is not None
+    return np.asarray(wheels[WHEELS.index(name[-2:])] - v_x)
+
+
+def _centre_line(mean: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
+    """Rim speeds on the centre line (4, m) [m/s]."""
+    yaw = mean.get("yaw_rate")
+    rim = [mean[f"omega_{w}"] * vehicle.r_e(w) for w in WHEELS]
+    if yaw is None:
+        return np.array(rim)
+    speed = np.mean(rim, axis=0)
+    # the radius of the curve, not the steering wheel: an offset of the one does not enter
+    steer = kinematic_steer_angle(yaw, speed, wheelbase=vehicle.wheelbase)
+    half = 0.5 * vehicle.track
+    return np.array([
+        centre_line_speed(
+            rim[i], yaw, steer if i < 2 else np.zeros_like(steer), y=half if i % 2 == 0 else -half,
+            wheelbase=vehicle.wheelbase,
+        )
+        for i in range(4)
+    ])  # fmt: skip
+
+
+def block_means(x: FloatArray, dt: float) -> FloatArray:
+    """Means over blocks of 0.1 s, NaN where any sample is missing; slower signals stay as they are. (n,) to (m,)"""
+    k = max(1, round(BLOCK_S / dt))
+    if k == 1:
+        return x
+    m = x.size // k
+    return np.asarray(x[: m * k].reshape(m, k).mean(axis=1))

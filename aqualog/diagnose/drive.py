@@ -1,0 +1,255 @@
+"""A log made ready: what drives the simulation, what is compared with it, and what is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from aqualog.diagnose.channels import block_means, channels_of
+from aqualog.diagnose.inputs import quiet_torque, smooth
+from aqualog.errors import SignalError
+from aqualog.features.stream import INPUTS, FeatureStream
+from aqualog.model.follow import FOLLOW_RATE, Course, follow
+from aqualog.model.scenario import Lane
+from aqualog.model.term import Model
+from aqualog.notation import WHEELS
+from aqualog.physics.kinematics import kinematic_steer_angle
+from aqualog.physics.load import G
+from aqualog.types import BoolArray, FloatArray, Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Drive", "prepare"]
+
+V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
+BESIDE_S = 1.0  # [s] before and after what is left out
+GAP_S = 0.25  # [s] longer gaps are not bridged
+A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
+# noise of what drives the simulation must not pass for motion: it would meet itself in the residual
+SPEED_S, STEER_S = 1.0, 0.5  # [s]
+LEAST_S = 20.0  # [s] of usable driving
+BRAKE_PRESSURE = 0.5e5  # [Pa]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s.
+
+    `coordinates` (m,): what a remaining error may depend on. `untorqued`: the log has no torque; the one that the base
+    model needs for the measured speed stands in, and the force balance is not judged.
+    """
+
+    name: str
+    dt: float
+    vehicle: Vehicle
+    course: Course
+    columns: Mapping[str, FloatArray]
+    channels: tuple[str, ...]
+    mask: BoolArray
+    coordinates: Mapping[str, FloatArray]
+    present: frozenset[str]
+    untorqued: bool
+    duration_s: float
+    notes: tuple[str, ...]
+
+    @property
+    def used_s(self) -> float:
+        """Usable driving. [s]"""
+        return float(self.mask.sum()) * max(0.1, self.dt)
+
+
+def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
+    """Signals of one drive as input and measurement.
+
+    Raises
+    ------
+    SignalError
+        If the log has neither velocity nor four wheel speeds, or nothing to compare.
+
+    Left out, with a second on either side: standstill and creeping, gaps, strong cornering, braking where the brakes'
+    torque is not in the log, a frozen accelerometer.
+    """
+    present = frozenset(s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height)
+    if signals.frame.height * signals.dt < LEAST_S:
+        raise SignalError(
+            f"{signals.frame.height * signals.dt:.0f} s of drive", where=name, expected=f"{LEAST_S:.0f} s at the least",
+            hint="a longer drive",
+        )  # fmt: skip
+    channels = channels_of(present, vehicle)
+    if not channels:
+        raise SignalError(
+            "nothing to compare", where=name, expected="accelerometer or wheel speeds, and a velocity",
+            hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+        )  # fmt: skip
+    columns = {s: signals.array(s) for s in present}
+    dt = signals.dt
+    n = signals.frame.height
+    notes: list[str] = []
+    velocity = _velocity(columns, vehicle, dt, present)
+    gaps = np.zeros(n, dtype=bool)
+    v = _bridged(velocity, dt, gaps)
+    torqued = "force_balance" in channels
+    needed = ["a_x"] if "a_x" in present else []
+    needed += [f"omega_{w}" for w in WHEELS if f"omega_{w}" in present]
+    filled: dict[str, FloatArray] = {}
+    for s in sorted(present):
+        own = np.zeros(n, dtype=bool)
+        filled[s] = _bridged(columns[s], dt, own)
+        if s in needed or s == "v_x" or (torqued and s.startswith("torque_")):
+            gaps |= own
+    if torqued:
+        torque = vehicle.torque_gain * np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
+        torque = quiet_torque(torque, dt)
+    else:
+        torque = _needed_torque(v, vehicle, dt)
+        notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
+    course = _without_lag(vehicle, Course(
+        np.arange(n, dtype=np.float64) * dt, torque, _steer(filled, v, vehicle, dt), smooth(v, dt, SPEED_S),
+        _lanes(filled, dt),
+        has_rods="tie_rod_fl" in channels,
+    ))  # fmt: skip
+    bad = gaps | (v < V_MIN)
+    if "a_x" in filled:
+        bad |= _frozen(filled["a_x"], dt)
+    if "yaw_rate" in filled:
+        bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
+    if "brake_pressure" in filled and torqued and not _brakes_in_torque(filled, torque):
+        bad |= filled["brake_pressure"] > BRAKE_PRESSURE
+        notes.append("braking is left out: its torque is not in the log")
+    mask = block_means(_widened(bad, dt).astype(np.float64), dt) == 0.0
+    return Drive(
+        name, dt, vehicle, course, filled, channels, mask, _coordinates(filled, course, v, dt), present, not torqued,
+        n * dt, tuple(notes),
+    )  # fmt: skip
+
+
+def _without_lag(vehicle: Vehicle, course: Course) -> Course:
+    """The course with a speed to follow that makes the simulated one meet the measured one without delay.
+
+    Drawn to a target, the simulation lags behind it by what draws it; a lagging copy of the measured speed's noise
+    would look like a signal that comes late.
+    """
+    nudge = follow(vehicle, course, Model())["nudge"]
+    return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
+
+
+def _velocity(columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, present: frozenset[str]) -> FloatArray:
+    if "v_x" in columns:
+        return columns["v_x"]
+    if not all(f"omega_{w}" in columns for w in WHEELS):
+        inputs = {s: x for s, x in columns.items() if s in INPUTS}
+        return FeatureStream(vehicle, dt, tuple(present)).push(inputs)["v_x_hat"]
+    # wheels that are not driven roll nearly without slip
+    free = [w for w in WHEELS if w not in vehicle.driven] or list(WHEELS)
+    return np.asarray(np.mean([columns[f"omega_{w}"] * vehicle.r_e(w) for w in free], axis=0))
+
+
+def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
+    """Short gaps by straight lines; samples in long ones are marked."""
+    good = np.isfinite(x)
+    if good.all():
+        return x
+    if not good.any():
+        gaps[:] = True
+        return np.zeros_like(x)
+    where = np.flatnonzero(good)
+    before = np.maximum.accumulate(np.where(good, np.arange(x.size), -1))
+    after = np.minimum.accumulate(np.where(good, np.arange(x.size), 2 * x.size)[::-1])[::-1]
+    gaps |= ~good & ((after - before) * dt > GAP_S)
+    return np.interp(np.arange(x.size), where, x[where])
+
+
+def _needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
+    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N m]"""
+    force = vehicle.mass * np.gradient(smooth(v, dt, SPEED_S), dt) + vehicle.mass * G * vehicle.rolling_resistance
+    force = force + 0.5 * vehicle.air_density * vehicle.drag_area * v * v
+    rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
+    return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.r_l(w) for w in WHEELS])
+
+
+def _steer(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
+    """Road-wheel angle, or else that of the curve that the gyro shows."""
+    if "steer_angle" in columns:
+        return smooth(columns["steer_angle"], dt, STEER_S)
+    if "yaw_rate" in columns:
+        return smooth(kinematic_steer_angle(columns["yaw_rate"], v, wheelbase=vehicle.wheelbase), dt, STEER_S)
+    return np.zeros_like(v)
+
+
+def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
+    """Stretches of water by their labels: each stretch with its mean depths."""
+    both = columns.get("water_depth")
+    left = columns.get("water_depth_left", both)
+    right = columns.get("water_depth_right", both)
+    if left is None and right is None:
+        return ()
+    left = right if left is None else left
+    right = left if right is None else right
+    assert left is not None
+    assert right is not None
+    wet: BoolArray = np.maximum(left, right) > 1e-5
+    # depths that are told in steps make a stretch each
+    change = np.flatnonzero(
+        (np.diff(wet.astype(np.int8)) != 0) | (np.abs(np.diff(left)) > 5e-5) | (np.abs(np.diff(right)) > 5e-5)
+    )
+    edges = [0, *(change + 1).tolist(), wet.size]
+    if len(edges) > 400:  # measured depths that vary: mean of each wet stretch
+        edges = [0, *(np.flatnonzero(np.diff(wet.astype(np.int8))) + 1).tolist(), wet.size]
+    return tuple(
+        Lane(
+            a * dt,
+            b * dt,
+            in_metres=False,
+            depth_left=float(left[a:b].mean()),
+            depth_right=float(right[a:b].mean()),
+            irregularity_left=0.0,
+            irregularity_right=0.0,
+        )
+        for a, b in pairwise(edges)
+        if b > a and wet[a]
+    )
+
+
+def _frozen(x: FloatArray, dt: float) -> BoolArray:
+    """Samples of stretches of 5 s and more in which a signal does not change at all."""
+    same = np.concatenate([[False], np.diff(x) == 0.0])
+    edge = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    out = np.zeros(x.size, dtype=bool)
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        if (b - a) * dt > 5.0:
+            out[a:b] = True
+    return out
+
+
+def _brakes_in_torque(columns: Mapping[str, FloatArray], torque: FloatArray) -> bool:
+    """Whether the torque holds the brakes: it is far below zero where the brakes are pressed."""
+    braked = columns["brake_pressure"] > 4.0 * BRAKE_PRESSURE
+    if braked.sum() < 10:
+        return True
+    total = torque.sum(axis=0)
+    return bool(np.median(total[braked]) < -300.0)
+
+
+def _widened(bad: BoolArray, dt: float) -> BoolArray:
+    k = max(1, round(BESIDE_S / dt))
+    return np.convolve(bad.astype(np.float64), np.ones(2 * k + 1), "same") > 0.5
+
+
+def _coordinates(columns: Mapping[str, FloatArray], course: Course, v: FloatArray, dt: float) -> dict[str, FloatArray]:
+    out = {
+        "t": course.t,
+        "v_x": v,
+        "torque": course.torque.sum(axis=0),
+        "position": np.cumsum(v) * dt,
+        "a_x": np.gradient(v, dt),
+    }
+    if course.lanes:
+        depth = np.zeros_like(v)
+        for lane in course.lanes:
+            depth[(course.t >= lane.start) & (course.t < lane.end)] = 0.5 * (lane.depth_left + lane.depth_right)
+        out["water_depth"] = depth
+    if "ambient_temperature" in columns:
+        out["ambient_temperature"] = columns["ambient_temperature"]
+    return {n: block_means(x, dt) for n, x in out.items()}

@@ -1,0 +1,278 @@
+"""What the terms of a model change for the detectors: the car that they take as known, and the signals they read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.errors import ConfigError
+from aqualog.model.plant import Plant, build_plant
+from aqualog.model.scenario import Scenario
+from aqualog.model.sensors import ESC, Channel, Sensors
+from aqualog.model.term import Model, Setup, Term
+from aqualog.model.tyre import TYRES
+from aqualog.notation import AXLES, WHEELS
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.resistance import air_drag, cornering_drag
+from aqualog.physics.rolling import effective_radius, warm_up_factor
+from aqualog.types import FloatArray, Signals
+from aqualog.vehicle import KEYS, Vehicle
+
+__all__ = ["Extended", "extended_inputs"]
+
+# fields of the plant that reach a detector, through the vehicle or through a signal
+_VEHICLE = frozenset({
+    "mass", "l_f", "l_r", "drag_area", "inertia", "r_w", "brake_drag", "slip_slope", "r_e", "r_l",
+})  # fmt: skip
+_SIGNAL = frozenset({
+    "torque_gain", "radius_growth", "leak_radius", "head_wind", "towed_mass", "cornering_drag", "warmup_extra",
+    "drag_over_v",
+})  # fmt: skip
+# say nothing by themselves, or follow from the others
+_SILENT = frozenset({"I_zz", "warmup_time", "leak_start", "leak_time"})
+_FORCES = frozenset({"head_wind", "towed_mass", "cornering_drag", "warmup_extra", "drag_over_v"})
+
+
+class Extended(NamedTuple):
+    """Inputs of the detectors with a model's terms in them; `notes` tell what could not be used or not in full."""
+
+    signals: Signals
+    vehicle: Vehicle
+    notes: tuple[str, ...]
+
+
+def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
+    """Signals and vehicle as the detectors need them, so that the terms of a model are no surprise to them.
+
+    Each term acts on the simulation of the dry car of the vehicle file; what it changes there is read back. What the
+    vehicle file has a key for goes there: mass and its place, drag area, rolling resistance (with dragging brakes),
+    inertias, radii, slip slopes. What it has no key for goes into the signals: a sensor's error is taken off, a wheel
+    whose radius is not that of its axle is turned into one that has it, and a force that holds the car back (wind,
+    trailer, cold tyres, curves) is put on the accelerometer, which then shows the car without it. One such force is a
+    slow change of a tenth of a m/s^2, which the velocity observer takes for the offset that it learns anyway.
+
+    Parameters
+    ----------
+    signals : Signals
+        As loaded with `vehicle`.
+    vehicle : Vehicle
+    model : Model
+
+    Returns
+    -------
+    Extended
+        With a model without terms, or with neutral ones, the very objects that were given.
+
+    Raises
+    ------
+    ConfigError
+        If a term takes the car out of what a vehicle file may say.
+    """
+    base = _believed(vehicle)
+    terms = tuple(t for t in model.terms if not _is_neutral(t))
+    setup = Model(terms).apply(base)
+    measured = _Columns(signals)
+    _undo_sensors(measured, setup.sensors)
+    notes = [n for t in terms for n in _notes(t, base, measured)]
+    car = _vehicle(vehicle, base.plant, setup.plant, notes)
+    _undo_wheels(measured, base.plant, setup.plant)
+    notes += _undo_forces(measured, base.plant, setup.plant)
+    return Extended(measured.signals(), car, tuple(dict.fromkeys(notes)))
+
+
+def _believed(vehicle: Vehicle) -> Setup:
+    """The simulation of the vehicle file, with perfect sensors on the buses of a series car."""
+    worn = TYRES["worn_summer"]
+    return Setup(build_plant(vehicle, worn, worn), Sensors("believed", ESC.groups), Scenario(vehicle))
+
+
+def _is_neutral(term: Term) -> bool:
+    neutral = {p.name: p.neutral for p in term.effect.parameters}
+    flat = all(value == 0.0 for _, value in term.knots)
+    return flat and all(value == neutral[name] for name, value in term.values.items())
+
+
+def _changed(before: Plant, after: Plant) -> set[str]:
+    return {n for n in Plant._fields if not np.array_equal(getattr(before, n), getattr(after, n))}
+
+
+class _Columns:
+    """The columns of a drive, copied where they are changed; NaN where missing."""
+
+    def __init__(self, signals: Signals) -> None:
+        self._signals = signals
+        self._new: dict[str, FloatArray] = {}
+        self.names = {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
+
+    def get(self, name: str) -> FloatArray:
+        """One column (n,)."""
+        return self._new[name] if name in self._new else self._signals.array(name)
+
+    def put(self, name: str, x: FloatArray) -> None:
+        """Replace a column, if the drive has it."""
+        if name in self.names:
+            self._new[name] = x
+
+    @property
+    def t(self) -> FloatArray:
+        """[s] (n,)"""
+        return self._signals.array("t")
+
+    @property
+    def dt(self) -> float:
+        """[s]"""
+        return self._signals.dt
+
+    def signals(self) -> Signals:
+        """The drive with its new columns; the one that was given if there are none."""
+        if not self._new:
+            return self._signals
+        import polars as pl
+
+        columns = [pl.Series(n, x).fill_nan(None) for n, x in self._new.items()]
+        return replace(self._signals, frame=self._signals.frame.with_columns(columns))
+
+
+def _undo_sensors(measured: _Columns, sensors: Sensors) -> None:
+    """Take off what sensors do to a signal: gain, bias and drift, then its delay and a clock that runs off.
+
+    A signal that comes late is moved by whole samples: what lies between two would have less noise than the detectors
+    of a wheel's unrest expect.
+    """
+    t = measured.t
+    for name, c in sensors.channels.items():
+        if c != Channel():
+            measured.put(name, (measured.get(name) - c.bias - c.drift * t) / c.gain)
+    skew = {name: g.skew_ppm for g in sensors.groups for name in g.signals if g.skew_ppm != 0.0}
+    late = {name: c.delay_s for name, c in sensors.channels.items() if c.delay_s != 0.0}
+    for name in {**skew, **late}:
+        seen = (t - t[0] + late.get(name, 0.0)) * (1.0 + skew.get(name, 0.0) * 1e-6) / measured.dt
+        measured.put(name, _taken(measured.get(name), np.rint(seen)))
+
+
+def _taken(x: FloatArray, i: FloatArray) -> FloatArray:
+    inside = (i >= 0.0) & (i < x.size)
+    return np.where(inside, x[np.where(inside, i, 0.0).astype(np.intp)], np.nan)
+
+
+def _notes(term: Term, base: Setup, measured: _Columns) -> list[str]:
+    """Why a term changes nothing for the detectors, or not all that it says."""
+    name = f"model: {term.effect.name}" + (f" at {term.place}" if term.place else "")
+    after = term.apply(base)
+    changed = _changed(base.plant, after.plant)
+    acts_on = {n for n, c in after.sensors.channels.items() if c != base.sensors.channels.get(n, Channel())}
+    acts_on |= {
+        n for b, a in zip(base.sensors.groups, after.sensors.groups, strict=True) if a != b for n in a.signals
+    }  # fmt: skip
+    if acts_on:
+        return [] if acts_on & measured.names else [f"{name}: the log has no {term.place}; not used"]
+    unused = changed - _VEHICLE - _SIGNAL - _SILENT
+    if not changed & (_VEHICLE | _SIGNAL):
+        return [f"{name}: no detector takes that as known; not used"]
+    return [f"{name}: used without {', '.join(sorted(unused))}"] if unused else []
+
+
+def _vehicle(vehicle: Vehicle, before: Plant, after: Plant, notes: list[str]) -> Vehicle:
+    changed = _changed(before, after)
+    new: dict[str, float] = {n: float(getattr(after, n)) for n in ("mass", "l_f", "l_r", "drag_area") if n in changed}
+    # the plant's slope is that of a tyre at its pressure, the file's is the car's: only their ratio is the model's
+    for name, at_tyre in (("r_e", False), ("r_l", False), ("inertia", False), ("slip_slope", True)):
+        if name not in changed:
+            continue
+        old, now = getattr(before, name), getattr(after, name)
+        for axle, wheels in AXLES.items():
+            i, j = (WHEELS.index(w) for w in wheels)
+            if now[i] == old[i] and now[j] == old[j]:
+                continue
+            key = f"{name}_{axle}"
+            mean = 0.5 * (now[i] + now[j]) if now[i] != now[j] else now[i]
+            new[key] = float(getattr(vehicle, key) * (mean / old[i])) if at_tyre else float(mean)
+            if now[i] != now[j] and name in ("inertia", "slip_slope"):
+                notes.append(
+                    f"model: {name} of the {'front' if axle == 'f' else 'rear'} axle is the mean of its wheels"
+                )
+    if changed & {"r_w", "brake_drag"}:
+        new["rolling_resistance"] = _rolling_resistance(after)
+    for k in KEYS.values():
+        if k.name in new and not k.low <= new[k.name] <= k.high:
+            raise ConfigError(
+                f"the model makes {k.path} = {new[k.name]:g} {k.unit}", expected=f"{k.low:g} ... {k.high:g}"
+            )
+    return replace(vehicle, **new) if new else vehicle  # type: ignore[arg-type]
+
+
+def _rolling_resistance(plant: Plant) -> float:
+    """One coefficient that holds the standing car back as its four tyres and dragging brakes do. [-]"""
+    loads = wheel_loads(
+        np.zeros(1), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
+    )[:, 0]
+    return float((plant.r_w * loads + plant.brake_drag / plant.r_l).sum() / loads.sum())
+
+
+def _undo_wheels(measured: _Columns, before: Plant, after: Plant) -> None:
+    """Wheel speeds and torques of a car whose wheels have the radius of their axle and report all of their torque."""
+    changed = _changed(before, after)
+    grows = changed & {"radius_growth", "leak_radius"}
+    v = _speed(measured, after) if grows else np.zeros(0)
+    # as the compiled simulation lets a tyre lose its air
+    leak = np.clip((measured.t - after.leak_start) / after.leak_time, 0.0, 1.0)
+    for i, w in enumerate(WHEELS):
+        other = WHEELS.index(next(x for x in AXLES[w[0]] if x != w))
+        factor_e, factor_l = (_over_axle(r, i, other) for r in (after.r_e, after.r_l))
+        if factor_e != 1.0:
+            measured.put(f"omega_{w}", factor_e * measured.get(f"omega_{w}"))
+        if grows and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
+            ratio = effective_radius(np.ones(1), v, growth=float(after.radius_growth[i]))
+            ratio = ratio * (1.0 - after.leak_radius[i] * leak)
+            measured.put(f"omega_{w}", ratio * measured.get(f"omega_{w}"))
+        gain = after.torque_gain / factor_l
+        if gain != 1.0:
+            measured.put(f"torque_{w}", gain * measured.get(f"torque_{w}"))
+
+
+def _over_axle(radius: FloatArray, i: int, other: int) -> float:
+    return 1.0 if radius[i] == radius[other] else float(radius[i] / (0.5 * (radius[i] + radius[other])))
+
+
+def _undo_forces(measured: _Columns, before: Plant, after: Plant) -> list[str]:
+    """Put on the accelerometer what forces that no vehicle file knows took from it: it shows the car without them."""
+    forces = _changed(before, after) & _FORCES
+    if not forces or "a_x" not in measured.names:
+        return [f"model: the log has no a_x; {', '.join(sorted(forces))} not used"] if forces else []
+    v, a_x, notes = np.nan_to_num(_speed(measured, after)), measured.get("a_x"), []
+    lost = np.zeros_like(v)
+    air = {"drag_area": after.drag_area, "air_density": after.air_density}
+    if "head_wind" in forces:
+        lost += air_drag(v + after.head_wind, **air) - air_drag(v, **air)
+    if "drag_over_v" in forces:
+        lost += np.interp(v, after.drag_over_v[:, 0], after.drag_over_v[:, 1])
+    if "warmup_extra" in forces:
+        warm = warm_up_factor(measured.t, extra=after.warmup_extra, time_constant=after.warmup_time)
+        lost += _rolling_resistance(after._replace(brake_drag=np.zeros(4))) * after.mass * G * (warm - 1.0)
+    if "towed_mass" in forces:
+        lost += after.towed_mass * (np.nan_to_num(a_x) + G * after.r_w[2])
+    if "cornering_drag" in forces:
+        if "a_y" in measured.names:
+            a_y = np.nan_to_num(measured.get("a_y"))
+            lost += cornering_drag(a_y, mass=after.mass, coefficient=after.cornering_drag)
+        else:
+            notes.append("model: the log has no a_y; cornering_drag not used")
+    measured.put("a_x", a_x + lost / after.mass)
+    return notes
+
+
+def _speed(measured: _Columns, plant: Plant) -> FloatArray:
+    """Speed of the car (n,): the reference, or else the mean of the rims that are known. [m/s]"""
+    rims: Mapping[int, FloatArray] = {
+        i: plant.r_e[i] * measured.get(f"omega_{w}") for i, w in enumerate(WHEELS) if f"omega_{w}" in measured.names
+    }
+    v = measured.get("v_x")
+    if not rims:
+        return v
+    known = np.array(list(rims.values()))
+    count = np.isfinite(known).sum(axis=0)
+    mean = np.where(count > 0, np.nansum(known, axis=0) / np.maximum(count, 1), np.nan)
+    return np.where(np.isfinite(v), v, mean)

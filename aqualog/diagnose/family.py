@@ -1,0 +1,176 @@
+"""Is there anything at all? The largest gain over all hypotheses against what noise of the same colour gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.diagnose.bench import Bench, gram_of, noises_after, tolerant
+from aqualog.diagnose.hypotheses import THREADS
+from aqualog.diagnose.noise import surrogate
+from aqualog.diagnose.subsets import fit_set, gains_on_top
+from aqualog.types import FloatArray
+
+__all__ = ["Calibration", "calibrate", "gumbel_p", "largest"]
+
+ALIKE = 0.97  # cosine of whitened signatures that surrogates need not tell apart
+EULER = 0.5772156649015329
+PLAIN_INFLATION = 1.3  # of the gains where no surrogates are asked for: what they gave on simulated noises (D)
+
+
+class Calibration(NamedTuple):
+    """Null distribution: `inflation` (H,) mean gain of each hypothesis over its parameters, `maxima` (S,)."""
+
+    inflation: FloatArray
+    maxima: FloatArray
+    threshold: float
+    achieved: float
+
+
+def largest(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Gains (H,) of all hypotheses beside a base set, and the whitened, tolerant inner products.
+
+    The noise is estimated twice: after the base set, and after the hypothesis that gains most by the first estimate, so
+    that an effect does not pass for noise.
+    """
+    noises = noises_after(bench, residuals, _theta(bench, residuals, base))
+    gram = tolerant(bench, gram_of(bench, noises, residuals))
+    gains = gains_on_top(bench, gram, base)
+    top = int(np.argmax(gains))
+    fit = fit_set(bench, gram, (*base, top)) or fit_set(bench, gram, tuple(base))
+    if fit is None:
+        return gains, gram
+    noises = noises_after(bench, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
+    gram = tolerant(bench, gram_of(bench, noises, residuals))
+    return gains_on_top(bench, gram, base), gram
+
+
+def _theta(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> dict[int, float]:
+    if not base:
+        return {}
+    gram = tolerant(bench, gram_of(bench, noises_after(bench, residuals, {}), residuals))
+    fit = fit_set(bench, gram, base)
+    return {} if fit is None else dict(zip(fit.columns, fit.theta.tolist(), strict=True))
+
+
+def calibrate(
+    bench: Bench,
+    quiet: Sequence[FloatArray],
+    gram: FloatArray,
+    *,
+    base: Sequence[int],
+    surrogates: int,
+    level: float,
+    seed: int,
+    tick: Callable[[], None] = lambda: None,
+) -> Calibration:
+    """Null distribution of the largest gain.
+
+    Parameters
+    ----------
+    bench : Bench
+    quiet : sequence of array (C, n)
+        Residuals after the best set: their smoothed spectra make the surrogates.
+    gram : array (K + 1, K + 1)
+        Tells which hypotheses are alike and need not be tested one by one.
+    base : sequence of int
+        Hypotheses that are accepted already; noise is tested beside them.
+    surrogates : int
+        0: no surrogates; the gains are taken to be inflated by 1.3 and Bonferroni's bound is used.
+    level : float
+        Share of logs without effect that may be called.
+    seed : int
+    """
+    H = len(bench.asked)
+    sizes = np.array([len(c) for c in bench.columns], dtype=np.float64)
+    groups = _groups(bench, gram)
+    leaders = sorted({g for g in groups.tolist() if not bench.asked[g].allowed})
+    allowed = [i for i, h in enumerate(bench.asked) if h.allowed]
+    if surrogates == 0:
+        return Calibration(np.full(H, PLAIN_INFLATION), np.zeros(0), _bonferroni(level, len(leaders)), level)
+    wanted = sorted({*leaders, *base, *allowed})
+    small = _restricted(bench, wanted)
+    at = {m: i for i, m in enumerate(wanted)}
+
+    def one(s: int) -> FloatArray:
+        rng = np.random.default_rng(np.random.SeedSequence([seed, s]))
+        noise_only = [surrogate(r, d.mask, rng) for r, d in zip(quiet, bench.drives, strict=True)]
+        gains, _ = largest(small, noise_only, [at[m] for m in base])
+        tick()
+        return gains
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        drawn = np.array(list(pool.map(one, range(surrogates))))
+    mean = np.ones(H)
+    for i, m in enumerate(wanted):
+        mean[m] = max(float(drawn[:, i].mean()) / sizes[m], 0.5)
+    inflation = mean[groups]
+    maxima = (drawn / inflation[wanted] / sizes[wanted]).max(axis=1)
+    threshold = _gumbel_quantile(maxima, level)
+    return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()))
+
+
+def gumbel_p(maxima: FloatArray, x: float) -> float:
+    """Share of null maxima beyond x, by a Gumbel distribution of their mean and spread; never below theirs counted."""
+    beta = float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi
+    mu = float(maxima.mean()) - EULER * beta
+    tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
+    counted = float((maxima >= x).mean())
+    return max(tail, counted)
+
+
+def _gumbel_quantile(maxima: FloatArray, level: float) -> float:
+    beta = float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi
+    mu = float(maxima.mean()) - EULER * beta
+    return mu - beta * math.log(-math.log1p(-level))
+
+
+def _bonferroni(level: float, count: int) -> float:
+    return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
+
+
+def _groups(bench: Bench, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Leader of each hypothesis: the first one whose whitened signature is all but the same."""
+    energy = np.diag(gram)
+    out = np.arange(len(bench.asked))
+    leaders: list[int] = []
+    for i, columns in enumerate(bench.columns):
+        if len(columns) > 1 or energy[columns[0]] <= 1e-12:
+            leaders.append(i)
+            continue
+        for j in leaders:
+            other = bench.columns[j]
+            if len(other) == 1 and energy[other[0]] > 1e-12:
+                cosine = gram[columns[0], other[0]] / math.sqrt(energy[columns[0]] * energy[other[0]])
+                if abs(cosine) > ALIKE:
+                    out[i] = j
+                    break
+        else:
+            leaders.append(i)
+    return out
+
+
+def _restricted(bench: Bench, wanted: Sequence[int]) -> Bench:
+    keep = [c for m in wanted for c in bench.columns[m]]
+    columns, k = [], 0
+    for m in wanted:
+        columns.append(tuple(range(k, k + len(bench.columns[m]))))
+        k += len(bench.columns[m])
+    return replace(
+        bench,
+        asked=tuple(bench.asked[m] for m in wanted),
+        signatures=tuple(s[keep] for s in bench.signatures),
+        prepared=tuple(p.of(keep) for p in bench.prepared),
+        columns=tuple(columns),
+        prior=bench.prior[keep],
+        low=bench.low[keep],
+        high=bench.high[keep],
+        smallest=bench.smallest[keep],
+        tolerance=bench.tolerance[keep],
+    )

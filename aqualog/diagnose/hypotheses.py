@@ -1,0 +1,238 @@
+"""Which effects, where, a log is asked about, and what each would do to its residuals: by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aqualog.diagnose.channels import channel_values
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.tolerances import TOLERANCES
+from aqualog.errors import ConfigError
+from aqualog.model.effects import EFFECTS
+from aqualog.model.follow import follow
+from aqualog.model.term import Effect, Model, Parameter, Term
+from aqualog.notation import WHEELS
+from aqualog.types import FloatArray
+
+__all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "value_in", "with_values"]
+
+THREADS = 2
+_WET = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
+_PLACES: Mapping[str, tuple[str | None, ...]] = {
+    "signal_delay": ("v_x", "a_x", "omega", "torque"),
+    "clock_skew": ("v_x", "a_x", "torque_fl"),
+    "payload_mass": (None, "f", "r"),
+    "uneven_water": ("left", "right"),
+    "velocity_scale": ("v_x",),
+    "accelerometer_bias": ("a_x", "a_y"),
+    "accelerometer_gain": ("a_x", "a_y"),
+    "accelerometer_drift": ("a_x", "a_y"),
+}
+_FREE: Mapping[str, tuple[str, ...]] = {
+    "tyre_warmup": ("extra",),
+    "trailer": ("mass", "delta_drag_area"),
+    "pressure_loss": ("radius",),
+    "uneven_water": ("depth_gain",),
+}
+_NOT_ASKED: Mapping[str, str] = {
+    "tone_ring": "once per turn is faster than the residuals, which are means over 0.1 s",
+}
+# effects that may well sit at a single wheel; others are asked about by axle
+_BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
+# what a car may have or not; all else is known to within a tolerance
+_EVENTS = ("pressure_loss", "trailer", "tyre_warmup", "uneven_water")
+_SHIFTS = ("signal_delay", "clock_skew")
+TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
+LEAKS = 5  # moments at which a tyre may begin to lose its air
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """One effect at one place. `free` parameters are sought, `fixed` ones have these values."""
+
+    effect: Effect
+    where: str | None
+    free: tuple[str, ...]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def allowed(self) -> bool:
+        """Whether it is a tolerance: allowed for and never named."""
+        return self.effect in TOLERANCES
+
+    @property
+    def key(self) -> str:
+        """`tyre_radius@fl`."""
+        return self.effect.name if self.where is None else f"{self.effect.name}@{self.where}"
+
+    def parameter(self, name: str) -> Parameter:
+        """One of the effect's parameters."""
+        return next(p for p in self.effect.parameters if p.name == name)
+
+    def tolerance(self, name: str) -> float:
+        """Standard deviation by which a parameter may be off without being worth a word; 0 for events."""
+        if self.allowed:
+            return self.parameter(name).sigma
+        return 0.0 if self.effect.name in _EVENTS else self.parameter(name).smallest * TOLERANCE
+
+    def step(self, name: str) -> float:
+        """Step of the finite difference: of the order that is expected, toward the side that has more room."""
+        p = self.parameter(name)
+        size = 0.5 * p.sigma
+        return size if p.high - p.neutral >= size else -size
+
+
+def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis, ...], dict[str, str]]:
+    """All that can be asked of these logs, and why the rest cannot: name to reason.
+
+    An effect that the model has already at a place is asked about like any other: as a change of its value.
+    """
+    present = frozenset.intersection(*(d.present for d in drives))
+    wet = any(d.course.lanes for d in drives)
+    torque = not any(d.untorqued for d in drives)
+    out: list[Hypothesis] = []
+    untested: dict[str, str] = dict(_NOT_ASKED)
+    for effect in EFFECTS.values():
+        if effect.name in _NOT_ASKED:
+            continue
+        if effect.name in _WET and not wet:
+            untested[effect.name] = "no water depth in the log"
+            continue
+        free = _FREE.get(effect.name, (effect.parameters[0].name,))
+        if not {p.name for p in effect.parameters} >= set(free):
+            continue
+        places = _PLACES.get(effect.name) or _wheel_places(effect)
+        asked = [w for w in places if _has_signal(w, present, torque=torque)]
+        if not asked:
+            untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
+        for where in asked:
+            out += [Hypothesis(effect, where, free, fixed) for fixed in _variants(effect, drives)]
+    out += [Hypothesis(e, None, ("by",)) for e in TOLERANCES]
+    return tuple(out), untested
+
+
+def _wheel_places(effect: Effect) -> tuple[str | None, ...]:
+    if "fl" not in effect.places:
+        return (None,)
+    return (*WHEELS, "f", "r", None) if effect.name in _BY_WHEEL else ("f", "r", None)
+
+
+def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> bool:
+    if where == "a_y":
+        return {"a_y", "yaw_rate", "steer_angle"} <= present
+    if where in ("v_x", "a_x"):
+        return where in present
+    if where == "omega":
+        return "omega_fl" in present
+    if where in ("torque", "torque_fl"):
+        return torque
+    return True
+
+
+def _variants(effect: Effect, drives: Sequence[Drive]) -> list[dict[str, float]]:
+    if effect.name == "tyre_warmup":
+        return [{"time_constant": x} for x in (150.0, 600.0)]
+    if effect.name == "pressure_loss":
+        length = max(d.duration_s for d in drives)
+        return [{"start": length * (i + 0.5) / LEAKS, "duration": 10.0} for i in range(LEAKS)]
+    return [{}]
+
+
+def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, float]]]) -> Model:
+    """The model with hypotheses at values of their free parameters (absolute, not changes).
+
+    Raises
+    ------
+    ConfigError
+        If a value is outside its physical bounds.
+    """
+    terms = list(model.terms)
+    for h, values in found:
+        own = {**h.fixed, **values}
+        for i, t in enumerate(terms):
+            if t.effect is h.effect and t.place == (h.where or h.effect.default):
+                terms[i] = Term(h.effect, {**t.values, **own}, h.where)
+                break
+        else:
+            terms.append(Term(h.effect, own, h.where))
+    return Model(tuple(terms))
+
+
+def value_in(model: Model, h: Hypothesis, name: str) -> float:
+    """Value of a parameter in a model; neutral if it has no such term."""
+    for t in model.terms:
+        if t.effect is h.effect and t.place == (h.where or h.effect.default):
+            return float(t.values.get(name, h.parameter(name).neutral))
+    return h.parameter(name).neutral
+
+
+def residual(drive: Drive, model: Model) -> FloatArray:
+    """Residual channels of a drive under a model. (C, m)"""
+    shown = follow(drive.vehicle, drive.course, model)
+    measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
+    return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
+
+
+def signatures(
+    drive: Drive,
+    model: Model,
+    asked: Sequence[Hypothesis],
+    *,
+    base: FloatArray,
+    tick: Callable[[], None] = lambda: None,
+    each: bool = False,
+) -> list[FloatArray]:
+    """What a unit of each free parameter takes away from the residual: (k, C, m) per hypothesis, around a model.
+
+    By differences of simulations led along the drive. What hypotheses of a whole axle or car do is the sum of
+    what its wheels do, to first order; unless `each` is asked for, they are not simulated again.
+    """
+
+    def one(h: Hypothesis) -> FloatArray:
+        out = []
+        for name in h.free:
+            at, step = value_in(model, h, name), h.step(name)
+            if h.effect.name in _SHIFTS:
+                # noise of an input, shifted one way only, would meet itself in the residual
+                later = residual(drive, with_values(model, [(h, {name: at + step})]))
+                out.append((residual(drive, with_values(model, [(h, {name: at - step})])) - later) / (2.0 * step))
+                continue
+            try:
+                changed = with_values(model, [(h, {name: at + step})])
+                out.append((base - residual(drive, changed)) / step)
+            except ConfigError:
+                changed = with_values(model, [(h, {name: at - step})])
+                out.append((residual(drive, changed) - base) / step)
+        tick()
+        return np.array(out)
+
+    alone = {i: h for i, h in enumerate(asked) if each or not _sums(h)}
+    with ThreadPoolExecutor(THREADS) as pool:
+        done = dict(zip(alone, pool.map(one, alone.values()), strict=True))
+    by_wheel: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], FloatArray] = {
+        (asked[i].effect.name, asked[i].where, tuple(asked[i].fixed.items())): x for i, x in done.items()
+    }
+    out = []
+    for i, h in enumerate(asked):
+        if i in done:
+            out.append(done[i])
+            continue
+        parts = [by_wheel[h.effect.name, w, tuple(h.fixed.items())] for w in _parts(h)]
+        out.append(np.sum(parts, axis=0))
+    return out
+
+
+def _parts(h: Hypothesis) -> tuple[str, ...]:
+    if h.effect.name not in _BY_WHEEL:
+        return ("f", "r")
+    return WHEELS if h.where is None else tuple(w for w in WHEELS if w[0] == h.where)
+
+
+def _sums(h: Hypothesis) -> bool:
+    if "fl" not in h.effect.places:
+        return False
+    return h.where is None or (h.where in ("f", "r") and h.effect.name in _BY_WHEEL)

@@ -1,0 +1,163 @@
+"""Which runs to drive next: where the causes that are left expect the most different slip and resistance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.diagnose.level.expect import Driven, Response, respond
+from aqualog.diagnose.level.noise import Fit
+from aqualog.diagnose.level.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
+from aqualog.diagnose.level.refit import Refit
+from aqualog.diagnose.records import Manoeuvre
+from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.simulate import assemble
+from aqualog.model.term import Model
+from aqualog.model.tyre import TYRES
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.resistance import air_drag
+from aqualog.types import FloatArray
+
+__all__ = ["advice"]
+
+RUNS = 5
+MINUTES = 3.0  # of a run with its way back (K)
+ENOUGH = 10.8  # lambda from which two causes are taken for each other less than once in twenty times
+SPEEDS = (60, 70, 80, 90, 100, 110)  # [km/h]
+DEPTHS = (0.6, 1.3, 2.0, 2.5)  # [mm]
+WAY = 130.0  # [m] of lane (thesis Fig. 2.25)
+_FRONT_AWAY = 1.0  # [m] of film that a front wheel leaves, where the rear wheels run beside its track: all of it
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A run that could be driven; `beside`: the rear wheels beside the front ones' track."""
+
+    name: str
+    words: str
+    scenario: Scenario
+    v: float
+    a: float = 0.0
+    beside: bool = False
+
+
+def advice(passes: Passes, survivors: Sequence[Refit], scatter: Fit) -> Manoeuvre | None:
+    """Five runs of the catalogue that best tell the two nearest causes apart.
+
+    None with fewer than two survivors. The answer is `none` where no run does.
+    """
+    if len(survivors) < 2:
+        return None
+    first, second = survivors[0], survivors[1]
+    pair = ("+".join(sorted(first.keys)) or "none", "+".join(sorted(second.keys)) or "none")
+    now = max(second.cost - first.cost, 0.0)
+    runs = _catalogue(passes)
+    a, b = (_expected(runs, r.model, passes) for r in (first, second))
+    sigma, kappa = scatter.scatter
+    channels = [i for i, n in enumerate(passes.names) if not n.startswith("dry_")]
+    best, most = None, 0.0
+    for k, run in enumerate(runs):
+        usable = a.steady[k] and b.steady[k]
+        told = [j for j, c in enumerate(channels) if np.isfinite(a.values[k, j] - b.values[k, j])]
+        if not usable or not told:
+            continue
+        c = [channels[j] for j in told]
+        road = 2.0 * run.scenario.tyre_front.scatter_length / WAY
+        v = sigma[np.ix_(c, c)] + np.diag(kappa[c] * a.variances[k, told] * road)
+        d = a.values[k, told] - b.values[k, told]
+        energy = RUNS * float(d @ np.linalg.solve(v, d))
+        if energy > most:
+            best, most = run, energy
+    if best is None or now + most < 2.0 * now + 1.0:
+        sentence = f"None of the runs of the catalogue tells {pair[0]} from {pair[1]}."
+        return Manoeuvre("none", (pair,), sentence, now, now + most, 0.0)
+    sentence = f"Drive {RUNS} runs {best.words}: they would tell {pair[0]} from {pair[1]}"
+    sentence += "." if now + most >= ENOUGH else " better, but hardly for sure."
+    return Manoeuvre(best.name, (pair,), sentence, now, now + most, RUNS * MINUTES)
+
+
+def _catalogue(passes: Passes) -> list[_Run]:
+    """Runs about the configuration that was driven most on water."""
+    wet = [t.scenario for t in passes.told if t.wet is not None]
+    usual = max(wet, key=lambda s: sum(o.tyre_front is s.tyre_front and o.p_rear == s.p_rear for o in wet))
+    right = usual.lanes[0].depth_right
+    share = usual.lanes[0].depth_left / right if right > 0.0 else 1.0
+    usual = replace(usual, load_front=0.0, load_rear=0.0)
+    out = []
+    for kmh in SPEEDS:
+        for mm in DEPTHS:
+            lane = Lane(0.0, 1e9, depth_left=share * mm * 1e-3, depth_right=mm * 1e-3)
+            scenario = replace(usual, lanes=(lane,))
+            at = f"{kmh} km/h and {mm:g} mm"
+            v = kmh / 3.6
+            out += [
+                _Run(f"constant_{kmh}_{mm:g}", f"at {at}", scenario, v),
+                _Run(f"accelerated_{kmh}_{mm:g}", f"with 1 m/s^2 at {at}", scenario, v, 1.0),
+                _Run(f"beside_track_{kmh}_{mm:g}", f"at {at} with the rear wheels beside the front ones' track",
+                     scenario, v, beside=True),
+                _Run(f"rear_load_{kmh}_{mm:g}", f"at {at} with 270 kg over the rear axle",
+                     replace(scenario, load_rear=270.0), v, 1.0),
+                _Run(f"even_water_{kmh}_{mm:g}", f"at {at} with both tracks alike",
+                     replace(scenario, lanes=(replace(lane, depth_left=mm * 1e-3),)), v),
+            ]  # fmt: skip
+            for name in sorted(set(TYRES) - {usual.tyre_front.name}):
+                tyre = TYRES[name]
+                words = f"at {at} on {name.replace('_', ' ')} tyres"
+                out.append(_Run(f"{name}_{kmh}_{mm:g}", words, replace(scenario, tyre_front=tyre, tyre_rear=tyre), v))
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Expected:
+    """(k, c) of the channels on the water, their variances along the lane, and whether a steady expectation holds."""
+
+    values: FloatArray
+    variances: FloatArray
+    steady: FloatArray
+
+
+def _expected(runs: Sequence[_Run], model: Model, passes: Passes) -> _Expected:
+    setups = []
+    for run in runs:
+        setup = assemble(run.scenario, model)
+        if run.beside:
+            setup = setup._replace(plant=setup.plant._replace(h_track=np.full(4, _FRONT_AWAY)))
+        setups.append(setup)
+    k = len(runs)
+    which = np.arange(k)
+    v, a = np.array([r.v for r in runs]), np.array([r.a for r in runs])
+    nothing = Driven(v, a, np.zeros((4, k)))
+    water = respond(setups, which, np.ones(k, dtype=np.bool_), nothing).resistance
+    dry = respond(setups, which, np.zeros(k, dtype=np.bool_), Driven(v, a, _traction(runs, np.zeros(k))))
+    wet = respond(setups, which, np.ones(k, dtype=np.bool_), Driven(v, a, _traction(runs, water)))
+    values, variances = [], []
+    for name in passes.names:
+        if name == RESISTANCE:
+            values.append(wet.resistance)
+            variances.append(wet.resistance_variance)
+        elif name.startswith("slip_slope_"):
+            i = WHEELS.index(name[-2:])
+            values.append(wet.slip[i] - dry.slip[i])
+            variances.append(wet.slip_variance[i])
+    return _Expected(np.stack(values, axis=1), np.stack(variances, axis=1), _is_steady(wet))
+
+
+def _is_steady(wet: Response) -> FloatArray:
+    return np.asarray((wet.lost.max(axis=0) <= LOST_MAX) & (wet.contact.min(axis=0) >= CONTACT_MIN))
+
+
+def _traction(runs: Sequence[_Run], water: FloatArray) -> FloatArray:
+    """Traction (4, k) as torques give it, of a driver who holds speed and acceleration against the water."""
+    out = np.empty((4, len(runs)))
+    for k, run in enumerate(runs):
+        car = run.scenario.vehicle
+        a = np.array([run.a])
+        F_z = wheel_loads(a, np.zeros(1), mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg, track=car.track)[:, 0]
+        drag = float(air_drag(np.array([run.v]), drag_area=car.drag_area, air_density=car.air_density)[0])
+        driving = car.mass * (run.a + float(water[k])) + drag + car.rolling_resistance * car.mass * G
+        share = 0.5 * np.array([1.0 - car.torque_split_rear] * 2 + [car.torque_split_rear] * 2)
+        out[:, k] = share * driving / F_z - car.rolling_resistance
+    return out

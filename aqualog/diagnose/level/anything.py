@@ -1,0 +1,141 @@
+"""Is there anything at all: a family-wise test whose level campaigns without effect set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.diagnose.level.noise import Design, Fit, Scatter, design_of, fit, prior_of
+from aqualog.diagnose.level.refit import conditioned
+from aqualog.types import FloatArray
+
+__all__ = ["Anything", "Group", "anything", "chi2_log_p", "whole_fit"]
+
+AGAIN = 4  # rounds of the scatter of a surrogate, which begins at that of the data
+ROUNDS = 25
+Group = tuple[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Anything:
+    """Family-wise test: `statistic` is -log10 of the smallest p-value of the groups, `best` the group that has it."""
+
+    statistic: float
+    threshold: float
+    p_value: float
+    achieved: float
+    surrogates: int
+    best: str
+
+
+def whole_fit(
+    y: FloatArray, x: FloatArray, road: FloatArray, nuisances: FloatArray, start: Scatter | None = None
+) -> Fit:
+    """Scatter of the runs with all columns at their most likely size under the priors."""
+    return fit(_design(y, x, road, nuisances), start=start, rounds=AGAIN if start else ROUNDS)
+
+
+def _design(y: FloatArray, x: FloatArray, road: FloatArray, nuisances: FloatArray) -> Design:
+    prior = prior_of(nuisances.shape[-1], x.shape[-1])
+    return design_of(y, np.concatenate([nuisances, x], axis=-1), road, prior)
+
+
+def chi2_log_p(x: float, dof: int) -> float:
+    """-log10 of the probability that chi^2 with `dof` degrees of freedom is beyond x."""
+    x = max(x, 1e-12)
+    # log of the upper tail, by the recurrence in steps of two degrees of freedom
+    half = 0.5 * x
+    if dof % 2:
+        tail = math.erfc(math.sqrt(half))
+        log_tail = math.log(tail) if tail > 1e-300 else -half - 0.5 * math.log(math.pi * half)
+        term, first = -half + 0.5 * math.log(half) - math.lgamma(1.5), 3
+    else:
+        log_tail, term, first = -half, -half + math.log(half), 4
+    for k in range(first, dof + 1, 2):
+        log_tail = float(np.logaddexp(log_tail, term))
+        term += math.log(half) - math.log(0.5 * k)
+    return -log_tail / math.log(10.0)
+
+
+def anything(
+    y: FloatArray,
+    x: FloatArray,
+    groups: Sequence[Group],
+    road: FloatArray,
+    nuisances: FloatArray,
+    *,
+    rng: np.random.Generator,
+    level: float,
+    surrogates: int,
+    report: Callable[[float], None] = lambda share: None,
+) -> Anything:
+    """Test whether any group of columns explains the runs' deviation better than chance.
+
+    Parameters
+    ----------
+    y : array (g, c)
+        Deviation from the model.
+    x : array (g, c, k)
+    groups : sequence of (name, columns)
+        Columns of x that stand for one thing.
+    surrogates : int
+        Campaigns of the same runs without effect: scatter as the data say, each run's own deviation drawn anew from
+        all runs' with random sign.
+
+    The scatter is estimated in each surrogate as it was in the data, so that its own uncertainty counts.
+    """
+    null = whole_fit(y, np.zeros((*y.shape, 0)), road, nuisances)
+    whole = whole_fit(y, x, road, nuisances)
+    scored = _scores(y, x, groups, nuisances, whole.weight)
+    best = max(scored, key=lambda n: scored[n], default="")
+    statistic = scored.get(best, 0.0)
+    known = np.isfinite(y)
+    pieces = _white(y, road, nuisances, null)
+    drawn = np.empty(surrogates)
+    factor = _roots(road, null)
+    for b in range(surrogates):
+        pick = rng.integers(0, len(pieces), y.shape[0])
+        flat = pieces[pick] * rng.choice([-1.0, 1.0], (y.shape[0], 1))
+        made = np.where(known, np.einsum("rcd,rd->rc", factor, flat), np.nan)
+        found = whole_fit(made, x, road, nuisances, whole.scatter)
+        drawn[b] = max(_scores(made, x, groups, nuisances, found.weight).values(), default=0.0)
+        report((b + 1) / surrogates)
+    threshold = float(np.quantile(drawn, 1.0 - level, method="higher"))
+    beyond = int(np.count_nonzero(drawn >= statistic))
+    return Anything(
+        statistic, threshold, (1 + beyond) / (1 + surrogates), float(np.mean(drawn > threshold)), surrogates, best
+    )  # fmt: skip
+
+
+def _scores(
+    y: FloatArray, x: FloatArray, groups: Sequence[Group], nuisances: FloatArray, weight: FloatArray
+) -> dict[str, float]:
+    information, score, _ = conditioned(x, y, nuisances, weight)
+    out = {}
+    for name, columns in groups:
+        c = list(columns)
+        a = information[np.ix_(c, c)]
+        size = np.linalg.pinv(a, rcond=1e-8, hermitian=True)
+        rank = int(np.linalg.matrix_rank(a, hermitian=True))
+        if rank:
+            out[name] = chi2_log_p(float(score[c] @ size @ score[c]), rank)
+    return out
+
+
+def _roots(road: FloatArray, found: Fit) -> FloatArray:
+    v = found.scatter.sigma[None] + np.einsum("rc,cd->rcd", found.scatter.kappa * road, np.eye(road.shape[1]))
+    return np.asarray(np.linalg.cholesky(v))
+
+
+def _white(y: FloatArray, road: FloatArray, nuisances: FloatArray, found: Fit) -> FloatArray:
+    """Deviations of the runs (g, c) in units of their scatter, of unit variance; what was not told is drawn as 0."""
+    known = np.isfinite(y)
+    e = np.where(known, y - np.einsum("rck,k->rc", nuisances, found.size[: nuisances.shape[-1]]), 0.0)
+    root = _roots(road, found)
+    flat = np.linalg.solve(root, e[:, :, None])[:, :, 0]
+    whole = known.all(axis=1)
+    flat = flat[whole] if whole.sum() >= 20 else flat
+    return np.asarray(flat / np.maximum(np.sqrt(np.mean(flat**2, axis=0)), 1e-12))

@@ -1,0 +1,219 @@
+"""What tyre, water and car make of slip and resistance at a speed and traction: the simulator's equations, steady.
+
+The simulation's right-hand side (`aqualog.model.kernel`) without its time: each wheel's water, contact and slip at the
+traction that was measured, averaged over the fluctuation of contact and water's depth instead of drawn once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.compiled import compiled, inlined
+from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, flat
+from aqualog.model.term import Setup
+from aqualog.physics import contact, hydroplaning, load, rolling, water
+from aqualog.physics.contact import friction_ratio
+from aqualog.physics.tyre_brush import brush_parts
+from aqualog.types import FloatArray
+
+__all__ = ["NODES", "S_MAX", "Driven", "Response", "respond"]
+
+NODES = 32  # points at which contact and depth are averaged
+S_MAX = 0.10  # [-] a wheel that slips more spins, and no regression uses it (`campaign.slip_slope`)
+_CONTACT = np.linspace(0.0, 1.0, 101)
+_SHARE = np.linspace(0.0, 0.995, 200)  # force over what the contact carries
+_PRIMES = (2, 3, 5, 7)
+
+
+class Driven(NamedTuple):
+    """How samples (n,) were driven: `v` [m/s], `a` specific force forward [m/s^2], and `mu` (4, n), the traction of
+    each wheel that its torque gives [-] (`physics.traction`): of a wheel without torque minus the rolling resistance.
+    """
+
+    v: FloatArray
+    a: FloatArray
+    mu: FloatArray
+
+
+class Response(NamedTuple):
+    """Expectation (4, n), or (n,) for the car, and variances over the fluctuation of contact and water.
+
+    `slip` [-] at the traction told, NaN where no contact carries it; `contact` L [-]; `resistance` [m/s^2]: what the
+    torques should have given and the water takes; `lost` (4, n): share of the fluctuation at which the wheel spins.
+    """
+
+    slip: FloatArray
+    slip_variance: FloatArray
+    contact: FloatArray
+    lost: FloatArray
+    resistance: FloatArray
+    resistance_variance: FloatArray
+
+
+def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.bool_], driven: Driven) -> Response:
+    """Steady response of cars.
+
+    Parameters
+    ----------
+    setups : sequence of Setup
+        Plants and scenarios, terms applied; the first stretch of each is its water.
+    which : int array (n,)
+        Setup of each sample.
+    wet : bool array (n,)
+        On the water, or on dry road.
+    driven : Driven
+
+    Left out: the wheels' inertia, pitch of the body, what a wheel that has stopped leaves and drags. Near full
+    aquaplaning, where `lost` is not 0, that is no longer small.
+    """
+    plants = [flat(s.plant) for s in setups]
+    cars, wheels = (np.concatenate([p[i] for p in plants]) for i in (0, 1))
+    lanes = np.zeros((len(setups), 5))
+    for k, s in enumerate(setups):
+        for lane in s.scenario.lanes[:1]:
+            lanes[k] = (
+                lane.depth_left, lane.depth_right, lane.irregularity_left, lane.irregularity_right,
+                s.scenario.water_scatter,
+            )  # fmt: skip
+    found = _respond(
+        driven.v, driven.a, np.ascontiguousarray(driven.mu), which, wet, cars, wheels.reshape(-1, 4), lanes, _points(),
+        _table(),
+    )  # fmt: skip
+    return Response(*found)
+
+
+_loads = inlined(load.loads_of_wheels)
+_friction_ratio = inlined(contact.friction_ratio)
+_lost_contact = inlined(contact.lost_contact)
+_half_length = inlined(contact.contact_half_length)
+_load_shift = inlined(contact.load_shift)
+_v_full = inlined(hydroplaning.full_aquaplaning_speed)
+_film_drag = inlined(water.film_drag)
+_wave_drag = inlined(water.wave_drag)
+_residual_film = inlined(water.residual_film)
+_load_factor = inlined(rolling.load_factor)
+_SPIN_UP = float(hydroplaning.SPIN_UP_RATIO)
+_FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
+_CONTACT_STEP, _SHARE_STEP, _SHARE_MAX = float(_CONTACT[1]), float(_SHARE[1]), float(_SHARE[-1])
+
+
+@compiled
+def _slip(mu, F_z, L, friction, q, table):  # type: ignore[no-untyped-def]
+    """Slip of the shortened brush at a traction. [-] NaN where the contact cannot carry it."""
+    carried = friction * _friction_ratio(L)
+    if not abs(mu) <= _SHARE_MAX * carried or carried <= 0.0:
+        return np.nan
+    L = max(L, 0.02)
+    x, y = L / _CONTACT_STEP, abs(mu) / carried / _SHARE_STEP
+    i, j = min(int(x), table.shape[0] - 2), min(int(y), table.shape[1] - 2)
+    u, w = x - i, y - j
+    bent = (1.0 - u) * ((1.0 - w) * table[i, j] + w * table[i, j + 1])
+    bent += u * ((1.0 - w) * table[i + 1, j] + w * table[i + 1, j + 1])
+    return mu * bent / (q.slip_slope * _load_factor(F_z, q.F_z_ref, q.load_sensitivity) * L * L)
+
+
+@compiled
+def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  # type: ignore[no-untyped-def]
+    n, nodes = v.size, points.shape[0]
+    slip, slip_variance, contact_mean, lost = np.zeros((4, n)), np.zeros((4, n)), np.ones((4, n)), np.zeros((4, n))
+    resistance, resistance_variance = np.zeros(n), np.zeros(n)
+    force = np.zeros(nodes)
+    left = np.zeros(nodes)
+    for m in range(n):
+        k = which[m]
+        p = cars[k]
+        loads = _loads(a[m], 0.0, p.mass, p.l_f, p.l_r, p.h_cg, p.track)
+        force[:] = 0.0
+        for order in range(4):
+            side, rear = order // 2, order % 2
+            i = 2 * rear + side
+            q = wheels[k, i]
+            F_z = loads[i]
+            if not wet[m]:
+                slip[i, m] = _slip(traction[i, m], F_z, 1.0, q.mu, q, table)
+                continue
+            half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
+            count, sum_s, sum_ss, sum_L = 0, 0.0, 0.0, 0.0
+            for node in range(nodes):
+                uneven = 1.0 + lanes[k, 2 + side] * points[node, 0]
+                film = left[node] if rear else lanes[k, side] * max(uneven, 0.0)
+                L, s, drag = 1.0, 0.0, 0.0
+                if film > 0.0:
+                    friction = q.mu * q.wet_friction
+                    noise = _FIELD_SHARE * (points[node, 1] + points[node, 2 + rear])
+                    v_full = _v_full(
+                        film, F_z, q.p, q.tread_capacity, q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR, q.h_bulk,
+                        q.h_onset, q.contact_exponent,
+                    )  # fmt: skip
+                    v_full *= max(1.0 + lanes[k, 4] * q.contact_scatter * noise, 0.2)
+                    for _ in range(2):  # a wheel that has slowed down floats sooner, and slips more
+                        rolls = min(max(1.0 / (1.0 - s), 0.0), 1.0)
+                        lifted = _lost_contact(v[m], v_full * (_SPIN_UP + (1.0 - _SPIN_UP) * rolls), q.contact_exponent)
+                        L = 1.0 - min(max(lifted * q.contact_gain, 0.0), 1.0)
+                        drag = q.water_drag_gain * _film_drag(
+                            film, v[m], v[m] / (1.0 - s), q.width, q.tread_capacity, q.h_film, q.groove_relief
+                        )
+                        drag += _load_shift(L, half, q.wedge_peak) * F_z / q.r_l
+                        # the torque that the water takes at the wheel never reaches the road
+                        found = _slip(traction[i, m] - drag / F_z, F_z, L, friction, q, table)
+                        carries = abs(found) < S_MAX
+                        s = found if carries else 0.0
+                        if s >= 0.0 or not carries:
+                            break
+                    drag += q.water_drag_gain * _wave_drag(film, v[m], q.width, q.h_wave)
+                else:
+                    s = _slip(traction[i, m], F_z, 1.0, q.mu, q, table)
+                    carries = abs(s) < S_MAX
+                if not rear:
+                    left[node] = _residual_film(film, L, wheels[k, 2 + side].h_track)
+                force[node] += drag
+                sum_L += L
+                if carries:
+                    count += 1
+                    sum_s += s
+                    sum_ss += s * s
+            contact_mean[i, m] = sum_L / nodes
+            lost[i, m] = 1.0 - count / nodes
+            slip[i, m] = sum_s / count if count > 0 else np.nan
+            slip_variance[i, m] = max(sum_ss / count - slip[i, m] ** 2, 0.0) if count > 0 else 0.0
+        if wet[m]:
+            resistance[m] = force.mean() / (p.mass + p.towed_mass)
+            resistance_variance[m] = force.var() / (p.mass + p.towed_mass) ** 2
+    return slip, slip_variance, contact_mean, lost, resistance, resistance_variance
+
+
+@lru_cache(maxsize=1)
+def _table() -> FloatArray:
+    """theta over force / (3 L^2), its limit (2.2), by contact (rows) and share of the greatest force (columns)."""
+    theta = np.concatenate([np.linspace(0.0, 3.0, 3001), np.geomspace(3.01, 300.0, 400)])
+    found = np.empty((_CONTACT.size, _SHARE.size))
+    for k, L in enumerate(np.maximum(_CONTACT, 0.01)):
+        stuck, slid = brush_parts(theta, float(L))
+        force = _SHARE * float(friction_ratio(np.array([L]))[0])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found[k] = np.interp(force, stuck + slid, theta) / force * (3.0 * L * L)
+        found[k, 0] = 1.0
+    return found
+
+
+@lru_cache(maxsize=1)
+def _points() -> FloatArray:
+    """Points (NODES, 4) of independent normal variables, even in space: depth, road, front and rear wheel."""
+    normal = NormalDist()
+    columns = []
+    for prime in _PRIMES:
+        digits, share, rest = np.zeros(NODES), 1.0, np.arange(1, NODES + 1)
+        while rest.any():
+            share /= prime
+            digits += share * (rest % prime)
+            rest //= prime
+        columns.append([normal.inv_cdf(float(x)) for x in digits])
+    points = np.array(columns).T
+    points -= points.mean(axis=0)
+    return np.ascontiguousarray(points / points.std(axis=0))

@@ -1,0 +1,166 @@
+"""A campaign's runs as the few numbers that the diagnosis compares: slip and resistance on the water against dry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.campaign.samples import RunInfo
+from aqualog.diagnose.level.expect import Driven, respond
+from aqualog.model.scenario import Scenario
+from aqualog.model.simulate import assemble
+from aqualog.model.term import Model
+from aqualog.notation import WHEELS
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["RESISTANCE", "Passes", "Told", "channels_of", "doubted", "expected_values", "question_of", "steady"]
+
+RESISTANCE = "resistance"
+LOST_MAX = 0.01  # share of the fluctuation at which a wheel spins; beyond, no steady expectation holds
+STEADY = 0.015  # relative error of the steady expectation against the simulation, measured on runs without effect
+FRICTION = 0.2  # relative: "known to 10 or 20 %", and it stands for the shape of the curve too
+CONTACT_MIN = 0.3  # [-] of any wheel; below, the passage to full aquaplaning is not steady
+
+
+class Question(NamedTuple):
+    """What the model is asked at once: samples (n,) of all runs, each with its `run`, its scenario (`which`), `wet`."""
+
+    scenarios: tuple[Scenario, ...]
+    run: NDArray[np.int64]
+    which: NDArray[np.int64]
+    wet: BoolArray
+    driven: Driven
+
+
+class Told(NamedTuple):
+    """What of a run goes into the expectation: configuration (equal ones share a plant), and how it was driven."""
+
+    scenario: Scenario
+    wet: Driven | None
+    dry: Driven | None
+
+
+@dataclass(frozen=True, slots=True)
+class Passes:
+    """Observations of a campaign, one row per run.
+
+    `values` (g, c), NaN where a run does not tell it; for each driven wheel `slip_slope_<w>`: mean slip on the water
+    less that on dry road, and `dry_<w>`: mean slip on dry road [-]; `resistance`: mean of the resistance measure on the
+    water less the run's dry level [m/s^2]. `names` (c,). `told` (g,) what the model needs. `coordinates` by name (g,):
+    `v_x`, `depth` [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `infos` (g,).
+    `left_out`: runs, by reason.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    told: tuple[Told, ...]
+    infos: tuple[RunInfo, ...]
+    coordinates: Mapping[str, FloatArray]
+    nuisances: FloatArray
+    seconds: FloatArray
+    left_out: Mapping[str, int]
+    question: Question
+
+    def part(self, which: Sequence[int]) -> Passes:
+        """Some of the runs."""
+        at = np.asarray(which, dtype=np.int64)
+        told = tuple(self.told[i] for i in at)
+        return replace(
+            self, values=self.values[at], told=told, question=question_of(told),
+            infos=tuple(self.infos[i] for i in at), coordinates={k: x[at] for k, x in self.coordinates.items()},
+            nuisances=self.nuisances[at], seconds=self.seconds[at],
+        )  # fmt: skip
+
+
+def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
+    """Names of the columns."""
+    return (*(f"slip_slope_{w}" for w in wheels), *(f"dry_{w}" for w in wheels), RESISTANCE)
+
+
+def question_of(told: Sequence[Told]) -> Question:
+    """All samples of the runs in one, so that the model is asked once."""
+    scenarios: dict[str, int] = {}
+    kept: list[Scenario] = []
+    run, which, wet, parts = [], [], [], []
+    for r, t in enumerate(told):
+        key = repr(t.scenario)
+        if key not in scenarios:
+            scenarios[key] = len(kept)
+            kept.append(t.scenario)
+        for is_wet, driven in ((False, t.dry), (True, t.wet)):
+            if driven is not None:
+                run.append(np.full(driven.v.size, r))
+                which.append(np.full(driven.v.size, scenarios[key]))
+                wet.append(np.full(driven.v.size, is_wet))
+                parts.append(driven)
+    if not parts:
+        none = np.zeros(0, dtype=np.int64)
+        return Question((), none, none, none.astype(bool), Driven(np.zeros(0), np.zeros(0), np.zeros((4, 0))))
+    joined = Driven(*(np.concatenate(x, axis=-1) for x in zip(*parts, strict=True)))
+    return Question(tuple(kept), np.concatenate(run), np.concatenate(which), np.concatenate(wet), joined)
+
+
+def doubted(passes: Passes, base: Model) -> Passes:
+    """The same runs with columns before the free ones for what the expectation itself is not sure of.
+
+    The steady expectation is good to `STEADY`, one share for all slips on the water and one for the resistance; and the
+    tyre's curve bends by a friction that is known to `FRICTION`. All are the same in all runs, with that prior
+    (`noise.prior_of`): more runs do not make an approximation true.
+    """
+    expected = expected_values(passes, base)[0]
+    columns = np.zeros((*expected.shape, 3))
+    columns[:, :, 2] = np.nan_to_num(expected_values(passes, base, friction=1.0 + FRICTION)[0] - expected)
+    columns[:, :-1, 0] = np.nan_to_num(STEADY * expected[:, :-1])
+    columns[:, -1, 1] = np.nan_to_num(STEADY * expected[:, -1])
+    columns[:, [n.startswith("dry_") for n in passes.names], 0] = 0.0
+    return replace(passes, nuisances=np.concatenate([columns, passes.nuisances], axis=-1))
+
+
+def steady(passes: Passes, model: Model) -> list[int]:
+    """Runs in which every wheel keeps enough contact by a model for its steady expectation to hold, by index."""
+    q = passes.question
+    found = respond([assemble(s, model) for s in q.scenarios], q.which, q.wet, q.driven)
+    lost, contact = found.lost.max(axis=0), found.contact.min(axis=0)
+    out = []
+    for r in range(len(passes.told)):
+        here = (q.run == r) & q.wet
+        if not here.any() or (lost[here].mean() <= LOST_MAX and contact[here].mean() >= CONTACT_MIN):
+            out.append(r)
+    return out
+
+
+def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """What a model expects of the observations (g, c), and the variances (g, c) that the road's fluctuation gives one
+    point of it. `friction`: factor on that of all wheels.
+    """
+    q = passes.question
+    setups = [assemble(s, model) for s in q.scenarios]
+    setups = [s._replace(plant=s.plant._replace(mu=friction * s.plant.mu)) for s in setups]
+    found = respond(setups, q.which, q.wet, q.driven)
+    values, variances = np.full((2, *passes.values.shape), np.nan)
+    g = len(passes.told)
+
+    def means(x: FloatArray, *, wet: bool) -> FloatArray:
+        """Mean of each run; NaN where it has no such samples."""
+        use = (q.wet == wet) & np.isfinite(x)
+        count = np.bincount(q.run[use], minlength=g)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.bincount(q.run[use], x[use], g) / count)
+
+    for c, name in enumerate(passes.names):
+        if name == RESISTANCE:
+            values[:, c] = means(found.resistance, wet=True)
+            variances[:, c] = means(found.resistance_variance, wet=True)
+            continue
+        wheel = WHEELS.index(name[-2:])
+        dry = means(found.slip[wheel], wet=False)
+        if name.startswith("dry_"):
+            values[:, c], variances[:, c] = dry, 0.0
+        else:
+            values[:, c] = means(found.slip[wheel], wet=True) - dry
+            variances[:, c] = means(found.slip_variance[wheel], wet=True)
+    return values, variances

@@ -1,0 +1,223 @@
+"""Coloured noise of residual channels: an autoregression with a long memory, whitening, and surrogates.
+
+Sensors drift, wind gusts, roads are rough: residuals hang together over time, and a test that takes their samples as
+independent finds an effect in every log. The channels are combined so that they share little noise, each combination
+follows an autoregression on its last samples and on means over ever longer stretches of its past (up to 13 s), and what
+is left of them is made uncorrelated across the combinations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "spectra", "surrogate", "whitened"]
+
+# lags of the autoregression, from ... to, as means [samples]
+_BLOCKS = (
+    (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 10), (11, 18), (19, 34), (35, 66), (67, 130),
+)  # fmt: skip
+_ORDERS = (1, 2, 3, 4, 6, 8, 9, 10, 11)
+MEMORY = 130
+AFTER_GAP = 6  # [samples] whose past is bridged
+HUBER = 3.0  # [sd] larger innovations weigh less
+RIDGE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """`rotation` (C, C) from channels to scaled contrasts, `taps` (C, 131) of the whitening filters, `shaping` (C, C)
+    from their innovations to unit ones, `weights` (C, n) square roots of the robust weights, 0 where masked.
+    """
+
+    rotation: FloatArray
+    taps: FloatArray
+    shaping: FloatArray
+    weights: FloatArray
+
+    @property
+    def count(self) -> float:
+        """Number of samples that count."""
+        return float((self.weights**2).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Spectra:
+    """Residual-shaped arrays (k, C, n) ready for whitening: transforms of them with a quiet past in front."""
+
+    values: FloatArray
+    transform: np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+    size: int
+    n: int
+
+    def of(self, rows: Sequence[int]) -> Spectra:
+        """Some of the arrays."""
+        return Spectra(self.values[list(rows)], self.transform[list(rows)], self.size, self.n)
+
+
+def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
+    """Masked samples by straight lines between usable ones. (..., n)"""
+    if mask.all():
+        return x
+    good = np.flatnonzero(mask)
+    if good.size == 0:
+        return np.zeros_like(x)
+    flat = x.reshape(-1, x.shape[-1])
+    at = np.arange(x.shape[-1])
+    return np.array([np.interp(at, good, row[good]) for row in flat]).reshape(x.shape)
+
+
+def spectra(x: FloatArray) -> Spectra:
+    """Transforms of arrays (k, C, n), bridged. Their past before the log is taken to be their first second."""
+    n = x.shape[-1]
+    past = np.repeat(x[..., :10].mean(axis=-1, keepdims=True), MEMORY, axis=-1)
+    size = _good_size(n + 2 * MEMORY + 1)
+    transform = np.fft.rfft(np.concatenate([past, x], axis=-1), size, axis=-1)
+    return Spectra(x, transform, size, n)
+
+
+def _good_size(n: int) -> int:
+    """Smallest size from n on with small prime factors."""
+    best = 1 << (n - 1).bit_length()
+    for p5 in (1, 5, 25):
+        for p3 in (1, 3, 9):
+            size = p5 * p3
+            while size < n:
+                size *= 2
+            best = min(best, size)
+    return best
+
+
+def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:
+    """Noise of a residual (C, n) on its usable samples.
+
+    Parameters
+    ----------
+    residual : array (C, n)
+        After what is known has been taken away.
+    mask : array (n,)
+        Usable samples; at least some hundreds.
+    contrasts : array (C, C)
+        Combinations of channels that share little noise, as rows.
+
+    Returns
+    -------
+    Noise
+        Its order is chosen per contrast by Akaike's criterion; innovations beyond 3 standard deviations weigh
+        less (Huber), so that outliers and kerbs do not rule.
+    """
+    x = bridged(residual, mask)
+    used = _settled(mask)
+    C, n = x.shape
+    scale = np.maximum((contrasts @ x)[:, mask].std(axis=1), 1e-12)
+    rotation = contrasts / scale[:, None]
+    z = rotation @ x
+    # an offset is an effect, not noise: an autoregression would take it for a slow wave
+    z = z - z[:, mask].mean(axis=1, keepdims=True)
+    taps = np.zeros((C, MEMORY + 1))
+    weights: FloatArray = np.ones((C, n)) * used
+    for _ in range(2):
+        for c in range(C):
+            taps[c] = _autoregression(z[c], weights[c])
+        e = _filtered(z, taps)
+        sd: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1) + 1e-15
+        size = np.abs(e) / sd[:, None]
+        weights = np.where(size > HUBER, HUBER / np.maximum(size, 1e-12), 1.0) * used
+    count = weights.sum(axis=1)
+    root = np.sqrt(weights)
+    loss = np.array([np.count_nonzero(t) for t in taps], dtype=np.float64)
+    cov = (e * root) @ (e * root).T / np.sqrt(np.outer(count - loss, count - loss))
+    cov += RIDGE * np.diag(np.diag(cov))
+    shaping = np.linalg.inv(np.linalg.cholesky(cov))
+    return Noise(rotation, taps, shaping, root)
+
+
+def _settled(mask: BoolArray) -> BoolArray:
+    """Usable samples whose nearest past is usable too."""
+    good = mask.astype(np.float64)
+    past = np.convolve(good, np.ones(AFTER_GAP + 1), "full")[: mask.size]
+    settled = past > AFTER_GAP + 0.5
+    settled[:AFTER_GAP] = mask[:AFTER_GAP]
+    return np.asarray(settled)
+
+
+def _autoregression(z: FloatArray, weights: FloatArray) -> FloatArray:
+    """Taps (131,) of the whitening filter of one channel: weighted least squares, order by Akaike's criterion."""
+    n = z.size
+    padded = np.concatenate([np.full(MEMORY, z[:10].mean()), z])
+    total = np.concatenate([[0.0], np.cumsum(padded)])
+    at = np.arange(n) + MEMORY
+    columns = [(total[at - a + 1] - total[at - b]) / (b - a + 1) for a, b in _BLOCKS]
+    A = np.array(columns) * np.sqrt(weights)
+    y = z * np.sqrt(weights)
+    gram, right, power = A @ A.T, A @ y, float(y @ y)
+    gram += RIDGE * np.diag(np.diag(gram)) + 1e-30 * np.eye(len(gram))
+    count = max(float(weights.sum()), 10.0)
+    best, chosen = np.inf, np.zeros(0)
+    for order in _ORDERS:
+        phi = np.linalg.solve(gram[:order, :order], right[:order])
+        rest = max(power - float(phi @ right[:order]), 1e-30)
+        criterion = count * np.log(rest) + 2.0 * order
+        if criterion < best:
+            best, chosen = criterion, phi
+    taps = np.zeros(MEMORY + 1)
+    taps[0] = 1.0
+    for share, (a, b) in zip(chosen.tolist(), _BLOCKS, strict=False):
+        taps[a : b + 1] -= share / (b - a + 1)
+    return taps
+
+
+def _filtered(z: FloatArray, taps: FloatArray) -> FloatArray:
+    n = z.shape[-1]
+    past = np.repeat(z[:, :10].mean(axis=1, keepdims=True), MEMORY, axis=1)
+    size = _good_size(n + 2 * MEMORY + 1)
+    y = np.fft.irfft(np.fft.rfft(np.concatenate([past, z], axis=1), size) * np.fft.rfft(taps, size), size)
+    return y[:, MEMORY : MEMORY + n]
+
+
+def whitened(x: Spectra, noise: Noise) -> FloatArray:
+    """Arrays (k, C, n) as independent unit innovations, flat: (k, C n).
+
+    Inner products of whitened arrays are in units of twice the log-likelihood; masked samples are zero.
+    """
+    filters = np.fft.rfft(noise.taps, x.size)
+    k = x.transform.shape[0]
+    out = np.empty((k, noise.taps.shape[0], x.n))
+    for i in range(k):
+        z = (noise.rotation @ x.transform[i]) * filters
+        e = np.fft.irfft(z, x.size)[:, MEMORY : MEMORY + x.n]
+        out[i] = noise.shaping @ (e * noise.weights)
+    return out.reshape(k, -1)
+
+
+def surrogate(residual: FloatArray, mask: BoolArray, rng: np.random.Generator) -> FloatArray:
+    """A residual without effects that has the spectra and cross spectra of this one: Gaussian, locally smoothed.
+
+    Each frequency is a random mixture of its neighbours, the same for all channels, the constant one of the lowest
+    ones: what an effect leaves at single frequencies is spread, and so is what a fitted effect has taken away.
+    """
+    x = bridged(residual, mask)
+    n = x.shape[-1]
+    mean = x[:, mask].mean(axis=1, keepdims=True)
+    f = np.fft.rfft(x - mean, axis=-1)
+    m = f.shape[-1]
+    k = np.arange(m)
+    out = np.zeros_like(f)
+    width = np.maximum(3, (0.12 * k).astype(np.intp))
+    width = np.minimum(width, 40)
+    power = np.zeros(m)
+    for d in range(-40, 41):
+        near = np.abs(d) <= width
+        j = np.abs(k + d)
+        j = np.where(j >= m, 2 * (m - 1) - j, j)
+        near &= j > 0
+        z = (rng.standard_normal(m) + 1j * rng.standard_normal(m)) * np.sqrt(0.5)
+        out += np.where(near, z * f[:, j], 0.0)
+        power += near
+    out /= np.sqrt(np.maximum(power, 1.0))
+    out[:, 0] = np.real(out[:, 0]) * np.sqrt(2.0)
+    return np.asarray(np.fft.irfft(out, n, axis=-1))

@@ -1,0 +1,134 @@
+"""From refitted sets to a verdict: what is named, what cannot be told apart, what is left open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.hypotheses import value_in
+from aqualog.diagnose.records import Alternative, Cause, Estimate, Verdict
+from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.search import CREDIBLE, Candidate
+from aqualog.diagnose.words import cause_sentence
+from aqualog.model.term import Model
+
+__all__ = ["Outcome", "causes_of", "conclude"]
+
+EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
+
+
+class Outcome(NamedTuple):
+    """Verdict, causes, alternatives; `chosen` is the refit that the extended model is made of, None without causes.
+
+    `small`: sentences about deviations that are significant and too small to be worth naming.
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    alternatives: tuple[Alternative, ...]
+    chosen: Refit | None
+    small: tuple[str, ...]
+
+
+def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, significant: bool) -> Outcome:
+    """The verdict on refitted sets, best first; without any: `no_effect`, or `unexplained` if the test found something.
+
+    A set is credible if the best one's evidence is less than 20 times its own. Members that every credible set has are
+    certain. Places of one effect that cannot be told apart are one cause, at the whole car if that is among them.
+    """
+    if not candidates:
+        return Outcome("unexplained" if significant else "no_effect", (), (), None, ())
+    credible = [c for c in candidates if c.evidence_ratio < CREDIBLE]
+    credible = _one_per_name(credible)
+    best = credible[0]
+    own = causes_of(bench, best, model)
+    worth = [_worth_naming(best.refit, i, model) for i in range(len(best.refit.members))]
+    small = tuple(
+        f"Significant, but too small to be worth naming: {c.sentence}" for c, w in zip(own, worth, strict=True) if not w
+    )
+    if not any(worth):
+        return Outcome("no_effect", (), (), None, small)
+    named = tuple(c for c, w in zip(own, worth, strict=True) if w)
+    others = tuple(Alternative(causes_of(bench, c, model), c.evidence_ratio) for c in credible[1:])
+    if not others:
+        return Outcome("named" if len(named) == 1 else "compound", named, (), best.refit, small)
+    every = [own, *(a.causes for a in others)]
+    certain = set.intersection(*({c.effect for c in s} for s in every))
+    union: dict[str, Cause] = {}
+    for s in every:
+        for c in s:
+            union.setdefault(c.effect, c)
+    shown = tuple(c for c in union.values() if c.effect in certain) + tuple(
+        c for c in union.values() if c.effect not in certain
+    )
+    return Outcome("cannot_tell", shown, others, best.refit, small)
+
+
+def _one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
+    """One candidate for each set of effects: the one at the whole car if there is one, else the best."""
+    out: dict[tuple[str, ...], Candidate] = {}
+    for c in credible:
+        names = tuple(sorted(h.effect.name for h in c.refit.members))
+        old = out.get(names)
+        if old is None:
+            out[names] = c
+        elif _whole(c) > _whole(old) and c.evidence_ratio < 5.0 * old.evidence_ratio:
+            out[names] = Candidate(c.refit, old.evidence_ratio, c.inflation)
+    return list(out.values())
+
+
+def _whole(c: Candidate) -> int:
+    return sum(h.where is None for h in c.refit.members)
+
+
+def _worth_naming(r: Refit, member: int, model: Model) -> bool:
+    h = r.members[member]
+    for k, (i, name) in enumerate(r.names):
+        if i == member and abs(r.values[k] - value_in(model, h, name)) >= h.parameter(name).smallest:
+            return True
+    return False
+
+
+def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
+    """The members of a set with values, intervals and sentences."""
+    r = candidate.refit
+    sd = np.sqrt(np.diag(r.covariance) * candidate.inflation)
+    explained = _explained(bench, r)
+    out = []
+    for i, h in enumerate(r.members):
+        parameters = {}
+        for k, (owner, name) in enumerate(r.names):
+            if owner == i:
+                p = h.parameter(name)
+                v, s = float(r.values[k]), 1.959964 * float(sd[k])
+                parameters[name] = Estimate(v, max(v - s, p.low), min(v + s, p.high), p.unit)
+        for name, v in h.fixed.items():
+            if name in {p.name for p in h.effect.parameters} and name not in parameters:
+                parameters[name] = Estimate(float(v), math.nan, math.nan, h.parameter(name).unit)
+        sentence = cause_sentence(h.effect.name, h.where, h.effect.sentence, parameters)
+        out.append(Cause(h.effect.name, h.where, parameters, explained[i], sentence))
+    return tuple(out)
+
+
+def _explained(bench: Bench, r: Refit) -> list[tuple[str, ...]]:
+    """Channels whose rms would rise again without a member."""
+    channels = bench.drives[0].channels
+    out: list[tuple[str, ...]] = []
+    k = 0
+    for h in r.members:
+        shares = np.zeros(len(channels))
+        for d, left, own in zip(bench.drives, r.residuals, r.signatures, strict=True):
+            theta = r.values[k : k + len(h.free)] - np.array([h.parameter(n).neutral for n in h.free])
+            without = left + np.tensordot(theta, own[k : k + len(h.free)], axes=1)
+            now = np.sqrt((left[:, d.mask] ** 2).mean(axis=1))
+            then = np.sqrt((without[:, d.mask] ** 2).mean(axis=1))
+            shares += then / np.maximum(now, 1e-15) - 1.0
+        shares /= len(bench.drives)
+        k += len(h.free)
+        names = tuple(c for c, s in zip(channels, shares, strict=True) if s > EXPLAINS)
+        out.append(names or (channels[int(np.argmax(shares))],))
+    return out

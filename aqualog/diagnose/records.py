@@ -1,0 +1,218 @@
+"""What a diagnosis is: the record that document, page and model file are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aqualog.model.term import Model
+from aqualog.types import FloatArray
+
+__all__ = [
+    "Alternative", "Cause", "ChannelGain", "Confusion", "Consequence", "Diagnosis", "Estimate", "Gain", "Limit",
+    "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
+]  # fmt: skip
+
+Verdict = Literal["no_effect", "named", "compound", "cannot_tell", "unexplained", "not_testable"]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Value of a parameter in the simulator's unit with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One effect that the measurement asks for. `explains`: residual channels whose error it takes away."""
+
+    effect: str
+    where: str | None
+    parameters: Mapping[str, Estimate]
+    explains: tuple[str, ...]
+    sentence: str
+
+    @property
+    def key(self) -> str:
+        """`tyre_radius@fl`, or the bare name for the whole car."""
+        return self.effect if self.where is None else f"{self.effect}@{self.where}"
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """A set of effects that explains the same; `evidence_ratio`: how many times less likely than the best."""
+
+    causes: tuple[Cause, ...]
+    evidence_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class Significance:
+    """Family-wise test for anything at all: largest statistic, its p-value, and the level that the calibration reached.
+
+    `level` is the one asked for, `achieved` the share of surrogates without effect beyond the threshold that was used.
+    """
+
+    statistic: float
+    threshold: float
+    p_value: float
+    level: float
+    achieved: float
+    surrogates: int
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Smallest size of an effect that this log shows with a power of 0.9, in the unit of its first parameter.
+
+    NaN where the log does not show it at any physical size.
+    """
+
+    effect: str
+    where: str | None
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Confusion:
+    """Two sets of effects and how well this log can tell them apart, before any residual was looked at.
+
+    `separation` lambda: whitened energy of `effect` at its reference size that the `rivals` (1 to 3) cannot imitate;
+    `p_correct` = Phi(sqrt(lambda) / 2). `relation`: sentence, where there is an exact relation.
+    """
+
+    effect: str
+    rivals: tuple[str, ...]
+    separation: float
+    p_correct: float
+    relation: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """What is left of a channel after the best set, as a function: support mask, value and simultaneous 95 % band.
+
+    `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in the channel's unit; `share` of
+    the channel's variance that it explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect
+    whose signature is most alike, with the cosine.
+    """
+
+    channel: str
+    depends_on: tuple[str, ...]
+    share: float
+    p_value: float
+    x: FloatArray
+    f: FloatArray
+    low: FloatArray
+    high: FloatArray
+    proxies: tuple[str, ...]
+    nearest: str | None
+    cosine: float
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """A run that would tell the surviving causes apart, or the answer that none of the catalogue does.
+
+    `name`: of the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair.
+    """
+
+    name: str
+    separates: tuple[tuple[str, str], ...]
+    sentence: str
+    separation_now: float
+    separation_then: float
+    minutes: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelGain:
+    """Root mean square of a residual channel before and after, one step ahead (`rmse`) and running free (`free`)."""
+
+    channel: str
+    unit: str
+    rmse_before: float
+    rmse_after: float
+    free_before: float = float("nan")
+    free_after: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Consequence:
+    """What the extended model changes for a detector: false alarms and latency on drives, before and after."""
+
+    detector: str
+    false_alarms_before: int
+    false_alarms_after: int
+    distance_km: float
+    latency_before_s: float | None
+    latency_after_s: float | None
+    found_before: int
+    found_after: int
+    passes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """What the extended model predicts better. `log_score` on held-out drives with its 95 % interval, in nats.
+
+    `heldout` names them; empty: the gain is on the diagnosed drives themselves (`in_sample`).
+    """
+
+    channels: tuple[ChannelGain, ...]
+    log_score: float
+    low: float
+    high: float
+    heldout: tuple[str, ...]
+    in_sample: bool
+    consequences: tuple[Consequence, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualView:
+    """A residual channel for the page: arrays (n,) at `dt`; NaN where masked.
+
+    `coordinates`: `t` [s], `v_x` [m/s], `torque` [N m], `position` [m], `a_x` [m/s^2] ... (n,) each; `before` and
+    `after` the residual with the vehicle file alone and with the extended model.
+    """
+
+    drive: str
+    channel: str
+    title: str
+    unit: str
+    dt: float
+    coordinates: Mapping[str, FloatArray]
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The result. `causes` with `cannot_tell`: the set that the log cannot separate."""
+
+    verdict: Verdict
+    sentence: str
+    drives: tuple[str, ...]
+    duration_s: float
+    used_s: float
+    causes: tuple[Cause, ...]
+    alternatives: tuple[Alternative, ...]
+    significance: Significance | None
+    limits: tuple[Limit, ...]
+    confusions: tuple[Confusion, ...]
+    remainders: tuple[Remainder, ...]
+    manoeuvre: Manoeuvre | None
+    gain: Gain | None
+    model: Model
+    channels: tuple[str, ...]
+    untested: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+    views: tuple[ResidualView, ...] = field(default=(), repr=False)

@@ -1,0 +1,187 @@
+"""Values and intervals of a set of effects, refitted in the simulator itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
+from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
+from aqualog.diagnose.subsets import PRIOR_WIDTH, SetFit
+from aqualog.errors import ConfigError
+from aqualog.model.term import Model
+from aqualog.types import FloatArray
+
+__all__ = ["Metric", "Refit", "metric", "refit", "whitened_residual"]
+
+KNOWN = 0.25  # share of the tolerances that the intervals allow for
+SHRINK = (1.0, 0.5, 0.2)
+ROUNDS = 6
+HOLDS = 0.1  # share by which a signature may miss what it promised before it is simulated anew
+ENOUGH = 0.3  # of twice the log-likelihood
+
+
+@dataclass(frozen=True, slots=True)
+class Refit:
+    """A set at its best values.
+
+    `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
+    tolerances, with the prior; `residuals` (C, n) and `signatures` (k, C, n) per drive at these values; `at_bound` if a
+    value sits at its physical bound.
+    """
+
+    members: tuple[Hypothesis, ...]
+    names: tuple[tuple[int, str], ...]
+    values: FloatArray
+    covariance: FloatArray
+    loss: float
+    model: Model
+    residuals: tuple[FloatArray, ...]
+    signatures: tuple[FloatArray, ...]
+    at_bound: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k)."""
+
+    noises: tuple[Noise, ...]
+    A: FloatArray
+    M: FloatArray
+
+    def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
+        """Inner products of rows (a, N) and (b, N): (a, b)."""
+        return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
+
+
+def metric(bench: Bench, noises: Sequence[Noise]) -> Metric:
+    """The metric in which sets are compared: see `bench.tolerant`."""
+    k = np.flatnonzero(bench.tolerance > 0.0).tolist()
+    A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
+    seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
+    A = A[seen]
+    M = np.linalg.inv(A @ A.T + np.diag(bench.tolerance[k][seen] ** -2.0))
+    return Metric(tuple(noises), A, M)
+
+
+def whitened_residual(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
+    """All drives' residuals as unit innovations, flat."""
+    parts = [
+        whitened(spectra(bridged(r, d.mask)[None]), n)[0]
+        for r, d, n in zip(residuals, bench.drives, noises, strict=True)
+    ]
+    return np.concatenate(parts)
+
+
+def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | None:
+    """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds.
+
+    Parameters
+    ----------
+    bench : Bench
+    fit : SetFit
+        Its values are where the search starts.
+    measure : Metric
+        Held fixed, so that sets can be compared.
+    model : Model
+        On which the set comes.
+    """
+    noises = measure.noises
+    members = tuple(bench.asked[m] for m in fit.members)
+    names = tuple((i, n) for i, h in enumerate(members) for n in h.free)
+    columns = list(fit.columns)
+    base = np.array([value_in(model, members[i], n) for i, n in names])
+    low, high = base + bench.low[columns], base + bench.high[columns]
+    width = PRIOR_WIDTH * bench.prior[columns]
+    J = np.concatenate(
+        [whitened(p.of(columns), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1
+    )  # (k, N): what a unit takes away
+    values = np.clip(base + fit.theta, low, high)
+    found = _try(bench, members, names, values, noises, model)
+    if found is None:
+        return None
+    y, residuals, extended = found
+    loss = _loss(measure, y, (values - base) / width)
+    fresh = False
+    for _ in range(ROUNDS):
+        P = np.diag(width**-2.0)
+        G = measure.inner(J, J) + P
+        step = np.linalg.solve(G, measure.inner(J, y[None])[:, 0] - (values - base) / width**2)
+        promised = float(step @ G @ step)
+        won = 0.0
+        for shrink in SHRINK if promised >= ENOUGH else ():
+            new = np.clip(values + shrink * step, low, high)
+            tried = _try(bench, members, names, new, noises, model)
+            if tried is None:
+                continue
+            won = loss - _loss(measure, tried[0], (new - base) / width)
+            if won > 0.0:
+                y, residuals, extended = tried
+                values, loss = new, loss - won
+                break
+            if not fresh:
+                break
+        if won > 0.0:
+            # as good as the signature promised: it still holds here
+            fresh = fresh and abs(won - promised) < HOLDS * promised
+        elif fresh:
+            break
+        if not fresh:
+            J = _rows(bench, _slopes(bench, members, residuals, extended), noises)
+            fresh = True
+    slopes = _slopes(bench, members, residuals, extended)
+    J = _rows(bench, slopes, noises)
+    covariance = _covariance(measure, J, np.diag(width**-2.0))
+    at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
+    return Refit(members, names, values, covariance, loss, extended, tuple(residuals), slopes, at_bound)
+
+
+def _covariance(measure: Metric, J: FloatArray, P: FloatArray) -> FloatArray:
+    """Of the estimate, if the car is off its file by `KNOWN` of the tolerances: they are what is not worth a word,
+    which is more than what a file is usually off by.
+    """  # fmt: skip
+    inverse = np.linalg.inv(measure.inner(J, J) + P)
+    W = J - (J @ measure.A.T) @ measure.M @ measure.A
+    cross = W @ measure.A.T
+    off = KNOWN**2 * np.linalg.inv(np.linalg.inv(measure.M) - measure.A @ measure.A.T)
+    return np.asarray(inverse @ (W @ W.T + cross @ off @ cross.T + P) @ inverse)
+
+
+def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:
+    return float(measure.inner(y[None], y[None])[0, 0] + off @ off)
+
+
+def _try(
+    bench: Bench,
+    members: tuple[Hypothesis, ...],
+    names: tuple[tuple[int, str], ...],
+    values: FloatArray,
+    noises: Sequence[Noise],
+    model: Model,
+) -> tuple[FloatArray, list[FloatArray], Model] | None:
+    by_member: list[dict[str, float]] = [{} for _ in members]
+    for (i, n), v in zip(names, values.tolist(), strict=True):
+        by_member[i][n] = v
+    try:
+        extended = with_values(model, list(zip(members, by_member, strict=True)))
+        residuals = [residual(d, extended) for d in bench.drives]
+    except ConfigError:
+        return None
+    return whitened_residual(bench, noises, residuals), residuals, extended
+
+
+def _slopes(
+    bench: Bench, members: tuple[Hypothesis, ...], residuals: Sequence[FloatArray], extended: Model
+) -> tuple[FloatArray, ...]:
+    return tuple(
+        np.concatenate(signatures(d, extended, members, base=r, each=True))
+        for d, r in zip(bench.drives, residuals, strict=True)
+    )
+
+
+def _rows(bench: Bench, slopes: Sequence[FloatArray], noises: Sequence[Noise]) -> FloatArray:
+    parts = [whitened(spectra(bridged(s, d.mask)), n) for s, d, n in zip(slopes, bench.drives, noises, strict=True)]
+    return np.concatenate(parts, axis=1)

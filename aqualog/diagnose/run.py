@@ -1,0 +1,169 @@
+"""The diagnosis of one or more drives, from signals to verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.diagnose import isolate
+from aqualog.diagnose.channels import CHANNELS
+from aqualog.diagnose.defects import Defect, accelerometer_defect
+from aqualog.diagnose.drive import Drive, prepare
+from aqualog.diagnose.hypotheses import hypotheses
+from aqualog.diagnose.outcome import conclude
+from aqualog.diagnose.records import Diagnosis, ResidualView
+from aqualog.diagnose.search import Tell, search, simulated
+from aqualog.diagnose.words import verdict_sentence
+from aqualog.errors import SignalError
+from aqualog.model.term import Model
+from aqualog.types import FloatArray, Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Options", "diagnose"]
+
+LEAST_USED_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """`level` of false alarms for anything at all; `surrogates` for its calibration, 0: none; `seed` of all draws."""
+
+    seed: int = 1
+    level: float = 0.01
+    surrogates: int = 49
+    views: bool = True
+
+
+def diagnose(
+    drives: Sequence[tuple[str, Signals]],
+    vehicle: Vehicle,
+    *,
+    model: Model | None = None,
+    holdout: Sequence[tuple[str, Signals]] = (),
+    options: Options | None = None,
+    progress: Tell | None = None,
+) -> Diagnosis:
+    """What the model gets wrong on these drives, and why.
+
+    Parameters
+    ----------
+    drives : sequence of (name, Signals)
+        Measured with the same car in the same state; each has a noise of its own.
+    vehicle : Vehicle
+        The car as it is believed to be.
+    model : Model, optional
+        Terms that are known already.
+    holdout : sequence of (name, Signals)
+        Drives that are not looked at but for the gain.
+    options : Options, optional
+    progress : callable, optional
+        Called with what is being done and the share that is done.
+
+    Returns
+    -------
+    Diagnosis
+        The same for the same input and seed.
+
+    Raises
+    ------
+    SignalError
+        If no drive can be used.
+    """
+    options = options or Options()
+    model = model or Model()
+    tell = progress or (lambda _text, _share: None)
+    tell("preparing", 0.0)
+    ready, notes = _prepared(drives, vehicle)
+    for d in ready:
+        defect = accelerometer_defect(d)
+        if defect is not None:
+            return _not_testable(ready, model, _words(d, defect, dict(drives)[d.name]), notes)
+    used = sum(d.used_s for d in ready)
+    if used < LEAST_USED_S:
+        return _not_testable(
+            ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes
+        )
+    asked, untested = hypotheses(ready, model)
+    bench = simulated(ready, asked, model, tell)
+    found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
+    outcome = conclude(bench, found.candidates, model, significant=found.tests[0].p_value <= options.level)
+    extended = outcome.chosen.model if outcome.chosen is not None else model
+    sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
+    after = list(outcome.chosen.residuals) if outcome.chosen is not None else list(bench.residuals)
+    return Diagnosis(
+        verdict=outcome.verdict,
+        sentence=verdict_sentence(outcome.verdict, outcome.causes, level=options.level),
+        drives=tuple(d.name for d in ready),
+        duration_s=sum(d.duration_s for d in ready),
+        used_s=used,
+        causes=outcome.causes,
+        alternatives=outcome.alternatives,
+        significance=found.tests[0],
+        limits=isolate.limits(bench, sizes),
+        confusions=isolate.confusions(bench, found.gram, sizes, found.calibration.inflation),
+        remainders=(),
+        manoeuvre=None,
+        gain=None,
+        model=extended,
+        channels=ready[0].channels,
+        untested=untested,
+        notes=(*notes, *outcome.small),
+        views=_views(ready, bench.residuals, after) if options.views else (),
+    )
+
+
+def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[list[Drive], tuple[str, ...]]:
+    """Drives that can be used and notes on the others; all have the channels of the first."""
+    out: list[Drive] = []
+    notes: list[str] = []
+    for name, signals in drives:
+        try:
+            d = prepare(signals, vehicle, name)
+        except SignalError as error:
+            if len(drives) == 1:
+                raise
+            notes.append(error.line())
+            continue
+        if out and d.channels != out[0].channels:
+            notes.append(f"{name}: other channels than {out[0].name}, left out")
+            continue
+        out.append(d)
+        notes += [f"{name}: {n}" for n in d.notes]
+    if not out:
+        raise SignalError("no drive can be used", hint="; ".join(notes[:3]))
+    return out, tuple(notes)
+
+
+def _words(drive: Drive, defect: Defect, signals: Signals) -> str:
+    origin = signals.origins.get("a_x")
+    channel = origin.channel if origin is not None else "a_x"
+    return (
+        f"a_x (channel {channel}) is not the acceleration of the car in {drive.name}: its changes follow those of the "
+        f"speed with a correlation of {defect.correlation:.2f} and {defect.gain:.2f} times their size"
+    )
+
+
+def _not_testable(drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...]) -> Diagnosis:
+    return Diagnosis(
+        "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason), tuple(d.name for d in drives),
+        sum(d.duration_s for d in drives), sum(d.used_s for d in drives), (), (), None, (), (), (), None, None, model,
+        drives[0].channels, {}, notes,
+    )  # fmt: skip
+
+
+def _views(
+    drives: Sequence[Drive], before: Sequence[FloatArray], after: Sequence[FloatArray]
+) -> tuple[ResidualView, ...]:
+    out = []
+    for d, b, a in zip(drives, before, after, strict=True):
+        for i, c in enumerate(d.channels):
+            kind = CHANNELS[c]
+            out.append(
+                ResidualView(
+                    d.name, c, kind.title, kind.unit, max(0.1, d.dt), d.coordinates, np.where(d.mask, b[i], np.nan),
+                    np.where(d.mask, a[i], np.nan),
+                )
+            )  # fmt: skip
+    return tuple(out)

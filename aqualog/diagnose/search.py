@@ -1,0 +1,206 @@
+"""From residuals to the sets of effects that explain them: one effect more as long as there is anything left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.diagnose.bench import Bench, make_bench, noises_after
+from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.family import Calibration, calibrate, gumbel_p, largest
+from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
+from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
+from aqualog.diagnose.records import Significance
+from aqualog.diagnose.refit import Refit, metric, refit, whitened_residual
+from aqualog.diagnose.subsets import SetFit, best_sets, fit_set
+from aqualog.model.term import Model
+from aqualog.types import FloatArray
+
+__all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
+
+MOST = 4  # effects in one set
+CREDIBLE = 20.0  # evidence ratio within which sets cannot be told apart
+REFITTED = 8  # sets that are refitted in the simulator
+# of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
+SLACK, BENT = 8.0, 0.05
+PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
+
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of its variances."""
+
+    refit: Refit
+    evidence_ratio: float
+    inflation: float
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """`tests`: one for each effect that was looked for, the last one without a finding. `gram` and `calibration` are
+    those of the first: what the log can tell at all. `candidates` best first, empty without a finding. `noises` after
+    the best set.
+    """  # fmt: skip
+
+    tests: tuple[Significance, ...]
+    gram: FloatArray
+    calibration: Calibration
+    candidates: tuple[Candidate, ...]
+    noises: tuple[Noise, ...]
+
+
+def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Bench:
+    """Residuals of the drives under a model, and what every hypothesis would take away from them."""
+    residuals, all_signatures = [], []
+    total = len(asked) * len(drives)
+    done = [0]
+
+    def tick() -> None:
+        done[0] += 1
+        tell("simulating each effect along the drive", 0.02 + 0.28 * done[0] / total)
+
+    for d in drives:
+        residuals.append(residual(d, model))
+        all_signatures.append(signatures(d, model, asked, base=residuals[-1], tick=tick))
+    values = {(i, n): value_in(model, h, n) for i, h in enumerate(asked) for n in h.free}
+    return make_bench(drives, asked, residuals, all_signatures, values)
+
+
+def search(
+    bench: Bench, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
+) -> Found:
+    """Test, best set, refit; again beside it, until nothing more is found or four effects are in the set."""
+    tests: list[Significance] = []
+    first: tuple[FloatArray, Calibration] | None = None
+    accepted: tuple[int, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    work = bench
+    while True:
+        tell("testing for anything at all" if not accepted else "testing for one effect more", 0.3 + 0.1 * len(tests))
+        gains, gram = largest(work, work.residuals, accepted)
+        sets = best_sets(work, gram, len(accepted) + 1, within=0.0, most=1) if len(accepted) < MOST else []
+        quiet = _after(work, sets[0]) if sets else list(work.residuals)
+        calibration = calibrate(
+            work, quiet, gram, base=accepted, surrogates=surrogates, level=level, seed=seed + len(tests)
+        )
+        tests.append(_tested(work, gains, accepted, calibration, level, surrogates))
+        first = first or (gram, calibration)
+        if tests[-1].p_value > level or not sets:
+            break
+        now = candidates[0].refit.residuals if candidates else bench.residuals
+        found = _refitted(work, gram, accepted, calibration, model, now, tell, 0.35 + 0.1 * len(tests))
+        if not found:
+            break
+        candidates = found
+        best = found[0].refit
+        accepted = tuple(_index(bench, h) for h in best.members)
+        work = _around(bench, best, accepted, model)
+    assert first is not None
+    quiet = list(candidates[0].refit.residuals) if candidates else list(bench.residuals)
+    noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, bench.drives, strict=True))
+    return Found(tuple(tests), first[0], first[1], candidates, noises)
+
+
+def _tested(
+    bench: Bench, gains: FloatArray, base: Sequence[int], c: Calibration, level: float, surrogates: int
+) -> Significance:
+    sizes = np.array([len(x) for x in bench.columns], dtype=np.float64)
+    ratio = gains / c.inflation / sizes
+    statistic = float(ratio.max())
+    if c.maxima.size:
+        p = max(gumbel_p(c.maxima, statistic), 1e-12)
+        return Significance(statistic, c.threshold, p, level, c.achieved, surrogates)
+    count = max(np.count_nonzero(gains), 1)
+    p = min(1.0, 1e-12 + count * math.erfc(math.sqrt(0.5 * max(statistic, 0.0))))
+    return Significance(statistic, c.threshold, p, level, float("nan"), 0)
+
+
+def _after(bench: Bench, fit: SetFit) -> list[FloatArray]:
+    return [
+        r - np.tensordot(fit.theta, s[list(fit.columns)], axes=1)
+        for r, s in zip(bench.residuals, bench.signatures, strict=True)
+    ]
+
+
+def _refitted(
+    bench: Bench,
+    gram: FloatArray,
+    base: Sequence[int],
+    calibration: Calibration,
+    model: Model,
+    now: Sequence[FloatArray],
+    tell: Tell,
+    share: float,
+) -> tuple[Candidate, ...]:
+    """Sets of one effect more than `base`, refitted in the simulator, best first; those at a physical bound are out.
+
+    None if the best of them does not take away from the residuals `now` what the test asks of an effect: then what the
+    test found is not of the form of any effect.
+    """
+    size = len(base) + 1
+    top = best_sets(bench, gram, size, within=0.0, most=1)
+    if not top:
+        return ()
+    inflation = max(1.0, float(np.mean([calibration.inflation[m] for m in top[0].members])))
+    noises = noises_after(bench, bench.residuals, dict(zip(top[0].columns, top[0].theta.tolist(), strict=True)))
+    known = fit_set(bench, gram, base) if base else None
+    won = top[0].gain - (known.gain if known is not None else 0.0)
+    within = (2.0 * math.log(CREDIBLE)) * inflation + SLACK + BENT * max(won, 0.0)
+    fits = best_sets(bench, gram, size, within=within, most=REFITTED)
+    measure = metric(bench, noises)
+    tell("refitting in the simulator", min(share, 0.95))
+    with ThreadPoolExecutor(THREADS) as pool:
+        refits = list(pool.map(lambda fit: refit(bench, fit, measure, model), fits))
+    done = [r for r in refits if r is not None and not r.at_bound]
+    losses = {id(r): r.loss / inflation + PER_PARAMETER * len(r.values) for r in done}
+    done.sort(key=lambda r: losses[id(r)])
+    large = [r for r in done if _all_there(r, model)]
+    # what is too small to be worth a word is another effect's disguise, if that one explains as much
+    if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
+        done = large
+    y = whitened_residual(bench, noises, now)[None]
+    if not done or float(measure.inner(y, y)[0, 0]) - done[0].loss < calibration.threshold * inflation:
+        return ()
+    return tuple(
+        Candidate(r, math.exp(min(0.5 * (losses[id(r)] - losses[id(done[0])]), 700.0)), inflation) for r in done
+    )
+
+
+def _all_there(r: Refit, model: Model) -> bool:
+    """Whether every value is worth naming."""
+    return all(
+        abs(v - value_in(model, r.members[i], n)) >= r.members[i].parameter(n).smallest
+        for (i, n), v in zip(r.names, r.values.tolist(), strict=True)
+    )
+
+
+def _index(bench: Bench, h: Hypothesis) -> int:
+    return bench.asked.index(h)
+
+
+def _around(bench: Bench, best: Refit, members: Sequence[int], model: Model) -> Bench:
+    """The bench with what is known of the best set put in place: its own signatures at its own values.
+
+    Residuals are those that a linear model around these values would have had at the start, so that sets are sought
+    anew from there.
+    """
+    columns = [c for m in members for c in bench.columns[m]]
+    start = best.values - np.array([value_in(model, best.members[i], n) for i, n in best.names])
+    new_signatures, new_residuals = [], []
+    for s, r, own in zip(bench.signatures, best.residuals, best.signatures, strict=True):
+        changed = s.copy()
+        changed[columns] = own
+        new_signatures.append(changed)
+        new_residuals.append(r + np.tensordot(start, own, axes=1))
+    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(new_signatures, bench.drives, strict=True))
+    return replace(
+        bench, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared
+    )
+

@@ -1,0 +1,51 @@
+"""What a vehicle file and a simulator are never exact about, and nobody asks for: allowed for, not named.
+
+The geometry of curves, the height of the centre of mass, the form of a tyre's curve, offsets of steering and gyro. Each
+has the form of an effect, so that what it does to the residuals follows from simulation like everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from aqualog.model.plant import Plant
+from aqualog.model.sensors import Channel
+from aqualog.model.term import Effect, Parameter, Setup
+
+__all__ = ["TOLERANCES"]
+
+
+def _plant(change: Callable[[Plant, float], Plant]) -> Callable[[Setup, Mapping[str, float], str | None], Setup]:
+    return lambda setup, v, _: setup._replace(plant=change(setup.plant, v["by"]))
+
+
+def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> Callable[
+    [Setup, Mapping[str, float], str | None], Setup
+]:  # fmt: skip
+    def apply(setup: Setup, v: Mapping[str, float], _: str | None) -> Setup:
+        old = setup.sensors.channels.get(signal, Channel())
+        return setup._replace(sensors=setup.sensors.with_channel(signal, change(old, v["by"])))
+
+    return apply
+
+
+def _of(name: str, unit: str, sd: float, apply: Callable[[Setup, Mapping[str, float], str | None], Setup]) -> Effect:
+    by = Parameter("by", unit, 0.0, sd, -20.0 * sd, 20.0 * sd, sd, "deviation; sigma is the tolerance (K)")
+    return Effect(name, "tolerance", "", "general knowledge", (by,), apply)
+
+
+TOLERANCES: tuple[Effect, ...] = (
+    _of("track", "-", 0.02, _plant(lambda p, x: p._replace(track=p.track * (1.0 + x)))),
+    _of("h_cg", "-", 0.1, _plant(lambda p, x: p._replace(h_cg=p.h_cg * (1.0 + x)))),
+    _of("axle_distance", "m", 0.03, _plant(lambda p, x: p._replace(l_f=p.l_f + x, l_r=p.l_r - x))),
+    _of("cornering_front", "-", 0.2, _plant(lambda p, x: p._replace(
+        cornering_slope=p.cornering_slope * [1.0 + x, 1.0 + x, 1.0, 1.0]))),
+    _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(
+        cornering_slope=p.cornering_slope * [1.0, 1.0, 1.0 + x, 1.0 + x]))),
+    _of("friction", "-", 0.15, _plant(lambda p, x: p._replace(mu=p.mu * (1.0 + x)))),
+    _of("steer_offset", "rad", 5e-3, _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),
+    _of("steer_gain", "-", 0.03, _channel("steer_angle", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
+    _of("gyro_offset", "rad/s", 2e-3, _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
+    _of("gyro_gain", "-", 0.02, _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
+)  # fmt: skip

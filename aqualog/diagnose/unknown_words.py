@@ -1,0 +1,80 @@
+"""What is left over, in a sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.diagnose.unknown_proxy import Choice
+from aqualog.types import FloatArray
+
+__all__ = ["describe"]
+
+_COORDINATES: dict[str, tuple[str, str]] = {
+    "v_x": ("speed", "m/s"),
+    "torque": ("torque", "N m"),
+    "a_x": ("acceleration", "m/s^2"),
+    "a_y": ("lateral acceleration", "m/s^2"),
+    "position": ("place on the road", "m"),
+    "t": ("time", "s"),
+    "water_depth": ("water depth", "m"),
+    "temperature": ("temperature", "degC"),
+    "slip": ("slip", "-"),
+    "drive_sign": ("driving or braking", "-"),
+    "steer_angle": ("steer angle", "rad"),
+    "yaw_rate": ("yaw rate", "rad/s"),
+}
+_CHANNELS: dict[str, tuple[str, str]] = {
+    "force_balance": ("force balance", "m/s^2"),
+    "kinematic": ("accelerometer against wheel acceleration", "m/s^2"),
+    "lateral": ("lateral acceleration", "m/s^2"),
+    "axle_slip": ("slip between the axles", "-"),
+    "side_slip_f": ("slip between the front wheels", "-"),
+    "side_slip_r": ("slip between the rear wheels", "-"),
+    **{f"slip_{w}": (f"slip {w}", "-") for w in ("fl", "fr", "rl", "rr")},
+    **{f"tie_rod_{w}": (f"tie rod {w}", "N") for w in ("fl", "fr")},
+}
+ALIKE = 0.9  # cosine from which a known effect looks nearly the same
+
+
+def describe(
+    channel: str, choice: Choice, x: FloatArray, f: FloatArray, low: FloatArray, high: FloatArray, share: float,
+    nearest: str | None, cosine: float,
+) -> str:  # fmt: skip
+    """What of which channel depends on what, where it is largest, what else could stand behind it, what is alike.
+
+    `x` (k, d), `f`, `low`, `high` (k,) as in a `Remainder`: NaN where the drive was not.
+    """
+    title, unit = _CHANNELS.get(channel, (channel, "?"))
+    of = " and ".join(_word(n) for n in choice.names)
+    text = f"What no known effect explains of the {title} depends on {of} ({share:.0%} of the variance"
+    sure = np.isfinite(f) & ((low > 0.0) | (high < 0.0))
+    if sure.any():
+        at = int(np.argmax(np.where(sure, np.abs(f), -1.0)))
+        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(choice.names, x[at], strict=True))
+        text += f"; {f[at]:+.3g} {unit}".removesuffix(" -") + f" at {there}"
+    text += ")."
+    if choice.proxies:
+        is_, are = ("is", "a proxy") if len(choice.proxies) == 1 else ("are", "proxies")
+        text += f" {_list(choice.proxies).capitalize()} {is_} only {are}."
+    plain = [e for e in choice.equals if not choice.along or e not in ("t", "position")]
+    if plain:
+        text += f" This drive cannot tell it from {_list(plain)}."
+    if choice.along:
+        text += " Without a second pass, a place on the road and a moment in time cannot be told apart."
+    if nearest is not None:
+        alike = "looks nearly the same" if cosine >= ALIKE else "is the nearest known effect"
+        text += f" {nearest} {alike} (cosine {cosine:.2f})."
+    return text
+
+
+def _word(name: str) -> str:
+    return _COORDINATES.get(name, (name, ""))[0]
+
+
+def _unit(name: str) -> str:
+    return _COORDINATES.get(name, ("", "-"))[1]
+
+
+def _list(names: tuple[str, ...] | list[str]) -> str:
+    words = [_word(n) for n in names]
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -1,0 +1,69 @@
+"""Sentences of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from aqualog.diagnose.records import Cause, Estimate
+
+__all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "verdict_sentence"]
+
+_PLACES = {
+    "fl": "front left wheel", "fr": "front right wheel", "rl": "rear left wheel", "rr": "rear right wheel",
+    "f": "front axle", "r": "rear axle", "left": "left side", "right": "right side",
+    "a_x": "longitudinal", "a_y": "lateral", "v_x": "reference velocity",
+    "omega": "wheel speeds", "torque": "wheel torque", "torque_fl": "torque's bus",
+}  # fmt: skip
+
+
+def place(where: str | None) -> str:
+    """` (front left wheel)`, or nothing for the whole car."""
+    return "" if where is None else f" ({_PLACES.get(where, where)})"
+
+
+def quantity(value: float, unit: str, *, change: bool = False) -> str:
+    """A value with three digits and its unit; ratios without one."""
+    sign = "+" if change else ""
+    text = f"{value:{sign}.3g}"
+    return text if unit == "-" else f"{text} {unit.replace('*', ' ')}"
+
+
+def name_of(effect: str, where: str | None) -> str:
+    """`tyre radius (front left wheel)`."""
+    return effect.replace("_", " ") + place(where)
+
+
+def cause_sentence(effect: str, where: str | None, sentence: str, parameters: Mapping[str, Estimate]) -> str:
+    """The effect's own sentence with its values and the interval of the first one."""
+    first = next(iter(parameters.values()))
+    values = {n: e.value for n, e in parameters.items()}
+    if effect == "payload_mass" and first.value < 0.0:
+        text = f"The car weighed {-first.value:.0f} kg less than the vehicle file says"
+    else:
+        text = sentence.format(where=where or "", **values).rstrip(".")
+    interval = f"{first.low:.3g} to {first.high:.3g}" + (
+        "" if first.unit == "-" else f" {first.unit.replace('*', ' ')}"
+    )
+    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {interval}."
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """`a, b and c`."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]
+
+
+def verdict_sentence(verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "") -> str:
+    """The verdict in one sentence."""
+    names = [name_of(c.effect, c.where) for c in causes]
+    if verdict == "no_effect":
+        return f"No effect: the model predicts what was measured, at a false-alarm level of {level:g}."
+    if verdict == "named":
+        return causes[0].sentence
+    if verdict == "compound":
+        return f"{len(causes)} effects together: {listed(names)}."
+    if verdict == "cannot_tell":
+        return f"Something is different, but this log cannot tell {listed(names, 'or')} apart."
+    if verdict == "unexplained":
+        known = f" beside {listed(names)}" if names else ""
+        return f"Something is different{known} that no effect of the library explains{reason}."
+    return f"Not testable: {reason}."

@@ -1,0 +1,191 @@
+"""The simulation led along a measured drive: reported torque and steering in, what the sensors would show out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aqualog.errors import ConfigError
+from aqualog.model import kernel
+from aqualog.model.plant import Plant, build_plant
+from aqualog.model.road import GRADE, build_road
+from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
+from aqualog.model.simulate import steering_columns
+from aqualog.model.start import resistance_at, rolling_state
+from aqualog.model.term import Model, Setup
+from aqualog.notation import WHEELS
+from aqualog.physics.load import G
+from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["FOLLOW_RATE", "Course", "follow", "led_truth", "setup_along", "shown"]
+
+STEP_S = 5e-3
+RECORD_S = 1e-2
+FOLLOW_RATE = 0.3  # [1/s] fast against a wrong resistance, slow against the noise of a measured speed
+V_START = 0.5  # [m/s]
+# perfect sensors on the buses of a series car: a clock that runs off takes its bus along
+PERFECT = Sensors("perfect", tuple(Group(g.name, g.signals) for g in ESC.groups))
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What was done with the car, as its log tells; arrays on an even grid `t` (n,) from 0 [s], finite.
+
+    `torque` (4, n) reported net wheel torques [N m], `steer` (n,) road-wheel angle [rad], `v_x` (n,) reference
+    velocity [m/s], `lanes` the water on the way.
+    """
+
+    t: FloatArray
+    torque: FloatArray
+    steer: FloatArray
+    v_x: FloatArray
+    lanes: tuple[Lane, ...] = field(default=())
+    has_rods: bool = False
+
+
+def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
+    """Plant, sensors and road of a drive along `course`: the car of the file, perfect sensors, and all terms."""
+    scenario = Scenario(
+        vehicle, duration_s=float(course.t[-1]), rate_hz=1.0 / float(course.t[1] - course.t[0]), lanes=course.lanes,
+        water_scatter=0.0, sensors=PERFECT,
+    )  # fmt: skip
+    plant = build_plant(vehicle, scenario.tyre_front, scenario.tyre_rear)
+    return model.apply(Setup(plant, PERFECT, scenario))
+
+
+def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLLOW_RATE) -> dict[str, FloatArray]:
+    """What the sensors would show of a measured drive if the car were that of the file and the model.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    course : Course
+    model : Model
+        Its terms act on car, road and sensors. What a term does to the sensors of torque and steering is undone before
+        they drive the simulation: a torque that is reported late is applied earlier.
+    rate : float
+        How fast the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
+
+    Returns
+    -------
+    columns : dict of array (n,)
+        Canonical signals on the grid of the course, without noise; `nudge` [m/s^2] is the acceleration that drew the
+        speed to the measured one, `position` [m].
+
+    Raises
+    ------
+    ConfigError
+        If the simulation diverges.
+    """
+    setup = setup_along(vehicle, course, model)
+    return shown(led_truth(setup, course, rate=rate), setup.sensors, course)
+
+
+def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArray]:
+    """What `sensors` show of a truth, on the grid of the course; a column that no sensor has is taken as it is."""
+    step = float(course.t[1] - course.t[0])
+    out: dict[str, FloatArray] = {}
+    for group in measure(truth, _bare(sensors), rate_hz=1.0 / step, seed=0):
+        for name, x in group.columns.items():
+            same = group.t.size == course.t.size and abs(group.t[-1] - course.t[-1]) < 1e-9
+            out[name] = x if same else _at(group.t, x, course.t)
+    for name in ("nudge", "position"):
+        out[name] = _at(truth.t, truth.columns[name], course.t)
+    return {n: x if x.size == course.t.size else np.resize(x, course.t.size) for n, x in out.items()}
+
+
+def _at(t: FloatArray, x: FloatArray, at: FloatArray) -> FloatArray:
+    return np.interp(at, t, x)
+
+
+def _bare(sensors: Sensors) -> Sensors:
+    """Sensors as they are led, without the tone ring: it has no phase that a log would share."""
+    return replace(sensors, teeth=0)
+
+
+def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Truth:
+    """The led drive without sensors, every 10 ms."""
+    plant, scenario = setup.plant, setup.scenario
+    n = max(2, math.ceil(float(course.t[-1]) / STEP_S - 1e-9))
+    fine: FloatArray = np.arange(n + 1, dtype=np.float64) * STEP_S
+    torque = np.array([
+        _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
+    ])  # fmt: skip
+    speed = np.maximum(np.interp(fine, course.t, course.v_x), 0.0)
+    controls = _controls(speed, _undone(course.t, course.steer, setup.sensors, "steer_angle", fine), rate)
+    road = build_road(scenario, float(speed.sum()) * STEP_S * 1.02 + 50.0)
+    start = _start(plant, torque[:, 0], float(max(speed[0], V_START)), float(road.fields[0, GRADE]))
+    every = round(RECORD_S / STEP_S)
+    rows = kernel.run(n, STEP_S, every, start, plant, road, controls, np.ascontiguousarray(torque.T))
+    if not np.isfinite(rows).all():
+        raise ConfigError("the simulation along the drive diverged", hint="less extreme parameters of car or model")
+    t: FloatArray = np.arange(rows.shape[0], dtype=np.float64) * RECORD_S
+    return Truth(t, _columns(rows, plant, scenario, rods=course.has_rods))
+
+
+def _controls(speed: FloatArray, steer: FloatArray, rate: float) -> kernel.Controls:
+    still = np.zeros_like(speed)
+    return kernel.Controls(
+        v_target=speed,
+        a_target=still,
+        drive=still,
+        brake=still,
+        split_rear=still + 0.5,
+        steer=steer,
+        exc=still,
+        grade=still,
+        wind=still,
+        gain=still + 1.0,
+        has_driver=False,
+        keeps_lane=False,
+        exc_kind=0,
+        exc_amplitude=0.0,
+        scatter=0.0,
+        follow=rate,
+    )
+
+
+def _undone(t: FloatArray, x: FloatArray, sensors: Sensors, name: str, at: FloatArray) -> FloatArray:
+    """What a sensor was shown, from what it reported: the inverse of `Channel` without noise and lag."""
+    channel = sensors.channels.get(name, Channel())
+    skew = _skew(sensors, name)
+    reported = np.interp((at + channel.delay_s + channel.latency_s) * (1.0 + skew), t, x)
+    return (reported - channel.bias - channel.drift * at) / channel.gain
+
+
+def _skew(sensors: Sensors, name: str) -> float:
+    return sum(g.skew_ppm for g in sensors.groups if name in g.signals) * 1e-6
+
+
+def _start(plant: Plant, torque: FloatArray, v: float, theta: float) -> FloatArray:
+    drive = float(torque.sum()) * plant.torque_gain
+    drag, rolling = resistance_at(plant, v, G * math.sin(theta))
+    a = (drive / float(plant.r_l.mean()) - float(rolling.sum()) - drag) / (plant.mass + plant.towed_mass)
+    state = rolling_state(plant, v=v, a=a, drive=0.0, split_rear=0.5)
+    state[kernel.DRIVE] = 0.0
+    return state
+
+
+_SCALARS = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
+
+
+def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) -> dict[str, FloatArray]:
+    def of_wheels(name: str) -> list[FloatArray]:
+        first = kernel.COLUMNS[name]
+        return [np.ascontiguousarray(rows[:, first + i]) for i in range(4)]
+
+    columns = {n: np.ascontiguousarray(rows[:, kernel.COLUMNS[n]]) for n in _SCALARS}
+    omega, angle, torque = (of_wheels(n) for n in ("omega", "angle", "torque"))
+    for i, w in enumerate(WHEELS):
+        columns[f"omega_{w}"] = omega[i]
+        columns[f"angle_{w}"] = angle[i]
+        columns[f"torque_{w}"] = torque[i] / plant.torque_gain
+    if rods:
+        names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "aligning", "braking", "contact")
+        columns |= steering_columns({n: of_wheels(n) for n in names}, plant, scenario)
+    return columns

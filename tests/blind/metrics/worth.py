@@ -1,0 +1,174 @@
+"""Metrics 8 to 12: what the verdict is worth: the next manoeuvre, compounds, gain, unknown effects, the detectors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from blind.metrics.measure import Measure, by, quantity, share
+from blind.metrics.rows import Row
+
+__all__ = ["compounds", "detectors", "gains", "manoeuvres", "speed", "unknown"]
+
+STRONG = 8.0
+
+
+def manoeuvres(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 8: the recommended run, driven by the world and diagnosed together with the first, gives the true name."""
+    cases = [r for r in rows if r.second is not None]
+    can = [r for r in cases if r.second.possible]
+    cannot = [r for r in cases if not r.second.possible]
+    resolved = [
+        r.second.verdict in ("named", "compound") and {c.key for c in r.second.causes} == set(r.hidden) for r in can
+    ]
+    out = [
+        share(8, "resolved by the recommended run", resolved, lambda v, *_: v >= 0.95, ">= 0.95", least=20),
+        quantity(
+            8,
+            "separation over the median run's",
+            [r.second.advantage for r in can],
+            _median,
+            lambda v: v >= 2.0,
+            ">= 2",
+            least=20,
+        ),
+        share(
+            8,
+            "says that no run can",
+            [r.second.name in ("none", "sensor") for r in cannot],
+            lambda v, *_: v >= 0.95,
+            ">= 0.95",
+            least=10,
+        ),
+    ]
+    for name, group in sorted(by(can, lambda r: r.second.name).items()):
+        hits = [
+            r.second.verdict in ("named", "compound") and {c.key for c in r.second.causes} == set(r.hidden)
+            for r in group
+        ]
+        out.append(share(8, f"  {name}", hits, lambda v, *_: v >= 0.95, ">= 0.95", least=5))
+    return out
+
+
+def compounds(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 9: two effects at once, each strong and no more than so much alike."""
+    pairs = [r for r in rows if r.group == "compound" and len(r.truth) == 2]
+    # a case that failed has no sizes and counts
+    cases = [r for r in pairs if r.error or (min(f.z for f in r.truth) >= STRONG and r.separation >= 0.3)]
+    recalled = [n in _said(r) for r in cases for n in r.hidden]
+    return [
+        share(
+            9,
+            "exact set of two",
+            [_said(r) == set(r.hidden) for r in cases],
+            lambda v, *_: v >= 0.85,
+            ">= 0.85",
+            least=100,
+        ),
+        share(
+            9,
+            "a false member",
+            [bool(_said(r) - set(r.hidden)) for r in cases],
+            lambda v, *_: v <= 0.08,
+            "<= 0.08",
+            least=100,
+        ),
+        share(9, "members recalled", recalled, lambda v, *_: v >= 0.92, ">= 0.92", least=200),
+    ]
+
+
+def _said(row: Row) -> set[str]:
+    return set(row.names)
+
+
+def gains(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 10: gain on the held-out drive as a share of that of the truth put into the same simulator."""
+    cases = [r for r in rows if r.group in ("named", "third") and r.truth and r.truth[0].known and r.truth[0].z >= 6.0]
+    cases = [r for r in cases if math.isfinite(r.oracle) and r.oracle > 0.0]
+    # no verdict, no gain: a case that was missed or failed has the share zero
+    shares = [(r.gain if math.isfinite(r.gain) else 0.0) / r.oracle for r in cases]
+    nulls = [r.worse for r in rows if not r.truth and not r.error and math.isfinite(r.worse)]
+    return [
+        quantity(10, "share of the oracle's gain, median", shares, _median, lambda v: v >= 0.95, ">= 0.95", least=50),
+        quantity(10, "share of the oracle's gain, p10", shares, _tenth, lambda v: v >= 0.80, ">= 0.80", least=50),
+        quantity(
+            10, "worst channel's error on nulls, largest", nulls, _largest, lambda v: v <= 0.01, "<= +1 %", least=50
+        ),
+    ]
+
+
+def unknown(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 11: effects that are in no library."""
+    cases = [r for r in rows if r.group == "unknown"]
+    errors = [r.function_error for r in cases if r.verdict == "unexplained"]
+    good = [r for r in cases if math.isfinite(r.oracle) and r.oracle > 0.0]
+    out = [
+        share(11, "unexplained", [r.verdict == "unexplained" for r in cases], lambda v, *_: v >= 0.90, ">= 0.90", least=40),
+        share(11, "misnamed", [bool(r.names) for r in cases], lambda v, *_: v <= 0.05, "<= 0.05", least=40),
+        quantity(11, "error of the function, median", errors, _median, lambda v: v <= 0.15, "<= 0.15", least=20),
+        quantity(11, "share of the oracle's gain, median", [(r.gain if math.isfinite(r.gain) else 0.0) / r.oracle for r in good],
+                 _median, lambda v: v >= 0.80, ">= 0.80", least=20),
+    ]  # fmt: skip
+    for name, group in sorted(by(cases, lambda r: r.truth[0].effect).items()):
+        said = by(
+            [r for r in group if r.verdict != "unexplained"], lambda r: "+".join(r.names) or r.verdict or "failed"
+        )
+        note = ", ".join(f"{n} {len(g)}" for n, g in said.items())
+        out.append(
+            share(
+                11,
+                f"  {name}",
+                [r.verdict == "unexplained" for r in group],
+                lambda v, *_: v >= 0.90,
+                ">= 0.90",
+                least=5,
+                note=note,
+            )
+        )
+    return out
+
+
+def detectors(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 12: false alarms of the detectors on wet drives, with the extended model and with the truth; finds kept."""
+    cases = [r.detector for r in rows if r.group == "detector" and r.detector]
+    before, after, truth = (sum(c[f"alarms_{k}"] for c in cases) for k in ("before", "after", "oracle"))
+    km, passes = sum(c["km"] for c in cases), sum(c["passes"] for c in cases)
+    found_before, found_after = sum(c["found_before"] for c in cases), sum(c["found_after"] for c in cases)
+    ratio = after / truth if truth else (0.0 if after == 0 else math.inf)
+    enough = len(cases) >= 10
+    lost = (found_before - found_after) / passes if passes else math.nan
+    per = 100.0 / km if km else math.nan
+    return [
+        Measure(12, "false alarms over the oracle's", len(cases), ratio if cases else math.nan, math.nan, math.nan, "<= 1.2",
+                ratio <= 1.2 if enough else None,
+                f"per 100 km: {before * per:.1f} before, {after * per:.1f} after, {truth * per:.1f} with the truth"),
+        Measure(12, "finds lost", int(passes), lost, math.nan, math.nan, "<= 0.01", lost <= 0.01 if enough and passes else None),
+    ]  # fmt: skip
+
+
+def speed(rows: Sequence[Row]) -> list[Measure]:
+    """Time and memory of a verdict, and cases that ended in an error."""
+    seconds = [r.seconds for r in rows if math.isfinite(r.seconds)]
+    cpu = [r.cpu_seconds for r in rows if math.isfinite(r.cpu_seconds)]
+    memory = [r.peak_mb for r in rows if math.isfinite(r.peak_mb)]
+    failed = by([r for r in rows if r.error], lambda r: r.error[:80])
+    return [
+        quantity(0, "time of a verdict, p90 [s]", seconds, lambda x: float(np.quantile(x, 0.9)), lambda v: v <= 60.0, "<= 60"),
+        quantity(0, "processor time of it, p90 [s]", cpu, lambda x: float(np.quantile(x, 0.9)), lambda _: True, "-"),
+        quantity(0, "peak memory, largest [MB]", memory, _largest, lambda v: v <= 1000.0, "<= 1000"),
+        share(0, "cases that failed", [bool(r.error) for r in rows], lambda v, *_: v == 0.0, "0",
+              note="; ".join(f"{len(g)} {n}" for n, g in failed.items())),
+    ]  # fmt: skip
+
+
+def _median(x: np.ndarray) -> float:
+    return float(np.median(x))
+
+
+def _tenth(x: np.ndarray) -> float:
+    return float(np.quantile(x, 0.1))
+
+
+def _largest(x: np.ndarray) -> float:
+    return float(np.max(x))

@@ -1,0 +1,105 @@
+"""How well `aqualog diagnose` does on blind cases: one table of measured figures beside their targets.
+
+`python -m tests.blind.score [--metric 1,2,...] [--small] [--jobs 2] [--seeds-from N] [--work DIR] [--json FILE]
+[--rivals]`
+from the checkout. With `--work` every case is kept as it is done, and a run that was killed goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+# the folder of the tests, as in the tests themselves: compiled code of the world is kept under the name of its module
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from blind.metrics import naming, worth
+from blind.metrics.measure import Measure
+from blind.metrics.plan import PARTS, Sizes, plan
+from blind.metrics.rows import Row
+from blind.metrics.run import run
+from blind.metrics.store import Store
+from blind.metrics.table import curve_text, measures_text, rivals_text
+
+NEEDS: dict[int, tuple[str, ...]] = {
+    1: ("null",), 2: ("named",), 3: ("named", "third"), 4: ("weak", "limit"), 5: ("named", "third"), 6: ("pairs",),
+    7: ("twins",), 8: ("twins",), 9: ("compound",), 10: ("null", "named", "third"), 11: ("unknown",),
+    12: ("detector",), 13: ("null", "named", "third"),
+}  # fmt: skip
+"""Parts of the plan that a metric is made from."""
+
+MEASURES = {
+    1: naming.false_discovery, 2: naming.naming, 3: naming.wrong_names, 4: naming.weak, 5: naming.coverage,
+    6: naming.forecasts, 7: naming.confounds, 8: worth.manoeuvres, 9: worth.compounds, 10: worth.gains,
+    11: worth.unknown, 12: worth.detectors, 13: lambda rows: rivals_text(rows)[1],
+}  # fmt: skip
+
+
+def measured(rows: Sequence[Row], metrics: Sequence[int]) -> list[Measure]:
+    """All figures of these metrics, with those on honesty and cost that belong to every run."""
+    out = [m for number in metrics for m in MEASURES[number](rows)]
+    if 2 in metrics:
+        out += naming.honesty(rows)
+    return out + worth.speed(rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print, and return 1 if a target was missed."""
+    given = _parsed(arguments)
+    metrics = sorted({int(n) for n in given.metric.split(",")}) if given.metric else sorted(NEEDS)
+    if given.rivals:
+        metrics = [13]
+    parts = [p for p in PARTS if any(p in NEEDS[m] for m in metrics)]
+    sizes = _thinned(Sizes(), given.thin)
+    jobs = plan(parts, sizes, given.seeds_from)
+    if given.small:
+        from blind.metrics.small import small_jobs
+
+        jobs = small_jobs(given.seeds_from)
+    from blind.metrics.case import work
+
+    rows = run(jobs, Store(given.work), work, processes=given.jobs)
+    figures = measured(rows, metrics)
+    print(f"{len(rows)} cases, seeds from {given.seeds_from}\n\n{measures_text(figures)}")
+    curve = naming.risk_coverage(rows) if 2 in metrics or 3 in metrics else []
+    if curve:
+        print(f"\n{curve_text(curve)}")
+    if 13 in metrics:
+        print(f"\n{rivals_text(rows)[0]}")
+    if given.json:
+        document = {
+            "seeds_from": given.seeds_from,
+            "cases": len(rows),
+            "measures": [asdict(m) for m in figures],
+            "risk_coverage": curve,
+        }
+        given.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return int(any(m.reached is False for m in figures))
+
+
+def _thinned(sizes: Sizes, by: float) -> Sizes:
+    counts = {f.name: max(1, round(getattr(sizes, f.name) / by)) for f in fields(sizes) if f.name != "duration_s"}
+    return replace(sizes, **counts)
+
+
+def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.blind.score", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--metric", default="", help="numbers with commas between; default all")
+    parser.add_argument("--small", action="store_true", help="a few short drives, under 90 s")
+    parser.add_argument("--rivals", action="store_true", help="only the table beside PySINDy, BIC and LASSO")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--seeds-from", type=int, default=1000, help="below 200: development")
+    parser.add_argument("--thin", type=float, default=1.0, help="so many times fewer cases of each kind")
+    parser.add_argument("--work", type=Path, help="folder that keeps the rows")
+    parser.add_argument("--json", type=Path, help="the figures as a document")
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,76 @@
+"""A few blind cases in every run of the tests: what is large is named, and where nothing is, nothing is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blind.metrics.run import run
+from blind.metrics.small import small_jobs
+from blind.metrics.store import Store
+
+pytest.importorskip("sklearn", reason="needs the extra `blind`")
+pytest.importorskip("pysindy", reason="needs the extra `blind`")
+
+
+@pytest.fixture(scope="module")
+def rows():
+    from blind.metrics.case import work
+
+    made = run(small_jobs(), Store(None), work, processes=1, say=lambda _: None)
+    assert not [r.error for r in made if r.error]
+    return made
+
+
+def test_nothing_is_found_where_nothing_is(rows):
+    assert [r.verdict for r in rows if not r.truth] == ["no_effect"] * sum(not r.truth for r in rows)
+
+
+def test_no_name_is_wrong(rows):
+    assert not [(r.hidden, r.names) for r in rows if r.wrong]
+
+
+def test_what_can_be_told_is_named_with_its_size(rows):
+    told = [r for r in rows if r.truth and r.truth[0].z >= 8.0 and r.truth[0].p_right >= 0.95]
+    assert len(told) >= 2
+    for r in told:
+        assert r.names == r.hidden
+        fact, cause = r.truth[0], r.causes[0]
+        name, (value, low, high) = next(iter(cause.values.items()))
+        assert low < value < high
+        assert value == pytest.approx(fact.values[name], rel=0.25)
+
+
+def test_what_is_hidden_is_among_what_is_left_open(rows):
+    hidden = [r for r in rows if r.truth]
+    assert all(set(r.hidden) <= r.listed for r in hidden)
+
+
+def test_unseen_drives_are_predicted_better(rows):
+    shares = [r.gain / r.oracle for r in rows if r.truth]
+    assert np.median(shares) >= 0.8
+    assert all(r.worse <= 0.01 for r in rows if not r.truth)
+
+
+def test_the_rivals_are_behind(rows):
+    hidden = [r for r in rows if r.truth]
+    for method in ("BIC forward", "E-SINDy, inclusion 0.9"):
+        theirs = np.median([r.rivals[method]["gain"] for r in hidden])
+        assert np.median([r.rivals["aqualog"]["gain"] for r in hidden]) > theirs
+        assert all(r.rivals[method]["found"] for r in rows if not r.truth)
+
+
+def test_the_verdict_fits_into_memory(rows):
+    assert max(r.peak_mb for r in rows) < 1500.0
+
+
+def test_no_reserved_seed_is_used_up():
+    assert all(j.spec.seed < 200 for j in small_jobs())
+
+
+def test_the_score_reads_the_truth_only_from_the_spec():
+    # what is diagnosed is the log and the vehicle file: nothing of the case goes into the call but these
+    text = (Path(__file__).parent / "metrics" / "case.py").read_text(encoding="utf-8")
+    call = text[text.index("    return diagnose(") :].split("\n\n")[0]
+    assert "truth" not in call
+    assert "spec" not in call
+    assert "hidden" not in call

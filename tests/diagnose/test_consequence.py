@@ -1,0 +1,91 @@
+"""What the user gains: false alarms and latency of the detectors, without and with the model."""
+
+import pytest
+
+from aqualog.diagnose.consequence import DETECTORS, PASSES, consequences, consequences_on_logs
+from aqualog.model.effects import EFFECTS
+from aqualog.model.scenario import Scenario
+from aqualog.model.signals import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.term import Model, Term
+from aqualog.vehicle import KEYS, Vehicle
+
+CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset(KEYS))
+SPEED = ((0.0, 8.0), (8.0, 8.0), (16.0, 32.0), (24.0, 32.0), (34.0, 12.0), (36.0, 12.0), (43.0, 32.0), (48.0, 32.0))
+
+
+def model(effect, where=None, **values):
+    return Model((Term(EFFECTS[effect], values, where),))
+
+
+PAYLOAD = model("payload_mass", "r", delta_mass=350.0)
+
+
+def by_name(found):
+    return {c.detector: c for c in found}
+
+
+@pytest.fixture(scope="module")
+def nothing_hidden():
+    """What the detectors do on the same drives of the car that the vehicle file describes."""
+    told = []
+    return by_name(consequences(CAR, Model(), seed=2, progress=told.append)), told
+
+
+def test_a_model_without_terms_changes_nothing(nothing_hidden):
+    found, told = nothing_hidden
+    assert tuple(found) == DETECTORS
+    for c in found.values():
+        assert c.false_alarms_before == c.false_alarms_after <= 1
+        assert c.latency_before_s == c.latency_after_s
+        assert c.found_before == c.found_after
+        assert 4 <= c.passes <= len(PASSES)
+        assert 10.0 < c.distance_km < 40.0
+    assert len(told) == len(set(told)) > len(PASSES)
+
+
+@pytest.mark.parametrize(
+    ("m", "at_least"),
+    [
+        (PAYLOAD, 6),
+        (model("torque_gain", gain=0.85), 6),
+        (model("accelerometer_drift", drift=-0.005), 4),
+        (model("signal_delay", "torque", delay=0.3), 8),
+        (model("tyre_radius", delta=0.08), 4),
+        (model("aero_drag", delta_drag_area=0.4), 3),
+    ],
+)
+def test_false_alarms_of_a_hidden_effect_are_gone_with_the_model(nothing_hidden, m, at_least):
+    found = by_name(consequences(CAR, m, seed=2))
+    c = found["resistance"]
+    assert c.false_alarms_before >= at_least
+    for c in found.values():
+        assert c.false_alarms_after <= nothing_hidden[0][c.detector].false_alarms_after
+        assert c.found_after >= c.found_before
+
+
+def test_a_late_accelerometer_costs_latency():
+    c = by_name(consequences(CAR, model("signal_delay", "a_x", delay=0.3), seed=2))["joint_criteria"]
+    assert c.latency_after_s < c.latency_before_s - 0.05
+
+
+def test_the_same_seed_gives_the_same(nothing_hidden):
+    assert by_name(consequences(CAR, Model(), seed=2)) == nothing_hidden[0]
+
+
+def test_logs_known_to_be_dry():
+    drive = as_signals(simulate(Scenario(CAR, duration_s=48.0, speed=SPEED), PAYLOAD), vehicle=CAR, truth=False)
+    told = []
+    found = by_name(consequences_on_logs([("a", drive), ("b", drive)], CAR, PAYLOAD, progress=told.append))
+    c = found["resistance"]
+    assert c.false_alarms_before >= 2
+    assert c.false_alarms_before % 2 == 0
+    assert c.false_alarms_after == 0
+    assert (c.passes, c.found_before, c.latency_before_s) == (0, 0, None)
+    assert c.distance_km == pytest.approx(2 * 1.038, rel=0.03)
+    assert told == ["a with the extended model", "b with the extended model"]
+
+
+def test_a_detector_that_cannot_run_is_left_out():
+    drive = as_signals(simulate(Scenario(Vehicle(name="x"), duration_s=10.0, speed=SPEED)), vehicle=CAR, truth=False)
+    assert consequences_on_logs([("a", drive)], Vehicle(name="x"), PAYLOAD) == ()

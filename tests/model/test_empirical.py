@@ -1,0 +1,118 @@
+"""Functions without a name in the model: tables of knots."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from thesis.passes import SEDAN
+
+from aqualog.config.model import dump_model, load_model
+from aqualog.errors import ConfigError
+from aqualog.model.effects import EFFECTS
+from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.simulate import assemble, drive_truth, simulate
+from aqualog.model.term import Model, Term
+
+HUMP = ((15.0, 0.0), (20.0, 400.0), (25.0, 0.0))
+HILL = ((0.0, 0.0), (60.0, 0.04), (120.0, 0.0))
+SCENARIO = Scenario(
+    SEDAN, duration_s=8.0, speed=((0.0, 12.0), (8.0, 28.0)), lanes=(Lane(2.0, 4.0, depth_left=1e-3, depth_right=1e-3),)
+)
+
+
+def one(name, knots, **values):
+    return Model().with_term(Term(EMPIRICAL[name], values, knots=knots))
+
+
+@pytest.mark.parametrize("name", sorted(EMPIRICAL))
+@pytest.mark.parametrize("knots", [(), ((0.0, 0.0), (30.0, 0.0))], ids=["none", "zero"])
+@pytest.mark.parametrize("grade", [(), ((0.0, 0.01), (50.0, -0.02))], ids=["flat", "hilly"])
+def test_neutral_changes_no_bit(name, knots, grade):
+    scenario = replace(SCENARIO, grade=grade, duration_s=4.0)
+    base, same = simulate(scenario), simulate(scenario, one(name, knots))
+    for a, b in zip(base.measured, same.measured, strict=True):
+        np.testing.assert_array_equal(a.t, b.t)
+        for column in a.columns:
+            np.testing.assert_array_equal(a.columns[column], b.columns[column], err_msg=column)
+
+
+def test_force_is_there_where_its_knots_say():
+    """The force that the wheels need on top, at constant speed, is the table's."""
+    for v, force in ((10.0, 0.0), (17.5, 200.0), (20.0, 400.0), (30.0, 0.0)):
+        scenario = Scenario(SEDAN, duration_s=6.0, speed=((0.0, v),))
+        drives = [drive_truth(assemble(scenario, m)).columns for m in (Model(), one("unexplained_force", HUMP))]
+        needed = [np.mean([sum(c[f"true_force_x_{w}"][-500:] for w in ("fl", "fr", "rl", "rr"))]) for c in drives]
+        assert needed[1] - needed[0] == pytest.approx(force, abs=1.0)
+
+
+def test_hill_is_there_where_its_knots_say():
+    truth = drive_truth(assemble(SCENARIO, one("unexplained_grade", HILL))).columns
+    wanted = np.interp(truth["true_position"], *np.array(HILL).T)
+    np.testing.assert_allclose(truth["true_grade"], wanted, atol=5e-5)
+    on_slope = drive_truth(assemble(replace(SCENARIO, grade=((0.0, 0.01),)), one("unexplained_grade", HILL))).columns
+    np.testing.assert_allclose(
+        on_slope["true_grade"], np.interp(on_slope["true_position"], *np.array(HILL).T) + 0.01, atol=5e-5
+    )
+
+
+def test_two_tables_add_up():
+    other = one("unexplained_force", ((10.0, 50.0), (22.0, 100.0)))
+    plant = other.apply(one("unexplained_force", HUMP).apply(assemble(SCENARIO))).plant
+    v = np.linspace(0.0, 40.0, 200)
+    both = np.interp(v, *np.array(HUMP).T) + np.interp(v, [10.0, 22.0], [50.0, 100.0])
+    np.testing.assert_allclose(np.interp(v, *plant.drag_over_v.T), both, atol=1e-9)
+
+
+def test_model_file_reads_back(tmp_path):
+    model = (
+        one("unexplained_force", tuple((x + 1 / 3, f / 7) for x, f in HUMP))
+        .with_term(Term(EMPIRICAL["unexplained_grade"], knots=HILL))
+        .with_term(Term(EFFECTS["payload_mass"], {"delta_mass": 12.5}, "r"))
+        .with_term(Term(EFFECTS["road_grade"], {"grade": 0.01}))
+    )
+    path = tmp_path / "model.toml"
+    path.write_text(dump_model(model), encoding="utf-8")
+    assert load_model(path) == model
+    path.write_text('[[term]]\neffect = "unexplained_force"\n', encoding="utf-8")
+    assert load_model(path) == Model((Term(EMPIRICAL["unexplained_force"]),))
+
+
+@pytest.mark.parametrize(
+    ("knots", "said"),
+    [
+        ("3", "line 4: knots = 3 is not a list of pairs"),
+        ("[]", "is not a list of pairs"),
+        ("[[1.0, 2.0, 3.0], [2.0, 1.0]]", "is not a list of pairs"),
+        ('[[1.0, "a"], [2.0, 1.0]]', "is not a list of pairs"),
+        ("[[1.0, nan], [2.0, 1.0]]", "is not a list of pairs"),
+        ("[[1.0, 2.0]]", "1 knots, at least 2"),
+        ("[[2.0, 1.0], [1.0, 1.0]]", "do not rise in v_x"),
+        ("[[-2.0, 1.0], [1.0, 1.0]]", "a knot at -2 is outside 0 ... 150 m/s"),
+        ("[[2.0, 1.0], [3.0, 1e6]]", "a value of 1e+06 is outside"),
+    ],
+)
+def test_faulty_knots_are_told(tmp_path, knots, said):
+    path = tmp_path / "model.toml"
+    path.write_text(f'# a model\n[[term]]\neffect = "unexplained_force"\nknots = {knots}\n', encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_model(path)
+    assert said in error.value.line()
+
+
+def test_knots_only_where_there_is_a_table(tmp_path):
+    with pytest.raises(ConfigError, match="no table"):
+        Term(EFFECTS["payload_mass"], knots=HUMP)
+    path = tmp_path / "model.toml"
+    path.write_text('[[term]]\neffect = "payload_mass"\nknots = [[1.0, 2.0], [2.0, 1.0]]\n', encoding="utf-8")
+    with pytest.raises(ConfigError, match='unknown key "knots"'):
+        load_model(path)
+    with pytest.raises(ConfigError, match="do not rise"):
+        one("unexplained_force", HUMP[::-1])
+
+
+def test_no_name_is_taken_twice():
+    assert not set(EFFECTS) & set(EMPIRICAL)
+    for effect in EMPIRICAL.values():
+        assert set(effect.twins) <= set(EFFECTS)
+        assert effect.table is not None

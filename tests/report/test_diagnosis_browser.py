@@ -1,0 +1,73 @@
+"""The page of a diagnosis in headless Chromium without a network: it draws, changes what it is drawn over, and no name
+runs."""
+
+import pytest
+from diagnosis_case import HOSTILE, cases, views_of
+from headless import click, requests, severe, wait_for
+from test_diagnosis_document import document_of
+
+from aqualog.report.diagnosis_page import write_diagnosis_page
+
+pytestmark = pytest.mark.browser
+DRAWN = "return document.querySelectorAll('#views .js-plotly-plot').length"
+FIRST = "document.querySelector('#views .js-plotly-plot')"
+
+
+@pytest.fixture
+def show(browser, tmp_path):
+    def opened(verdict):
+        path = tmp_path / "page.html"
+        write_diagnosis_page(document_of(verdict), views_of(verdict), path, f"car {HOSTILE}")
+        for kind in ("browser", "performance"):
+            browser.get_log(kind)
+        browser.get(path.as_uri())
+        ready = "return document.body.dataset.ready === 'true' && document.body.dataset.views === 'ready'"
+        wait_for(lambda: browser.execute_script(ready))
+        return browser
+
+    return opened
+
+
+def axis_title(browser):
+    return browser.execute_script(f"return {FIRST}._fullLayout.xaxis.title.text")
+
+
+def metas(browser):
+    return browser.execute_script(f"return {FIRST}._fullData.map(t => t.meta || '')")
+
+
+def test_panels_change_with_coordinate_drive_and_samples(show):
+    browser = show("named")
+    wait_for(lambda: browser.execute_script(DRAWN) >= 4)
+    assert axis_title(browser) == "torque of all wheels [N·m]"  # what tells most about the explained channel
+    click(browser, '#coordinate-choice button[value="v_x"]')
+    wait_for(lambda: axis_title(browser) == "speed [km/h]")
+    assert metas(browser).count("median") == 2
+    assert metas(browser).count("raw") == 2
+    click(browser, "#raw-choice")
+    wait_for(lambda: metas(browser).count("raw") == 0)
+    pressed = "return [...document.querySelectorAll('#coordinate-choice [aria-pressed=true]')].map(b => b.value)"
+    assert browser.execute_script(pressed) == ["v_x"]
+    options = browser.execute_script("return [...document.getElementById('drive-choice').options].map(o => o.text)")
+    assert len(options) == 2
+    before = browser.execute_script(f"return {FIRST}._fullData[0].y.slice(0, 5)")
+    browser.execute_script(
+        "const d = document.getElementById('drive-choice'); d.value = '1'; d.dispatchEvent(new Event('change'))"
+    )
+    wait_for(lambda: browser.execute_script(DRAWN) >= 4)
+    assert browser.execute_script(f"return {FIRST}._fullData[0].y.slice(0, 5)") != before
+    assert severe(browser) == []
+    assert requests(browser) == []
+
+
+@pytest.mark.parametrize("verdict", list(cases()))
+def test_every_verdict_draws_without_a_fault(show, verdict):
+    browser = show(verdict)
+    title = browser.execute_script("return document.querySelector('.headline').textContent")
+    assert title == document_of(verdict)["sentence"]
+    top = browser.execute_script("return document.querySelector('.headline').getBoundingClientRect().top")
+    assert top < 220
+    wide = browser.execute_script("return document.documentElement.scrollWidth - window.innerWidth")
+    assert wide <= 0
+    assert severe(browser) == []
+    assert requests(browser) == []
