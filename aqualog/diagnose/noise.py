@@ -15,7 +15,7 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "spectra", "surrogate", "whitened"]
+__all__ = ["MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "spectra", "surrogate", "whitened"]
 
 # lags of the autoregression, from ... to, as means [samples]
 _BLOCKS = (
@@ -134,6 +134,11 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     cov += RIDGE * np.diag(np.diag(cov))
     shaping = np.linalg.inv(np.linalg.cholesky(cov))
     return Noise(rotation, taps, shaping, root)
+
+
+def for_mask(noise: Noise, mask: BoolArray) -> Noise:
+    """The same noise on another drive: full weight wherever it can be used."""
+    return Noise(noise.rotation, noise.taps, noise.shaping, np.ones((len(noise.taps), 1)) * _settled(mask))
 
 
 def _settled(mask: BoolArray) -> BoolArray:

@@ -15,9 +15,9 @@ from aqualog.errors import ConfigError
 from aqualog.model.term import Model
 from aqualog.types import FloatArray
 
-__all__ = ["Metric", "Refit", "metric", "refit", "whitened_residual"]
+__all__ = ["KNOWN", "Metric", "Refit", "metric", "refit", "whitened_residual"]
 
-KNOWN = 0.25  # share of the tolerances that the intervals allow for
+KNOWN = 0.25  # share of the tolerances that values and intervals allow for
 SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss what it promised before it is simulated anew
@@ -57,13 +57,17 @@ class Metric:
         return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
 
 
-def metric(bench: Bench, noises: Sequence[Noise]) -> Metric:
-    """The metric in which sets are compared: see `bench.tolerant`."""
+def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0) -> Metric:
+    """The metric of `bench.tolerant` with a share of the tolerances.
+
+    With all of them sets are compared; with `KNOWN` of them values are found: what is not worth a word is more than
+    what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows.
+    """
     k = np.flatnonzero(bench.tolerance > 0.0).tolist()
     A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
     seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
     A = A[seen]
-    M = np.linalg.inv(A @ A.T + np.diag(bench.tolerance[k][seen] ** -2.0))
+    M = np.linalg.inv(A @ A.T + np.diag((share * bench.tolerance[k][seen]) ** -2.0))
     return Metric(tuple(noises), A, M)
 
 
@@ -134,20 +138,9 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
             fresh = True
     slopes = _slopes(bench, members, residuals, extended)
     J = _rows(bench, slopes, noises)
-    covariance = _covariance(measure, J, np.diag(width**-2.0))
+    covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0))
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
     return Refit(members, names, values, covariance, loss, extended, tuple(residuals), slopes, at_bound)
-
-
-def _covariance(measure: Metric, J: FloatArray, P: FloatArray) -> FloatArray:
-    """Of the estimate, if the car is off its file by `KNOWN` of the tolerances: they are what is not worth a word,
-    which is more than what a file is usually off by.
-    """  # fmt: skip
-    inverse = np.linalg.inv(measure.inner(J, J) + P)
-    W = J - (J @ measure.A.T) @ measure.M @ measure.A
-    cross = W @ measure.A.T
-    off = KNOWN**2 * np.linalg.inv(np.linalg.inv(measure.M) - measure.A @ measure.A.T)
-    return np.asarray(inverse @ (W @ W.T + cross @ off @ cross.T + P) @ inverse)
 
 
 def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose import isolate
-from aqualog.diagnose.channels import CHANNELS
+from aqualog.diagnose.bench import Bench, Stack
+from aqualog.diagnose.channels import CHANNELS, contrasts
+from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
 from aqualog.diagnose.drive import Drive, prepare
-from aqualog.diagnose.hypotheses import hypotheses
-from aqualog.diagnose.outcome import conclude
-from aqualog.diagnose.records import Diagnosis, ResidualView
-from aqualog.diagnose.search import Tell, search, simulated
+from aqualog.diagnose.heldout import measured_gain
+from aqualog.diagnose.hypotheses import hypotheses, residual
+from aqualog.diagnose.noise import fit_noise
+from aqualog.diagnose.outcome import Outcome, conclude
+from aqualog.diagnose.records import Diagnosis, Remainder, ResidualView
+from aqualog.diagnose.search import Found, Tell, search, simulated
+from aqualog.diagnose.unknown import find_remainders
+from aqualog.diagnose.unknown_term import as_term
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.errors import SignalError
 from aqualog.model.term import Model
@@ -24,16 +30,22 @@ from aqualog.vehicle import Vehicle
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
+WORTH_TELLING = 0.05  # of a channel's variance that a function must explain
+PARTIAL = 0.2  # of what is left beside a cause: then the cause is the nearest one, not the right one
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """`level` of false alarms for anything at all; `surrogates` for its calibration, 0: none; `seed` of all draws."""
+    """`level` of false alarms for anything at all, `surrogates` for its calibration, 0: none; `seed` of all draws.
+
+    `views`: with the residuals for a page; `consequences`: with what the model changes for the detectors.
+    """
 
     seed: int = 1
     level: float = 0.01
     surrogates: int = 49
     views: bool = True
+    consequences: bool = True
 
 
 def diagnose(
@@ -89,12 +101,27 @@ def diagnose(
     bench = simulated(ready, asked, model, tell)
     found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(bench, found.candidates, model, significant=found.tests[0].p_value <= options.level)
-    extended = outcome.chosen.model if outcome.chosen is not None else model
+    tell("describing what is left", 0.8)
+    outcome, remainders = _remainders(bench, found, outcome, options)
+    extended = _extended(outcome, remainders, model, vehicle)
     sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
-    after = list(outcome.chosen.residuals) if outcome.chosen is not None else list(bench.residuals)
+    after = [residual(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
+    gained = None
+    if extended.terms != model.terms:
+        tell("measuring the gain", 0.88)
+        unseen = _prepared(holdout, vehicle)[0] if holdout else []
+        unseen = [d for d in unseen if d.channels == ready[0].channels]
+        effects = ()
+        if options.consequences and "mass" in vehicle.given:
+            effects = consequences(vehicle, extended, seed=options.seed)
+        gained = measured_gain(
+            unseen or ready, model, extended, found.noises[0], seed=options.seed, in_sample=not unseen,
+            consequences=effects,
+        )  # fmt: skip
+    reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ""
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=verdict_sentence(outcome.verdict, outcome.causes, level=options.level),
+        sentence=verdict_sentence(outcome.verdict, outcome.causes, level=options.level, reason=reason),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=used,
@@ -103,15 +130,61 @@ def diagnose(
         significance=found.tests[0],
         limits=isolate.limits(bench, sizes),
         confusions=isolate.confusions(bench, found.gram, sizes, found.calibration.inflation),
-        remainders=(),
+        remainders=remainders,
         manoeuvre=None,
-        gain=None,
+        gain=gained,
         model=extended,
         channels=ready[0].channels,
         untested=untested,
         notes=(*notes, *outcome.small),
         views=_views(ready, bench.residuals, after) if options.views else (),
     )
+
+
+def _remainders(
+    bench: Bench, found: Found, outcome: Outcome, options: Options
+) -> tuple[Outcome, tuple[Remainder, ...]]:
+    """Functions in what is left, of the longest drive; they overrule a cause that explains less than they do."""
+    d = max(range(len(bench.drives)), key=lambda i: bench.drives[i].used_s)
+    named = outcome.verdict in ("named", "compound", "cannot_tell") and outcome.chosen is not None
+    left = outcome.chosen.residuals[d] if named and outcome.chosen is not None else bench.residuals[d]
+    remainders = _functions(bench, found, d, left, options)
+    if not remainders:
+        return outcome, ()
+    if named:
+        own = {c for cause in outcome.causes for c in cause.explains}
+        strong = [r for r in remainders if r.channel in own and r.share > PARTIAL]
+        if not strong:
+            return outcome, remainders
+        whole = _functions(bench, found, d, bench.residuals[d], options)
+        if not whole:
+            return outcome, remainders
+        remainders = whole
+    return Outcome("unexplained", (), (), None, outcome.small), remainders
+
+
+def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
+    drive = bench.drives[d]
+    noise = fit_noise(left, drive.mask, contrasts(drive.channels))
+    stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
+    known: dict[str, FloatArray] = {}
+    for h, columns in zip(bench.asked, bench.columns, strict=True):
+        if not h.allowed:
+            known.setdefault(h.key, bench.signatures[d][columns[0]])
+    surrogates = max(options.surrogates, round(1.0 / options.level) - 1)
+    remainders = find_remainders(
+        stack, signatures=known, level=options.level, seed=options.seed, surrogates=surrogates
+    )
+    return tuple(r for r in remainders if r.share > WORTH_TELLING)
+
+
+def _extended(outcome: Outcome, remainders: tuple[Remainder, ...], model: Model, vehicle: Vehicle) -> Model:
+    extended = outcome.chosen.model if outcome.chosen is not None else model
+    for r in remainders:
+        term = as_term(r, mass=vehicle.mass)
+        if term is not None and all(t.effect is not term.effect for t in extended.terms):
+            extended = extended.with_term(term)
+    return extended
 
 
 def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[list[Drive], tuple[str, ...]]:

@@ -16,7 +16,7 @@ from aqualog.diagnose.family import Calibration, calibrate, gumbel_p, largest
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
-from aqualog.diagnose.refit import Refit, metric, refit, whitened_residual
+from aqualog.diagnose.refit import KNOWN, Refit, metric, refit, whitened_residual
 from aqualog.diagnose.subsets import SetFit, best_sets, fit_set
 from aqualog.model.term import Model
 from aqualog.types import FloatArray
@@ -28,6 +28,7 @@ CREDIBLE = 20.0  # evidence ratio within which sets cannot be told apart
 REFITTED = 8  # sets that are refitted in the simulator
 # of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
 SLACK, BENT = 8.0, 0.05
+HALF = 0.5  # of what the test asks for, that a set must take away once it is refitted
 PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
 
 Tell = Callable[[str, float], None]
@@ -166,11 +167,24 @@ def _refitted(
     if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
         done = large
     y = whitened_residual(bench, noises, now)[None]
-    if not done or float(measure.inner(y, y)[0, 0]) - done[0].loss < calibration.threshold * inflation:
+    if not done or float(measure.inner(y, y)[0, 0]) - done[0].loss < HALF * calibration.threshold * inflation:
         return ()
+    ratios = [math.exp(min(0.5 * (losses[id(r)] - losses[id(done[0])]), 700.0)) for r in done]
+    credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]
+    fine = metric(bench, noises, share=KNOWN)
+    starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
+    with ThreadPoolExecutor(THREADS) as pool:
+        sharp = list(pool.map(lambda start: refit(bench, start, fine, model), starts))
     return tuple(
-        Candidate(r, math.exp(min(0.5 * (losses[id(r)] - losses[id(done[0])]), 700.0)), inflation) for r in done
+        Candidate(s if s is not None and not s.at_bound else r, x, inflation)
+        for (r, x), s in zip(credible, sharp, strict=True)
     )
+
+
+def _at(fit: SetFit, r: Refit, model: Model) -> SetFit:
+    """The set at refitted values, as a start."""
+    base = np.array([value_in(model, r.members[i], n) for i, n in r.names])
+    return replace(fit, theta=r.values - base)
 
 
 def _all_there(r: Refit, model: Model) -> bool:

@@ -1,0 +1,169 @@
+"""Catalogue of safe runs, checks and sensors that may tell causes apart, as data.
+
+Runs stay within 3.5 m/s^2 and 130 km/h on a dry road, 90 km/h on a wet one, and last a minute. They are driven on the
+road of the log and soon after it, so that slope and wind are the same. Slopes are not among them: a hill whose height
+is not known would be one effect more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from aqualog.diagnose.drive import Drive
+from aqualog.model.follow import PERFECT
+from aqualog.model.scenario import Lane, Profile, Scenario, Steering
+from aqualog.model.term import Model, Term
+
+__all__ = [
+    "CHECKS",
+    "LENGTH_S",
+    "RUNS",
+    "SENSORS",
+    "TURNING",
+    "Check",
+    "Run",
+    "Sensor",
+    "fitting",
+    "programme",
+    "turned",
+]
+
+LENGTH_S = 60.0
+RATE_HZ = 50.0  # [Hz] of a simulated run; residuals are means over 0.1 s
+KMH = 1.0 / 3.6
+TURNING = ("head_wind", "road_grade")  # effects that change their sign when the road is driven the other way
+WATER = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
+WET_S = 5.0  # [s] on and beside the water, in turn
+WET_STEP, WET_LEAST, WET_MOST = 20.0 * KMH, 30.0 * KMH, 90.0 * KMH  # [m/s]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of one minute. `speed` (t [s], v [km/h]) that the driver keeps to; `minutes` with the way there and back.
+
+    `how` completes "Drive ...". `rolls` from this time on without drive or brakes [s]. `water`: how it differs from the
+    log's speed on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, as `speed` says.
+    """
+
+    name: str
+    how: str
+    minutes: float
+    speed: Profile = ()
+    steering: Steering | None = None
+    rolls: float | None = None
+    opposite: bool = False
+    water: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A value that is read without driving: of one parameter, with standard deviation `sd` in its unit."""
+
+    name: str
+    how: str
+    minutes: float
+    effect: str
+    where: tuple[str | None, ...]
+    parameter: str
+    sd: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """Signals that a log may lack."""
+
+    name: str
+    signals: tuple[str, ...]
+
+
+def _saw(low: float, high: float, up: float, down: float) -> Profile:
+    """Speeds up and down between two [km/h] at two accelerations [m/s^2], until the minute is over."""
+    out, t, v = [(0.0, low), (3.0, low)], 3.0, low
+    while t < LENGTH_S:
+        v = high if v == low else low
+        t += abs(high - low) * KMH / (up if v == high else down)
+        out.append((t, v))
+    return tuple(out)
+
+
+_SAME = "on the same road, in the same direction and soon"
+RUNS: tuple[Run, ...] = (
+    Run("hard_acceleration", f"from 40 to 110 km/h at 3 m/s^2 and back, again and again, {_SAME}", 2.0,
+        _saw(40.0, 110.0, 3.0, 1.5)),
+    Run("coast_down", f"up to 120 km/h and let the car roll without drive and brakes, {_SAME}", 2.0,
+        ((0.0, 100.0), (8.0, 120.0), (10.0, 120.0)), rolls=10.0),
+    Run("speed_steps", f"at 40, 60, 80, 100 and 120 km/h for ten seconds each, {_SAME}", 2.0,
+        ((0.0, 40.0), (10.0, 40.0), (14.0, 60.0), (22.0, 60.0), (26.0, 80.0), (34.0, 80.0), (38.0, 100.0),
+         (46.0, 100.0), (50.0, 120.0), (60.0, 120.0))),
+    Run("brake_steps", f"at 100 km/h and brake to 40 km/h at 1.5, 2.5 and 3.5 m/s^2, {_SAME}", 2.0,
+        ((0.0, 100.0), (4.0, 100.0), (15.1, 40.0), (25.0, 100.0), (31.7, 40.0), (42.0, 100.0), (46.8, 40.0),
+         (60.0, 100.0))),
+    Run("slalom", f"at 60 km/h and swing gently from side to side within the lane, {_SAME}", 2.0,
+        ((0.0, 60.0), (60.0, 60.0)), steering=Steering(0.02, 4.0, 3.0)),
+    Run("opposite_direction", "the same road in the opposite direction, at 60 to 110 km/h, while the wind is the same",
+        6.0, _saw(60.0, 110.0, 1.0, 0.7), opposite=True),
+    Run("second_pass_dry", "the same road at the same speed when it is dry", 2.0, water=0),
+    Run("wet_pass_slower", "through the same water 20 km/h slower", 2.0, water=-1),
+    Run("wet_pass_faster", "through the same water 20 km/h faster, at most at 90 km/h", 2.0, water=1),
+)  # fmt: skip
+
+CHECKS: tuple[Check, ...] = (
+    # level to 0.3 %: twice in opposite directions at one place, and the mean of both
+    Check("standstill", "Stand for half a minute, turn the car round at the same place and stand again: the mean of "
+          "both readings of the accelerometer is its bias", 5.0, "accelerometer_bias", ("a_x", None), "bias", 0.01),
+    Check("weighing", "Weigh the car as it was driven", 30.0, "payload_mass", (None,), "delta_mass", 10.0),
+)  # fmt: skip
+
+SENSORS: tuple[Sensor, ...] = (
+    Sensor("a reference velocity", ("v_x",)),
+    Sensor("a longitudinal accelerometer", ("a_x",)),
+    Sensor("wheel torques", ("torque_fl", "torque_fr", "torque_rl", "torque_rr")),
+    Sensor("steering angle, gyro and lateral accelerometer", ("steer_angle", "yaw_rate", "a_y")),
+)
+
+
+def fitting(effects: frozenset[str], *, wet: bool) -> tuple[Run, ...]:
+    """Runs that make sense for these effects: water only where it is at stake, the way back where it turns a sign."""
+    return tuple(
+        r
+        for r in RUNS
+        if (r.water is None or (wet and effects & set(WATER))) and (not r.opposite or effects & set(TURNING))
+    )
+
+
+def programme(run: Run, drive: Drive) -> Scenario:
+    """A run as the scenario of a simulation with perfect sensors, with the car and the water of a drive."""
+    lanes = drive.course.lanes
+    speed, wet = tuple((t, v * KMH) for t, v in run.speed), False
+    if run.water is not None:
+        v = _wet_speed(drive, lanes) + run.water * WET_STEP
+        v = v if run.water == 0 else min(max(v, WET_LEAST), WET_MOST)
+        speed, wet = ((0.0, v), (LENGTH_S, v)), run.water != 0
+    share = () if run.rolls is None else ((0.0, 1.0), (run.rolls, 1.0), (run.rolls + 0.5, 0.0))
+    return Scenario(
+        drive.vehicle, duration_s=LENGTH_S, rate_hz=min(RATE_HZ, 1.0 / drive.dt), speed=speed, steering=run.steering,
+        drive_share=share, lanes=_lanes(lanes) if wet else (), water_scatter=0.0, sensors=PERFECT,
+    )  # fmt: skip
+
+
+def _wet_speed(drive: Drive, lanes: Sequence[Lane]) -> float:
+    course = drive.course
+    on = [(course.t >= lane.start) & (course.t < lane.end) for lane in lanes]
+    return float(course.v_x[sum(on, start=course.t < 0.0)].mean())
+
+
+def _lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
+    """Water and dry road in turn, as deep as on the log's stretches one after the other."""
+    starts = [WET_S * (1 + 2 * i) for i in range(int(LENGTH_S / (2.0 * WET_S)))]
+    return tuple(replace(lanes[i % len(lanes)], start=s, end=s + WET_S) for i, s in enumerate(starts))
+
+
+def turned(model: Model) -> Model:
+    """The model as it acts when the same road is driven the other way: wind and slope come from the other side."""
+    return Model(tuple(_turned(t) if t.effect.name in TURNING else t for t in model.terms))
+
+
+def _turned(term: Term) -> Term:
+    values = {n: -v for n, v in term.values.items()}
+    return Term(term.effect, values, term.where, tuple((x, -v) for x, v in term.knots))
