@@ -71,6 +71,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "report",
                 "reproduce",
                 "campaign",
+                "diagnose",
             )
         ),
     ],

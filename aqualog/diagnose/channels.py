@@ -72,7 +72,8 @@ def contrasts(channels: tuple[str, ...]) -> FloatArray:
         out[at["kinematic"], at["force_balance"]] = -1.0
     four = [at[f"slip_{w}"] for w in WHEELS if f"slip_{w}" in at]
     if len(four) == 4:
-        out[np.ix_(four, four)] = [[0.25, 0.25, 0.25, 0.25], [0.5, 0.5, -0.5, -0.5], [1, -1, 0, 0], [0, 0, 1, -1]]
+        of_four = [[0.25, 0.25, 0.25, 0.25], [0.5, 0.5, -0.5, -0.5], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]]
+        out[np.ix_(four, four)] = np.array(of_four)
     if {"tie_rod_fl", "tie_rod_fr"} <= set(at):
         rods = [at["tie_rod_fl"], at["tie_rod_fr"]]
         out[np.ix_(rods, rods)] = [[0.5, 0.5], [1.0, -1.0]]

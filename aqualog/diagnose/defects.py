@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.diagnose.drive import Drive
-from aqualog.types import FloatArray
+from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Defect", "accelerometer_defect"]
 
@@ -58,7 +58,7 @@ def _smooth(x: FloatArray, k: int) -> FloatArray:
     return np.convolve(np.pad(x, k // 2, mode="edge"), np.full(k, 1.0 / k), "valid")
 
 
-def _shifted(x, y, good, lag):  # type: ignore[no-untyped-def]
+def _shifted(x: FloatArray, y: FloatArray, good: BoolArray, lag: int) -> tuple[FloatArray, FloatArray, BoolArray]:
     """`y` later than `x` by `lag` samples."""
     if lag >= 0:
         return x[: x.size - lag], y[lag:], good[: good.size - lag] & good[lag:]

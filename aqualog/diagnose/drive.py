@@ -27,8 +27,11 @@ V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
 BESIDE_S = 1.0  # [s] before and after what is left out
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
+A_X_MAX = 6.0  # [m/s^2]
+FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 # noise of what drives the simulation must not pass for motion: it would meet itself in the residual
 SPEED_S, STEER_S = 1.0, 0.5  # [s]
+UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
 LEAST_S = 20.0  # [s] of usable driving
 BRAKE_PRESSURE = 0.5e5  # [Pa]
 
@@ -113,11 +116,17 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     bad = gaps | (v < V_MIN)
     if "a_x" in filled:
         bad |= _frozen(filled["a_x"], dt)
+    bad |= np.abs(np.gradient(smooth(v, dt, SPEED_S), dt)) > A_X_MAX
     if "yaw_rate" in filled:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
-    if "brake_pressure" in filled and torqued and not _brakes_in_torque(filled, torque):
+    if "brake_pressure" in filled and not (torqued and _brakes_in_torque(filled, torque)):
         bad |= filled["brake_pressure"] > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
+    elif torqued and "brake_pressure" not in filled and _brakes_unlogged(filled, torque, v, vehicle, dt):
+        bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
+        notes.append(
+            "the car slows down more than its torque says: brakes are not in the log, driven stretches are used"
+        )
     mask = block_means(_widened(bad, dt).astype(np.float64), dt) == 0.0
     return Drive(
         name, dt, vehicle, course, filled, channels, mask, _coordinates(filled, course, v, dt), present, not torqued,
@@ -163,7 +172,9 @@ def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
 
 def _needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N m]"""
-    force = vehicle.mass * np.gradient(smooth(v, dt, SPEED_S), dt) + vehicle.mass * G * vehicle.rolling_resistance
+    # brakes are on all wheels, and left out; the engine's share alone would lock an axle
+    inertia = np.clip(np.gradient(smooth(v, dt, SPEED_S), dt), 0.0, 2.0)
+    force = vehicle.mass * inertia + vehicle.mass * G * vehicle.rolling_resistance
     force = force + 0.5 * vehicle.air_density * vehicle.drag_area * v * v
     rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
     return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.r_l(w) for w in WHEELS])
@@ -172,10 +183,14 @@ def _needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
 def _steer(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Road-wheel angle, or else that of the curve that the gyro shows."""
     if "steer_angle" in columns:
-        return smooth(columns["steer_angle"], dt, STEER_S)
-    if "yaw_rate" in columns:
-        return smooth(kinematic_steer_angle(columns["yaw_rate"], v, wheelbase=vehicle.wheelbase), dt, STEER_S)
-    return np.zeros_like(v)
+        angle = columns["steer_angle"]
+    elif "yaw_rate" in columns:
+        angle = kinematic_steer_angle(columns["yaw_rate"], v, wheelbase=vehicle.wheelbase)
+    else:
+        return np.zeros_like(v)
+    # beyond what is used anyway the led car could spin
+    most = vehicle.wheelbase * 1.2 * A_Y_MAX / np.maximum(v, V_MIN) ** 2
+    return smooth(np.clip(angle, -most, most), dt, STEER_S)
 
 
 def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
@@ -230,6 +245,18 @@ def _brakes_in_torque(columns: Mapping[str, FloatArray], torque: FloatArray) -> 
         return True
     total = torque.sum(axis=0)
     return bool(np.median(total[braked]) < -300.0)
+
+
+def _brakes_unlogged(
+    columns: Mapping[str, FloatArray], torque: FloatArray, v: FloatArray, vehicle: Vehicle, dt: float
+) -> bool:
+    """Whether the car often slows down much more than its torque explains: then somebody else brakes."""
+    a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
+    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.r_l("fl") * vehicle.mass)
+    moving = v > V_MIN
+    if moving.sum() * dt < LEAST_S:
+        return False
+    return bool(((a < explained - UNEXPLAINED) & moving).sum() > 0.01 * moving.sum())
 
 
 def _widened(bad: BoolArray, dt: float) -> BoolArray:

@@ -12,13 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.diagnose.bench import Bench, gram_of, noises_after, tolerant
+from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.hypotheses import THREADS
-from aqualog.diagnose.noise import surrogate
+from aqualog.diagnose.noise import Noise, surrogate, white_noise
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 from aqualog.types import FloatArray
 
 __all__ = ["Calibration", "calibrate", "gumbel_p", "largest"]
 
+FEW = 2  # hypotheses after which the noise is tried
 ALIKE = 0.97  # cosine of whitened signatures that surrogates need not tell apart
 EULER = 0.5772156649015329
 PLAIN_INFLATION = 1.3  # of the gains where no surrogates are asked for: what they gave on simulated noises (D)
@@ -36,19 +38,32 @@ class Calibration(NamedTuple):
 def largest(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gains (H,) of all hypotheses beside a base set, and the whitened, tolerant inner products.
 
-    The noise is estimated twice: after the base set, and after the hypothesis that gains most by the first estimate, so
-    that an effect does not pass for noise.
+    The noise is estimated after the hypothesis that makes the measurement likeliest, among those that gain most by the
+    colour of the residual as it is and by no colour at all: an effect that is large against the noise would pass for
+    coloured noise otherwise, and nothing would be left to find.
     """
     noises = noises_after(bench, residuals, _theta(bench, residuals, base))
     gram = tolerant(bench, gram_of(bench, noises, residuals))
-    gains = gains_on_top(bench, gram, base)
-    top = int(np.argmax(gains))
-    fit = fit_set(bench, gram, (*base, top)) or fit_set(bench, gram, tuple(base))
-    if fit is None:
-        return gains, gram
-    noises = noises_after(bench, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
-    gram = tolerant(bench, gram_of(bench, noises, residuals))
+    plain = tolerant(bench, gram_of(bench, [_colourless(bench, i, r) for i, r in enumerate(residuals)], residuals))
+    best = (sum(n.surprise for n in noises), noises)
+    for metric, most in ((gram, FEW), (plain, FEW)):
+        gains = gains_on_top(bench, metric, base)
+        for top in np.argsort(-gains)[:most].tolist():
+            fit = fit_set(bench, metric, (*base, top))
+            if fit is None:
+                continue
+            tried = noises_after(bench, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
+            surprise = sum(n.surprise for n in tried)
+            if surprise < best[0]:
+                best = (surprise, tried)
+    gram = tolerant(bench, gram_of(bench, best[1], residuals))
     return gains_on_top(bench, gram, base), gram
+
+
+def _colourless(bench: Bench, i: int, residual: FloatArray) -> Noise:
+    """White noise of the size of a residual's steps."""
+    drive = bench.drives[i]
+    return white_noise(residual, drive.mask, contrasts(drive.channels))
 
 
 def _theta(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> dict[int, float]:

@@ -45,6 +45,8 @@ _NOT_ASKED: Mapping[str, str] = {
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
 # what a car may have or not; all else is known to within a tolerance
 _EVENTS = ("pressure_loss", "trailer", "tyre_warmup", "uneven_water")
+# tolerances of what a vehicle file does not tell: the model has a tyre's usual value
+_UNTOLD: Mapping[str, float] = {"load_sensitivity": 0.15, "relaxation_length": 0.1}
 _SHIFTS = ("signal_delay", "clock_skew")
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 LEAKS = 5  # moments at which a tyre may begin to lose its air
@@ -77,6 +79,8 @@ class Hypothesis:
         """Standard deviation by which a parameter may be off without being worth a word; 0 for events."""
         if self.allowed:
             return self.parameter(name).sigma
+        if self.effect.name in _UNTOLD:
+            return _UNTOLD[self.effect.name]
         return 0.0 if self.effect.name in _EVENTS else self.parameter(name).smallest * TOLERANCE
 
     def step(self, name: str) -> float:

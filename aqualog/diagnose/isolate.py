@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
-from aqualog.diagnose.words import place, quantity
+from aqualog.diagnose.words import listed, name_of, quantity
 from aqualog.types import FloatArray
 
 __all__ = ["confusions", "limits", "reference_sizes", "separation"]
@@ -61,7 +61,7 @@ def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, thres
 
 def limits(bench: Bench, sizes: FloatArray) -> tuple[Limit, ...]:
     """Detection limit of each effect and place, by its first parameter."""
-    out = {}
+    out: dict[str, Limit] = {}
     for h, columns in zip(bench.asked, bench.columns, strict=True):
         if h.allowed:
             continue
@@ -78,58 +78,64 @@ def confusions(bench: Bench, gram: FloatArray, sizes: FloatArray, inflation: Flo
     At the reference sizes; effects that the log does not show are left out.
     """
     G = gram[:-1, :-1]
-    seen = [i for i, c in enumerate(bench.columns) if math.isfinite(sizes[c[0]]) and len(c) == 1 and not bench.asked[i].allowed]
+    seen = [
+        i for i, c in enumerate(bench.columns)
+        if math.isfinite(sizes[c[0]]) and len(c) == 1 and not bench.asked[i].allowed
+    ]  # fmt: skip
     first: dict[str, int] = {}
     for i in seen:
         first.setdefault(bench.asked[i].key, i)
     index = list(first.values())
+    c = np.array([bench.columns[i][0] for i in index], dtype=np.intp)
+    inner = G[np.ix_(c, c)]
+    energy = np.diag(inner)
+    theta = sizes[c] / np.sqrt(inflation[index])
+    # what row i keeps when column j may imitate it
+    pairs = np.maximum((energy[:, None] - inner**2 / energy[None, :]) * theta[:, None] ** 2, 0.0)
     out = []
-    for i in index:
-        column = bench.columns[i][0]
-        theta = np.array([sizes[column]]) / math.sqrt(inflation[i])
-        energy = float(theta[0] ** 2 * G[column, column])
-        pairs = {}
-        for j in index:
-            if i != j:
-                lam = separation(G, (column,), bench.columns[j], theta)
-                pairs[j] = lam
-                out.append(_confusion(bench, G, i, (j,), lam, energy))
-        nearest = sorted((j for j in pairs if compatible(bench, (i, j))), key=lambda j: pairs[j])[:RIVALS]
+    for k, i in enumerate(index):
+        own = float(theta[k] ** 2 * energy[k])
+        out += [_confusion(bench, G, i, (j,), float(pairs[k, m]), own) for m, j in enumerate(index) if m != k]
+        near = [m for m in np.argsort(pairs[k]).tolist() if m != k and compatible(bench, (i, index[m]))][:RIVALS]
         for size in (2, 3):
-            best: tuple[float, tuple[int, ...]] | None = None
-            for rivals in combinations(nearest, size):
-                if not compatible(bench, (i, *rivals)):
-                    continue
-                r = [bench.columns[j][0] for j in rivals]
-                lam = separation(G, (column,), r, theta)
-                if best is None or lam < best[0]:
-                    best = (lam, rivals)
-            if best and best[0] < 0.5 * min([pairs[j] for j in best[1]]) and p_correct(best[0]) < TOLD_APART:
-                out.append(_confusion(bench, G, i, best[1], best[0], energy))
+            sets = [s for s in combinations(near, size) if compatible(bench, (i, *(index[m] for m in s)))]
+            lam = _kept(inner, k, np.array(sets, dtype=np.intp).reshape(-1, size)) * theta[k] ** 2
+            if not sets:
+                continue
+            best = int(np.argmin(lam))
+            if lam[best] < 0.5 * min(pairs[k, m] for m in sets[best]) and p_correct(lam[best]) < TOLD_APART:
+                out.append(_confusion(bench, G, i, tuple(index[m] for m in sets[best]), float(lam[best]), own))
                 break
     return tuple(out)
 
 
+def _kept(inner: FloatArray, k: int, sets: np.ndarray[tuple[int, int], np.dtype[np.intp]]) -> FloatArray:
+    """Energy that column k keeps when each of the sets (m, size) may imitate it. (m,)"""
+    scale = np.sqrt(np.diag(inner))
+    unit = inner / np.outer(scale, scale)
+    R = unit[sets[:, :, None], sets[:, None, :]] + 1e-9 * np.eye(sets.shape[1])
+    r = unit[sets, k]
+    left = 1.0 - np.einsum("ij,ij->i", r, np.linalg.solve(R, r[..., None])[..., 0])
+    return np.asarray(np.maximum(left, 0.0) * inner[k, k])
+
+
 def _confusion(bench: Bench, G: FloatArray, i: int, rivals: tuple[int, ...], lam: float, energy: float) -> Confusion:
-    relation = _relation(bench, G, i, rivals) if lam < EXACT * energy else ""
-    return Confusion(bench.asked[i].key, tuple(bench.asked[j].key for j in rivals), lam, p_correct(lam), relation)
-
-
-def _relation(bench: Bench, G: FloatArray, i: int, rivals: tuple[int, ...]) -> str:
-    """In words: what of the rivals looks like a certain size of the effect, on this log."""
+    key, others = bench.asked[i].key, tuple(bench.asked[j].key for j in rivals)
+    if lam >= EXACT * energy:
+        return Confusion(key, others, lam, p_correct(lam))
     c = bench.columns[i][0]
     r = [bench.columns[j][0] for j in rivals]
-    h = bench.asked[i]
-    size = bench.smallest[c]
-    amount = np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size
-    parts = [
-        f"{bench.asked[j].effect.name.replace('_', ' ')}{place(bench.asked[j].where)} of "
-        f"{quantity(float(a), bench.asked[j].parameter(bench.asked[j].free[0]).unit, change=True)}"
-        for j, a in zip(rivals, amount, strict=True)
-    ]
-    unit = h.parameter(h.free[0]).unit
-    joined = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
-    return (
-        f"On this log {h.effect.name.replace('_', ' ')}{place(h.where)} of {quantity(size, unit, change=True)} looks "
-        f"exactly like {joined}."
-    )
+    size = float(bench.smallest[c])
+    alike = np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size
+    sizes = (size, *(float(a) for a in alike))
+    return Confusion(key, others, lam, p_correct(lam), _relation(bench, (i, *rivals), sizes), sizes)
+
+
+def _relation(bench: Bench, effects: Sequence[int], sizes: Sequence[float]) -> str:
+    """In words: what of the rivals looks like a certain size of the effect, on this log."""
+    parts = []
+    for i, size in zip(effects, sizes, strict=True):
+        h = bench.asked[i]
+        unit = h.parameter(h.free[0]).unit
+        parts.append(f"{name_of(h.effect.name, h.where)} of {quantity(size, unit, change=True)}")
+    return f"On this log {parts[0]} looks exactly like {listed(parts[1:])}."

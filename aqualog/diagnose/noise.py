@@ -15,7 +15,9 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "spectra", "surrogate", "whitened"]
+__all__ = [
+    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "spectra", "surrogate", "white_noise", "whitened",
+]  # fmt: skip
 
 # lags of the autoregression, from ... to, as means [samples]
 _BLOCKS = (
@@ -26,6 +28,9 @@ MEMORY = 130
 AFTER_GAP = 6  # [samples] whose past is bridged
 HUBER = 3.0  # [sd] larger innovations weigh less
 RIDGE = 1e-6
+# [m/s^2], [m/s], [N] white noise that every channel is taken to have besides: without any, whatever is smooth could be
+# foretold from its past and would pass for noise
+FLOOR = 5e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,12 @@ class Noise:
     taps: FloatArray
     shaping: FloatArray
     weights: FloatArray
+
+    @property
+    def surprise(self) -> float:
+        """Negative log-likelihood of the residual that the noise was fitted to, but for a constant."""
+        sharp = np.log(np.abs(np.diag(self.shaping))).sum() + np.linalg.slogdet(self.rotation)[1]
+        return -float(sharp) * float((self.weights > 0.0).sum()) / len(self.taps)
 
     @property
     def count(self) -> float:
@@ -113,7 +124,7 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     x = bridged(residual, mask)
     used = _settled(mask)
     C, n = x.shape
-    scale = np.maximum((contrasts @ x)[:, mask].std(axis=1), 1e-12)
+    scale = np.maximum((contrasts @ x)[:, mask].std(axis=1), FLOOR)
     rotation = contrasts / scale[:, None]
     z = rotation @ x
     # an offset is an effect, not noise: an autoregression would take it for a slow wave
@@ -122,7 +133,7 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     weights: FloatArray = np.ones((C, n)) * used
     for _ in range(2):
         for c in range(C):
-            taps[c] = _autoregression(z[c], weights[c])
+            taps[c] = _autoregression(z[c], weights[c], (FLOOR / float(scale[c])) ** 2)
         e = _filtered(z, taps)
         sd: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1) + 1e-15
         size = np.abs(e) / sd[:, None]
@@ -131,9 +142,18 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     root = np.sqrt(weights)
     loss = np.array([np.count_nonzero(t) for t in taps], dtype=np.float64)
     cov = (e * root) @ (e * root).T / np.sqrt(np.outer(count - loss, count - loss))
-    cov += RIDGE * np.diag(np.diag(cov))
+    cov += RIDGE * np.diag(np.diag(cov)) + np.diag((FLOOR / scale) ** 2)
     shaping = np.linalg.inv(np.linalg.cholesky(cov))
     return Noise(rotation, taps, shaping, root)
+
+
+def white_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:
+    """Noise without colour, of the size of the steps from sample to sample."""
+    steps = np.diff(contrasts @ bridged(residual, mask), axis=1) * np.sqrt(0.5)
+    scale = np.maximum(1.4826 * np.median(np.abs(steps), axis=1), FLOOR)
+    taps = np.zeros((len(scale), MEMORY + 1))
+    taps[:, 0] = 1.0
+    return Noise(contrasts / scale[:, None], taps, np.eye(len(scale)), np.ones((len(scale), 1)) * _settled(mask))
 
 
 def for_mask(noise: Noise, mask: BoolArray) -> Noise:
@@ -150,7 +170,7 @@ def _settled(mask: BoolArray) -> BoolArray:
     return np.asarray(settled)
 
 
-def _autoregression(z: FloatArray, weights: FloatArray) -> FloatArray:
+def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatArray:
     """Taps (131,) of the whitening filter of one channel: weighted least squares, order by Akaike's criterion."""
     n = z.size
     padded = np.concatenate([np.full(MEMORY, z[:10].mean()), z])
@@ -160,8 +180,10 @@ def _autoregression(z: FloatArray, weights: FloatArray) -> FloatArray:
     A = np.array(columns) * np.sqrt(weights)
     y = z * np.sqrt(weights)
     gram, right, power = A @ A.T, A @ y, float(y @ y)
-    gram += RIDGE * np.diag(np.diag(gram)) + 1e-30 * np.eye(len(gram))
     count = max(float(weights.sum()), 10.0)
+    # as if white noise of the floor were added: of means over blocks it leaves less
+    power += count * white
+    gram += RIDGE * np.diag(np.diag(gram)) + np.diag([count * white / (b - a + 1) + 1e-30 for a, b in _BLOCKS])
     best, chosen = np.inf, np.zeros(0)
     for order in _ORDERS:
         phi = np.linalg.solve(gram[:order, :order], right[:order])

@@ -18,6 +18,8 @@ from aqualog.model.term import Model
 
 __all__ = ["Outcome", "causes_of", "conclude"]
 
+Z = 1.959964  # 97.5 % quantile of the normal distribution
+BEYOND_DOUBT = 1e-5  # p-value of a test that no effect and no function bears out, to be told as a finding
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 
 
@@ -34,19 +36,19 @@ class Outcome(NamedTuple):
     small: tuple[str, ...]
 
 
-def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, significant: bool) -> Outcome:
-    """The verdict on refitted sets, best first; without any: `no_effect`, or `unexplained` if the test found something.
+def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_value: float) -> Outcome:
+    """The verdict on refitted sets, best first; without any: `no_effect`, or `unexplained` if the test is beyond doubt.
 
     A set is credible if the best one's evidence is less than 20 times its own. Members that every credible set has are
     certain. Places of one effect that cannot be told apart are one cause, at the whole car if that is among them.
     """
     if not candidates:
-        return Outcome("unexplained" if significant else "no_effect", (), (), None, ())
+        return Outcome("unexplained" if p_value < BEYOND_DOUBT else "no_effect", (), (), None, ())
     credible = [c for c in candidates if c.evidence_ratio < CREDIBLE]
     credible = _one_per_name(credible)
     best = credible[0]
     own = causes_of(bench, best, model)
-    worth = [_worth_naming(best.refit, i, model) for i in range(len(best.refit.members))]
+    worth = [_worth_naming(best, i, model) for i in range(len(best.refit.members))]
     small = tuple(
         f"Significant, but too small to be worth naming: {c.sentence}" for c, w in zip(own, worth, strict=True) if not w
     )
@@ -85,10 +87,16 @@ def _whole(c: Candidate) -> int:
     return sum(h.where is None for h in c.refit.members)
 
 
-def _worth_naming(r: Refit, member: int, model: Model) -> bool:
+def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
+    """Whether a value of a member is as large as its smallest size, and its interval leaves out that it is nothing."""
+    r = candidate.refit
     h = r.members[member]
+    sd = np.sqrt(np.diag(r.covariance) * candidate.inflation)
     for k, (i, name) in enumerate(r.names):
-        if i == member and abs(r.values[k] - value_in(model, h, name)) >= h.parameter(name).smallest:
+        if i != member:
+            continue
+        off = abs(float(r.values[k]) - value_in(model, h, name))
+        if off >= max(h.parameter(name).smallest, Z * float(sd[k])):
             return True
     return False
 
@@ -104,7 +112,7 @@ def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, 
         for k, (owner, name) in enumerate(r.names):
             if owner == i:
                 p = h.parameter(name)
-                v, s = float(r.values[k]), 1.959964 * float(sd[k])
+                v, s = float(r.values[k]), Z * float(sd[k])
                 parameters[name] = Estimate(v, max(v - s, p.low), min(v + s, p.high), p.unit)
         for name, v in h.fixed.items():
             if name in {p.name for p in h.effect.parameters} and name not in parameters:

@@ -84,7 +84,8 @@ class Confusion:
     """Two sets of effects and how well this log can tell them apart, before any residual was looked at.
 
     `separation` lambda: whitened energy of `effect` at its reference size that the `rivals` (1 to 3) cannot imitate;
-    `p_correct` = Phi(sqrt(lambda) / 2). `relation`: sentence, where there is an exact relation.
+    `p_correct` = Phi(sqrt(lambda) / 2). `relation`: sentence, where there is an exact relation, and the `sizes` in it:
+    of the effect, then of the rivals.
     """
 
     effect: str
@@ -92,6 +93,7 @@ class Confusion:
     separation: float
     p_correct: float
     relation: str = ""
+    sizes: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

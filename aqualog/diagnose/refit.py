@@ -140,7 +140,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
     J = _rows(bench, slopes, noises)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0))
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
-    return Refit(members, names, values, covariance, loss, extended, tuple(residuals), slopes, at_bound)
+    return Refit(members, names, values, np.asarray(covariance), loss, extended, tuple(residuals), slopes, at_bound)
 
 
 def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:

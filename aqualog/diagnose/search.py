@@ -17,15 +17,15 @@ from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signature
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
 from aqualog.diagnose.refit import KNOWN, Refit, metric, refit, whitened_residual
-from aqualog.diagnose.subsets import SetFit, best_sets, fit_set
+from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set
 from aqualog.model.term import Model
 from aqualog.types import FloatArray
 
 __all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
 
-MOST = 4  # effects in one set
+MOST = 3  # effects in one set
 CREDIBLE = 20.0  # evidence ratio within which sets cannot be told apart
-REFITTED = 8  # sets that are refitted in the simulator
+REFITTED = 6  # sets that are refitted in the simulator
 # of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
 SLACK, BENT = 8.0, 0.05
 HALF = 0.5  # of what the test asks for, that a set must take away once it is refitted
@@ -77,7 +77,7 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
 def search(
     bench: Bench, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
 ) -> Found:
-    """Test, best set, refit; again beside it, until nothing more is found or four effects are in the set."""
+    """Test, best set, refit; again beside it, until nothing more is found or three effects are in the set."""
     tests: list[Significance] = []
     first: tuple[FloatArray, Calibration] | None = None
     accepted: tuple[int, ...] = ()
@@ -118,7 +118,7 @@ def _tested(
     if c.maxima.size:
         p = max(gumbel_p(c.maxima, statistic), 1e-12)
         return Significance(statistic, c.threshold, p, level, c.achieved, surrogates)
-    count = max(np.count_nonzero(gains), 1)
+    count = max(int((gains > 0.0).sum()), 1)
     p = min(1.0, 1e-12 + count * math.erfc(math.sqrt(0.5 * max(statistic, 0.0))))
     return Significance(statistic, c.threshold, p, level, float("nan"), 0)
 
@@ -155,6 +155,7 @@ def _refitted(
     won = top[0].gain - (known.gain if known is not None else 0.0)
     within = (2.0 * math.log(CREDIBLE)) * inflation + SLACK + BENT * max(won, 0.0)
     fits = best_sets(bench, gram, size, within=within, most=REFITTED)
+    fits += _twins(bench, gram, fits[0], {f.members for f in fits})
     measure = metric(bench, noises)
     tell("refitting in the simulator", min(share, 0.95))
     with ThreadPoolExecutor(THREADS) as pool:
@@ -179,6 +180,22 @@ def _refitted(
         Candidate(s if s is not None and not s.at_bound else r, x, inflation)
         for (r, x), s in zip(credible, sharp, strict=True)
     )
+
+
+def _twins(bench: Bench, gram: FloatArray, top: SetFit, known: set[tuple[int, ...]]) -> list[SetFit]:
+    """The best set with one member changed for a known twin of it: these are refitted whatever their signatures say."""
+    out = []
+    for k, m in enumerate(top.members):
+        for name in bench.asked[m].effect.twins:
+            for i, h in enumerate(bench.asked):
+                if h.effect.name != name or h.where not in (None, h.effect.default):
+                    continue
+                members = tuple(sorted((*top.members[:k], i, *top.members[k + 1 :])))
+                fit = fit_set(bench, gram, members) if len(set(members)) == len(members) else None
+                if fit is not None and members not in known and compatible(bench, members):
+                    known = known | {members}
+                    out.append(fit)
+    return out
 
 
 def _at(fit: SetFit, r: Refit, model: Model) -> SetFit:
@@ -214,7 +231,4 @@ def _around(bench: Bench, best: Refit, members: Sequence[int], model: Model) -> 
         new_signatures.append(changed)
         new_residuals.append(r + np.tensordot(start, own, axes=1))
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(new_signatures, bench.drives, strict=True))
-    return replace(
-        bench, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared
-    )
-
+    return replace(bench, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared)

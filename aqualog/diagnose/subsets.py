@@ -12,7 +12,7 @@ from aqualog.diagnose.bench import Bench
 from aqualog.notation import AXLES, WHEELS
 from aqualog.types import FloatArray
 
-__all__ = ["PRIOR_WIDTH", "SetFit", "best_sets", "fit_set", "gains_on_top"]
+__all__ = ["PRIOR_WIDTH", "SetFit", "best_sets", "compatible", "fit_set", "gains_on_top"]
 
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
 SINGULAR = 1e-4  # share of a column's energy that the others of its set must leave

@@ -243,6 +243,7 @@ def _confusion(c: Confusion) -> dict[str, Any]:
         "separation": _number(c.separation),
         "p_correct": _number(c.p_correct),
         "relation": c.relation,
+        "sizes": [_number(x) for x in c.sizes],
     }
 
 

@@ -1,0 +1,309 @@
+"""The road's profile: a slope angle over the position that two channels show independently of each other.
+
+The accelerometer feels a slope, and so does the balance of wheels against torque; they share no sensor's slow error:
+
+    kinematic                  = g sin(theta(s)) + b    accelerometer less dv/dt,  b its wander
+    kinematic - force_balance  = g sin(theta(s)) + w    torque less dv/dt,         w wind and what the torque is off by
+
+The velocity is in both, but its slow error is not seen in them: 0.05 m/s^2 over ten seconds would be half a metre a
+second. What the two share over 150 m and more is the road.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.records import Cause, Estimate
+from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.term import Knots, Model, Term
+from aqualog.physics.load import G
+from aqualog.types import BoolArray, FloatArray
+
+__all__ = ["Profile", "find_profile", "with_profile"]
+
+BIN_M = 25.0  # [m]
+OVER_M = 150.0  # [m] shorter waves are the car's pitching and the driver's pedal
+HALF_M = 200.0  # [m] wavelength of which the estimate keeps half
+FADES_M = 2000.0  # [m] from data the estimate falls to nothing
+LEAST = 0.005  # rms of the slope that is worth a word: half of what a motorway is allowed to climb unnoticed (K)
+LEAST_ALONE = 0.02  # rms without torque and on one pass: 20 mg are an accelerometer's own wander (V, ESC data sheets)
+LEAST_BINS = 40
+STANDS_OUT = 4.0  # standard deviations of a correlation by chance
+SMOOTHED = 0.03  # of the rms that smoothing may take or noise may add
+LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.5, 0.7
+ALIKE_M = 2000.0  # [m] over which a road's likeness to itself is counted
+GOES_WITH_ACCELERATION = slice(3, None)  # of the shapes of `_motion`
+CLIPPED = 5.0  # robust standard deviations
+BIAS_SD, FORCE_SD = 0.1, 0.03  # [m/s^2] what offsets of accelerometer and resistance hide of a mean slope (V, ESC; K)
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A hilly road. Arrays over the knots `s` (k,) [m]: slope angle `theta` [rad], uphill positive, with its pointwise
+    95 % band; its mean over the drive is not in it: a constant is the accelerometer's offset as well.
+
+    `rms` and `mean` [rad] with 95 % intervals; `shared`: correlation of the two channels over 150 m, NaN without
+    torque; `lap_m`: length after which the road repeats itself, None on one pass; `known`: knots with data near by.
+    """
+
+    drive: str
+    s: FloatArray
+    theta: FloatArray
+    low: FloatArray
+    high: FloatArray
+    known: BoolArray
+    rms: Estimate
+    mean: Estimate
+    p_value: float
+    shared: float
+    lap_m: float | None
+
+    @property
+    def knots(self) -> Knots:
+        """Position [m] and slope angle [rad], as a term or a scenario takes them."""
+        return tuple(zip(self.s.tolist(), np.clip(self.theta, -0.3, 0.3).tolist(), strict=True))
+
+    @property
+    def term(self) -> Term:
+        """The profile as a term of a model of this drive."""
+        return Term(EMPIRICAL["unexplained_grade"], knots=self.knots)
+
+    @property
+    def cause(self) -> Cause:
+        """What the diagnosis names."""
+        text = f"The road climbs and falls with {self.rms.value:.1%} rms along the way"
+        if self.lap_m is not None:
+            text += f", and again after {self.lap_m:.0f} m"
+        elif not np.isfinite(self.shared):
+            text += "; on one pass without torque, place and time cannot be told apart"
+        text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}."
+        return Cause("road_grade", None, {"grade_rms": self.rms, "grade_mean": self.mean}, ("kinematic",), text)
+
+
+def with_profile(model: Model, profile: Profile) -> Model:
+    """The model of a drive with its road in it; on top of a profile that the model has already."""
+    for i, t in enumerate(model.terms):
+        if t.effect is profile.term.effect:
+            s = np.unique([x for x, _ in (*t.knots, *profile.knots)])
+            both = sum(np.interp(s, *np.array(k).T) for k in (t.knots, profile.knots))
+            knots = tuple(zip(s.tolist(), np.clip(both, -0.3, 0.3).tolist(), strict=True))
+            return Model((*model.terms[:i], replace(t, knots=knots), *model.terms[i + 1 :]))
+    return model.with_term(profile.term)
+
+
+def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
+    """The slope of the road along a drive, or None if the drive does not show one.
+
+    Parameters
+    ----------
+    drive : Drive
+    residual : array (C, n)
+        Of the drive's channels under the model at hand [m/s^2].
+
+    Returns
+    -------
+    profile : Profile or None
+        With torque: what both channels share beyond chance and beyond 0.5 % rms. Without: only if the road is driven
+        again and shows the same, or beyond 2 % rms. Errors of mass, delays, scales and clocks, which go with the
+        acceleration, are taken out of both channels first.
+    """
+    if "kinematic" not in drive.channels:
+        return None
+    bins = _Bins.of(drive, residual)
+    if bins is None:
+        return None
+    K = bins.smooth(bins.cleaned(bins.kinematic))
+    at, lap = bins.used, _lap(bins, K)
+    if bins.force is None:
+        rough = float(np.sqrt(np.mean(K[at] ** 2))) / G
+        if rough < (LEAST if lap is not None else LEAST_ALONE):
+            return None
+        z, shared, p = bins.kinematic, float("nan"), float("nan")
+    else:
+        F = bins.smooth(bins.cleaned(bins.force))
+        common, shared, score = _together(K, K - F, at)
+        if common < (LEAST * G) ** 2 or score < STANDS_OUT:
+            return None
+        # what the accelerometer wanders is in both and comes off; wind and brakes are in the force balance alone
+        power = float(np.mean(F[at] ** 2))
+        share = min(max(float(np.mean((K * F)[at])) / max(power, 1e-12), 0.0), 1.0)
+        z, p = bins.kinematic - share * bins.force, math.erfc(score / math.sqrt(2.0))
+    s, theta, half, known = _estimate(bins, z)
+    return Profile(
+        drive.name, s, theta, theta - half, theta + half, known, _rms(theta, half, bins), _mean(bins), p, shared, lap
+    )
+
+
+def _rms(theta: FloatArray, half: FloatArray, bins: _Bins) -> Estimate:
+    """Rms of the slope over what was driven; its error hangs together over a wave of the estimate. [rad]"""
+    at = bins.used
+    noise = float(np.mean((half[at] / 1.96) ** 2))
+    power = float(np.mean((theta[at] - theta[at].mean()) ** 2))
+    value = math.sqrt(power)
+    count = max(float(at.sum()) * BIN_M / HALF_M, 3.0)
+    spread = 1.96 * math.sqrt((4.0 * power * noise + 2.0 * noise**2) / count) / (2.0 * value) + SMOOTHED * value
+    return Estimate(value, max(value - spread, 0.0), value + spread, "rad")
+
+
+@dataclass(frozen=True, slots=True)
+class _Bins:
+    """Channels as means over 25 m of way (k,), `weight` (k,) samples in each, `used` where there are any, and what
+    goes with the motion (k, q)."""
+
+    kinematic: FloatArray
+    force: FloatArray | None
+    weight: FloatArray
+    used: BoolArray
+    motion: FloatArray
+
+    @staticmethod
+    def of(drive: Drive, residual: FloatArray) -> _Bins | None:
+        good = drive.mask & np.isfinite(residual).all(axis=0)
+        position = drive.coordinates["position"]
+        where = np.floor_divide(np.maximum(position, 0.0), BIN_M).astype(np.intp)
+        k = int(where.max()) + 1
+        weight = np.bincount(where[good], minlength=k).astype(np.float64)
+        if np.count_nonzero(weight) < LEAST_BINS:
+            return None
+
+        def mean(x: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(where[good], x[good], minlength=k) / np.maximum(weight, 1.0))
+
+        kinematic = _clipped(residual[drive.channels.index("kinematic")], good)
+        force = None
+        if "force_balance" in drive.channels:
+            force = mean(_clipped(residual[drive.channels.index("force_balance")], good))
+        motion = np.array([mean(x) for x in _motion(drive)]).T
+        return _Bins(mean(kinematic), force, weight, weight > 0.0, motion)
+
+    def cleaned(self, x: FloatArray) -> FloatArray:
+        """A channel without what goes with the motion, by least squares."""
+        root = np.sqrt(self.weight)
+        beta = np.linalg.lstsq(self.motion * root[:, None], x * root, rcond=1e-10)[0]
+        return np.asarray(np.where(self.used, x - self.motion @ beta, 0.0))
+
+    def smooth(self, x: FloatArray) -> FloatArray:
+        """Mean with a raised cosine of 150 m half width, over what is used."""
+        window = np.hanning(2 * round(OVER_M / BIN_M) + 1)[1:-1]
+        total = np.convolve(x * self.weight, window, "same")
+        return np.asarray(np.where(self.used, total / np.maximum(np.convolve(self.weight, window, "same"), 1e-9), 0.0))
+
+
+def _motion(drive: Drive) -> list[FloatArray]:
+    """Offset, speed, acceleration, jerk, their growth over time: shapes of sensors' and the car's errors. (n,) each"""
+    step = max(0.1, drive.dt)
+    v = drive.coordinates["v_x"]
+    a = np.gradient(v, step)
+    jerk = np.gradient(a, step)
+    t = drive.coordinates["t"] / max(drive.duration_s, 1.0)
+    return [np.ones_like(v), v / 20.0, t, a, jerk, t * a, t * jerk, v / 20.0 * a]
+
+
+def _clipped(x: FloatArray, good: BoolArray) -> FloatArray:
+    middle = float(np.median(x[good]))
+    sd = 1.4826 * float(np.median(np.abs(x[good] - middle))) + 1e-9
+    return np.clip(x, middle - CLIPPED * sd, middle + CLIPPED * sd)
+
+
+def _together(K: FloatArray, Y: FloatArray, at: BoolArray) -> tuple[float, float, float]:
+    """Covariance, correlation and how many standard deviations it is from nought: Fisher's transform."""
+    k, y = (np.where(at, x - x[at].mean(), 0.0) for x in (K, Y))
+    sd = float(k[at].std() * y[at].std())
+    covariance = float(np.mean((k * y)[at]))
+    if sd == 0.0:
+        return 0.0, 0.0, 0.0
+    correlation = covariance / sd
+    return covariance, correlation, _score(correlation, _independent(k, y, at))
+
+
+def _score(correlation: float, count: float) -> float:
+    return float(np.arctanh(np.clip(correlation, -0.9999, 0.9999)) * np.sqrt(max(count - 3.0, 0.0)))
+
+
+def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
+    """How many independent samples two series along the way are worth, from their own likeness (Bartlett)."""
+    n = 2 * at.size
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(at.astype(np.float64), n)) ** 2, n)
+    own = [np.fft.irfft(np.abs(np.fft.rfft(x, n)) ** 2, n) / np.maximum(pairs, 1.0) for x in (a, b)]
+    reach = min(round(ALIKE_M / BIN_M), at.size - 1)
+    taper = np.linspace(1.0, 0.0, reach + 1)
+    rho = [x[: reach + 1] / max(x[0], 1e-30) for x in own]
+    both = rho[0] * rho[1] * taper
+    total = float(both[0] + 2.0 * both[1:].sum())
+    return float(at.sum()) / max(total, 2.0 * OVER_M / BIN_M / 2.0)
+
+
+def _lap(bins: _Bins, K: FloatArray) -> float | None:
+    """Length after which the channel repeats itself over the way: a wandering sensor knows no place. [m]"""
+    best, found = LAP_CORRELATION, None
+    centred = np.where(bins.used, K - K[bins.used].mean(), 0.0)
+    share = _independent(centred, centred, bins.used) / bins.used.sum()
+    for lag in range(round(LAP_LEAST_M / BIN_M), K.size // 2 + 1):
+        both = bins.used[lag:] & bins.used[:-lag]
+        a, b = centred[lag:][both], centred[:-lag][both]
+        if both.sum() * share < 8.0 or a.std() == 0.0 or b.std() == 0.0:
+            continue
+        c = float(np.corrcoef(a, b)[0, 1])
+        # the first lap, not a multiple of it
+        nearer = found is None or c > best + 0.1 or lag * BIN_M < found + 3.0 * OVER_M
+        if c > best and nearer and _score(c, float(both.sum()) * share) > LAP_SIGMAS:
+            best, found = c, lag * BIN_M
+    return found
+
+
+def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Penalised slope over the way beside what goes with the motion: knots [m], theta, half band [rad], known."""
+    # speed and time would pass for slow waves of the road
+    motion = bins.motion[:, GOES_WITH_ACCELERATION]
+    k, q = z.size, motion.shape[1]
+    weight = bins.weight / max(float(np.median(bins.weight[bins.used])), 1.0)
+    D = np.diff(np.eye(k), 2, axis=0)
+    stiff = (HALF_M / (2.0 * np.pi * BIN_M)) ** 4
+    penalty = stiff * (D.T @ D) + stiff * (2.0 * np.pi * BIN_M / FADES_M) ** 4 * np.eye(k)
+    A = np.concatenate([np.eye(k), motion], axis=1) * np.sqrt(weight)[:, None]
+    P = np.zeros((k + q, k + q))
+    P[:k, :k] = penalty
+    P[k:, k:] = 1e-9 * np.eye(q)
+    inverse = np.linalg.inv(A.T @ A + P)
+    x = inverse @ (A.T @ (z * np.sqrt(weight)))
+    left = np.where(bins.used, z - x[:k] - motion @ x[k:], 0.0)
+    coloured = _correlated(left, bins.used)
+    # what smoothing takes off is about what it takes off again
+    bias = x[:k] - np.linalg.solve(np.diag(weight) + penalty, weight * x[:k])
+    variance = np.diag(inverse @ (A.T @ A) @ inverse)[:k] * float(np.mean(left[bins.used] ** 2)) * coloured
+    theta: FloatArray = x[:k] / G
+    theta = theta - float(np.average(theta, weights=bins.weight))
+    near = np.convolve(bins.used.astype(np.float64), np.ones(2 * round(OVER_M / BIN_M) + 1), "same")[:k] > 0.5
+    s: FloatArray = (np.arange(k, dtype=np.float64) + 0.5) * BIN_M
+    return s, theta, (1.96 * np.sqrt(np.maximum(variance, 0.0)) + np.abs(bias)) / G, np.asarray(near)
+
+
+def _correlated(x: FloatArray, at: BoolArray) -> float:
+    """By how much a mean of correlated bins is less sure than of independent ones: 1 + 2 sum of rho. >= 1"""
+    power = max(float(np.mean(x[at] ** 2)), 1e-30)
+    total = 1.0
+    for lag in range(1, 13):
+        both = at[lag:] & at[:-lag]
+        if not both.any():
+            break
+        rho = float(np.mean((x[lag:] * x[:-lag])[both])) / power
+        if rho <= 0.05:
+            break
+        total += 2.0 * rho
+    return total
+
+
+def _mean(bins: _Bins) -> Estimate:
+    """Mean slope: from both channels by what their offsets may be. [rad]"""
+    kinematic = float(np.average(bins.kinematic, weights=bins.weight))
+    looks: list[tuple[float, float]] = [(kinematic, BIAS_SD)]
+    if bins.force is not None:
+        looks.append((kinematic - float(np.average(bins.force, weights=bins.weight)), FORCE_SD))
+    precision = math.fsum(1.0 / (sd * sd) for _, sd in looks)
+    value = math.fsum(x / (sd * sd) for x, sd in looks) / precision / G
+    half = 1.96 / math.sqrt(precision) / G
+    return Estimate(value, value - half, value + half, "rad")

@@ -1,0 +1,63 @@
+"""An accelerometer that is not one is exposed; one that is only off, late or tilted is not."""
+
+import numpy as np
+import polars as pl
+import pytest
+from test_drive import CAR, changed, plain, signals, term
+
+from aqualog.diagnose.defects import accelerometer_defect
+from aqualog.diagnose.drive import prepare
+
+
+def judged(change):
+    log = plain()
+    x = change(log.array("a_x"))
+    return accelerometer_defect(prepare(changed(log, log.frame.with_columns(pl.Series("a_x", x))), CAR, "a"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda a: a,
+        lambda a: a + 0.5,
+        lambda a: 1.1 * a,
+        lambda a: np.roll(a, 40),
+        lambda a: a + 0.3 * np.sin(2.0 * np.pi * np.arange(a.size) / 6000.0),  # hills
+        lambda a: a + np.random.default_rng(1).normal(0.0, 0.1, a.size),
+    ],
+    ids=["true", "bias", "gain", "late", "hills", "noise"],
+)
+def test_a_true_accelerometer_passes(change):
+    assert judged(change) is None
+
+
+def test_the_opposite_sign_is_a_defect():
+    d = judged(lambda a: -a)
+    assert d.correlation < -0.95
+    assert d.gain == pytest.approx(-1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("by", [0.3, 2.0])
+def test_the_wrong_unit_is_a_defect_with_its_size(by):
+    d = judged(lambda a: by * a)
+    assert d.gain == pytest.approx(by, rel=0.1)
+    assert d.correlation > 0.95
+
+
+def test_another_channel_is_a_defect():
+    d = judged(lambda a: np.random.default_rng(2).normal(0.0, 0.5, a.size).cumsum() * 0.02)
+    assert abs(d.correlation) < 0.5
+
+
+def test_a_lag_is_found():
+    d = judged(lambda a: -np.roll(a, 50))
+    assert d.lag_s == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_drive_at_one_speed_tells_nothing():
+    d = prepare(signals(speed=((0.0, 20.0),)), CAR, "a")
+    assert accelerometer_defect(d) is None
+
+
+def test_a_grade_is_no_defect():
+    assert accelerometer_defect(prepare(signals(term("road_grade", grade=0.05)), CAR, "a")) is None

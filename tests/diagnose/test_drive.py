@@ -1,0 +1,132 @@
+"""A log made ready: what is used, what is left out, what stands in; and the short drives of the tests beside this."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import polars as pl
+import pytest
+
+from aqualog.diagnose.drive import prepare
+from aqualog.errors import SignalError
+from aqualog.model.effects import EFFECTS
+from aqualog.model.scenario import Scenario
+from aqualog.model.sensors import IDEAL, Channel
+from aqualog.model.signals import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.term import Model, Term
+from aqualog.notation import WHEELS
+from aqualog.vehicle import Vehicle
+
+CAR = Vehicle(name="test car", given=frozenset({"mass"}))
+# no braking: the car of the log rolls out
+SPEED = ((0.0, 15.0), (8.0, 15.0), (16.0, 24.0), (28.0, 24.0), (40.0, 20.0), (46.0, 24.0), (58.0, 24.0), (66.0, 30.0), (78.0, 30.0), (90.0, 25.0))  # fmt: skip
+NOISY = replace(
+    IDEAL,
+    channels={
+        "a_x": Channel(noise=0.05), "a_y": Channel(noise=0.05), "v_x": Channel(noise=0.03), "yaw_rate": Channel(noise=1e-3),
+        **{f"omega_{w}": Channel(noise=0.05) for w in WHEELS}, **{f"tie_rod_{w}": Channel(noise=20.0) for w in WHEELS[:2]},
+    },
+)  # fmt: skip
+
+
+def term(name, where=None, **values):
+    return Term(EFFECTS[name], values, where)
+
+
+def signals(*terms, sensors=IDEAL, seed=3, drop=(), **kw):
+    """A simulated drive of 90 s with these terms in the car."""
+    scenario = Scenario(CAR, sensors=sensors, seed=seed, **({"speed": SPEED, "duration_s": 90.0} | kw))
+    made = as_signals(simulate(scenario, Model(terms)), truth=False)
+    return changed(made, made.frame.drop(drop))
+
+
+def changed(log, frame):
+    return replace(log, frame=frame)
+
+
+@cache
+def plain():
+    return signals()
+
+
+def test_a_dry_drive_is_used_whole():
+    d = prepare(plain(), CAR, "a")
+    assert d.used_s == d.duration_s == pytest.approx(90.0)
+    assert {"force_balance", "kinematic", "slip_fl", "slip_rr"} <= set(d.channels)
+    assert not d.untorqued
+    assert all(x.shape == d.mask.shape for x in d.coordinates.values())
+
+
+def test_a_long_gap_is_left_out_with_a_second_beside_and_a_short_one_bridged():
+    x = plain().array("a_x").copy()
+    x[3000:3010] = np.nan  # 0.1 s
+    x[6000:6200] = np.nan  # 2 s
+    d = prepare(changed(plain(), plain().frame.with_columns(pl.Series("a_x", x).fill_nan(None))), CAR, "a")
+    assert d.mask[290:310].all()
+    assert not d.mask[591:629].any()
+    assert d.mask[:589].all()
+    assert d.mask[631:].all()
+
+
+def test_standstill_and_creeping_are_left_out():
+    d = prepare(signals(speed=((0.0, 15.0), (20.0, 15.0), (30.0, 2.0), (40.0, 2.0), (50.0, 15.0))), CAR, "a")
+    v = d.coordinates["v_x"]
+    assert not d.mask[v < 4.0].any()
+    assert d.mask[v > 8.0].mean() > 0.9
+
+
+def test_a_frozen_accelerometer_is_left_out_where_it_is_frozen():
+    noisy = signals(sensors=NOISY)
+    x = noisy.array("a_x").copy()
+    x[2000:4000] = x[2000]
+    d = prepare(changed(noisy, noisy.frame.with_columns(pl.Series("a_x", x))), CAR, "a")
+    assert not d.mask[210:390].any()
+    assert d.mask[:180].all()
+
+
+def test_braking_is_left_out_where_the_torque_does_not_hold_it():
+    log = plain()
+    p = np.where(np.arange(log.frame.height) // 100 == 30, 10e5, 0.0)
+    d = prepare(changed(log, log.frame.with_columns(pl.Series("brake_pressure", p))), CAR, "a")
+    assert not d.mask[292:318].any()
+    assert d.mask[:280].all()
+    assert any("braking" in n for n in d.notes)
+
+
+def test_without_torque_the_torque_that_the_model_needs_stands_in():
+    log = changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS]))
+    d = prepare(log, CAR, "a")
+    assert d.untorqued
+    assert "force_balance" not in d.channels
+    needed, driven = d.course.torque.sum(axis=0), sum(plain().array(f"torque_{w}") for w in WHEELS)
+    pulls = driven > 0.0  # what brakes and engine share of the rest is not known
+    assert np.corrcoef(needed[pulls], driven[pulls])[0, 1] > 0.95
+
+
+def test_the_gain_of_the_file_scales_the_torque():
+    a, b = (prepare(plain(), replace(CAR, torque_gain=g), "a").course.torque for g in (1.0, 2.0))
+    np.testing.assert_allclose(b[2:].mean(), 2.0 * a[2:].mean(), rtol=1e-3)
+
+
+def test_water_of_the_log_lies_on_the_course():
+    n = plain().frame.height
+    depth = np.where((np.arange(n) >= 2000) & (np.arange(n) < 3000), 1e-3, 0.0)
+    frame = plain().frame.with_columns(
+        pl.Series("water_depth_left", depth), pl.Series("water_depth_right", 2.0 * depth)
+    )
+    d = prepare(changed(plain(), frame), CAR, "a")
+    (lane,) = d.course.lanes
+    assert (lane.start, lane.end) == (pytest.approx(20.0), pytest.approx(30.0))
+    assert (lane.depth_left, lane.depth_right) == (pytest.approx(1e-3), pytest.approx(2e-3))
+    assert d.coordinates["water_depth"].max() == pytest.approx(1.5e-3)
+
+
+def test_too_little_is_said():
+    with pytest.raises(SignalError, match="10 s of drive"):
+        prepare(changed(plain(), plain().frame.head(1000)), CAR, "a")
+    bare = changed(
+        plain(), plain().frame.select("t", "v_x") if "t" in plain().frame.columns else plain().frame.select("v_x")
+    )
+    with pytest.raises(SignalError, match="nothing to compare"):
+        prepare(bare, CAR, "a")

@@ -1,0 +1,92 @@
+"""The road's profile: found where there are hills, silent where sensors wander or something else is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
+
+from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.grade import find_profile, with_profile
+from aqualog.diagnose.hypotheses import residual
+from aqualog.model.term import Model
+
+HILLY = Spec("hilly", "gusts", (), 8, "compact_fwd", holdout=0)
+
+
+def looked(spec, model=Model()):  # noqa: B008 - frozen
+    drive = prepare(make_case(spec).drives[0][1], CARS[spec.vehicle], "d")
+    return drive, residual(drive, model)
+
+
+@pytest.fixture(scope="module")
+def hilly():
+    drive, r = looked(HILLY)
+    return drive, r, find_profile(drive, r)
+
+
+def test_profile_is_that_of_the_road(hilly):
+    _, _, found = hilly
+    _, road = clean_rows(HILLY, world_of(HILLY))
+    at = found.known
+    truth = np.interp(found.s, np.arange(len(road.grid)) * road.ds, road.grid[:, 1])[at]
+    off = found.theta[at] - truth
+    assert np.corrcoef(found.theta[at], truth)[0, 1] > 0.98
+    assert np.std(off) < 0.003
+    assert found.rms.low < np.std(truth) < found.rms.high
+    assert found.mean.low < truth.mean() < found.mean.high
+    assert found.lap_m is None
+
+
+def test_cause_names_the_grade(hilly):
+    _, _, found = hilly
+    cause = found.cause
+    assert (cause.effect, cause.explains) == ("road_grade", ("kinematic",))
+    assert cause.parameters["grade_rms"].unit == "rad"
+    assert f"{found.rms.value:.1%} rms" in cause.sentence
+
+
+def test_with_it_in_the_model_the_residual_falls(hilly):
+    drive, before, found = hilly
+    after = residual(drive, with_profile(Model(), found))
+    kinematic, force = (drive.channels.index(c) for c in ("kinematic", "force_balance"))
+    assert after[kinematic, drive.mask].std() < 0.7 * before[kinematic, drive.mask].std()
+    assert after[force, drive.mask].std() < 1.1 * before[force, drive.mask].std()
+    assert find_profile(drive, after) is None
+
+
+def test_two_profiles_are_one_term(hilly):
+    drive, _, found = hilly
+    model = with_profile(with_profile(Model(), found), replace(found, theta=-found.theta))
+    assert len(model.terms) == 1
+    assert all(abs(value) < 1e-12 for _, value in model.terms[0].knots)
+    assert drive.name == found.drive
+
+
+@pytest.mark.parametrize("noise", ["ou5", "pink", "gusts"])
+def test_flat_road_with_slow_noise_is_silent(noise):
+    drive, r = looked(Spec("mixed", noise, (), 3, holdout=0))
+    assert find_profile(drive, r) is None
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        Hidden("payload_mass", None, {"delta_mass": 250.0}), Hidden("accelerometer_gain", "a_x", {"gain": 1.06}),
+        Hidden("drag_patch", None, {"force": 400.0, "start": 500.0, "length": 600.0, "period": 0.0}),
+    ],
+)  # fmt: skip
+def test_other_causes_are_no_road(hidden):
+    drive, r = looked(Spec("mixed", "ou1", (hidden,), 5, holdout=0))
+    assert find_profile(drive, r) is None
+
+
+def test_without_torque_a_wandering_accelerometer_is_no_road(hilly):
+    drive, before, _ = hilly
+    kinematic = drive.channels.index("kinematic")
+    alone = replace(drive, channels=("kinematic",), untorqued=True)
+    rng = np.random.default_rng(4)
+    wander = np.convolve(rng.standard_normal(before.shape[1] + 200), np.hanning(201), "valid")
+    assert find_profile(alone, 0.1 * (wander / wander.std())[None, : before.shape[1]]) is None
+    found = find_profile(alone, before[kinematic][None])
+    assert found is None or "cannot be told apart" in found.cause.sentence

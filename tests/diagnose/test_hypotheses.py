@@ -1,0 +1,106 @@
+"""What a log is asked about, and what a unit of each would do: differences of simulations."""
+
+import numpy as np
+import pytest
+from test_drive import CAR, changed, plain, term
+
+from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
+from aqualog.diagnose.tolerances import TOLERANCES
+from aqualog.model.effects import EFFECTS
+from aqualog.model.follow import setup_along
+from aqualog.model.term import Model
+from aqualog.notation import WHEELS
+
+
+def one(name, where=None, **fixed):
+    return Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,), fixed)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return prepare(plain(), CAR, "a")
+
+
+@pytest.fixture(scope="module")
+def base(drive):
+    return residual(drive, Model())
+
+
+def test_every_effect_is_asked_about_or_its_absence_has_a_reason(drive):
+    asked, untested = hypotheses([drive], Model())
+    named = {h.effect.name for h in asked if not h.allowed}
+    assert named | set(untested) == set(EFFECTS)
+    assert not named & set(untested)
+    assert "no water depth in the log" in untested["contact_loss"]
+    assert {h.effect.name for h in asked if h.allowed} == {t.name for t in TOLERANCES}
+
+
+def test_what_has_no_signal_is_not_asked_about():
+    d = prepare(changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS])), CAR, "a")
+    asked, _ = hypotheses([d], Model())
+    keys = {h.key for h in asked}
+    assert "signal_delay@torque" not in keys
+    assert "signal_delay@v_x" in keys
+
+
+@pytest.mark.parametrize(
+    ("h", "size"),
+    [
+        (one("payload_mass"), 50.0), (one("road_grade"), 0.01), (one("tyre_radius", "fl"), 0.003),
+        (one("slip_stiffness", "r"), 0.1), (one("accelerometer_bias", "a_x"), 0.1), (one("aero_drag"), 0.05),
+    ],
+    ids=lambda x: x.key if isinstance(x, Hypothesis) else "",
+)  # fmt: skip
+def test_a_signature_is_what_the_effect_takes_away(drive, base, h, size):
+    (s,) = signatures(drive, Model(), [h], base=base, each=True)
+    name = h.free[0]
+    with_it = residual(drive, with_values(Model(), [(h, {name: h.parameter(name).neutral + size})]))
+    taken = base - with_it
+    assert np.linalg.norm(taken - size * s[0]) < 0.1 * np.linalg.norm(taken)
+
+
+@pytest.mark.parametrize("where", ["f", None])
+def test_an_axle_is_the_sum_of_its_wheels(drive, base, where):
+    parts = [one("tyre_radius", w) for w in WHEELS]
+    asked = [*parts, one("tyre_radius", where)]
+    summed = signatures(drive, Model(), asked, base=base)[-1]
+    own = signatures(drive, Model(), asked[-1:], base=base, each=True)[0]
+    i = [drive.channels.index(f"slip_{w}") for w in WHEELS]
+    np.testing.assert_allclose(summed[0, i], own[0, i], atol=0.02 * np.abs(own[0, i]).max())
+
+
+def test_values_are_put_into_the_model_and_found_there():
+    h, other = one("payload_mass", "r"), one("tyre_radius", "fl")
+    m = with_values(
+        Model((term("payload_mass", "r", delta_mass=100.0),)), [(h, {"delta_mass": 150.0}), (other, {"delta": 0.01})]
+    )
+    assert (value_in(m, h, "delta_mass"), value_in(m, other, "delta")) == (150.0, 0.01)
+    assert value_in(m, one("payload_mass"), "delta_mass") == 0.0
+    assert len(m.terms) == 2
+
+
+def test_the_step_goes_where_there_is_room():
+    for effect in EFFECTS.values():
+        h = Hypothesis(effect, None, (effect.parameters[0].name,))
+        p = h.parameter(h.free[0])
+        assert p.low <= p.neutral + h.step(h.free[0]) <= p.high, effect.name
+
+
+def test_tolerances_are_neutral_at_zero_and_change_something_else(drive):
+    base = setup_along(CAR, drive.course, Model())
+    for effect in TOLERANCES:
+        zero = effect.apply(base, {"by": 0.0}, None)
+        some = effect.apply(base, {"by": effect.parameters[0].sigma}, None)
+
+        def flat(setup):
+            return [np.asarray(x, dtype=float) for x in setup.plant if not isinstance(x, str)]
+
+        assert all(np.array_equal(a, b) for a, b in zip(flat(zero), flat(base), strict=True)), effect.name
+        moved = any(not np.array_equal(a, b) for a, b in zip(flat(some), flat(base), strict=True))
+        assert moved or some.sensors.channels != base.sensors.channels, effect.name
+
+
+def test_events_are_not_tolerated_and_all_else_is():
+    assert one("trailer").tolerance("mass") == 0.0
+    assert one("payload_mass").tolerance("delta_mass") == pytest.approx(20.0 / 3.0)

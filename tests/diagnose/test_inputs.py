@@ -1,0 +1,59 @@
+"""Inputs without noise: what is motion stays, what is a sensor's goes, nothing is delayed."""
+
+import numpy as np
+import pytest
+
+from aqualog.diagnose.inputs import quiet, quiet_torque, smooth
+
+DT = 0.01
+T = np.arange(9000) * DT
+MOTION = 200.0 + 150.0 * np.sin(2.0 * np.pi * 0.05 * T) + 60.0 * np.sin(2.0 * np.pi * 0.3 * T)
+RNG = np.random.default_rng(1)
+
+
+def test_noise_goes_and_motion_stays_without_delay():
+    noisy = MOTION + 20.0 * RNG.standard_normal(T.size)
+    out = quiet(noisy, DT)
+    inside = slice(200, -200)
+    assert (out - MOTION)[inside].std() < 0.25 * 20.0
+    lags = range(-20, 21)
+    best = max(lags, key=lambda k: np.corrcoef(np.roll(out, -k)[inside], MOTION[inside])[0, 1])
+    assert abs(best) <= 1
+
+
+def test_a_signal_without_noise_stays():
+    np.testing.assert_allclose(quiet(MOTION, DT), MOTION, atol=1.0)
+
+
+def test_a_slow_signal_stays_as_it_is():
+    slow = MOTION[::20]
+    assert quiet(slow, 0.2) is slow
+
+
+@pytest.mark.parametrize("over", [0.5, 1.0])
+def test_smoothing_keeps_lines_and_means_and_has_no_delay(over):
+    line = 3.0 + 0.1 * T
+    k = round(over / DT)
+    np.testing.assert_allclose(smooth(line, DT, over)[k:-k], line[k:-k], rtol=1e-12)
+    pulse = np.zeros(501)
+    pulse[250] = 1.0
+    out = smooth(pulse, DT, over)
+    assert out.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(out, out[::-1], atol=1e-15)
+    assert smooth(line, 1.0, over) is line
+
+
+def test_left_and_right_get_the_mean_of_their_axle():
+    torque = np.array([np.zeros(T.size), np.zeros(T.size), MOTION, MOTION]) + 5.0 * RNG.standard_normal((4, T.size))
+    out = quiet_torque(torque, DT)
+    assert np.array_equal(out[2], out[3])
+    assert np.ptp(out[0]) == 0.0
+    assert out[2].mean() == pytest.approx(MOTION.mean(), abs=2.0)
+
+
+def test_a_real_difference_of_left_and_right_stays():
+    apart = 80.0 * np.sin(2.0 * np.pi * 0.1 * T)
+    torque = np.array([0.0 * T, 0.0 * T, MOTION + apart, MOTION - apart]) + 3.0 * RNG.standard_normal((4, T.size))
+    out = quiet_torque(torque, DT)
+    half = 0.5 * (out[2] - out[3])
+    assert (half - apart)[200:-200].std() < 4.0

@@ -1,0 +1,154 @@
+"""The simulation led along a drive: it gives the drive back, and what sensors did to its inputs is undone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aqualog.model import kernel
+from aqualog.model.effects import EFFECTS
+from aqualog.model.follow import Course, follow
+from aqualog.model.road import build_road
+from aqualog.model.scenario import Scenario
+from aqualog.model.sensors import IDEAL
+from aqualog.model.simulate import assemble, simulate
+from aqualog.model.start import rolling_state
+from aqualog.model.term import Model, Term
+from aqualog.notation import WHEELS
+from aqualog.vehicle import Vehicle
+
+CAR = Vehicle(name="test car")
+SPEED = ((0.0, 18.0), (5.0, 18.0), (15.0, 26.0), (25.0, 26.0), (45.0, 20.0), (60.0, 28.0))
+INSIDE = slice(300, -100)  # the first steps settle
+
+
+def drive(*terms, **kw):
+    scenario = Scenario(CAR, speed=SPEED, duration_s=60.0, sensors=IDEAL, **kw)
+    made = simulate(scenario, Model(terms))
+    columns = next(m for m in made.measured if m.name == "signals")
+    return columns.t, columns.columns
+
+
+def course(t, c, v=None):
+    return Course(t, np.array([c[f"torque_{w}"] for w in WHEELS]), c["steer_angle"], c["v_x"] if v is None else v)
+
+
+def term(name, where=None, **values):
+    return Term(EFFECTS[name], values, where)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return drive()
+
+
+def test_a_drive_is_given_back_in_all_channels(made):
+    t, c = made
+    shown = follow(CAR, course(t, c), Model())
+    for name, atol in (("v_x", 0.01), ("a_x", 0.02), ("a_y", 1e-6), ("yaw_rate", 1e-6)):
+        np.testing.assert_allclose(shown[name][INSIDE], c[name][INSIDE], atol=atol, err_msg=name)
+    for w in WHEELS:
+        np.testing.assert_allclose(shown[f"omega_{w}"][INSIDE], c[f"omega_{w}"][INSIDE], atol=0.04)
+        # between samples of 10 ms the led torque is a straight line
+        np.testing.assert_allclose(shown[f"torque_{w}"][INSIDE], c[f"torque_{w}"][INSIDE], atol=1.0)
+    assert np.abs(shown["nudge"][INSIDE]).max() < 0.005
+
+
+def test_running_free_the_speed_stays_with_the_measured_one(made):
+    t, c = made
+    shown = follow(CAR, course(t, c), Model(), rate=0.0)
+    assert np.all(shown["nudge"] == 0.0)
+    assert np.abs(shown["v_x"] - c["v_x"]).max() < 0.15
+
+
+def test_a_wrong_mass_runs_away_free_and_is_drawn_back_nudged(made):
+    t, c = made
+    heavy = Model((term("payload_mass", delta_mass=300.0),))
+    free, led = (np.abs(follow(CAR, course(t, c), heavy, rate=r)["v_x"] - c["v_x"]).max() for r in (0.0, 0.3))
+    assert free > 1.0
+    assert led < 0.4 * free
+
+
+def test_the_nudge_is_rate_times_what_is_missing(made):
+    t, c = made
+    shown = follow(CAR, course(t, c, c["v_x"] + 1.0), Model(), rate=0.2)
+    np.testing.assert_allclose(shown["nudge"], 0.2 * (c["v_x"] + 1.0 - shown["v_x"]), atol=5e-3)
+
+
+@pytest.mark.parametrize("delay", [0.2, -0.1])
+def test_a_torque_that_is_reported_late_is_applied_earlier(made, delay):
+    t, c = made
+    late = {n: np.interp(t - delay, t, x) if n.startswith("torque") else x for n, x in c.items()}
+    knows, not_ = (
+        follow(CAR, course(t, late), m)["a_x"] - c["a_x"]
+        for m in (Model((term("signal_delay", "torque", delay=delay),)), Model())
+    )
+    inside = slice(300, -300)
+    assert knows[inside].std() < 0.1 * not_[inside].std()
+
+
+def test_a_torque_that_arrives_in_part_is_undone(made):
+    t, _ = made
+    _, c = drive(term("torque_gain", gain=0.9))
+    right = follow(CAR, course(t, c), Model((term("torque_gain", gain=0.9),)))
+    wrong = follow(CAR, course(t, c), Model())
+    assert np.abs(right["a_x"] - c["a_x"])[INSIDE].max() < 0.02
+    assert np.abs(wrong["a_x"] - c["a_x"])[INSIDE].max() > 0.05
+    # what the sensor shows is what was reported, whatever reaches the wheel
+    np.testing.assert_allclose(right["torque_rl"][INSIDE], c["torque_rl"][INSIDE], atol=1.0)
+
+
+def test_terms_of_the_sensors_show_in_their_own_column_alone(made):
+    t, c = made
+    base = follow(CAR, course(t, c), Model())
+    off = follow(CAR, course(t, c), Model((term("accelerometer_bias", "a_x", bias=0.3),)))
+    np.testing.assert_allclose(off["a_x"] - base["a_x"], 0.3, atol=1e-12)
+    assert all(np.array_equal(off[n], x) for n, x in base.items() if n != "a_x")
+
+
+def test_torque_applied_to_one_wheel_turns_that_wheel(made):
+    t, c = made
+    at = course(t, c)
+    more = at.torque.copy()
+    more[2] += 100.0
+    a, b = follow(CAR, at, Model()), follow(CAR, replace(at, torque=more), Model())
+    np.testing.assert_allclose((b["torque_rl"] - a["torque_rl"])[INSIDE], 100.0, atol=1e-6)
+    np.testing.assert_allclose((b["torque_rr"] - a["torque_rr"])[INSIDE], 0.0, atol=1e-6)
+    assert np.median(b["omega_rl"] - b["omega_rr"]) > 0.01
+
+
+def kernel_rows(applied=None, follow_rate=0.0, torque=0.0):
+    setup = assemble(Scenario(CAR, sensors=IDEAL))
+    n = 2000
+    zero = np.zeros(n + 1)
+    controls = kernel.Controls(
+        v_target=zero + 20.0, a_target=zero, drive=zero + torque, brake=zero, split_rear=zero + 1.0, steer=zero, exc=zero,
+        grade=zero, wind=zero, gain=zero + 1.0, has_driver=False, keeps_lane=False, exc_kind=0, exc_amplitude=0.0,
+        scatter=0.0, follow=follow_rate,
+    )  # fmt: skip
+    start = rolling_state(setup.plant, v=20.0, a=0.0, drive=torque, split_rear=1.0)
+    start[kernel.DRIVE] = torque
+    road = build_road(setup.scenario, 200.0)
+    args = () if applied is None else (np.ascontiguousarray(applied),)
+    return kernel.run(n, 1e-3, 10, start, setup.plant, road, controls, *args)
+
+
+def test_no_applied_torque_leaves_every_bit():
+    bare = kernel_rows()
+    assert np.array_equal(bare, kernel_rows(np.zeros((1, 4))))
+    assert np.array_equal(bare, kernel_rows(np.zeros((2001, 4))))
+    assert np.all(bare[:, kernel.COLUMNS["nudge"]] == 0.0)
+
+
+def test_one_row_of_torque_holds_for_the_whole_drive():
+    one = np.array([[0.0, 0.0, 80.0, 60.0]])
+    assert np.array_equal(kernel_rows(one), kernel_rows(np.repeat(one, 2001, axis=0)))
+    rows = kernel_rows(one)
+    assert rows[-1, kernel.COLUMNS["v_x"]] > kernel_rows()[-1, kernel.COLUMNS["v_x"]] + 0.05
+
+
+def test_a_driven_simulation_knows_no_nudge():
+    a = simulate(Scenario(CAR, duration_s=3.0, sensors=IDEAL))
+    b = simulate(Scenario(CAR, duration_s=3.0, sensors=IDEAL))
+    assert all(np.array_equal(a.truth.columns[n], b.truth.columns[n], equal_nan=True) for n in a.truth.columns)
+    assert "nudge" not in a.truth.columns

@@ -1,0 +1,141 @@
+"""Diagnosis of measured drives: what is there is named, what cannot be judged is said to be so."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from aqualog.align.load import load_signals
+from aqualog.calibrate.apply import calibrated
+from aqualog.calibrate.run import calibrate
+from aqualog.cli.main import app
+from aqualog.config.signal_map import load_signal_map
+from aqualog.config.vehicle import load_vehicle
+from aqualog.diagnose.defects import accelerometer_defect
+from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.grade import find_profile, with_profile
+from aqualog.diagnose.hypotheses import residual
+from aqualog.model.term import Model
+
+HERE = Path(__file__).parent
+OTHER_TRIPS = ("A05", "A10", "A11", "A15", "A17", "B26")
+pytestmark = pytest.mark.real
+
+
+def command(*args):
+    result = CliRunner().invoke(app, ["diagnose", *map(str, args)])
+    return result.exit_code, result.stdout, [s for s in result.stderr.splitlines() if s.startswith("error:")]
+
+
+def toyota(real_logs, signal_map, *more):
+    folder = real_logs / "toyota_rav4"
+    return command(
+        folder / "can_bus.mf4", "--dbc", folder / "toyota_2017.dbc", "--vehicle", HERE / "toyota.toml", "--signals",
+        HERE / signal_map, "--json", *more,
+    )  # fmt: skip
+
+
+def test_toyota_wrong_acceleration_channel_is_exposed(real_logs):
+    _, out, _ = toyota(real_logs, "diagnose_toyota_wrong_map.toml")
+    document = json.loads(out)
+    assert document["verdict"] == "not_testable"
+    assert "KINEMATICS.ACCEL_X" in document["sentence"]
+    assert "-0.9" in document["sentence"]
+
+
+def prepared(name, paths, car, signal_map, dbc=()):
+    signals = load_signals(paths, vehicle=car, signal_map=load_signal_map(HERE / signal_map), dbc=dbc)
+    drive = prepare(signals, car, name)
+    return drive, residual(drive, Model())
+
+
+def test_toyota_right_channel_passes(real_logs):
+    folder = real_logs / "toyota_rav4"
+    drive, r = prepared(
+        "toyota", [folder / "can_bus.mf4"], load_vehicle(HERE / "toyota.toml"), "toyota_map.toml",
+        [folder / "toyota_2017.dbc"],
+    )  # fmt: skip
+    assert accelerometer_defect(drive) is None
+    assert drive.untorqued
+    assert find_profile(drive, r) is None
+
+
+@pytest.mark.parametrize("name", ["00000001-60FE3F04.MF4", "00000002-60FE415D.MF4"])
+def test_canedge_is_refused_with_what_is_missing(real_logs, name):
+    folder = real_logs / "canedge"
+    code, out, errors = command(folder / name, "--dbc", folder / "canmod-gps.dbc", "--vehicle", HERE / "toyota.toml")
+    assert code == 4
+    assert out == ""
+    assert len(errors) == 1
+    assert "omega_fl" in errors[0]
+
+
+@pytest.fixture(scope="module")
+def bmw(real_logs):
+    """The car as six other trips show it."""
+    car = load_vehicle(HERE / "diagnose_bmw_i3.toml")
+    trips = [
+        load_signals(
+            [real_logs / "bmw_i3" / f"Trip{t}.csv"], vehicle=car,
+            signal_map=load_signal_map(HERE / "diagnose_bmw_i3_map.toml"),
+        )
+        for t in OTHER_TRIPS
+    ]  # fmt: skip
+    return calibrated(car, calibrate(trips, OTHER_TRIPS, car, {"mass": 1375.0}).parameters)
+
+
+def looked(real_logs, car, trip):
+    drive, r = prepared(trip, [real_logs / "bmw_i3" / f"Trip{trip}.csv"], car, "diagnose_bmw_i3_map.toml")
+    return drive, r, find_profile(drive, r)
+
+
+def smooth(x, over):
+    window = np.hanning(2 * over + 1)[1:-1]
+    return np.convolve(np.pad(x, over - 1, mode="edge"), window / window.sum(), "valid")
+
+
+def elevation_over_way(real_logs, trip, drive, s):
+    lines = (real_logs / "bmw_i3" / f"Trip{trip}.csv").read_text(encoding="latin1").splitlines()[1:]
+    rows = np.array([[float(x or "nan") for x in line.split(";")[:3]] for line in lines])
+    height = np.interp(drive.coordinates["t"], rows[:, 0] - rows[0, 0], rows[:, 2])
+    return np.interp(s, drive.coordinates["position"], height)
+
+
+def test_hilly_trip_shows_its_road_and_the_withheld_elevation_agrees(real_logs, bmw):
+    drive, r, found = looked(real_logs, bmw, "A12")
+    assert found.cause.effect == "road_grade"
+    assert 0.015 < found.rms.low < found.rms.high < 0.025
+    assert found.shared > 0.95  # accelerometer and torque show the same road
+    height = elevation_over_way(real_logs, "A12", drive, found.s)
+    own = np.cumsum(found.theta) * float(found.s[1] - found.s[0])
+    flat = [x - np.polyval(np.polyfit(found.s, x, 1), found.s) for x in (own, height)]
+    assert np.corrcoef(*flat)[0, 1] > 0.85
+    slopes = [smooth(x, 24)[found.known] for x in (found.theta, np.gradient(height, found.s))]
+    assert np.corrcoef(*slopes)[0, 1] > 0.7  # over 600 m: the elevation comes in steps of a metre
+    assert 0.8 < np.polyfit(slopes[1], slopes[0], 1)[0] < 1.2
+    after = residual(drive, with_profile(Model(), found))
+    kinematic = drive.channels.index("kinematic")
+    assert after[kinematic, drive.mask].std() < 0.9 * r[kinematic, drive.mask].std()
+
+
+def test_road_of_the_loaded_trip_is_flatter(real_logs, bmw):
+    _, _, found = looked(real_logs, bmw, "B24")
+    assert 0.005 < found.rms.low < found.rms.high < 0.011
+
+
+@pytest.mark.xfail(
+    strict=True, reason="without torque in the log the brakes act on the driven axle, and the simulated car spins"
+)
+def test_porsche_offset_and_laps(real_logs):
+    drive, r = prepared(
+        "porsche", sorted((real_logs / "porsche_981").glob("*.csv")), load_vehicle(HERE / "porsche.toml"),
+        "diagnose_porsche_map.toml",
+    )  # fmt: skip
+    kinematic = r[drive.channels.index("kinematic"), drive.mask]
+    assert kinematic.std() < 1.0
+    assert np.median(kinematic) == pytest.approx(-1.6, abs=0.2)
+    found = find_profile(drive, r)
+    assert found.lap_m == pytest.approx(5450.0, abs=75.0)  # Watkins Glen with the boot
+    assert 0.02 < found.rms.value < 0.04
