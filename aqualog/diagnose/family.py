@@ -133,7 +133,7 @@ def calibrate(
 
 def gumbel_p(maxima: FloatArray, x: float) -> float:
     """Share of null maxima beyond x, by a Gumbel distribution of their mean and spread; never below theirs counted."""
-    beta = float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi
+    beta = max(float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi, 1e-9)
     mu = float(maxima.mean()) - EULER * beta
     tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
     counted = float((maxima >= x).mean())

@@ -29,8 +29,8 @@ class Refit:
     """A set at its best values.
 
     `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
-    tolerances, with the prior; `residuals` (C, n) and `signatures` (k, C, n) per drive at these values; `at_bound` if a
-    value sits at its physical bound.
+    tolerances, and what values beyond three times their usual size cost; `residuals` (C, n) and `signatures` (k, C, n)
+    per drive at these values; `at_bound` if a value sits at its physical bound.
     """
 
     members: tuple[Hypothesis, ...]
@@ -130,7 +130,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
                 break
         if won > 0.0:
             # as good as the signature promised: it still holds here
-            fresh = fresh and abs(won - promised) < HOLDS * promised
+            fresh = fresh and shrink == 1.0 and abs(won - promised) < HOLDS * promised
         elif fresh:
             break
         if not fresh:
@@ -140,6 +140,8 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
     J = _rows(bench, slopes, noises)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0))
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
+    # within three times its usual size no value is less likely than another when sets are compared
+    loss -= float(np.minimum(((values - base) / width) ** 2, 1.0).sum())
     return Refit(members, names, values, np.asarray(covariance), loss, extended, tuple(residuals), slopes, at_bound)
 
 

@@ -15,7 +15,7 @@ from aqualog.types import FloatArray
 __all__ = ["PRIOR_WIDTH", "SetFit", "best_sets", "compatible", "fit_set", "gains_on_top"]
 
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
-SINGULAR = 1e-4  # share of a column's energy that the others of its set must leave
+SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 CANDIDATES = 40  # hypotheses that sets of three and more are made of
 
 
@@ -36,7 +36,8 @@ def fit_set(bench: Bench, gram: FloatArray, members: Sequence[int]) -> SetFit | 
     G, b = gram[np.ix_(c, c)], gram[c, -1]
     scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
     unit = G / np.outer(scale, scale)
-    if len(c) > 1 and 1.0 / np.max(np.diag(np.linalg.pinv(unit, hermitian=True))) < SINGULAR:
+    # a ridge keeps the direction in which exact twins cancel, which a pseudoinverse would leave out
+    if len(c) > 1 and 1.0 / np.max(np.diag(np.linalg.inv(unit + 1e-9 * np.eye(len(c))))) < SINGULAR:
         return None
     P = np.diag(1.0 / (PRIOR_WIDTH * bench.prior[c]) ** 2)
     theta: FloatArray = np.linalg.solve(G + P, b).astype(np.float64)

@@ -134,3 +134,14 @@ def test_a_cause_explains_the_channels_that_it_takes_away():
         False,
     )
     assert told(Candidate(only, 1.0, 1.0)).causes[0].explains == ("axle_slip",)
+
+
+@pytest.mark.xfail(strict=True, reason="members of no size make a certain cause look undecided")
+def test_members_too_small_to_name_do_not_make_alternatives():
+    o = told(
+        candidate(payload_mass=200.0, road_grade=1e-4),
+        candidate(2.0, payload_mass=200.0, tyre_radius_fl=1e-5),
+        candidate(2.1, payload_mass=200.0, accelerometer_bias_a_x=1e-3),
+    )
+    assert o.verdict == "named"
+    assert names(o) == ["payload_mass"]

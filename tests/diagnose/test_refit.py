@@ -70,7 +70,6 @@ def test_the_simulator_corrects_what_the_linear_start_got_wrong():
     assert r.loss < float(measure.inner(y, y)[0, 0])
 
 
-@pytest.mark.xfail(strict=True, reason="a stale signature is taken for fresh after a shortened step: stops at 0.76")
 def test_a_linear_start_that_is_far_off_is_corrected_too():
     # slip goes with one over the slope: the linear value is 0.26
     h = one("slip_stiffness", "rl")

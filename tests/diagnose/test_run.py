@@ -81,7 +81,7 @@ def test_compound():
 def test_cannot_tell(monkeypatch):
     # at one speed, wind and drag area are one force
     ask(monkeypatch, ("aero_drag", "head_wind", "tyre_radius@fl"))
-    d = told(log=noisy(term("head_wind", speed=6.0), speed=((0.0, 25.0),)))
+    d = told(log=noisy(term("head_wind", speed=3.0), speed=((0.0, 25.0),)))
     assert d.verdict == "cannot_tell"
     assert keys(d) == {"aero_drag", "head_wind"}
     assert d.alternatives[0].evidence_ratio < 20.0
@@ -176,9 +176,9 @@ def test_two_runs_are_equal_and_another_seed_draws_anew():
     hidden = term("payload_mass", delta_mass=250.0)
     a, b = told(hidden), told(hidden)
     assert same(a, b)
-    c = told(hidden, options=replace(QUICK, seed=2))
-    assert c.significance.threshold != a.significance.threshold
-    assert keys(c) == keys(a)
+    quiet, other = (told(options=replace(QUICK, seed=s)) for s in (1, 2))
+    assert other.significance.threshold != quiet.significance.threshold
+    assert other.verdict == quiet.verdict == "no_effect"
 
 
 def test_progress_is_told_and_rises():

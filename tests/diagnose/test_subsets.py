@@ -134,7 +134,6 @@ def test_a_value_outside_its_bounds_is_no_fit():
     assert all("road_grade" not in keys(b, f.members) for f in best_sets(b, gram(b), 2, within=1e9, most=50))
 
 
-@pytest.mark.xfail(strict=True, reason="the pseudoinverse leaves out the direction in which exact twins cancel")
 def test_members_that_are_exactly_the_same_cannot_be_fitted_together():
     s = waves(1500, 12)
     s[1] = 3.0 * s[0]
