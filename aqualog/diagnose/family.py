@@ -18,7 +18,7 @@ from aqualog.diagnose.noise import Noise, surrogate, white_noise
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 from aqualog.types import FloatArray
 
-__all__ = ["Calibration", "calibrate", "gumbel_p", "largest"]
+__all__ = ["Calibration", "calibrate", "chance", "gumbel_p", "largest"]
 
 FEW = 2  # hypotheses after which the noise is tried
 ALIKE = 0.97  # cosine of whitened signatures that surrogates need not tell apart
@@ -33,6 +33,7 @@ class Calibration(NamedTuple):
     maxima: FloatArray
     threshold: float
     achieved: float
+    tested: int
 
 
 def largest(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
@@ -108,7 +109,9 @@ def calibrate(
     leaders = sorted({g for g in groups.tolist() if not bench.asked[g].allowed})
     allowed = [i for i, h in enumerate(bench.asked) if h.allowed]
     if surrogates == 0:
-        return Calibration(np.full(H, PLAIN_INFLATION), np.zeros(0), _bonferroni(level, len(leaders)), level)
+        return Calibration(
+            np.full(H, PLAIN_INFLATION), np.zeros(0), _bonferroni(level, len(leaders)), level, len(leaders)
+        )
     wanted = sorted({*leaders, *base, *allowed})
     small = _restricted(bench, wanted)
     at = {m: i for i, m in enumerate(wanted)}
@@ -124,11 +127,12 @@ def calibrate(
         drawn = np.array(list(pool.map(one, range(surrogates))))
     mean = np.ones(H)
     for i, m in enumerate(wanted):
-        mean[m] = max(float(drawn[:, i].mean()) / sizes[m], 0.5)
+        mean[m] = max(float(drawn[:, i].mean()) / sizes[m], 1.0)
     inflation = mean[groups]
     maxima = (drawn / inflation[wanted] / sizes[wanted]).max(axis=1)
-    threshold = _gumbel_quantile(maxima, level)
-    return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()))
+    # where tolerances are larger than the noise, noise alone gives next to nothing; the car's own deviations do
+    threshold = max(_gumbel_quantile(maxima, level), _bonferroni(level, len(leaders)))
+    return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
 def gumbel_p(maxima: FloatArray, x: float) -> float:
@@ -138,6 +142,11 @@ def gumbel_p(maxima: FloatArray, x: float) -> float:
     tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
     counted = float((maxima >= x).mean())
     return max(tail, counted)
+
+
+def chance(x: float, count: int) -> float:
+    """Bound of the share of nulls whose largest of `count` gains, each of one degree of freedom, is beyond x."""
+    return min(1.0, count * math.erfc(math.sqrt(0.5 * max(x, 0.0))))
 
 
 def _gumbel_quantile(maxima: FloatArray, level: float) -> float:

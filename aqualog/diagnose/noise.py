@@ -218,7 +218,7 @@ def whitened(x: Spectra, noise: Noise) -> FloatArray:
         z = (noise.rotation @ x.transform[i]) * filters
         e = np.fft.irfft(z, x.size)[:, MEMORY : MEMORY + x.n]
         out[i] = noise.shaping @ (e * noise.weights)
-    return out.reshape(k, -1)
+    return out.reshape(k, out.shape[1] * x.n)
 
 
 def surrogate(residual: FloatArray, mask: BoolArray, rng: np.random.Generator) -> FloatArray:

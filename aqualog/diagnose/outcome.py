@@ -16,7 +16,7 @@ from aqualog.diagnose.search import CREDIBLE, Candidate
 from aqualog.diagnose.words import cause_sentence
 from aqualog.model.term import Model
 
-__all__ = ["Outcome", "causes_of", "conclude"]
+__all__ = ["Outcome", "causes_of", "conclude", "one_per_name"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 BEYOND_DOUBT = 1e-5  # p-value of a test that no effect and no function bears out, to be told as a finding
@@ -45,7 +45,7 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     if not candidates:
         return Outcome("unexplained" if p_value < BEYOND_DOUBT else "no_effect", (), (), None, ())
     credible = [c for c in candidates if c.evidence_ratio < CREDIBLE]
-    credible = _one_per_name(credible)
+    credible = one_per_name(credible)
     best = credible[0]
     own = causes_of(bench, best, model)
     worth = [_worth_naming(best, i, model) for i in range(len(best.refit.members))]
@@ -55,10 +55,14 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     if not any(worth):
         return Outcome("no_effect", (), (), None, small)
     named = tuple(c for c, w in zip(own, worth, strict=True) if w)
-    others = tuple(Alternative(causes_of(bench, c, model), c.evidence_ratio) for c in credible[1:])
+    others = tuple(
+        Alternative(large, c.evidence_ratio)
+        for c in credible[1:]
+        if (large := _large(bench, c, model)) and {x.effect for x in large} != {x.effect for x in named}
+    )
     if not others:
         return Outcome("named" if len(named) == 1 else "compound", named, (), best.refit, small)
-    every = [own, *(a.causes for a in others)]
+    every = [named, *(a.causes for a in others)]
     certain = set.intersection(*({c.effect for c in s} for s in every))
     union: dict[str, Cause] = {}
     for s in every:
@@ -70,7 +74,7 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     return Outcome("cannot_tell", shown, others, best.refit, small)
 
 
-def _one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
+def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
     """One candidate for each set of effects: the one at the whole car if there is one, else the best."""
     out: dict[tuple[str, ...], Candidate] = {}
     for c in credible:
@@ -85,6 +89,12 @@ def _one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
 
 def _whole(c: Candidate) -> int:
     return sum(h.where is None for h in c.refit.members)
+
+
+def _large(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
+    """The causes of a set that are worth naming."""
+    causes = causes_of(bench, candidate, model)
+    return tuple(c for i, c in enumerate(causes) if _worth_naming(candidate, i, model))
 
 
 def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:

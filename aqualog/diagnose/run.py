@@ -19,7 +19,7 @@ from aqualog.diagnose.heldout import measured_gain
 from aqualog.diagnose.hypotheses import hypotheses, residual
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
-from aqualog.diagnose.outcome import Outcome, conclude
+from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
 from aqualog.diagnose.records import Consequence, Diagnosis, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.unknown import find_remainders
@@ -132,7 +132,7 @@ def diagnose(
     next_run = None
     if outcome.verdict == "cannot_tell":
         tell("looking for a run that would tell", 0.95)
-        next_run = next_manoeuvre(bench, found.candidates, found.noises, model)
+        next_run = next_manoeuvre(bench, one_per_name(found.candidates), found.noises, model)
     reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ""
     return Diagnosis(
         verdict=outcome.verdict,

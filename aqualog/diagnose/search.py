@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.diagnose.bench import Bench, make_bench, noises_after
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.family import Calibration, calibrate, gumbel_p, largest
+from aqualog.diagnose.family import Calibration, calibrate, chance, gumbel_p, largest
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
@@ -116,10 +116,9 @@ def _tested(
     ratio = gains / c.inflation / sizes
     statistic = float(ratio.max())
     if c.maxima.size:
-        p = max(gumbel_p(c.maxima, statistic), 1e-12)
+        p = max(gumbel_p(c.maxima, statistic), chance(statistic, c.tested), 1e-12)
         return Significance(statistic, c.threshold, p, level, c.achieved, surrogates)
-    count = max(int((gains > 0.0).sum()), 1)
-    p = min(1.0, 1e-12 + count * math.erfc(math.sqrt(0.5 * max(statistic, 0.0))))
+    p = max(chance(statistic, c.tested), 1e-12)
     return Significance(statistic, c.threshold, p, level, float("nan"), 0)
 
 
@@ -164,11 +163,16 @@ def _refitted(
     losses = {id(r): r.loss / inflation + PER_PARAMETER * len(r.values) for r in done}
     done.sort(key=lambda r: losses[id(r)])
     large = [r for r in done if _all_there(r, model)]
+    if base and not large:
+        return ()
     # what is too small to be worth a word is another effect's disguise, if that one explains as much
     if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
         done = large
     y = whitened_residual(bench, noises, now)[None]
-    if not done or float(measure.inner(y, y)[0, 0]) - done[0].loss < HALF * calibration.threshold * inflation:
+    known_loss = float(measure.inner(y, y)[0, 0])
+    if known is not None and (again := refit(bench, known, measure, model)) is not None:
+        known_loss = min(known_loss, again.loss)
+    if not done or known_loss - done[0].loss < HALF * calibration.threshold * inflation:
         return ()
     ratios = [math.exp(min(0.5 * (losses[id(r)] - losses[id(done[0])]), 700.0)) for r in done]
     credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]

@@ -136,7 +136,6 @@ def test_a_cause_explains_the_channels_that_it_takes_away():
     assert told(Candidate(only, 1.0, 1.0)).causes[0].explains == ("axle_slip",)
 
 
-@pytest.mark.xfail(strict=True, reason="members of no size make a certain cause look undecided")
 def test_members_too_small_to_name_do_not_make_alternatives():
     o = told(
         candidate(payload_mass=200.0, road_grade=1e-4),

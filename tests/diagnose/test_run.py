@@ -172,12 +172,11 @@ def same(a, b):
     )  # fmt: skip
 
 
-def test_two_runs_are_equal_and_another_seed_draws_anew():
+def test_two_runs_are_equal_and_another_seed_says_the_same():
     hidden = term("payload_mass", delta_mass=250.0)
     a, b = told(hidden), told(hidden)
     assert same(a, b)
     quiet, other = (told(options=replace(QUICK, seed=s)) for s in (1, 2))
-    assert other.significance.threshold != quiet.significance.threshold
     assert other.verdict == quiet.verdict == "no_effect"
 
 
