@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -59,9 +60,12 @@ def percent(share: float | None) -> str:
 
 def ordinary(text: str) -> str:
     """The text without typography, for terminals and files that may not have it."""
+    raised = {ord(s): p for s, p in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True)}
+    # powers of ten first: their 2 and 3 are no squares and cubes of a unit
+    text = re.sub("·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda power: "e" + power[1].translate(raised), text)
     for sign, plain in _ORDINARY.items():
         text = text.replace(sign, plain)
-    return text.translate({ord(s): p for s, p in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True)})
+    return text.translate(raised)
 
 
 def short(x: float | None, digits: int = 3) -> str:

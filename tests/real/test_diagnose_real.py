@@ -125,9 +125,6 @@ def test_road_of_the_loaded_trip_is_flatter(real_logs, bmw):
     assert 0.005 < found.rms.low < found.rms.high < 0.011
 
 
-@pytest.mark.xfail(
-    strict=True, reason="without torque in the log the brakes act on the driven axle, and the simulated car spins"
-)
 def test_porsche_offset_and_laps(real_logs):
     drive, r = prepared(
         "porsche", sorted((real_logs / "porsche_981").glob("*.csv")), load_vehicle(HERE / "porsche.toml"),

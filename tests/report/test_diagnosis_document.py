@@ -234,3 +234,9 @@ def test_sets_that_are_told_apart_are_in_the_matrix_alone():
     names, p = d["isolability_pairs"]["effects"], d["isolability_pairs"]["p_correct"]
     i, j, k = (names.index(n) for n in ("payload_mass", "torque_gain", "head_wind"))
     assert (p[i][j], p[j][i], p[i][k], p[k][i], p[j][k], p[i][i]) == (0.674, 0.7, 1.0, 1.0, None, None)
+
+
+def test_powers_of_ten_stay_numbers_in_plain_text():
+    from aqualog.report.diagnosis_numbers import ordinary
+
+    assert ordinary("p = 1.00·10⁻¹² at 3 m/s²") == "p = 1.00e-12 at 3 m/s^2"
