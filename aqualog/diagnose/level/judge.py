@@ -9,7 +9,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from aqualog.diagnose.level.library import Library
+from aqualog.diagnose.level.catalogue import Library
 from aqualog.diagnose.level.refit import conditioned
 from aqualog.diagnose.records import Confusion, Limit
 from aqualog.types import FloatArray

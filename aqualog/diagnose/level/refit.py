@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aqualog.diagnose.level.library import Hypothesis, model_with
+from aqualog.diagnose.level.catalogue import Hypothesis, model_with
 from aqualog.diagnose.level.noise import inverse_of, prior_of
 from aqualog.diagnose.level.passes import Passes, expected_values
 from aqualog.intervals import student_quantile

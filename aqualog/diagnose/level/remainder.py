@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.diagnose.level.anything import Anything, anything, chi2_log_p
-from aqualog.diagnose.level.library import Library
+from aqualog.diagnose.level.catalogue import Library
 from aqualog.diagnose.level.noise import Fit
 from aqualog.diagnose.level.passes import RESISTANCE, Passes
 from aqualog.diagnose.level.refit import conditioned

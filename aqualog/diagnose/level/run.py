@@ -11,9 +11,9 @@ from aqualog.campaign.records import Campaign
 from aqualog.campaign.samples import CampaignData
 from aqualog.diagnose.level.advice import advice
 from aqualog.diagnose.level.anything import Anything, anything, whole_fit
+from aqualog.diagnose.level.catalogue import Library, hypotheses, library, untested
 from aqualog.diagnose.level.gain import gain
 from aqualog.diagnose.level.judge import confusions, limits
-from aqualog.diagnose.level.library import Library, hypotheses, library, untested
 from aqualog.diagnose.level.noise import Fit, design_of, inverse_of, prior_of
 from aqualog.diagnose.level.observe import passes_of
 from aqualog.diagnose.level.passes import Passes, doubted, steady

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.diagnose.level.anything import whole_fit
-from aqualog.diagnose.level.library import Hypothesis, Library, library
+from aqualog.diagnose.level.catalogue import Hypothesis, Library, library
 from aqualog.diagnose.level.noise import Fit
 from aqualog.diagnose.level.passes import Passes, expected_values
 from aqualog.diagnose.level.refit import Refit, conditioned, refit, weighed
