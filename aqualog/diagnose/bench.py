@@ -36,7 +36,7 @@ class Stack:
 class Bench:
     """Drives with their residuals (C, n) and the columns of signatures (K, C, n): one for each free parameter.
 
-    `owner` (K,) is the hypothesis of a column, `columns[i]` the columns of hypothesis i.
+    `columns[i]` are the columns of hypothesis i.
     """
 
     drives: tuple[Drive, ...]
@@ -99,14 +99,10 @@ def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
 
 
-def gram_of(
-    bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray], keep: Sequence[int] | None = None
-) -> FloatArray:
-    """Whitened inner products of the columns (all or those to `keep`), the residual last, summed over drives."""
+def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
+    """Whitened inner products of the columns, the residual last, summed over drives."""
     total: FloatArray | float = 0.0
     for drive, ready, noise, residual in zip(bench.drives, bench.prepared, noises, residuals, strict=True):
-        if keep is not None:
-            ready = ready.of(keep)
         columns = whitened(ready, noise)
         y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)
         rows = np.concatenate([columns, y])

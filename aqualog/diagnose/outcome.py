@@ -26,7 +26,8 @@ EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect expl
 class Outcome(NamedTuple):
     """Verdict, causes, alternatives; `chosen` is the refit that the extended model is made of, None without causes.
 
-    `small`: sentences about deviations that are significant and too small to be worth naming.
+    `certain`: effects that every credible set has. `small`: sentences about deviations that are significant and too
+    small to be worth naming.
     """
 
     verdict: Verdict
@@ -34,6 +35,7 @@ class Outcome(NamedTuple):
     alternatives: tuple[Alternative, ...]
     chosen: Refit | None
     small: tuple[str, ...]
+    certain: frozenset[str] = frozenset()
 
 
 def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_value: float) -> Outcome:
@@ -71,7 +73,7 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     shown = tuple(c for c in union.values() if c.effect in certain) + tuple(
         c for c in union.values() if c.effect not in certain
     )
-    return Outcome("cannot_tell", shown, others, best.refit, small)
+    return Outcome("cannot_tell", shown, others, best.refit, small, frozenset(certain))
 
 
 def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
@@ -115,7 +117,7 @@ def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, 
     """The members of a set with values, intervals and sentences."""
     r = candidate.refit
     sd = np.sqrt(np.diag(r.covariance) * candidate.inflation)
-    explained = _explained(bench, r)
+    explained = _explained(bench, r, model)
     out = []
     for i, h in enumerate(r.members):
         parameters = {}
@@ -132,7 +134,7 @@ def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, 
     return tuple(out)
 
 
-def _explained(bench: Bench, r: Refit) -> list[tuple[str, ...]]:
+def _explained(bench: Bench, r: Refit, model: Model) -> list[tuple[str, ...]]:
     """Channels whose rms would rise again without a member."""
     channels = bench.drives[0].channels
     out: list[tuple[str, ...]] = []
@@ -140,7 +142,7 @@ def _explained(bench: Bench, r: Refit) -> list[tuple[str, ...]]:
     for h in r.members:
         shares = np.zeros(len(channels))
         for d, left, own in zip(bench.drives, r.residuals, r.signatures, strict=True):
-            theta = r.values[k : k + len(h.free)] - np.array([h.parameter(n).neutral for n in h.free])
+            theta = r.values[k : k + len(h.free)] - np.array([value_in(model, h, n) for n in h.free])
             without = left + np.tensordot(theta, own[k : k + len(h.free)], axes=1)
             now = np.sqrt((left[:, d.mask] ** 2).mean(axis=1))
             then = np.sqrt((without[:, d.mask] ** 2).mean(axis=1))

@@ -16,7 +16,7 @@ from aqualog.diagnose.defects import Defect, accelerometer_defect
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.heldout import measured_gain
-from aqualog.diagnose.hypotheses import hypotheses, residual
+from aqualog.diagnose.hypotheses import hypotheses, residual, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
@@ -136,7 +136,9 @@ def diagnose(
     reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ""
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=verdict_sentence(outcome.verdict, outcome.causes, level=options.level, reason=reason),
+        sentence=verdict_sentence(
+            outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain
+        ),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=used,
@@ -166,7 +168,8 @@ def _road(drives: Sequence[Drive], model: Model) -> Profile | None:
 
 def _with_road(outcome: Outcome, road: Profile) -> Outcome:
     verdict: Verdict = {"no_effect": "named", "named": "compound"}.get(outcome.verdict, outcome.verdict)  # type: ignore[assignment]
-    return outcome._replace(verdict=verdict, causes=(*outcome.causes, road.cause))
+    certain = outcome.certain | {road.cause.effect}
+    return outcome._replace(verdict=verdict, causes=(*outcome.causes, road.cause), certain=certain)
 
 
 def _without_road(extended: Model, given: Model) -> Model:
@@ -222,7 +225,16 @@ def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Op
 
 
 def _extended(outcome: Outcome, remainders: tuple[Remainder, ...], model: Model, vehicle: Vehicle) -> Model:
-    extended = outcome.chosen.model if outcome.chosen is not None else model
+    extended = model
+    if outcome.chosen is not None:
+        # what is too small to be named is not put into the model either
+        named = {c.key for c in outcome.causes}
+        best = outcome.chosen
+        extended = with_values(model, [
+            (h, {n: v for (i, n), v in zip(best.names, best.values.tolist(), strict=True) if best.members[i] is h})
+            for h in best.members
+            if h.key in named
+        ])  # fmt: skip
     for r in remainders:
         term = as_term(r, mass=vehicle.mass)
         if term is not None and all(t.effect is not term.effect for t in extended.terms):

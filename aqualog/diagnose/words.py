@@ -52,8 +52,10 @@ def listed(names: Sequence[str], last: str = "and") -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]
 
 
-def verdict_sentence(verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "") -> str:
-    """The verdict in one sentence."""
+def verdict_sentence(
+    verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "", certain: frozenset[str] = frozenset()
+) -> str:
+    """The verdict in one sentence; `certain`: effects that are not in doubt where others cannot be told apart."""
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect":
         return f"No effect: the model predicts what was measured, at a false-alarm level of {level:g}."
@@ -62,6 +64,10 @@ def verdict_sentence(verdict: str, causes: Sequence[Cause], *, level: float, rea
     if verdict == "compound":
         return f"{len(causes)} effects together: {listed(names)}."
     if verdict == "cannot_tell":
+        sure = [name_of(c.effect, c.where) for c in causes if c.effect in certain]
+        open_ones = [name_of(c.effect, c.where) for c in causes if c.effect not in certain]
+        if sure and open_ones:
+            return f"Certain: {listed(sure)}; beside it this log cannot tell {listed(open_ones, 'or')} apart."
         return f"Something is different, but this log cannot tell {listed(names, 'or')} apart."
     if verdict == "unexplained":
         known = f" beside {listed(names)}" if names else ""

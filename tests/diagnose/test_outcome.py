@@ -144,3 +144,14 @@ def test_members_too_small_to_name_do_not_make_alternatives():
     )
     assert o.verdict == "named"
     assert names(o) == ["payload_mass"]
+
+
+def test_what_is_certain_is_not_called_open():
+    from aqualog.diagnose.records import Cause
+    from aqualog.diagnose.words import verdict_sentence
+
+    causes = [Cause(n, None, {}, (), "") for n in ("payload_mass", "aero_drag", "head_wind")]
+    said = verdict_sentence("cannot_tell", causes, level=0.01, certain=frozenset({"payload_mass"}))
+    assert said == "Certain: payload mass; beside it this log cannot tell aero drag or head wind apart."
+    both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
+    assert both == "Something is different, but this log cannot tell aero drag or head wind apart."
