@@ -1,9 +1,13 @@
 """Fixtures that all tests share."""
 
+import os
 import sys
 from pathlib import Path
 
 import pytest
+
+# tests run side by side: threads of linear algebra beside them would only wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parents[1]
 REAL_LOGS = ROOT.parent / "shared" / "real_logs"
