@@ -18,7 +18,7 @@ from aqualog.diagnose.noise import Noise, surrogate, white_noise
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 from aqualog.types import FloatArray
 
-__all__ = ["Calibration", "calibrate", "chance", "gumbel_p", "largest"]
+__all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
 
 FEW = 2  # hypotheses after which the noise is tried
 ALIKE = 0.97  # cosine of whitened signatures that surrogates need not tell apart
@@ -113,7 +113,7 @@ def calibrate(
     allowed = [i for i, h in enumerate(bench.asked) if h.allowed]
     if surrogates == 0:
         return Calibration(
-            np.full(H, PLAIN_INFLATION), np.zeros(0), _bonferroni(level, len(leaders)), level, len(leaders)
+            np.full(H, PLAIN_INFLATION), np.zeros(0), bonferroni(level, len(leaders)), level, len(leaders)
         )
     wanted = sorted({*leaders, *base, *allowed})
     small = _restricted(bench, wanted)
@@ -134,7 +134,7 @@ def calibrate(
     inflation = mean[groups]
     maxima = (drawn / inflation[wanted] / sizes[wanted]).max(axis=1)
     # where tolerances are larger than the noise, noise alone gives next to nothing; the car's own deviations do
-    threshold = max(_gumbel_quantile(maxima, level), _bonferroni(level, len(leaders)))
+    threshold = max(_gumbel_quantile(maxima, level), bonferroni(level, len(leaders)))
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
@@ -158,7 +158,8 @@ def _gumbel_quantile(maxima: FloatArray, level: float) -> float:
     return mu - beta * math.log(-math.log1p(-level))
 
 
-def _bonferroni(level: float, count: int) -> float:
+def bonferroni(level: float, count: int) -> float:
+    """Threshold of the largest of `count` gains, each of one degree of freedom, whatever their dependence."""
     return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
 
 

@@ -76,9 +76,12 @@ class Hypothesis:
         return next(p for p in self.effect.parameters if p.name == name)
 
     def tolerance(self, name: str) -> float:
-        """Standard deviation by which a parameter may be off without being worth a word; 0 for events."""
+        """Standard deviation by which a parameter may be off without being worth a word; 0 for events and for
+        places whose parts are asked about."""
         if self.allowed:
             return self.parameter(name).sigma
+        if _sums(self) or (self.effect.name == "payload_mass" and self.where is not None):
+            return 0.0  # its parts have theirs
         if self.effect.name in _UNTOLD:
             return _UNTOLD[self.effect.name]
         return 0.0 if self.effect.name in _EVENTS else self.parameter(name).smallest * TOLERANCE

@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.diagnose.bench import Bench, make_bench, noises_after
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.family import Calibration, calibrate, chance, gumbel_p, largest
+from aqualog.diagnose.family import Calibration, bonferroni, calibrate, chance, gumbel_p, largest
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
@@ -86,6 +86,9 @@ def search(
     while True:
         tell("testing for anything at all" if not accepted else "testing for one effect more", 0.3 + 0.1 * len(tests))
         gains, gram = largest(work, work.residuals, accepted)
+        if first is not None and (nothing := _surely_nothing(work, gains, first[1], level)) is not None:
+            tests.append(nothing)
+            break
         sets = best_sets(work, gram, len(accepted) + 1, within=0.0, most=1) if len(accepted) < MOST else []
         quiet = _after(work, sets[0]) if sets else list(work.residuals)
         calibration = calibrate(
@@ -131,6 +134,18 @@ def _tested(
         return Significance(statistic, c.threshold, p, level, c.achieved, surrogates)
     p = max(chance(statistic, c.tested), 1e-12)
     return Significance(statistic, c.threshold, p, level, float("nan"), 0)
+
+
+def _surely_nothing(bench: Bench, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
+    """The test's result where not even gains that no coloured noise has inflated are beyond Bonferroni's bound.
+
+    It is a floor of every threshold: surrogates, which cost most of the time, could not make a finding of it.
+    """
+    statistic = float((gains / [len(x) for x in bench.columns]).max())
+    p = chance(statistic, c.tested)
+    if p <= level:
+        return None
+    return Significance(statistic, bonferroni(level, c.tested), p, level, c.achieved, 0)
 
 
 def _after(bench: Bench, fit: SetFit) -> list[FloatArray]:

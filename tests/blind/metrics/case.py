@@ -17,16 +17,12 @@ from blind.metrics.rows import Fact, Row, Said
 from blind.metrics.second import second
 from blind.rivals.columns import Residuals
 from blind.rivals.compare import heldout_share, measured
-from blind.world.cases import Case, Hidden, Spec, clean_pair, clean_rows, implied, make_case, truth
-from blind.world.effects import apply
-from blind.world.sensors import as_signals, measure
+from blind.world.cases import Case, Hidden, Spec, clean_pair, make_case, truth
 from blind.world.vehicles import CARS
-from blind.world.world import nominal_world
 
 from aqualog.diagnose.records import Cause, Diagnosis
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
-from aqualog.types import Signals
 
 __all__ = ["LEVEL", "SEED", "work"]
 
@@ -82,7 +78,7 @@ def _worked(job: Job, row: Row) -> Row:
 def _diagnosed(case: Case, job: Job) -> Diagnosis:
     return diagnose(
         case.drives, case.vehicle, holdout=case.holdout,
-        options=Options(seed=SEED, level=LEVEL, surrogates=job.surrogates, views=False),
+        options=Options(seed=SEED, level=LEVEL, surrogates=job.surrogates, views=False, consequences=False),
     )  # fmt: skip
 
 
@@ -187,7 +183,7 @@ def _heldout(row: Row, job: Job, spec: Spec, case: Case, found: Diagnosis, log: 
             return row
         models = {"before": type(found.model)(), "after": found.model, "oracle": oracle}
         return replace(row, detector=consequence(signals, case.vehicle, models))
-    pair = _clean_pair_at(spec, spec.drives) if spec.hidden else None
+    pair = clean_pair(spec, spec.drives) if spec.hidden else None
     unseen = forecast.log_of(signals, case.vehicle, pair)
     if spec.hidden:
         model = gain.true_model(row.truth)
@@ -212,15 +208,3 @@ def _residuals(log: forecast.Log) -> Residuals:
     n = log.residual.shape[1]
     coordinates = {k: x[:n] for k, x in d.coordinates.items()}
     return Residuals(d.channels, log.residual, d.mask, coordinates, max(0.1, d.dt))
-
-
-def _clean_pair_at(spec: Spec, index: int) -> tuple[Signals, Signals]:
-    """As the world's `clean_pair`, of another drive of the case."""
-    vehicle = CARS[spec.vehicle]
-    pair = []
-    for hidden in (truth(spec), implied(spec)):
-        world = apply(nominal_world(vehicle), hidden)
-        rows, road = clean_rows(spec, world, index)
-        columns = measure(rows, world, None, spec.seed)
-        pair.append(as_signals(columns, rows, road, vehicle.wheelbase, name="clean", has_v_x=spec.has_v_x))
-    return pair[0], pair[1]

@@ -29,7 +29,7 @@ class Job:
     members: tuple[str, ...] = ()
     twins: tuple[Hidden, ...] = ()
     can: bool = True
-    surrogates: int = 99
+    surrogates: int = 49
 
 
 @dataclass(frozen=True, slots=True)
