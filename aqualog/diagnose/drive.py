@@ -28,6 +28,8 @@ BESIDE_S = 1.0  # [s] before and after what is left out
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
+# [m/s^3] steeper torque, and those few samples show clocks, filters and tyres' lag: 10 ms are 0.1 m/s^2
+JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 # noise of what drives the simulation must not pass for motion: it would meet itself in the residual
 SPEED_S, STEER_S = 1.0, 0.5  # [s]
@@ -72,7 +74,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         If the log has neither velocity nor four wheel speeds, or nothing to compare.
 
     Left out, with a second on either side: standstill and creeping, gaps, strong cornering, braking where the brakes'
-    torque is not in the log, a frozen accelerometer.
+    torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque.
     """
     present = frozenset(s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height)
     if signals.frame.height * signals.dt < LEAST_S:
@@ -127,7 +129,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         notes.append(
             "the car slows down more than its torque says: brakes are not in the log, driven stretches are used"
         )
-    mask = block_means(_widened(bad, dt).astype(np.float64), dt) == 0.0
+    left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(torque, vehicle, dt) > JERK_MAX, JERK_S, dt)
+    mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(
         name, dt, vehicle, course, filled, channels, mask, _coordinates(filled, course, v, dt), present, not torqued,
         n * dt, tuple(notes),
@@ -259,8 +262,17 @@ def _brakes_unlogged(
     return bool(((a < explained - UNEXPLAINED) & moving).sum() > 0.01 * moving.sum())
 
 
-def _widened(bad: BoolArray, dt: float) -> BoolArray:
-    k = max(1, round(BESIDE_S / dt))
+def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
+    """How fast the drive's share of the acceleration changes, over 0.1 s. (n,) [m/s^3]"""
+    a = torque.sum(axis=0) / (vehicle.mass * vehicle.r_l("fl"))
+    k = max(1, round(0.5 * JERK_S / dt))
+    padded = np.pad(a, k, mode="edge")
+    return np.asarray(np.abs(padded[2 * k :] - padded[: -2 * k]) / (2 * k * dt))
+
+
+def _widened(bad: BoolArray, by: float, dt: float) -> BoolArray:
+    """True samples and those within `by` seconds of them."""
+    k = max(1, round(by / dt))
     return np.convolve(bad.astype(np.float64), np.ones(2 * k + 1), "same") > 0.5
 
 

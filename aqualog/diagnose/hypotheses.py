@@ -45,8 +45,13 @@ _NOT_ASKED: Mapping[str, str] = {
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
 # what a car may have or not; all else is known to within a tolerance
 _EVENTS = ("pressure_loss", "trailer", "tyre_warmup", "uneven_water")
-# tolerances of what a vehicle file does not tell: the model has a tyre's usual value
-_UNTOLD: Mapping[str, float] = {"load_sensitivity": 0.15, "relaxation_length": 0.1}
+# tolerances of what a vehicle file or a simulator is off by more than a third of the smallest size: slip slopes change
+# by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
+# crowned roads differ, tyres follow their load by other laws (K)
+_LOOSE: Mapping[str, float] = {
+    "slip_stiffness": 0.05, "load_sensitivity": 0.25, "wheel_inertia": 0.15, "relaxation_length": 0.15,
+    "signal_delay": 0.005, "cornering_drag": 0.003, "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
+}  # fmt: skip
 _SHIFTS = ("signal_delay", "clock_skew")
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 LEAKS = 5  # moments at which a tyre may begin to lose its air
@@ -82,9 +87,10 @@ class Hypothesis:
             return self.parameter(name).sigma
         if _sums(self) or (self.effect.name == "payload_mass" and self.where is not None):
             return 0.0  # its parts have theirs
-        if self.effect.name in _UNTOLD:
-            return _UNTOLD[self.effect.name]
-        return 0.0 if self.effect.name in _EVENTS else self.parameter(name).smallest * TOLERANCE
+        if self.effect.name in _EVENTS:
+            return 0.0
+        usual = self.parameter(name).smallest * TOLERANCE
+        return _LOOSE.get(self.key, _LOOSE.get(self.effect.name, usual))
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""

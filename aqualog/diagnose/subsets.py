@@ -68,7 +68,9 @@ def compatible(bench: Bench, members: Sequence[int]) -> bool:
     seen: set[tuple[str, str]] = set()
     for m in members:
         h = bench.asked[m]
-        places = AXLES.get(h.where or "", WHEELS if h.where is None else (h.where,))
+        # a load at the front and one taken off the rear are no two loads, but the same car with another centre of mass
+        whole = h.where is None or h.effect.name == "payload_mass"
+        places = WHEELS if whole else AXLES.get(h.where or "", (h.where or "",))
         for p in places:
             if (h.effect.name, p) in seen:
                 return False

@@ -2,6 +2,7 @@
 
 The geometry of curves, the height of the centre of mass, the form of a tyre's curve, offsets of steering and gyro. Each
 has the form of an effect, so that what it does to the residuals follows from simulation like everything else.
+`friction` is mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ TOLERANCES: tuple[Effect, ...] = (
         cornering_slope=p.cornering_slope * [1.0 + x, 1.0 + x, 1.0, 1.0]))),
     _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0, 1.0, 1.0 + x, 1.0 + x]))),
-    _of("friction", "-", 0.15, _plant(lambda p, x: p._replace(mu=p.mu * (1.0 + x)))),
+    _of("friction", "-", 0.5, _plant(lambda p, x: p._replace(mu=p.mu * (1.0 + x)))),
     _of("steer_offset", "rad", 5e-3, _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),
     _of("steer_gain", "-", 0.03, _channel("steer_angle", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
     _of("gyro_offset", "rad/s", 2e-3, _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
