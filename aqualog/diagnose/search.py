@@ -28,6 +28,8 @@ CREDIBLE = 20.0  # evidence ratio within which sets cannot be told apart
 REFITTED = 6  # sets that are refitted in the simulator
 # of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
 SLACK, BENT = 8.0, 0.05
+# of the threshold, for every effect beside a first one: what simulator and car differ by grows with what is hidden
+FURTHER = 1.5
 HALF = 0.5  # of what the test asks for, that a set must take away once it is refitted
 PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
 
@@ -97,7 +99,8 @@ def search(
         )  # fmt: skip
         tests.append(_tested(work, gains, accepted, calibration, level, surrogates))
         first = first or (gram, calibration)
-        if tests[-1].p_value > level or not sets:
+        least = FURTHER * calibration.threshold if accepted else 0.0
+        if tests[-1].p_value > level or tests[-1].statistic < least or not sets:
             break
         now = candidates[0].refit.residuals if candidates else bench.residuals
         found = _refitted(work, gram, accepted, calibration, model, now, tell, 0.35 + 0.1 * len(tests))
