@@ -94,6 +94,16 @@ def test_braking_is_left_out_where_the_torque_does_not_hold_it():
     assert any("braking" in n for n in d.notes)
 
 
+def test_jumps_of_the_torque_are_left_out_and_no_more_than_that():
+    log = plain()
+    step = 200.0 * (np.arange(log.frame.height) > 3000)
+    jumped = log.frame.with_columns((pl.col(f"torque_{w}") + pl.Series(step)).alias(f"torque_{w}") for w in WHEELS)
+    d = prepare(changed(log, jumped), CAR, "a")
+    assert not d.mask[299:302].any()
+    assert d.mask[:297].all()
+    assert d.mask[304:].all()
+
+
 def test_without_torque_the_torque_that_the_model_needs_stands_in():
     log = changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS]))
     d = prepare(log, CAR, "a")

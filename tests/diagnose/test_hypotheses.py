@@ -104,3 +104,13 @@ def test_tolerances_are_neutral_at_zero_and_change_something_else(drive):
 def test_events_are_not_tolerated_and_all_else_is():
     assert one("trailer").tolerance("mass") == 0.0
     assert one("payload_mass").tolerance("delta_mass") == pytest.approx(20.0 / 3.0)
+    assert one("slip_stiffness", "fl").tolerance("gain") == 0.05
+    assert one("accelerometer_bias", "a_y").tolerance("bias") > one("accelerometer_bias", "a_x").tolerance("bias")
+
+
+@pytest.mark.parametrize(
+    ("name", "where"), [("brake_drag", None), ("brake_drag", "f"), ("rolling_resistance", None), ("payload_mass", "r")]
+)
+def test_a_deviation_is_allowed_for_once(name, where):
+    h = one(name, where)
+    assert h.tolerance(h.free[0]) == 0.0

@@ -162,6 +162,12 @@ def test_nothing_is_named_twice():
     assert compatible(b, (AT["tyre_radius@fl"], AT["slip_stiffness@r"]))
 
 
+def test_a_car_carries_one_load():
+    b = made(asked=(hypothesis("payload_mass", "f"), hypothesis("payload_mass", "r"), hypothesis("tyre_radius", "f")))
+    assert not compatible(b, (0, 1))
+    assert compatible(b, (0, 2))
+
+
 def test_sets_come_best_first_and_not_too_many():
     b = made(seed=7, road_grade=1.0)
     fits = best_sets(b, gram(b), 1, within=1e9, most=5)
