@@ -13,7 +13,9 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant"]
+__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
+
+FARTHEST = 3.0  # tolerances by which a deviation is off at the most
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,3 +118,18 @@ def noises_after(bench: Bench, residuals: Sequence[FloatArray], theta: Mapping[i
         fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
         for d, r, s in zip(bench.drives, residuals, bench.signatures, strict=True)
     ]
+
+
+def without_deviations(bench: Bench, i: int, residual: FloatArray, noise: Noise) -> FloatArray:
+    """Residual (C, n) of drive i less what deviations within the tolerances most likely have to do with it.
+
+    The mean of their posterior: a ridge with the tolerances as prior. What a vehicle file may be off by anyway should
+    not be described as something unknown; but where the most likely deviations would be beyond three tolerances, all of
+    them are taken back to that: something large must not vanish because it is of such a form.
+    """
+    k = np.flatnonzero(bench.tolerance > 0.0).tolist()
+    A = whitened(bench.prepared[i].of(k), noise)
+    y = whitened(spectra(bridged(residual, bench.drives[i].mask)[None]), noise)[0]
+    theta = np.linalg.solve(A @ A.T + np.diag(bench.tolerance[k] ** -2.0), A @ y)
+    theta = theta / max(1.0, float(np.abs(theta / bench.tolerance[k]).max(initial=0.0)) / FARTHEST)
+    return np.asarray(residual - np.tensordot(theta, bench.signatures[i][k], axes=1))

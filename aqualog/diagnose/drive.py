@@ -21,7 +21,7 @@ from aqualog.physics.load import G
 from aqualog.types import BoolArray, FloatArray, Signals
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Drive", "prepare"]
+__all__ = ["Drive", "led_by", "prepare"]
 
 V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
 BESIDE_S = 1.0  # [s] before and after what is left out
@@ -42,6 +42,8 @@ BRAKE_PRESSURE = 0.5e5  # [Pa]
 class Drive:
     """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s.
 
+    `speed` (n,) the quiet measured speed [m/s]; that of the course leads it by what draws the simulation.
+
     `coordinates` (m,): what a remaining error may depend on. `untorqued`: the log has no torque; the one that the base
     model needs for the measured speed stands in, and the force balance is not judged.
     """
@@ -50,6 +52,7 @@ class Drive:
     dt: float
     vehicle: Vehicle
     course: Course
+    speed: FloatArray
     columns: Mapping[str, FloatArray]
     channels: tuple[str, ...]
     mask: BoolArray
@@ -110,15 +113,16 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     else:
         torque = _needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
-    course = _without_lag(vehicle, Course(
-        np.arange(n, dtype=np.float64) * dt, torque, _steer(filled, v, vehicle, dt), smooth(v, dt, SPEED_S),
-        _lanes(filled, dt),
-        has_rods="tie_rod_fl" in channels,
-    ))  # fmt: skip
+    speed = smooth(v, dt, SPEED_S)
+    t = np.arange(n, dtype=np.float64) * dt
+    measured = Course(
+        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels
+    )
+    course = _without_lag(vehicle, measured, Model())
     bad = gaps | (v < V_MIN)
     if "a_x" in filled:
         bad |= _frozen(filled["a_x"], dt)
-    bad |= np.abs(np.gradient(smooth(v, dt, SPEED_S), dt)) > A_X_MAX
+    bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
     if "brake_pressure" in filled and not (torqued and _brakes_in_torque(filled, torque)):
@@ -132,18 +136,27 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(torque, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(
-        name, dt, vehicle, course, filled, channels, mask, _coordinates(filled, course, v, dt), present, not torqued,
-        n * dt, tuple(notes),
+        name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, v, dt), present,
+        not torqued, n * dt, tuple(notes),
     )  # fmt: skip
 
 
-def _without_lag(vehicle: Vehicle, course: Course) -> Course:
+def led_by(drive: Drive, model: Model) -> Drive:
+    """The drive led along so that the simulation with a model meets the measured speed.
+
+    `prepare` leads the vehicle file's car. With an effect in the model that changes the acceleration by a, that course
+    is a / FOLLOW_RATE off: 0.2 m/s^2 of drag make 0.7 m/s, and drag at that speed is 5 % off.
+    """
+    return replace(drive, course=_without_lag(drive.vehicle, replace(drive.course, v_x=drive.speed), model))
+
+
+def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
     """The course with a speed to follow that makes the simulated one meet the measured one without delay.
 
     Drawn to a target, the simulation lags behind it by what draws it; a lagging copy of the measured speed's noise
     would look like a signal that comes late.
     """
-    nudge = follow(vehicle, course, Model())["nudge"]
+    nudge = follow(vehicle, course, model)["nudge"]
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
 
 

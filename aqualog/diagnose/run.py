@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose import isolate
-from aqualog.diagnose.bench import Bench, Stack
+from aqualog.diagnose.bench import Bench, Stack, without_deviations
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
@@ -209,6 +209,7 @@ def _remainders(
 def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
     drive = bench.drives[d]
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
+    left = without_deviations(bench, d, left, noise)
     stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}
     for h, columns in zip(bench.asked, bench.columns, strict=True):

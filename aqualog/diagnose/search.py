@@ -11,7 +11,7 @@ import numpy as np
 
 from aqualog.diagnose.bench import Bench, make_bench, noises_after
 from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.family import Calibration, bonferroni, calibrate, chance, gumbel_p, largest
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
@@ -207,8 +207,9 @@ def _refitted(
     credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]
     fine = metric(bench, noises, share=KNOWN)
     starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
+    benches = [replace(bench, drives=tuple(led_by(d, r.model) for d in bench.drives)) for r, _ in credible]
     with ThreadPoolExecutor(THREADS) as pool:
-        sharp = list(pool.map(lambda start: refit(bench, start, fine, model), starts))
+        sharp = list(pool.map(lambda b, start: refit(b, start, fine, model), benches, starts))
     return tuple(
         Candidate(s if s is not None and not s.at_bound else r, x, inflation)
         for (r, x), s in zip(credible, sharp, strict=True)

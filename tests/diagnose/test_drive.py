@@ -7,9 +7,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.drive import led_by, prepare
 from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
+from aqualog.model.follow import follow
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL, Channel
 from aqualog.model.signals import as_signals
@@ -117,6 +118,13 @@ def test_without_torque_the_torque_that_the_model_needs_stands_in():
 def test_the_gain_of_the_file_scales_the_torque():
     a, b = (prepare(plain(), replace(CAR, torque_gain=g), "a").course.torque for g in (1.0, 2.0))
     np.testing.assert_allclose(b[2:].mean(), 2.0 * a[2:].mean(), rtol=1e-3)
+
+
+def test_led_by_the_right_model_the_simulation_meets_the_measured_speed():
+    right = Model((term("aero_drag", delta_drag_area=0.3),))
+    d = prepare(signals(*right.terms), CAR, "a")
+    off = [follow(CAR, x.course, right)["v_x"] - x.speed for x in (d, led_by(d, right))]
+    assert np.abs(off[1][2000:]).mean() < 0.1 * np.abs(off[0][2000:]).mean()
 
 
 def test_water_of_the_log_lies_on_the_course():

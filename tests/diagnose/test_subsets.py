@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.bench import gram_of, make_bench, tolerant
+from aqualog.diagnose.bench import gram_of, make_bench, tolerant, without_deviations
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import PRIOR_WIDTH, best_sets, compatible, fit_set, gains_on_top
@@ -79,6 +79,15 @@ def test_what_is_within_tolerance_gains_little():
     i = AT["road_grade"]
     assert plain[i] > 50.0
     assert forgiving[i] < 4.0
+
+
+def test_deviations_within_the_tolerances_are_taken_off_and_no_more():
+    b = made(noise=0.05, road_grade=0.03)
+    noise = fit_noise(b.residuals[0], b.drives[0].mask, np.eye(2))
+    unit = b.signatures[0][AT["aero_drag"]] * b.tolerance[AT["aero_drag"]]
+    left = [np.std(without_deviations(b, 0, size * unit, noise)) / np.std(size * unit) for size in (1.0, 60.0)]
+    assert left[0] < 0.1
+    assert 0.9 < left[1] < 1.0
 
 
 def test_inner_products_add_up_over_drives():
