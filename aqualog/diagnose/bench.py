@@ -13,7 +13,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant"]
+__all__ = ["Bench", "Stack", "forgiven", "gram_of", "make_bench", "noises_after", "tolerant"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +50,7 @@ class Bench:
     high: FloatArray
     smallest: FloatArray
     tolerance: FloatArray  # (K,) by which each may be off without being worth a word
+    barred: BoolArray  # (H,) hypotheses that the drives speak against: neither tested nor put into sets
 
     @property
     def count(self) -> int:
@@ -83,7 +84,7 @@ def make_bench(
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Bench(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
-        np.array(low), np.array(high), np.array(smallest), np.array(tolerance),
+        np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
     )  # fmt: skip
 
 
@@ -97,6 +98,24 @@ def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
     k = np.flatnonzero((bench.tolerance > 0.0) & (np.diag(gram)[:-1] > 1e-12))
     inner = gram[np.ix_(k, k)] + np.diag(bench.tolerance[k] ** -2.0)
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
+
+
+def forgiven(bench: Bench, d: int, residual: FloatArray, columns: Sequence[int]) -> FloatArray:
+    """A residual (C, n) of drive d less what deviations within the tolerances of these columns most likely are of it.
+
+    The columns' posterior means, theta = (S^-2 + A'A)^-1 A'y: what is left is y in the metric of `tolerant`. The noise
+    is estimated again after a first round, in which what the deviations are would still count as noise.
+    """
+    drive = bench.drives[d]
+    k = [c for c in columns if bench.tolerance[c] > 0.0]
+    left = residual
+    for _ in range(2 if k else 0):
+        noise = fit_noise(left, drive.mask, contrasts(drive.channels))
+        A = whitened(bench.prepared[d].of(k), noise)
+        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
+        theta = np.linalg.solve(A @ A.T + np.diag(bench.tolerance[k] ** -2.0), A @ y)
+        left = residual - np.tensordot(theta, bench.signatures[d][k], axes=1)
+    return left
 
 
 def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.tolerances import TOLERANCES
+from aqualog.diagnose.tolerances import TOLERANCES, WATER_TOLERANCES
 from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
@@ -44,7 +44,7 @@ _NOT_ASKED: Mapping[str, str] = {
 # effects that may well sit at a single wheel; others are asked about by axle
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
 # what a car may have or not; all else is known to within a tolerance
-_EVENTS = ("pressure_loss", "trailer", "tyre_warmup", "uneven_water")
+_EVENTS = ("pressure_loss", "trailer", "tyre_warmup")
 # tolerances of what a vehicle file does not tell: the model has a tyre's usual value
 _UNTOLD: Mapping[str, float] = {"load_sensitivity": 0.15, "relaxation_length": 0.1}
 _SHIFTS = ("signal_delay", "clock_skew")
@@ -64,7 +64,12 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: allowed for and never named."""
-        return self.effect in TOLERANCES
+        return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES
+
+    @property
+    def of_water(self) -> bool:
+        """Whether it is about what water does."""
+        return self.effect in WATER_TOLERANCES or self.effect.name in _WET
 
     @property
     def key(self) -> str:
@@ -118,7 +123,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in asked:
             out += [Hypothesis(effect, where, free, fixed) for fixed in _variants(effect, drives)]
-    out += [Hypothesis(e, None, ("by",)) for e in TOLERANCES]
+    out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(WATER_TOLERANCES if wet else ()))]
     return tuple(out), untested
 
 
