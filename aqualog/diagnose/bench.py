@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,9 +14,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
-
-FARTHEST = 3.0  # tolerances by which a deviation is off at the most
+__all__ = ["Bench", "Stack", "forgiven", "gram_of", "make_bench", "noises_after", "tolerant"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +51,7 @@ class Bench:
     high: FloatArray
     smallest: FloatArray
     tolerance: FloatArray  # (K,) by which each may be off without being worth a word
+    barred: BoolArray  # (H,) hypotheses that the drives speak against: neither tested nor put into sets
 
     @property
     def count(self) -> int:
@@ -85,7 +85,7 @@ def make_bench(
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Bench(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
-        np.array(low), np.array(high), np.array(smallest), np.array(tolerance),
+        np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
     )  # fmt: skip
 
 
@@ -99,6 +99,29 @@ def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
     k = np.flatnonzero((bench.tolerance > 0.0) & (np.diag(gram)[:-1] > 1e-12))
     inner = gram[np.ix_(k, k)] + np.diag(bench.tolerance[k] ** -2.0)
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
+
+
+def forgiven(
+    bench: Bench, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
+) -> FloatArray:
+    """A residual (C, n) of drive d less what deviations within the tolerances of these columns most likely are of it.
+
+    The columns' posterior means, theta = (S^-2 + A'A)^-1 A'y: what is left is y in the metric of `tolerant`. The noise
+    is estimated again after a first round, in which what the deviations are would still count as noise. Where one of
+    them would be beyond `farthest` tolerances, all are taken back in proportion: something large must not vanish
+    because it is of their form.
+    """
+    drive = bench.drives[d]
+    k = [c for c in columns if bench.tolerance[c] > 0.0]
+    left = residual
+    for _ in range(2 if k else 0):
+        noise = fit_noise(left, drive.mask, contrasts(drive.channels))
+        A = whitened(bench.prepared[d].of(k), noise)
+        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
+        theta = np.linalg.solve(A @ A.T + np.diag(bench.tolerance[k] ** -2.0), A @ y)
+        theta = theta / max(1.0, float(np.abs(theta / bench.tolerance[k]).max()) / farthest)
+        left = residual - np.tensordot(theta, bench.signatures[d][k], axes=1)
+    return left
 
 
 def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
@@ -118,18 +141,3 @@ def noises_after(bench: Bench, residuals: Sequence[FloatArray], theta: Mapping[i
         fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
         for d, r, s in zip(bench.drives, residuals, bench.signatures, strict=True)
     ]
-
-
-def without_deviations(bench: Bench, i: int, residual: FloatArray, noise: Noise) -> FloatArray:
-    """Residual (C, n) of drive i less what deviations within the tolerances most likely have to do with it.
-
-    The mean of their posterior: a ridge with the tolerances as prior. What a vehicle file may be off by anyway should
-    not be described as something unknown; but where the most likely deviations would be beyond three tolerances, all of
-    them are taken back to that: something large must not vanish because it is of such a form.
-    """
-    k = np.flatnonzero(bench.tolerance > 0.0).tolist()
-    A = whitened(bench.prepared[i].of(k), noise)
-    y = whitened(spectra(bridged(residual, bench.drives[i].mask)[None]), noise)[0]
-    theta = np.linalg.solve(A @ A.T + np.diag(bench.tolerance[k] ** -2.0), A @ y)
-    theta = theta / max(1.0, float(np.abs(theta / bench.tolerance[k]).max(initial=0.0)) / FARTHEST)
-    return np.asarray(residual - np.tensordot(theta, bench.signatures[i][k], axes=1))

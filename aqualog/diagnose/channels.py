@@ -15,7 +15,16 @@ from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["BLOCK_S", "CHANNELS", "Kind", "block_means", "channel_values", "channels_of", "contrasts"]
+__all__ = [
+    "BLOCK_S",
+    "CHANNELS",
+    "Kind",
+    "block_means",
+    "centre_line_speeds",
+    "channel_values",
+    "channels_of",
+    "contrasts",
+]
 
 BLOCK_S = 0.1  # [s] what is slower than 5 Hz; faster it is springs, teeth and buses
 
@@ -106,7 +115,7 @@ def channel_values(
     step = max(BLOCK_S, dt)
     # as a speed, so that it passes the same differences as the wheels'
     drawn = block_means(np.cumsum(columns["nudge"]) * dt, dt) if "nudge" in columns else 0.0
-    wheels = _centre_line(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
+    wheels = centre_line_speeds(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
     v_x = mean.get("v_x")
     out = []
     for name in channels:
@@ -145,10 +154,10 @@ def _slip_channel(name: str, wheels: FloatArray, v_x: FloatArray | None, vehicle
     return np.asarray(wheels[WHEELS.index(name[-2:])] - v_x)
 
 
-def _centre_line(mean: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
-    """Rim speeds on the centre line (4, m) [m/s]."""
-    yaw = mean.get("yaw_rate")
-    rim = [mean[f"omega_{w}"] * vehicle.r_e(w) for w in WHEELS]
+def centre_line_speeds(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
+    """Rim speeds on the centre line (4, m) [m/s], of canonical signals with four wheels."""
+    yaw = columns.get("yaw_rate")
+    rim = [columns[f"omega_{w}"] * vehicle.r_e(w) for w in WHEELS]
     if yaw is None:
         return np.array(rim)
     speed = np.mean(rim, axis=0)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from aqualog.diagnose.channels import block_means, channels_of
+from aqualog.diagnose.floating import floating
 from aqualog.diagnose.inputs import quiet_torque, smooth
 from aqualog.errors import SignalError
 from aqualog.features.stream import INPUTS, FeatureStream
@@ -119,7 +120,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels
     )
     course = _without_lag(vehicle, measured, Model())
-    bad = gaps | (v < V_MIN)
+    floats = floating(filled, v, vehicle, course)
+    bad = gaps | floats | (v < V_MIN)
     if "a_x" in filled:
         bad |= _frozen(filled["a_x"], dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
@@ -128,7 +130,11 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     if "brake_pressure" in filled and not (torqued and _brakes_in_torque(filled, torque)):
         bad |= filled["brake_pressure"] > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
-    elif torqued and "brake_pressure" not in filled and _brakes_unlogged(filled, torque, v, vehicle, dt):
+    elif (
+        torqued
+        and "brake_pressure" not in filled
+        and _brakes_unlogged(torque, v, _widened(floats | _on_water(course), BESIDE_S, dt), vehicle, dt)
+    ):
         bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
         notes.append(
             "the car slows down more than its torque says: brakes are not in the log, driven stretches are used"
@@ -263,13 +269,18 @@ def _brakes_in_torque(columns: Mapping[str, FloatArray], torque: FloatArray) -> 
     return bool(np.median(total[braked]) < -300.0)
 
 
-def _brakes_unlogged(
-    columns: Mapping[str, FloatArray], torque: FloatArray, v: FloatArray, vehicle: Vehicle, dt: float
-) -> bool:
-    """Whether the car often slows down much more than its torque explains: then somebody else brakes."""
+def _on_water(course: Course) -> BoolArray:
+    out: BoolArray = np.zeros(course.t.shape, dtype=bool)
+    for lane in course.lanes:
+        out |= (course.t >= lane.start) & (course.t < lane.end)
+    return out
+
+
+def _brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
+    """Whether the car often slows down much more than its torque explains off the water: then somebody else brakes."""
     a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
     explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.r_l("fl") * vehicle.mass)
-    moving = v > V_MIN
+    moving = (v > V_MIN) & ~wet
     if moving.sum() * dt < LEAST_S:
         return False
     return bool(((a < explained - UNEXPLAINED) & moving).sum() > 0.01 * moving.sum())

@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.tolerances import TOLERANCES
+from aqualog.diagnose.tolerances import TOLERANCES, WATER_TOLERANCES
 from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
@@ -44,7 +44,7 @@ _NOT_ASKED: Mapping[str, str] = {
 # effects that may well sit at a single wheel; others are asked about by axle
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
 # what a car may have or not; all else is known to within a tolerance
-_EVENTS = ("pressure_loss", "trailer", "tyre_warmup", "uneven_water")
+_EVENTS = ("pressure_loss", "trailer", "tyre_warmup")
 # tolerances of what a vehicle file or a simulator is off by more than a third of the smallest size: slip slopes change
 # by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
 # crowned roads differ, tyres follow their load by other laws (K)
@@ -69,7 +69,12 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: allowed for and never named."""
-        return self.effect in TOLERANCES
+        return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES
+
+    @property
+    def of_water(self) -> bool:
+        """Whether it is about what water does."""
+        return self.effect in WATER_TOLERANCES or self.effect.name in _WET
 
     @property
     def key(self) -> str:
@@ -124,7 +129,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in asked:
             out += [Hypothesis(effect, where, free, fixed) for fixed in _variants(effect, drives)]
-    out += [Hypothesis(e, None, ("by",)) for e in TOLERANCES]
+    out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(WATER_TOLERANCES if wet else ()))]
     return tuple(out), untested
 
 

@@ -18,6 +18,9 @@ from aqualog.types import FloatArray
 __all__ = ["KNOWN", "Metric", "Refit", "metric", "refit", "whitened_residual"]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals allow for
+# times the tolerances of the laws of water: they are guesses themselves, and a name, unlike a finding, must not hang on
+# how good these are
+DOUBT = 2.0
 SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss what it promised before it is simulated anew
@@ -61,13 +64,16 @@ def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0) -> Metr
     """The metric of `bench.tolerant` with a share of the tolerances.
 
     With all of them sets are compared; with `KNOWN` of them values are found: what is not worth a word is more than
-    what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows.
+    what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows. What
+    the laws of water are off by is no matter of words: whatever the share, it counts `DOUBT` times.
     """
     k = np.flatnonzero(bench.tolerance > 0.0).tolist()
+    owner = {c: h for h, columns in zip(bench.asked, bench.columns, strict=True) for c in columns}
+    tolerance = bench.tolerance[k] * [DOUBT if owner[c].of_water else share for c in k]
     A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
     seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
     A = A[seen]
-    M = np.linalg.inv(A @ A.T + np.diag((share * bench.tolerance[k][seen]) ** -2.0))
+    M = np.linalg.inv(A @ A.T + np.diag(tolerance[seen] ** -2.0))
     return Metric(tuple(noises), A, M)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose import isolate
-from aqualog.diagnose.bench import Bench, Stack, without_deviations
+from aqualog.diagnose.bench import Bench, Stack, forgiven
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
@@ -22,6 +22,7 @@ from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
 from aqualog.diagnose.records import Consequence, Diagnosis, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
+from aqualog.diagnose.support import supported
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_term import as_term
 from aqualog.diagnose.words import verdict_sentence
@@ -36,6 +37,7 @@ LEAST_USED_S = 20.0
 WORTH_TELLING = 0.05  # of a channel's variance that a function must explain
 # rms of a road's slope that is named: on measured drives about 1 % was not borne out by the logged elevation
 HILLY = 0.015
+FARTHEST = 3.0  # tolerances that a deviation may be off by, to pass for one
 PARTIAL = 0.2  # of what is left beside a cause: then the cause is the nearest one, not the right one
 
 
@@ -106,6 +108,7 @@ def diagnose(
         model = with_profile(model, road)
     asked, untested = hypotheses(ready, model)
     bench = simulated(ready, asked, model, tell)
+    bench = supported(bench)
     found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(bench, found.candidates, model, p_value=found.tests[0].p_value)
     tell("describing what is left", 0.8)
@@ -208,8 +211,12 @@ def _remainders(
 
 def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
     drive = bench.drives[d]
+    # a law of water that is off by what its sources leave open is no function without a name
+    of_water = [c for h, columns in zip(bench.asked, bench.columns, strict=True) if h.of_water for c in columns]
+    left = forgiven(bench, d, left, of_water)
+    # nor is anything else that a file or a tyre may be off by
+    left = forgiven(bench, d, left, range(bench.count), farthest=FARTHEST)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-    left = without_deviations(bench, d, left, noise)
     stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}
     for h, columns in zip(bench.asked, bench.columns, strict=True):

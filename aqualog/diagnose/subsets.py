@@ -57,7 +57,9 @@ def gains_on_top(bench: Bench, gram: FloatArray, base: Sequence[int]) -> FloatAr
     for i, columns in enumerate(bench.columns):
         c = list(columns)
         energy = np.diag(rest)[c]
-        if bench.asked[i].allowed or i in base or np.any(energy < SINGULAR * np.maximum(np.diag(gram)[c], 1e-300)):
+        if bench.asked[i].allowed or bench.barred[i] or i in base:
+            continue
+        if np.any(energy < SINGULAR * np.maximum(np.diag(gram)[c], 1e-300)):
             continue
         out[i] = float(rest[c, -1] @ np.linalg.solve(rest[np.ix_(c, c)], rest[c, -1]))
     return out
@@ -86,7 +88,7 @@ def best_sets(bench: Bench, gram: FloatArray, size: int, *, within: float, most:
     """
     alive = [
         i for i, c in enumerate(bench.columns)
-        if np.all(np.diag(gram)[list(c)] > 1e-12) and not bench.asked[i].allowed
+        if np.all(np.diag(gram)[list(c)] > 1e-12) and not bench.asked[i].allowed and not bench.barred[i]
     ]  # fmt: skip
     if size == 1:
         fits = [f for i in alive if (f := fit_set(bench, gram, (i,)))]

@@ -143,8 +143,9 @@ _ALL = [
     Effect(
         "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
         "momentum estimate within a factor of two (D)",
-        (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.1, "on film and wave"),),
+        (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.3, "on film and wave"),),
         _on_plant(lambda p, v, w: p._replace(water_drag_gain=_scaled(p.water_drag_gain, w, v["gain"]))), _WHEEL_PLACES,
+        twins=("track_clearing", "contact_loss"),
     ),
     Effect(
         "brake_drag", "torque against a wheel [N m]", "The brake drags with {torque:.0f} N m.", "a few N m a wheel (K)",
@@ -281,23 +282,25 @@ _ALL = [
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
         "shape assumed (D)",
-        (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.1, "on the lost share"),),
+        (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.3, "on the lost share"),),
         _on_plant(lambda p, v, w: p._replace(contact_gain=_scaled(p.contact_gain, w, v["gain"]))), _WHEEL_PLACES,
+        twins=("water_drag", "uneven_water"),
     ),
     Effect(
         "track_clearing", "film in the track of the front wheels [m]", "The front wheels leave another film.",
         "below 0.6 mm (D)",
-        (Parameter("delta_film", "m", 0.0, 2e-4, -5e-4, 5e-3, 1e-4, "on the tyre's own"),),
+        (Parameter("delta_film", "m", 0.0, 6e-4, -5e-4, 5e-3, 2e-4, "on the tyre's own"),),
         _on_plant(lambda p, v, _: p._replace(h_track=np.maximum(p.h_track + v["delta_film"], 0.0))),
+        twins=("water_drag",),
     ),
     Effect(
         "uneven_water", "water of one side", "The {where} track has {depth_gain:.2f} of the water.",
         "thesis 2.1: left lower and more irregular",
         (
-            Parameter("depth_gain", "-", 1.0, 0.3, 0.0, 5.0, 0.1, "on the depth of that side"),
+            Parameter("depth_gain", "-", 1.0, 0.3, 0.0, 5.0, 0.2, "on the depth of that side"),
             Parameter("irregularity", "-", 0.0, 0.2, 0.0, 2.0, 0.05, "added rms, relative to the depth"),
         ),
-        _uneven_water, ("left", "right"), "left",
+        _uneven_water, ("left", "right"), "left", twins=("contact_loss", "water_drag"),
     ),
     Effect(
         "clock_skew", "clock of a bus [ppm]", "The clock of the signal runs {skew:.0f} ppm off.",

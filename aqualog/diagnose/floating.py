@@ -1,0 +1,66 @@
+"""Where a wheel floats, or nearly does: what no residual should be judged by.
+
+A wheel that has lost its grip is bistable. Whether it spins down in a puddle, when, and when it is back is decided by
+differences of the water that no model knows, and then its speed is tens of m/s off: not a residual of the model but a
+coin that fell the other way. The same drive gives some of these where nothing is hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from aqualog.diagnose.channels import centre_line_speeds
+from aqualog.model.effects import EFFECTS
+from aqualog.model.follow import Course, follow
+from aqualog.model.term import Model, Term
+from aqualog.notation import WHEELS
+from aqualog.types import BoolArray, FloatArray
+from aqualog.vehicle import Vehicle
+
+__all__ = ["floating"]
+
+# slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
+# without floating needs a fifth of that
+BEYOND_GRIP = 0.05
+# times its own lost contact with which the simulation must still hold on: it goes with the fourth power of the speed of
+# full aquaplaning, which sources give as 118 (thesis), 95 (PAVDRN, K) and 88 km/h (Gallaway, K) at 1.3 mm
+RESERVE = 2.0
+# [s] a wheel that stood takes up speed again within one (D: 33 m/s in 0.65 s), but the led car has been turned by it,
+# nobody steers it back, and its yaw dies out in a few
+RECOVERY_S = 5.0
+V_LEAST = 4.0  # [m/s] under the slip
+
+
+def floating(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, course: Course) -> BoolArray:
+    """Samples (n,) in which a wheel may float. All False on a dry course.
+
+    Parameters
+    ----------
+    columns : mapping of array (n,)
+        Measured signals; wheels that are not logged are taken from the simulation alone.
+    v : array (n,)
+        Measured velocity. [m/s]
+    vehicle : Vehicle
+    course : Course
+        The simulation is led along it as it is, and with twice the lost contact.
+
+    From where a wheel is beyond its grip, measured or in either simulation, to the end of that stretch of water and
+    until the car has recovered: who floats a little less floats a little later.
+    """
+    out: BoolArray = np.zeros(v.shape, dtype=bool)
+    if not course.lanes:
+        return out
+    more = Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),))
+    for shown in (columns, follow(vehicle, course, Model()), follow(vehicle, course, more)):
+        if all(f"omega_{w}" in shown for w in WHEELS):
+            speed = shown.get("v_x", v)
+            slip = centre_line_speeds(shown, vehicle) / np.maximum(speed, V_LEAST) - 1.0
+            out |= np.abs(slip).max(axis=0) > BEYOND_GRIP
+    for lane in course.lanes:
+        passed = (course.t >= lane.start) & (course.t < lane.end + RECOVERY_S)
+        first = np.flatnonzero(passed & out)
+        if first.size:
+            out |= passed & (course.t >= course.t[first[0]])
+    return out

@@ -1,0 +1,48 @@
+"""Where a wheel floats or may float nothing is judged; the rest of the water is."""
+
+from dataclasses import replace
+
+import numpy as np
+from test_drive import CAR, changed, signals, term
+
+from aqualog.diagnose.channels import centre_line_speeds
+from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.floating import BEYOND_GRIP
+from aqualog.model.scenario import Lane
+from aqualog.model.sensors import IDEAL
+
+SPEED = ((0.0, 22.0), (28.0, 22.0), (32.0, 34.0), (44.0, 34.0), (52.0, 20.0))
+LANES = tuple(Lane(t, t + 6.0, in_metres=False, depth_left=1.6e-3, depth_right=1.8e-3) for t in (8.0, 18.0, 36.0, 60.0))
+
+
+def wet(*terms, sensors=IDEAL, lanes=LANES):
+    return signals(*terms, speed=SPEED, lanes=lanes, sensors=sensors)
+
+
+def test_where_a_wheel_floats_nothing_is_judged_and_the_rest_of_the_water_is():
+    log = wet()
+    d = prepare(log, CAR, "a")
+    v = np.maximum(log.array("v_x"), 4.0)
+    slip = np.abs(centre_line_speeds({s: log.array(s) for s in log.symbols}, CAR) / v - 1.0).max(axis=0)
+    beyond = slip.reshape(-1, 10).max(axis=1) > BEYOND_GRIP
+    assert beyond.any()
+    assert not d.mask[beyond].any()
+    slow = (d.coordinates["water_depth"] > 0.0) & (d.coordinates["t"] < 25.0)
+    assert d.mask[slow].all()
+
+
+def test_a_wheel_that_only_the_simulation_lets_float_is_left_out_too():
+    dry = signals(speed=SPEED)
+    frame = dry.frame.with_columns(wet().frame.select("water_depth_left", "water_depth_right"))
+    d = prepare(changed(dry, frame), CAR, "a")
+    assert not d.mask[370:410].any()
+    assert d.mask[90:130].all()
+
+
+def test_water_is_no_brake_that_is_not_logged():
+    deep = tuple(replace(x, depth_left=2.5e-3, depth_right=2.5e-3) for x in LANES)
+    log = wet(term("water_drag", gain=5.0), lanes=deep)
+    log = changed(log, log.frame.drop("brake_pressure", strict=False))
+    assert not any("brakes" in n for n in prepare(log, CAR, "a").notes)
+    dry = changed(log, log.frame.select(s for s in log.frame.columns if "water" not in s))
+    assert any("brakes" in n for n in prepare(dry, CAR, "a").notes)
