@@ -51,13 +51,17 @@ def _on_plant(change: Callable[[Plant, Values, str | None], Plant]) -> Callable[
     return lambda setup, v, where: setup._replace(plant=change(setup.plant, v, where))
 
 
+def _signals_at(where: str | None) -> tuple[str, ...]:
+    """The signal of that name, or all four wheels' for `omega` and `torque`."""
+    return tuple(f"{where}_{w}" for w in WHEELS) if where in ("omega", "torque") else (str(where),)
+
+
 def _on_channels(change: Callable[[Channel, Values], Channel]) -> Callable[[Setup, Values, str | None], Setup]:
     """Change the channel of a signal, or of all four wheels' for `omega` and `torque`."""
 
     def apply(setup: Setup, v: Values, where: str | None) -> Setup:
-        signals = [f"{where}_{w}" for w in WHEELS] if where in ("omega", "torque") else [str(where)]
         sensors = setup.sensors
-        for signal in signals:
+        for signal in _signals_at(where):
             sensors = sensors.with_channel(signal, change(sensors.channels.get(signal, Channel()), v))
         return setup._replace(sensors=sensors)
 
@@ -81,8 +85,10 @@ def _tone_ring(setup: Setup, v: Values, where: str | None) -> Setup:
 
 
 def _clock_skew(setup: Setup, v: Values, where: str | None) -> Setup:
+    # a clock is that of a bus: whoever shares it runs off too
+    shared = set(_signals_at(where))
     groups = tuple(
-        replace(g, skew_ppm=g.skew_ppm + v["skew"]) if where in g.signals else g for g in setup.sensors.groups
+        replace(g, skew_ppm=g.skew_ppm + v["skew"]) if shared & set(g.signals) else g for g in setup.sensors.groups
     )
     return setup._replace(sensors=replace(setup.sensors, groups=groups))
 

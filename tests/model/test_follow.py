@@ -106,6 +106,16 @@ def test_terms_of_the_sensors_show_in_their_own_column_alone(made):
     assert all(np.array_equal(off[n], x) for n, x in base.items() if n != "a_x")
 
 
+@pytest.mark.parametrize("place", ["omega", "torque"])
+def test_the_clock_of_four_wheels_is_that_of_any_one_of_them(made, place):
+    t, c = made
+    base = follow(CAR, course(t, c), Model())
+    four = follow(CAR, course(t, c), Model((term("clock_skew", place, skew=5e4),)))
+    one = follow(CAR, course(t, c), Model((term("clock_skew", f"{place}_fl", skew=5e4),)))
+    assert np.abs(four["omega_rr"] - base["omega_rr"])[INSIDE].max() > 1e-3
+    assert all(np.array_equal(four[n], x) for n, x in one.items())
+
+
 def test_torque_applied_to_one_wheel_turns_that_wheel(made):
     t, c = made
     at = course(t, c)
