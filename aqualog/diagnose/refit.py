@@ -25,6 +25,7 @@ SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss what it promised before it is simulated anew
 ENOUGH = 0.3  # of twice the log-likelihood
+FREEDOM = 3.0  # degrees of the distribution of sizes: the fewest with a variance (K)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +33,9 @@ class Refit:
     """A set at its best values.
 
     `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
-    tolerances, and what values beyond three times their usual size cost; `residuals` (C, n) and `signatures` (k, C, n)
-    per drive at these values; `at_bound` if a value sits at its physical bound.
+    tolerances, and what values cost by their usual sizes; `residuals` (C, n) and `signatures` (k, C, n)
+    per drive at these values; `at_bound` if a value sits at its physical bound; `unlikely`: the share of `loss` that
+    the sizes of the values have.
     """
 
     members: tuple[Hypothesis, ...]
@@ -45,6 +47,7 @@ class Refit:
     residuals: tuple[FloatArray, ...]
     signatures: tuple[FloatArray, ...]
     at_bound: bool
+    unlikely: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +149,20 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
     J = _rows(bench, slopes, noises)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0))
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
-    # within three times its usual size no value is less likely than another when sets are compared
-    loss -= float(np.minimum(((values - base) / width) ** 2, 1.0).sum())
-    return Refit(members, names, values, np.asarray(covariance), loss, extended, tuple(residuals), slopes, at_bound)
+    unlikely = _unlikely((values - base) / bench.prior[columns])
+    loss += unlikely - float((((values - base) / width) ** 2).sum())
+    return Refit(
+        members, names, values, np.asarray(covariance), loss, extended, tuple(residuals), slopes, at_bound, unlikely
+    )
+
+
+def _unlikely(z: FloatArray) -> float:
+    """Twice the negative log of how likely values are, by their usual size: Student's distribution, 0 at no deviation.
+
+    Its tails are heavy: one fault may well be large. Two large ones that happen to cancel are a rare coincidence, and
+    what near twins do to a residual is little; normal tails would rather split a large fault among twins.
+    """
+    return float((FREEDOM + 1.0) * np.log1p(z**2 / FREEDOM).sum())
 
 
 def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:

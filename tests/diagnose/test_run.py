@@ -89,7 +89,19 @@ def test_cannot_tell(monkeypatch):
     assert twins.p_correct < 0.7
 
 
-@pytest.mark.xfail(strict=True, reason="near twins that cancel are taken for a compound: -9 % grade and +1.2 m/s^2")
+def test_a_slope_and_an_offset_that_cancel_are_no_compound(monkeypatch):
+    # without torque the two look all but the same: -9 % and +1.2 m/s^2 together would explain a few millimetres of slip
+    ask(monkeypatch, ("accelerometer_bias@a_x", "road_grade", "tyre_radius@fl"))
+    log = noisy(term("accelerometer_bias", "a_x", bias=0.4), drop=[f"torque_{w}" for w in ("fl", "fr", "rl", "rr")])
+    d = told(log=log)
+    assert d.verdict in ("named", "cannot_tell")
+    assert d.causes[0].key == "accelerometer_bias@a_x"
+    assert d.causes[0].parameters["bias"].value == pytest.approx(0.4, abs=0.02)
+    twins = next(c for c in d.confusions if c.effect == "road_grade" and c.rivals == ("accelerometer_bias@a_x",))
+    assert twins.p_correct < 0.7
+
+
+@pytest.mark.xfail(strict=True, reason="the torque that stands in does not grow with a slope, the load on an axle does")
 def test_a_slope_and_an_offset_without_torque(monkeypatch):
     # without torque a slope and an offset of the accelerometer look the same
     ask(monkeypatch, ("accelerometer_bias@a_x", "road_grade", "tyre_radius@fl"))
@@ -98,8 +110,6 @@ def test_a_slope_and_an_offset_without_torque(monkeypatch):
     assert d.verdict == "cannot_tell"
     assert keys(d) == {"accelerometer_bias@a_x", "road_grade"}
     assert d.alternatives[0].evidence_ratio < 20.0
-    twins = next(c for c in d.confusions if c.effect == "road_grade" and c.rivals == ("accelerometer_bias@a_x",))
-    assert twins.p_correct < 0.7
 
 
 def function_of_speed(share):

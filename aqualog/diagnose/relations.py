@@ -1,0 +1,38 @@
+"""Relations among effects that hold on every log: what one of them does, two others together do as well.
+
+Beside the twins of an effect, which look like it one by one. An accelerometer reads the pull of a slope like an offset;
+the force balance does not see a slope, but it sees the offset, and that as a rolling resistance. No drive breaks such a
+relation, so that the smaller set is no better proven than the larger one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from aqualog.diagnose.hypotheses import Hypothesis
+
+__all__ = ["RELATIONS", "imitations"]
+
+# offset b of the accelerometer = slope b / g and rolling resistance -b / g, but for the slip that rolling costs (D)
+RELATIONS: tuple[tuple[str, str, str], ...] = (("accelerometer_bias", "road_grade", "rolling_resistance"),)
+
+
+def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tuple[int, ...]]:
+    """Sets of hypotheses that a relation makes equal to `members`, none of which holds them all; sorted indices.
+
+    Any two effects of a relation span what all three do. Effects are taken at the whole car or at their usual place.
+    """
+    out = []
+    for relation in RELATIONS:
+        usual = {
+            h.effect.name: i for i, h in enumerate(asked)
+            if h.effect.name in relation and h.where in (None, h.effect.default)
+        }  # fmt: skip
+        related = {i for i in members if i in usual.values()}
+        if not related or len(usual) < len(relation):
+            continue
+        for two in combinations(usual.values(), 2):
+            if not related <= set(two):
+                out.append(tuple(sorted({*members} - related | set(two))))
+    return out
