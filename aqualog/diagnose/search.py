@@ -16,7 +16,8 @@ from aqualog.diagnose.family import Calibration, bonferroni, calibrate, chance, 
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
-from aqualog.diagnose.refit import KNOWN, Refit, metric, refit, whitened_residual
+from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, whitened_residual
+from aqualog.diagnose.relations import imitations
 from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set
 from aqualog.model.term import Model
 from aqualog.notation import AXLES
@@ -33,6 +34,7 @@ SLACK, BENT = 8.0, 0.05
 FURTHER = 1.5
 # share of what the best set gains by which the form of a law of water may have misjudged another thing that water does
 FORM = 0.3
+UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 HALF = 0.5  # of what the test asks for, that a set must take away once it is refitted
 PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
 
@@ -208,6 +210,16 @@ def _refitted(
         known_loss = min(known_loss, again.loss)
     if not done or known_loss - done[0].loss < HALF * calibration.threshold * inflation:
         return ()
+    best = done[0]
+    members = next(f.members for f, own in zip(fits, refits, strict=True) if own is best)
+    for fit, same in _imitated(bench, gram, members, measure, model):
+        # the relation holds on every log: that it takes more effects, in these sizes, is no evidence against it
+        fits.append(fit)
+        refits.append(same)
+        done.append(same)
+        worse = (same.loss - same.unlikely) - (best.loss - best.unlikely)
+        losses[id(same)] = losses[id(best)] + max(worse, 0.0) / inflation
+    done.sort(key=lambda r: losses[id(r)])
     wet = (known_loss - done[0].loss) / inflation if _about_water(done[0]) else 0.0
     behind = [losses[id(r)] - losses[id(done[0])] - (FORM * wet if _about_water(r) else 0.0) for r in done]
     ratios = [math.exp(min(0.5 * max(x, 0.0), 700.0)) for x in behind]
@@ -253,6 +265,25 @@ def _of_water(bench: Bench, gram: FloatArray, known: set[tuple[int, ...]]) -> li
 
 def _about_water(r: Refit) -> bool:
     return any(h.of_water for h in r.members)
+
+
+def _imitated(
+    bench: Bench, gram: FloatArray, members: Sequence[int], measure: Metric, model: Model
+) -> list[tuple[SetFit, Refit]]:
+    """Refits of the sets that a relation makes equal to the best one, without those at a physical bound."""
+    out = []
+    for other in imitations(bench.asked, members):
+        fit = fit_set(bench, gram, other) if len(other) <= MOST else None
+        same = refit(bench, fit, measure, model) if fit is not None and compatible(bench, other) else None
+        if fit is not None and same is not None and not same.at_bound and _all_there(same, model) and _usual(same):
+            out.append((fit, same))
+    return out
+
+
+def _usual(r: Refit) -> bool:
+    """Whether no value is beyond three times its usual size: an offset that happens to be huge is no rival."""
+    own = [(r.members[i].parameter(n), v) for (i, n), v in zip(r.names, r.values.tolist(), strict=True)]
+    return all(abs(v - p.neutral) <= UNUSUAL * p.sigma for p, v in own)
 
 
 def _at(fit: SetFit, r: Refit, model: Model) -> SetFit:
