@@ -306,7 +306,8 @@ def _coordinates(columns: Mapping[str, FloatArray], course: Course, v: FloatArra
         "v_x": v,
         "torque": course.torque.sum(axis=0),
         "position": np.cumsum(v) * dt,
-        "a_x": np.gradient(v, dt),
+        # as it is, the noise of the velocity would be most of its change
+        "a_x": np.gradient(smooth(v, dt, SPEED_S), dt),
     }
     if course.lanes:
         depth = np.zeros_like(v)

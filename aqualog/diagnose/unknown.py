@@ -199,7 +199,8 @@ def _choice(
     for g in short:
         columns = g.columns.astype(np.float64)
         weight, _ = _smoothing(g, taken, row, shape)
-        candidates.append(Candidate(g.basis.names, columns, weight * g.basis.penalty, g.basis.along))
+        tested = g.basis.names in names
+        candidates.append(Candidate(g.basis.names, columns, weight * g.basis.penalty, g.basis.along, tested))
     return choose(candidates, taken, row, blocks)
 
 

@@ -12,7 +12,7 @@ from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["PAIRS", "Basis", "bases"]
 
-PAIRS = (("v_x", "water_depth"), ("v_x", "torque"))
+PAIRS = (("v_x", "water_depth"), ("v_x", "torque"), ("v_x", "a_x"))
 COLUMNS = 14  # of a coordinate: humps down to about a tenth of its range
 COLUMNS_ALONG = 26  # of a coordinate that runs with time: a road has more features than a car
 COLUMNS_PAIR = 6  # per coordinate

@@ -24,13 +24,14 @@ Blocks = npt.NDArray[np.int64]
 class Candidate(NamedTuple):
     """A function that may explain the residual: whitened columns (N, K), penalty (K, K) times its factor.
 
-    `along`: its coordinate runs with time.
+    `along`: its coordinate runs with time. `passed`: the test found it; else it stands beside for comparison.
     """
 
     names: tuple[str, ...]
     columns: FloatArray
     penalty: FloatArray
     along: bool
+    passed: bool = True
 
 
 class Choice(NamedTuple):
@@ -87,18 +88,12 @@ def choose(candidates: Sequence[Candidate], constants: FloatArray, rows: FloatAr
 
     singles = [i for i, c in enumerate(candidates) if len(c.names) == 1]
     place = {candidates[i].names[0]: i for i in singles}
-    totals = {i: float(gain(i).sum()) for i in singles}
-    best = max(totals, key=lambda i: totals[i])
-    # what does not run with time can be carried to another drive: it wins where the drive cannot tell
-    plain = [i for i in singles if not candidates[i].along]
-    if candidates[best].along and plain:
-        other = max(plain, key=lambda i: totals[i])
-        if totals[other] > 0.0 and not _helps(gain(best, other) - gain(other)):
-            best = other
+    found = [i for i in singles if candidates[i].passed]
+    best = _of_one(candidates, found, gain) if found else _of_two(candidates, gain)
     road = place.get("position", best)
     if candidates[best].along and candidates[road].along:  # same thing here, but the model has a road and no clock
         best = road
-    for i, c in enumerate(candidates):
+    for i, c in enumerate(candidates if found else ()):
         if len(c.names) == 2 and all(name in place for name in c.names):
             parts = [place[name] for name in c.names]
             if all(_helps(gain(i) - gain(*m)) for m in ((best,), parts)) and gain(i).sum() > gain(best).sum():
@@ -125,6 +120,25 @@ def choose(candidates: Sequence[Candidate], constants: FloatArray, rows: FloatAr
         tuple(p for p in proxies if p not in equals),
         total,
     )
+
+
+def _of_one(candidates: Sequence[Candidate], among: Sequence[int], gain: Callable[..., FloatArray]) -> int:
+    """The coordinate that explains most."""
+    totals = {i: float(gain(i).sum()) for i in among}
+    best = max(totals, key=lambda i: totals[i])
+    # what does not run with time can be carried to another drive: it wins where the drive cannot tell
+    plain = [i for i in among if not candidates[i].along]
+    if candidates[best].along and plain:
+        other = max(plain, key=lambda i: totals[i])
+        if totals[other] > 0.0 and not _helps(gain(best, other) - gain(other)):
+            return other
+    return best
+
+
+def _of_two(candidates: Sequence[Candidate], gain: Callable[..., FloatArray]) -> int:
+    """The pair that explains most, where no coordinate alone was found: a part of it is no answer then."""
+    pairs = [i for i, c in enumerate(candidates) if c.passed]
+    return max(pairs, key=lambda i: float(gain(i).sum()))
 
 
 def _helps(gains: FloatArray) -> bool:

@@ -59,6 +59,14 @@ def test_a_dry_drive_is_used_whole():
     assert all(x.shape == d.mask.shape for x in d.coordinates.values())
 
 
+def test_the_change_of_speed_is_not_the_noise_of_the_velocity():
+    log = plain()
+    v = log.array("v_x") + 0.05 * np.random.default_rng(1).standard_normal(log.frame.height)
+    noisy = changed(log, log.frame.with_columns(pl.Series("v_x", v)))
+    quiet, loud = (prepare(x, CAR, "a").coordinates["a_x"] for x in (log, noisy))
+    assert np.std(loud - quiet) < 0.1
+
+
 def test_a_long_gap_is_left_out_with_a_second_beside_and_a_short_one_bridged():
     x = plain().array("a_x").copy()
     x[3000:3010] = np.nan  # 0.1 s

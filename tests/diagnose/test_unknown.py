@@ -145,6 +145,22 @@ def test_one_pass_cannot_tell_place_from_time():
     assert "road_grade is the nearest known effect (cosine 0.40)" in text
 
 
+@pytest.mark.parametrize("passed", [True, False])
+def test_part_of_a_pair_is_no_answer_unless_it_was_found_itself(passed):
+    """What only stands beside a pair for comparison cannot take its place."""
+    n, q = 1200, 4
+    rng = np.random.default_rng(8)
+    waves = np.stack([np.cos(np.pi * k * np.arange(n) / n) for k in range(1, 2 * q + 1)], axis=1)
+    speed, pair = waves[:, :q], waves
+    rows = rng.standard_normal(n) + speed @ np.full(q, 0.3) + 0.12 * waves[:, q]
+    stiff = 1e-6 * np.eye(2 * q)
+    singles = [Candidate(("v_x",), speed, stiff[:q, :q], along=False, passed=passed)]
+    singles.append(Candidate(("a_x",), waves[:, q:], stiff[:q, :q], along=False, passed=False))
+    both = Candidate(("v_x", "a_x"), pair, stiff, along=False)
+    choice = choose([both, *singles], np.ones((n, 1)), rows, np.arange(n) // 20)
+    assert choice.names == (("v_x",) if passed else ("v_x", "a_x"))
+
+
 def test_nothing_where_there_is_nothing():
     """Of 16 drives of noise at a level of 5 %: four or more would be less than one chance in a hundred."""
     assert sum(bool(search(fake(100 + i, keep=0.9), level=0.05, seed=i)) for i in range(16)) < 4
