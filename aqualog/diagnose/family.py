@@ -201,4 +201,5 @@ def _restricted(bench: Bench, wanted: Sequence[int]) -> Bench:
         high=bench.high[keep],
         smallest=bench.smallest[keep],
         tolerance=bench.tolerance[keep],
+        spread=bench.spread[keep],
     )

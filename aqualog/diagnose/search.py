@@ -202,10 +202,13 @@ def _refitted(
         return ()
     ratios = [math.exp(min(0.5 * (losses[id(r)] - losses[id(done[0])]), 700.0)) for r in done]
     credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]
-    fine = metric(bench, noises, share=KNOWN)
     starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
+
+    def sharpened(start: SetFit) -> Refit | None:
+        return refit(bench, start, metric(bench, noises, share=KNOWN, beside=start.columns), model)
+
     with ThreadPoolExecutor(THREADS) as pool:
-        sharp = list(pool.map(lambda start: refit(bench, start, fine, model), starts))
+        sharp = list(pool.map(sharpened, starts))
     return tuple(
         Candidate(s if s is not None and not s.at_bound else r, x, inflation)
         for (r, x), s in zip(credible, sharp, strict=True)

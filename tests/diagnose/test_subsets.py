@@ -10,6 +10,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import PRIOR_WIDTH, best_sets, compatible, fit_set, gains_on_top
 from aqualog.model.effects import EFFECTS
+from aqualog.vehicle import Vehicle
 
 CHANNELS = ("axle_slip", "lateral")
 
@@ -36,7 +37,7 @@ def keys(bench, members):
 def bench_of(residual, signatures, asked=ASKED, mask=None):
     """One drive with this residual (C, n) and one signature (C, n) for each hypothesis."""
     mask = np.ones(residual.shape[1], dtype=bool) if mask is None else mask
-    drive = SimpleNamespace(mask=mask, channels=CHANNELS[: len(residual)])
+    drive = SimpleNamespace(mask=mask, channels=CHANNELS[: len(residual)], vehicle=Vehicle())
     values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(asked)}
     return make_bench([drive], asked, [residual], [[s[None] for s in signatures]], values)
 
