@@ -24,6 +24,7 @@ from aqualog.diagnose.records import Consequence, Diagnosis, Remainder, Residual
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_term import as_term
+from aqualog.diagnose.usual import without_usual
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.errors import SignalError
 from aqualog.model.term import Model
@@ -208,6 +209,7 @@ def _remainders(
 
 def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
     drive = bench.drives[d]
+    left = without_usual(bench, d, left)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
     stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}

@@ -14,6 +14,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
 from aqualog.diagnose.subsets import fit_set, gains_on_top
+from aqualog.diagnose.usual import without_usual
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
@@ -66,3 +67,15 @@ def test_keys_of_the_file_in_units_of_the_effects():
     assert day_to_day(one("rolling_resistance", "f"), "delta_r_w", car) == 0.0
     assert day_to_day(one("payload_mass"), "delta_mass", car) == 0.0
     assert day_to_day(one("head_wind"), "speed", car) == 0.0
+
+
+def test_what_drives_differ_by_is_nothing_to_look_for():
+    bench, *_ = of_mass(60.0)
+    left = without_usual(bench, 0, bench.residuals[0])
+    mask, force = bench.drives[0].mask, bench.drives[0].channels.index("force_balance")
+    before, after = (float(np.mean(x[force, mask] ** 2)) for x in (bench.residuals[0], left))
+    gone = bench.residuals[0] - left
+    assert after < 0.7 * before
+    assert 60.0 < float(np.sum(gone * bench.signatures[0][0]) / np.sum(bench.signatures[0][0] ** 2)) < 125.0
+    plain, *_ = of_mass(0.0)
+    assert without_usual(plain, 0, plain.residuals[0]) is plain.residuals[0]
