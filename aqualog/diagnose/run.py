@@ -103,7 +103,9 @@ def diagnose(
         return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
     given = model
     road = _road(ready, model)
+    hilly = road is not None and road.rms.value >= HILLY
     if road is not None:
+        # named or not: a car pulls uphill, and the torque would pass for the cause
         model = with_profile(model, road)
     asked, untested = hypotheses(ready, model)
     bench = simulated(ready, asked, model, tell)
@@ -112,8 +114,8 @@ def diagnose(
     tell("describing what is left", 0.8)
     outcome, remainders = _remainders(bench, found, outcome, options)
     if road is not None:
-        outcome = _with_road(outcome, road)
-    extended = _extended(outcome, remainders, model, vehicle)
+        outcome = _with_road(outcome, road, named=hilly)
+    extended = _extended(outcome, remainders, model if hilly else given, vehicle)
     sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
     before = [residual(d, given) for d in ready] if road is not None else list(bench.residuals)
     after = [residual(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
@@ -160,14 +162,14 @@ def diagnose(
 
 
 def _road(drives: Sequence[Drive], model: Model) -> Profile | None:
-    """The road of a single drive, where its slopes are beyond what the velocity's own error could be."""
-    if len(drives) != 1:
-        return None
-    road = find_profile(drives[0], residual(drives[0], model))
-    return road if road is not None and road.rms.value >= HILLY else None
+    """The road of a single drive."""
+    return find_profile(drives[0], residual(drives[0], model)) if len(drives) == 1 else None
 
 
-def _with_road(outcome: Outcome, road: Profile) -> Outcome:
+def _with_road(outcome: Outcome, road: Profile, *, named: bool) -> Outcome:
+    if not named:
+        told = f"Significant, but too small to be worth naming: {road.cause.sentence}"
+        return outcome._replace(small=(*outcome.small, told))
     verdict: Verdict = {"no_effect": "named", "named": "compound"}.get(outcome.verdict, outcome.verdict)  # type: ignore[assignment]
     certain = outcome.certain | {road.cause.effect}
     return outcome._replace(verdict=verdict, causes=(*outcome.causes, road.cause), certain=certain)
