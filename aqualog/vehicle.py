@@ -12,7 +12,17 @@ from typing import Literal
 
 from aqualog.notation import WHEELS
 
-__all__ = ["COEFFICIENTS", "KEYS", "POLYNOMIALS", "Drivetrain", "Key", "Vehicle", "vehicle_toml"]
+__all__ = [
+    "COEFFICIENTS",
+    "KEYS",
+    "POLYNOMIALS",
+    "SPREAD",
+    "Drivetrain",
+    "Key",
+    "Vehicle",
+    "spread_lines",
+    "vehicle_toml",
+]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
 
@@ -67,6 +77,10 @@ POLYNOMIALS = {
 }
 """Sections of polynomials: c0, and c_y, c_x with powers from the first on; `sigma` is what they leave on dry road."""
 
+SPREAD = ("mass", "drag_area", "rolling_resistance", "torque_gain")
+"""Keys of the table `spread`: the standard deviation by which one more drive differs from the file's value, in the
+key's unit. Wind, surface, temperature, fuel and all else that a balance of forces does not know."""
+
 COEFFICIENTS = ("c0", "c_y", "c_x", "sigma")
 
 KEYS: dict[str, Key] = {k.path: k for k in _ALL}
@@ -108,6 +122,7 @@ class Vehicle:
     mu_max: float = _default("tyre.mu_max")
     tie_rod: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     steering_torque: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    spread: Mapping[str, float] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     def r_e(self, wheel: str) -> float:
@@ -142,6 +157,11 @@ class Vehicle:
         return "r" if self.drivetrain == "fwd" else "f"
 
 
+def spread_lines(vehicle: Vehicle) -> list[str]:
+    """The lines of the table `spread` in a vehicle file."""
+    return [f"{n} = {vehicle.spread[n]!r}  # [{KEYS[n].unit}]" for n in SPREAD if n in vehicle.spread]
+
+
 def vehicle_toml(vehicle: Vehicle) -> str:
     """The vehicle as the text of a vehicle file, every key with unit and meaning."""
     name = vehicle.name.replace("\\", "").replace('"', "")
@@ -152,6 +172,8 @@ def vehicle_toml(vehicle: Vehicle) -> str:
             section = key.section
             lines += ["", f"[{section}]"]
         lines.append(f"{key.name} = {getattr(vehicle, key.name)!r}  # [{key.unit}] {key.meaning}")
+    if vehicle.spread:
+        lines += ["", "[spread]", *spread_lines(vehicle)]
     for section in POLYNOMIALS:
         table = getattr(vehicle, section)
         if table:

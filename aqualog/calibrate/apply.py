@@ -36,16 +36,23 @@ def told(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[f
 
 
 def calibrated(
-    vehicle: Vehicle, parameters: Sequence[Parameter], transfers: Mapping[str, TieRodFit] | None = None
+    vehicle: Vehicle,
+    parameters: Sequence[Parameter],
+    transfers: Mapping[str, TieRodFit] | None = None,
+    spread: Mapping[str, float] | None = None,
 ) -> Vehicle:
     """The vehicle with the values that are told; the others stay.
 
     Keys that are told count as given. So do the loaded radii, once the effective ones are: forces rest on those that
-    the calibration has used.
+    the calibration has used. A spread from drive to drive that the drives do not show stays the file's.
     """
     values = told(parameters, vehicle)
     radii = {"wheels.r_l_f", "wheels.r_l_r"} if "wheels.r_e_f" in values else set()
     changed = {key.rsplit(".", 1)[-1]: value for key, (value, _) in values.items()}
     polynomials = {section: {**fit.coefficients, "sigma": (fit.sigma,)} for section, fit in (transfers or {}).items()}
     given = vehicle.given | set(values) | radii
-    return replace(vehicle, **changed, **polynomials, given=frozenset(given))  # type: ignore[arg-type]
+    # the gain's is that of the torques as they were read, like the gain itself
+    scale = {"torque_gain": vehicle.torque_gain}
+    seen = {n: float(f"{sd * scale.get(n, 1.0):.{DIGITS}g}") for n, sd in (spread or {}).items()}
+    both = {**vehicle.spread, **seen}
+    return replace(vehicle, **changed, **polynomials, spread=both, given=frozenset(given))  # type: ignore[arg-type]

@@ -79,7 +79,8 @@ class TieRodFit:
 class Calibration:
     """Result over all drives. `fixed` are the values given from outside; `cannot_tell` are sentences.
 
-    `transfers` are polynomials by section of the vehicle file: `tie_rod`, `steering_torque`.
+    `transfers` are polynomials by section of the vehicle file: `tie_rod`, `steering_torque`. `spread` is the standard
+    deviation by which one more drive differs from a parameter, in its unit; empty where too few drives show it.
     """
 
     vehicle_name: str
@@ -89,6 +90,7 @@ class Calibration:
     cannot_tell: tuple[str, ...]
     notes: tuple[str, ...]
     transfers: Mapping[str, TieRodFit] = field(default_factory=dict)
+    spread: Mapping[str, float] = field(default_factory=dict)
 
     def get(self, name: str) -> Parameter:
         """Parameter by name; KeyError if there is none."""

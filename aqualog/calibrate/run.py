@@ -15,12 +15,12 @@ from aqualog.calibrate.fits import drive_fits
 from aqualog.calibrate.offset import energy_offset
 from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
-from aqualog.calibrate.spread import spread_of
+from aqualog.calibrate.spread import one_more, spread_of
 from aqualog.calibrate.tie_rod import transfers
 from aqualog.errors import FitError
 from aqualog.physics.load import G
 from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
+from aqualog.vehicle import SPREAD, Vehicle
 
 __all__ = ["calibrate"]
 
@@ -78,9 +78,11 @@ def calibrate(
     skipped = [
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]
+    told = {p.name for p in parameters if p.identified and p.name not in fixed}
+    differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in SPREAD and n in told and sd > 0.0}
     notes = (*words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
     return Calibration(
-        vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods
+        vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
     )
 
 

@@ -16,7 +16,7 @@ from aqualog.types import FloatArray
 
 __all__ = [
     "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "combined", "half_width", "jackknife", "jackknife_of",
-    "of_drives", "spread_of", "stratified",
+    "of_drives", "one_more", "spread_of", "stratified",
 ]  # fmt: skip
 
 DRIVES_MIN = 4  # from here on the drives themselves show how they differ
@@ -70,6 +70,19 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
     if len(samples) < DRIVES_MIN:
         return assumed
     return combined(assumed, of_drives(estimator, samples))
+
+
+def one_more(spread: Spread, count: int) -> dict[str, float]:
+    """Standard deviation by which one more drive differs from the estimates over `count` drives, by name.
+
+    Of estimates over J drives like these it is sd sqrt(J) for a drive by itself and sd sqrt(J + 1) for its difference
+    to them (D). So wide that 1.96 of it is half of the 95 % interval, whatever the degrees of freedom. Empty where the
+    drives have not shown how they differ.
+    """
+    if not spread.by_drive:
+        return {}
+    half = {n: half_width(sd * math.sqrt(count + 1.0), spread.dof[n]) for n, sd in spread.sd.items()}
+    return {n: x / 1.96 for n, x in half.items() if math.isfinite(x)}
 
 
 def combined(assumed: Spread, seen: Spread) -> Spread:

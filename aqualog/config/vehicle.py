@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import TableFaults, is_real, load_toml
-from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, Vehicle
+from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle
 
 __all__ = ["load_vehicle"]
 
@@ -43,6 +43,8 @@ def load_vehicle(path: Path) -> Vehicle:
     for section in POLYNOMIALS:
         with faults.inside(section):
             values[section] = _polynomial(document.pop(section, {}), section, faults)
+    with faults.inside("spread"):
+        values["spread"] = _spread(document.pop("spread", {}), faults)
     for section, table in _sections(document, faults).items():
         with faults.inside(section):
             _numbers(table, section, faults, values, given)
@@ -61,7 +63,7 @@ def _sections(document: dict[str, Any], faults: TableFaults) -> dict[str, dict[s
         if name in sections and isinstance(value, dict):
             found[name] = value
         elif isinstance(value, dict):
-            faults.unknown(name, [*sections, *POLYNOMIALS])
+            faults.unknown(name, [*sections, *POLYNOMIALS, "spread"])
         else:
             found[""][name] = value
     return found
@@ -82,6 +84,22 @@ def _numbers(table: dict[str, Any], section: str, faults: TableFaults, values: d
             faults.add(name, f"{name} stands in [{section}]; {own}")
         else:
             faults.unknown(name, known)
+
+
+def _spread(table: Any, faults: TableFaults) -> dict[str, float]:
+    """Standard deviations from drive to drive by key, each at most as large as its key may be."""
+    result: dict[str, float] = {}
+    if not isinstance(table, dict):
+        faults.add("spread", "spread is not a table; write [spread]")
+        return result
+    for name in table:
+        if name not in SPREAD:
+            faults.unknown(name, SPREAD)
+            continue
+        number = faults.number(table, name, low=0.0, high=KEYS[name].high, unit=KEYS[name].unit)
+        if number is not None:
+            result[name] = number
+    return result
 
 
 def _polynomial(table: Any, section: str, faults: TableFaults) -> dict[str, tuple[float, ...]]:

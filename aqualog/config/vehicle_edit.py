@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aqualog.calibrate.apply import calibrated, told
 from aqualog.calibrate.records import Calibration, Parameter
-from aqualog.vehicle import KEYS, POLYNOMIALS, Vehicle
+from aqualog.vehicle import KEYS, POLYNOMIALS, Vehicle, spread_lines
 
 __all__ = ["calibrated_toml"]
 
@@ -15,7 +15,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     Keys that neither the old file nor the drives tell stand as comments, so that no default poses as given. Values have
     seven digits.
     """
-    new = calibrated(vehicle, calibration.parameters, calibration.transfers)
+    new = calibrated(vehicle, calibration.parameters, calibration.transfers, calibration.spread)
     values = told(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
@@ -32,6 +32,8 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         elif key.path not in new.given:
             line = f"# {line}; not told, default"
         lines.append(line)
+    if new.spread:
+        lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
     for part in POLYNOMIALS:
         table = getattr(new, part)
         if not table:

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.day_to_day import day_to_day
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["Bench", "Stack", "forgiven", "gram_of", "make_bench", "noises_after", "tolerant"]
+__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +53,17 @@ class Bench:
     smallest: FloatArray
     tolerance: FloatArray  # (K,) by which each may be off without being worth a word
     barred: BoolArray  # (H,) hypotheses that the drives speak against: neither tested nor put into sets
+    spread: FloatArray  # (K,) by which drives of the same car have been seen to differ, 0 where nobody has looked
 
     @property
     def count(self) -> int:
         """Number of columns."""
         return self.prior.size
+
+    @property
+    def forgiven(self) -> FloatArray:
+        """Standard deviation that each parameter has before a drive is looked at. (K,)"""
+        return np.maximum(self.tolerance, self.spread)
 
 
 def make_bench(
@@ -68,7 +75,7 @@ def make_bench(
 ) -> Bench:
     """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
     columns: list[tuple[int, ...]] = []
-    prior, low, high, smallest, tolerance = [], [], [], [], []
+    prior, low, high, smallest, tolerance, spread = [], [], [], [], [], []
     k = 0
     for i, h in enumerate(asked):
         columns.append(tuple(range(k, k + len(h.free))))
@@ -80,12 +87,14 @@ def make_bench(
             low.append(p.low - now)
             high.append(p.high - now)
             smallest.append(p.smallest)
+            spread.append(day_to_day(h, name, drives[0].vehicle))
             tolerance.append(h.tolerance(name))
     flat = [np.concatenate(list(s)) for s in signatures]
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Bench(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
         np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
+        np.array(spread),
     )  # fmt: skip
 
 
@@ -96,12 +105,12 @@ def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
     enough samples any of it is significant. The covariance of the residual is that of the noise plus that of all these
     deviations, I + X S^2 X'; by Woodbury its inverse takes A (S^-2 + A' A)^-1 A' off.
     """
-    k = np.flatnonzero((bench.tolerance > 0.0) & (np.diag(gram)[:-1] > 1e-12))
-    inner = gram[np.ix_(k, k)] + np.diag(bench.tolerance[k] ** -2.0)
+    k = np.flatnonzero((bench.forgiven > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+    inner = gram[np.ix_(k, k)] + np.diag(bench.forgiven[k] ** -2.0)
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
 
 
-def forgiven(
+def without_deviations(
     bench: Bench, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
 ) -> FloatArray:
     """A residual (C, n) of drive d less what deviations within the tolerances of these columns most likely are of it.
@@ -112,14 +121,14 @@ def forgiven(
     because it is of their form.
     """
     drive = bench.drives[d]
-    k = [c for c in columns if bench.tolerance[c] > 0.0]
+    k = [c for c in columns if bench.forgiven[c] > 0.0]
     left = residual
     for _ in range(2 if k else 0):
         noise = fit_noise(left, drive.mask, contrasts(drive.channels))
         A = whitened(bench.prepared[d].of(k), noise)
         y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
-        theta = np.linalg.solve(A @ A.T + np.diag(bench.tolerance[k] ** -2.0), A @ y)
-        theta = theta / max(1.0, float(np.abs(theta / bench.tolerance[k]).max()) / farthest)
+        theta = np.linalg.solve(A @ A.T + np.diag(bench.forgiven[k] ** -2.0), A @ y)
+        theta = theta / max(1.0, float(np.abs(theta / bench.forgiven[k]).max()) / farthest)
         left = residual - np.tensordot(theta, bench.signatures[d][k], axes=1)
     return left
 

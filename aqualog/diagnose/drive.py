@@ -109,8 +109,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         if s in needed or s == "v_x" or (torqued and s.startswith("torque_")):
             gaps |= own
     if torqued:
-        torque = vehicle.torque_gain * np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
-        torque = quiet_torque(torque, dt)
+        # signals have the file's torque gain already: it is applied on reading
+        torque = quiet_torque(np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS]), dt)
     else:
         torque = _needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
@@ -127,18 +127,19 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
-    if "brake_pressure" in filled and not (torqued and _brakes_in_torque(filled, torque)):
+    # friction brakes are at every wheel: the torque of one axle cannot hold them
+    every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
+    if "brake_pressure" in filled and not (every_wheel and _brakes_in_torque(filled, torque)):
         bad |= filled["brake_pressure"] > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
-    elif (
-        torqued
-        and "brake_pressure" not in filled
-        and _brakes_unlogged(torque, v, _widened(floats | _on_water(course), BESIDE_S, dt), vehicle, dt)
-    ):
-        bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
-        notes.append(
-            "the car slows down more than its torque says: brakes are not in the log, driven stretches are used"
-        )
+    elif torqued and "brake_pressure" not in filled:
+        unlogged = "" if every_wheel else "the torque is that of one axle"
+        wet = _widened(floats | _on_water(course), BESIDE_S, dt)
+        if every_wheel and _brakes_unlogged(torque, v, wet, vehicle, dt):
+            unlogged = "the car slows down more than its torque says"
+        if unlogged:
+            bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
+            notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(torque, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(

@@ -202,4 +202,5 @@ def _restricted(bench: Bench, wanted: Sequence[int]) -> Bench:
         smallest=bench.smallest[keep],
         tolerance=bench.tolerance[keep],
         barred=bench.barred[list(wanted)],
+        spread=bench.spread[keep],
     )

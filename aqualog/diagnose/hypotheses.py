@@ -22,6 +22,11 @@ __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "val
 
 THREADS = 2
 _WET = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
+# how fast a wheel turns under its force: without wheel speeds these would only bend what others explain
+_AT_WHEELS = (
+    "slip_stiffness", "slip_stiffness_drift", "load_sensitivity", "relaxation_length", "tyre_radius",
+    "tyre_radius_growth", "pressure_loss",
+)  # fmt: skip
 _PLACES: Mapping[str, tuple[str | None, ...]] = {
     "signal_delay": ("v_x", "a_x", "omega", "torque"),
     "clock_skew": ("v_x", "a_x", "torque_fl"),
@@ -112,6 +117,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     present = frozenset.intersection(*(d.present for d in drives))
     wet = any(d.course.lanes for d in drives)
     torque = not any(d.untorqued for d in drives)
+    wheels = all(f"omega_{w}" in present for w in WHEELS)
     out: list[Hypothesis] = []
     untested: dict[str, str] = dict(_NOT_ASKED)
     for effect in EFFECTS.values():
@@ -119,6 +125,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             continue
         if effect.name in _WET and not wet:
             untested[effect.name] = "no water depth in the log"
+            continue
+        if effect.name in _AT_WHEELS and not wheels:
+            untested[effect.name] = "no wheel speeds in the log"
             continue
         free = _FREE.get(effect.name, (effect.parameters[0].name,))
         if not {p.name for p in effect.parameters} >= set(free):

@@ -97,9 +97,8 @@ def next_manoeuvre(
     )
     if not pairs:
         return None
-    forgiven = tuple(
-        (h, n, h.tolerance(n)) for h in bench.asked for n in h.free if h.tolerance(n) > 0.0
-    )  # in the order of the bench's columns
+    names = [(h, n) for h in bench.asked for n in h.free]  # in the order of the bench's columns
+    forgiven = tuple((h, n, sd) for (h, n), sd in zip(names, bench.forgiven.tolist(), strict=True) if sd > 0.0)
     like = max(range(len(bench.drives)), key=lambda d: bench.drives[d].used_s)
     case = Case(bench, tuple(credible), tuple(noises), model, pairs, forgiven, like)
     log = of_log(case)

@@ -52,32 +52,42 @@ class Refit:
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k)."""
+    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k).
+
+    `apart` (K,): standard deviations that are not in it and come on top of the values found.
+    """
 
     noises: tuple[Noise, ...]
     A: FloatArray
     M: FloatArray
+    apart: FloatArray
 
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
         return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
 
 
-def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0) -> Metric:
+def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
     """The metric of `bench.tolerant` with a share of the tolerances.
 
     With all of them sets are compared; with `KNOWN` of them values are found: what is not worth a word is more than
     what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows. What
-    the laws of water are off by is no matter of words: whatever the share, it counts `DOUBT` times.
+    the laws of water are off by is no matter of words: whatever the share, it counts `DOUBT` times. What the car's
+    drives have been seen to differ by counts in full: this drive is off by it, too. Of the columns `beside`, whose
+    values are sought, it comes on top of the values, which is the same (D) where a signature stays what it was, and
+    still right where it does not.
     """
-    k = np.flatnonzero(bench.tolerance > 0.0).tolist()
+    apart = np.zeros(bench.count)
+    apart[list(beside)] = bench.spread[list(beside)]
     owner = {c: h for h, columns in zip(bench.asked, bench.columns, strict=True) for c in columns}
-    tolerance = bench.tolerance[k] * [DOUBT if owner[c].of_water else share for c in k]
+    shares = np.array([DOUBT if owner[c].of_water else share for c in range(bench.count)])
+    sd = np.maximum(shares * bench.tolerance, bench.spread - apart)
+    k = np.flatnonzero(sd > 0.0).tolist()
     A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
     seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
     A = A[seen]
-    M = np.linalg.inv(A @ A.T + np.diag(tolerance[seen] ** -2.0))
-    return Metric(tuple(noises), A, M)
+    M = np.linalg.inv(A @ A.T + np.diag(sd[k][seen] ** -2.0))
+    return Metric(tuple(noises), A, M, apart)
 
 
 def whitened_residual(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
@@ -147,7 +157,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
             fresh = True
     slopes = _slopes(bench, members, residuals, extended)
     J = _rows(bench, slopes, noises)
-    covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0))
+    covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
     unlikely = _unlikely((values - base) / bench.prior[columns])
     loss += unlikely - float((((values - base) / width) ** 2).sum())

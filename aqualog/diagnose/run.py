@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose import isolate
-from aqualog.diagnose.bench import Bench, Stack, forgiven
+from aqualog.diagnose.bench import Bench, Stack, without_deviations
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
@@ -104,7 +104,9 @@ def diagnose(
         return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
     given = model
     road = _road(ready, model)
+    hilly = road is not None and road.rms.value >= HILLY
     if road is not None:
+        # named or not: a car pulls uphill, and the torque would pass for the cause
         model = with_profile(model, road)
     asked, untested = hypotheses(ready, model)
     bench = simulated(ready, asked, model, tell)
@@ -114,8 +116,8 @@ def diagnose(
     tell("describing what is left", 0.8)
     outcome, remainders = _remainders(bench, found, outcome, options)
     if road is not None:
-        outcome = _with_road(outcome, road)
-    extended = _extended(outcome, remainders, model, vehicle)
+        outcome = _with_road(outcome, road, named=hilly)
+    extended = _extended(outcome, remainders, model if hilly else given, vehicle)
     sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
     before = [residual(d, given) for d in ready] if road is not None else list(bench.residuals)
     after = [residual(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
@@ -162,14 +164,14 @@ def diagnose(
 
 
 def _road(drives: Sequence[Drive], model: Model) -> Profile | None:
-    """The road of a single drive, where its slopes are beyond what the velocity's own error could be."""
-    if len(drives) != 1:
-        return None
-    road = find_profile(drives[0], residual(drives[0], model))
-    return road if road is not None and road.rms.value >= HILLY else None
+    """The road of a single drive."""
+    return find_profile(drives[0], residual(drives[0], model)) if len(drives) == 1 else None
 
 
-def _with_road(outcome: Outcome, road: Profile) -> Outcome:
+def _with_road(outcome: Outcome, road: Profile, *, named: bool) -> Outcome:
+    if not named:
+        told = f"Significant, but too small to be worth naming: {road.cause.sentence}"
+        return outcome._replace(small=(*outcome.small, told))
     verdict: Verdict = {"no_effect": "named", "named": "compound"}.get(outcome.verdict, outcome.verdict)  # type: ignore[assignment]
     certain = outcome.certain | {road.cause.effect}
     return outcome._replace(verdict=verdict, causes=(*outcome.causes, road.cause), certain=certain)
@@ -211,11 +213,12 @@ def _remainders(
 
 def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
     drive = bench.drives[d]
-    # a law of water that is off by what its sources leave open is no function without a name
-    of_water = [c for h, columns in zip(bench.asked, bench.columns, strict=True) if h.of_water for c in columns]
-    left = forgiven(bench, d, left, of_water)
+    # a law of water that is off by what its sources leave open is no function without a name, nor is what the car's
+    # drives differ by
+    open_ = [c for h, columns in zip(bench.asked, bench.columns, strict=True) if h.of_water for c in columns]
+    left = without_deviations(bench, d, left, sorted({*open_, *np.flatnonzero(bench.spread > 0.0).tolist()}))
     # nor is anything else that a file or a tyre may be off by
-    left = forgiven(bench, d, left, range(bench.count), farthest=FARTHEST)
+    left = without_deviations(bench, d, left, range(bench.count), farthest=FARTHEST)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
     stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}

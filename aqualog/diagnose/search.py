@@ -224,11 +224,14 @@ def _refitted(
     behind = [losses[id(r)] - losses[id(done[0])] - (FORM * wet if _about_water(r) else 0.0) for r in done]
     ratios = [math.exp(min(0.5 * max(x, 0.0), 700.0)) for x in behind]
     credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]
-    fine = metric(bench, noises, share=KNOWN)
     starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
-    benches = [replace(bench, drives=tuple(led_by(d, r.model) for d in bench.drives)) for r, _ in credible]
+
+    def sharpened(start: SetFit, found: Refit) -> Refit | None:
+        led = replace(bench, drives=tuple(led_by(d, found.model) for d in bench.drives))
+        return refit(led, start, metric(bench, noises, share=KNOWN, beside=start.columns), model)
+
     with ThreadPoolExecutor(THREADS) as pool:
-        sharp = list(pool.map(lambda b, start: refit(b, start, fine, model), benches, starts))
+        sharp = list(pool.map(sharpened, starts, (r for r, _ in credible)))
     return tuple(
         Candidate(s if s is not None and not s.at_bound else r, x, inflation)
         for (r, x), s in zip(credible, sharp, strict=True)

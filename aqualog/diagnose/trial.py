@@ -101,7 +101,7 @@ def _certain(gram: FloatArray, rows: tuple[int, int, int], rivals: Sequence[int]
 def of_log(case: Case) -> FloatArray:
     """Inner products of what each set leaves of the log, its columns, and all that is forgiven."""
     bench = case.bench
-    forgiven = np.flatnonzero(bench.tolerance > 0.0).tolist()
+    forgiven = np.flatnonzero(bench.forgiven > 0.0).tolist()
     total: FloatArray | float = 0.0
     for d, (drive, noise) in enumerate(zip(bench.drives, case.noises, strict=True)):
         parts = [c.refit.residuals[d][None] for c in case.credible] + [c.refit.signatures[d] for c in case.credible]

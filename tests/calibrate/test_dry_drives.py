@@ -154,6 +154,17 @@ def test_vehicle_file_holds_values_and_intervals(series, tmp_path):
     low, high = result.get("mass").ci95
     assert f"95 %: {low:.5g} ... {high:.5g}" in text
     assert "# - torque_gain: mass and torque gain are one ratio" in text
+    assert result.spread == {}  # two drives do not show how drives differ
+    assert "[spread]" not in text
+
+
+def test_vehicle_file_holds_the_spread_from_drive_to_drive(series, tmp_path):
+    _, true, _, result = series
+    before = replace(believed(true), torque_gain=2.0, spread={"mass": 9.0, "drag_area": 0.03})
+    path = tmp_path / "car.toml"
+    shown = replace(result, spread={"mass": 12.5, "torque_gain": 0.01})
+    path.write_text(calibrated_toml(before, shown), encoding="utf-8")
+    assert load_vehicle(path).spread == {"mass": 12.5, "drag_area": 0.03, "torque_gain": 0.02}
 
 
 def test_between_drives_the_heavy_one_stands_out():
@@ -163,6 +174,8 @@ def test_between_drives_the_heavy_one_stands_out():
     heavy = replace(true, mass=true.mass + 200.0)
     signals = [one_drive(c, gain, rng, seconds=320.0, sensors=ESC) for c in (true, true, true, heavy)]
     result = calibrate(signals, list("abcd"), believed(true), {"torque_gain": 1.0 / gain})
+    assert set(result.spread) <= {"mass", "drag_area", "rolling_resistance"}  # the gain is given
+    assert 50.0 < result.spread["mass"] < 400.0
     difference, low, high = result.drives[3].against_others
     assert low < 200.0 < high
     assert difference == pytest.approx(200.0, abs=30.0)

@@ -11,6 +11,7 @@ from aqualog.calibrate.spread import (
     combined,
     half_width,
     jackknife_of,
+    one_more,
     spread_of,
     stratified,
     variance_ratio_chance,
@@ -68,3 +69,15 @@ def test_winds_of_drives_count_once():
     one = 0.7 * WIND_SD / 22.0  # [m^2] a wind w adds 2 v w to v^2: w / v of the drag area
     assert np.median(between) == pytest.approx(one / np.sqrt(4.0), rel=0.25)
     assert np.median(within) < 0.25 * np.median(between)
+
+
+def test_one_drive_more_lies_within_its_spread():
+    """Five drives and a sixth, seen from the mean of the five."""
+    rng = np.random.default_rng(7)
+    inside = []
+    for _ in range(2000):
+        x = rng.normal(size=6)
+        seen = Spread({"x": float(np.std(x[:5], ddof=1)) / np.sqrt(5.0)}, {"x": 4.0}, by_drive=True)
+        inside.append(abs(x[5] - x[:5].mean()) <= 1.96 * one_more(seen, 5)["x"])
+    assert 0.93 < np.mean(inside) < 0.97
+    assert one_more(Spread({"x": 1.0}, {"x": 9.0}, by_drive=False), 2) == {}

@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from aqualog.diagnose.channels import block_means
 from aqualog.diagnose.drive import led_by, prepare
 from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
@@ -123,9 +124,21 @@ def test_without_torque_the_torque_that_the_model_needs_stands_in():
     assert np.corrcoef(needed[pulls], driven[pulls])[0, 1] > 0.95
 
 
-def test_the_gain_of_the_file_scales_the_torque():
+def test_the_gain_of_the_file_is_in_the_signals_already():
     a, b = (prepare(plain(), replace(CAR, torque_gain=g), "a").course.torque for g in (1.0, 2.0))
-    np.testing.assert_allclose(b[2:].mean(), 2.0 * a[2:].mean(), rtol=1e-3)
+    np.testing.assert_array_equal(b, a)
+
+
+def test_torque_of_one_axle_holds_no_brakes():
+    whole = changed(plain(), plain().frame.drop("brake_pressure"))
+    log = changed(plain(), whole.frame.drop("torque_fl", "torque_fr"))
+    d = prepare(log, CAR, "a")
+    braked = block_means(log.array("torque_rl") + log.array("torque_rr"), log.dt) < 0.0
+    assert braked.any()
+    assert not d.mask[braked].any()
+    assert d.mask.any()
+    assert any("brakes are not in the log" in n for n in d.notes)
+    assert not any("brakes" in n for n in prepare(whole, CAR, "a").notes)
 
 
 def test_led_by_the_right_model_the_simulation_meets_the_measured_speed():

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 
+from aqualog.diagnose import run
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.grade import find_profile, with_profile
 from aqualog.diagnose.hypotheses import residual
+from aqualog.diagnose.outcome import Outcome
 from aqualog.model.term import Model
 
 HILLY = Spec("hilly", "gusts", (), 8, "compact_fwd", holdout=0)
@@ -90,3 +92,14 @@ def test_without_torque_a_wandering_accelerometer_is_no_road(hilly):
     assert find_profile(alone, 0.1 * (wander / wander.std())[None, : before.shape[1]]) is None
     found = find_profile(alone, before[kinematic][None])
     assert found is None or "cannot be told apart" in found.cause.sentence
+
+
+def test_a_road_too_small_to_be_named_is_in_the_model_all_the_same(hilly):
+    drive, _, found = hilly
+    small = run._road([drive], with_profile(Model(), replace(found, theta=0.6 * found.theta)))
+    assert 0.005 < small.rms.value < run.HILLY
+    nothing = Outcome("no_effect", (), (), None, ())
+    silent = run._with_road(nothing, small, named=False)
+    assert (silent.verdict, silent.causes) == ("no_effect", ())
+    assert "too small" in silent.small[0]
+    assert run._with_road(nothing, small, named=True).verdict == "named"

@@ -44,6 +44,14 @@ def test_what_has_no_signal_is_not_asked_about():
     assert "signal_delay@v_x" in keys
 
 
+def test_slip_and_radius_are_not_asked_about_without_wheel_speeds():
+    d = prepare(changed(plain(), plain().frame.drop([f"omega_{w}" for w in WHEELS])), CAR, "a")
+    asked, untested = hypotheses([d], Model())
+    assert not {"slip_stiffness", "tyre_radius", "pressure_loss"} & {h.effect.name for h in asked}
+    assert untested["slip_stiffness_drift"] == "no wheel speeds in the log"
+    assert {"payload_mass", "rolling_resistance", "signal_delay"} <= {h.effect.name for h in asked}
+
+
 @pytest.mark.parametrize(
     ("h", "size"),
     [

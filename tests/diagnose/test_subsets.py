@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.bench import forgiven, gram_of, make_bench, tolerant
+from aqualog.diagnose.bench import gram_of, make_bench, tolerant, without_deviations
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import PRIOR_WIDTH, best_sets, compatible, fit_set, gains_on_top
 from aqualog.model.effects import EFFECTS
+from aqualog.vehicle import Vehicle
 
 CHANNELS = ("axle_slip", "lateral")
 
@@ -36,7 +37,7 @@ def keys(bench, members):
 def bench_of(residual, signatures, asked=ASKED, mask=None):
     """One drive with this residual (C, n) and one signature (C, n) for each hypothesis."""
     mask = np.ones(residual.shape[1], dtype=bool) if mask is None else mask
-    drive = SimpleNamespace(mask=mask, channels=CHANNELS[: len(residual)])
+    drive = SimpleNamespace(mask=mask, channels=CHANNELS[: len(residual)], vehicle=Vehicle())
     values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(asked)}
     return make_bench([drive], asked, [residual], [[s[None] for s in signatures]], values)
 
@@ -85,7 +86,10 @@ def test_deviations_within_the_tolerances_are_taken_off_and_no_more():
     b = made(noise=0.05, road_grade=0.03)
     unit = b.signatures[0][AT["aero_drag"]] * b.tolerance[AT["aero_drag"]]
     y = b.residuals[0]
-    left = [np.std(forgiven(b, 0, y + n * unit, range(b.count), farthest=3.0)) / np.std(n * unit) for n in (2.0, 60.0)]
+    left = [
+        np.std(without_deviations(b, 0, y + n * unit, range(b.count), farthest=3.0)) / np.std(n * unit)
+        for n in (2.0, 60.0)
+    ]
     assert left[0] < 0.5
     assert 0.9 < left[1] < 1.0
 

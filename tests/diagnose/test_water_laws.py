@@ -6,7 +6,7 @@ import numpy as np
 from test_drive import CAR, NOISY, signals, term
 from test_floating import wet
 
-from aqualog.diagnose.bench import forgiven, gram_of, noises_after
+from aqualog.diagnose.bench import gram_of, noises_after, without_deviations
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.refit import DOUBT, KNOWN, metric
@@ -36,10 +36,13 @@ def test_what_a_law_of_water_may_be_off_by_is_taken_from_what_is_left_and_no_mor
     at = next(c[0] for h, c in zip(b.asked, b.columns, strict=True) if h.effect.name == "wedge_peak")
     off = b.tolerance[at] * b.signatures[0][at]
     y = b.residuals[0]
-    taken = {n: float(np.sum((y + n * off - forgiven(b, 0, y + n * off, [at])) * off) / np.sum(off**2)) for n in (0, 9)}
+    taken = {
+        n: float(np.sum((y + n * off - without_deviations(b, 0, y + n * off, [at])) * off) / np.sum(off**2))
+        for n in (0, 9)
+    }
     assert abs(taken[0]) < 3.0
     assert 0.5 < taken[9] - taken[0] < 9.0
-    assert forgiven(b, 0, y, []) is y
+    assert without_deviations(b, 0, y, []) is y
 
 
 def test_names_and_values_allow_for_more_than_the_laws_of_water_may_be_off_by():

@@ -6,7 +6,7 @@ from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.config.signal_map import load_signal_map, map_text
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
-from aqualog.vehicle import KEYS
+from aqualog.vehicle import KEYS, vehicle_toml
 
 CONTRACT = """
 name = "sedan RWD"
@@ -76,6 +76,18 @@ def test_all_faults_in_one_message(tmp_path):
     for part in ("line 1", "4x4", "line 2", '"mass"', "l_f", "99", '"wheels"', '"mu_max"'):
         assert part in line
     assert "\n" not in line
+
+
+def test_spread_from_drive_to_drive(tmp_path):
+    car = load_vehicle(write(tmp_path, "mass = 1500.0\n[spread]\nmass = 20\ntorque_gain = 0.01"))
+    assert car.spread == {"mass": 20.0, "torque_gain": 0.01}
+    assert load_vehicle(write(tmp_path, vehicle_toml(car))).spread == car.spread
+    assert load_vehicle(write(tmp_path, "mass = 1500.0")).spread == {}
+    for wrong in ("l_f = 0.1", "mass = -1.0", 'drag_area = "x"'):
+        with pytest.raises(ConfigError):
+            load_vehicle(write(tmp_path, f"[spread]\n{wrong}"))
+    with pytest.raises(ConfigError, match="spread"):
+        load_vehicle(write(tmp_path, "spread = 3.0"))
 
 
 @pytest.mark.parametrize("text", ["mass = ", "\x00", "mass = nan"])
