@@ -17,6 +17,8 @@ from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
 
+ROUNDS = 200  # of coordinate descent: deviations that are alike take long to share what they explain
+
 
 @dataclass(frozen=True, slots=True)
 class Stack:
@@ -116,9 +118,8 @@ def without_deviations(
     """A residual (C, n) of drive d less what deviations within the tolerances of these columns most likely are of it.
 
     The columns' posterior means, theta = (S^-2 + A'A)^-1 A'y: what is left is y in the metric of `tolerant`. The noise
-    is estimated again after a first round, in which what the deviations are would still count as noise. Where one of
-    them would be beyond `farthest` tolerances, all are taken back in proportion: something large must not vanish
-    because it is of their form.
+    is estimated again after a first round, in which what the deviations are would still count as noise. None of them
+    is beyond `farthest` tolerances: something large must not vanish because it is of their form.
     """
     drive = bench.drives[d]
     k = [c for c in columns if bench.forgiven[c] > 0.0]
@@ -127,10 +128,21 @@ def without_deviations(
         noise = fit_noise(left, drive.mask, contrasts(drive.channels))
         A = whitened(bench.prepared[d].of(k), noise)
         y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
-        theta = np.linalg.solve(A @ A.T + np.diag(bench.forgiven[k] ** -2.0), A @ y)
-        theta = theta / max(1.0, float(np.abs(theta / bench.forgiven[k]).max()) / farthest)
+        theta = _within(A @ A.T + np.diag(bench.forgiven[k] ** -2.0), A @ y, farthest * bench.forgiven[k])
         left = residual - np.tensordot(theta, bench.signatures[d][k], axes=1)
     return left
+
+
+def _within(G: FloatArray, b: FloatArray, most: FloatArray) -> FloatArray:
+    """Minimum of theta' G theta / 2 - b' theta with |theta| <= `most`, by coordinate descent. (k,)"""
+    theta = np.clip(np.linalg.solve(G, b), -most, most)
+    if np.all(np.abs(theta) < most):
+        return np.asarray(theta)
+    for _ in range(ROUNDS):
+        for i in range(theta.size):
+            theta[i] += (b[i] - G[i] @ theta) / G[i, i]
+            theta[i] = min(max(theta[i], -most[i]), most[i])
+    return np.asarray(theta)
 
 
 def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:

@@ -228,7 +228,7 @@ def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Op
     surrogates = max(options.surrogates, round(1.0 / options.level) - 1)
     remainders = find_remainders(stack, signatures=known, level=options.level, seed=options.seed, surrogates=surrogates)
     sd = dict(zip(drive.channels, left[:, drive.mask].std(axis=1).tolist(), strict=True))
-    least = {"m/s^2": 0.01, "m/s": 0.01, "N": 20.0}
+    least = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}
     return tuple(
         r for r in remainders
         if r.share > WORTH_TELLING and math.sqrt(r.share) * sd[r.channel] > least[CHANNELS[r.channel].unit]
