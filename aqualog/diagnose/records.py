@@ -10,9 +10,11 @@ from aqualog.model.term import Model
 from aqualog.types import FloatArray
 
 __all__ = [
-    "Alternative", "Cause", "ChannelGain", "Confusion", "Consequence", "Diagnosis", "Estimate", "Gain", "Limit",
-    "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
+    "AGREES", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence", "Diagnosis",
+    "Estimate", "Gain", "Limit", "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
 ]  # fmt: skip
+
+AGREES = 0.01  # chance below which drives are said to differ
 
 Verdict = Literal["no_effect", "named", "compound", "cannot_tell", "unexplained", "not_testable"]
 
@@ -41,6 +43,33 @@ class Cause:
     def key(self) -> str:
         """`tyre_radius@fl`, or the bare name for the whole car."""
         return self.effect if self.where is None else f"{self.effect}@{self.where}"
+
+
+@dataclass(frozen=True, slots=True)
+class ByDrive:
+    """What one drive says of a value: by itself, and what the other drives say. `gain` [nats]: log score that the value
+    of the others wins on this drive over no effect; negative where it predicts worse.
+    """
+
+    drive: str
+    alone: Estimate
+    others: float
+    gain: float
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Whether drives agree on a value: `p_value` of their differing as much by chance. `key` of the cause."""
+
+    key: str
+    parameter: str
+    drives: tuple[ByDrive, ...]
+    p_value: float
+
+    @property
+    def holds(self) -> bool:
+        """Drives agree, and each one is predicted better with the value of the others."""
+        return self.p_value >= AGREES and all(d.gain > 0.0 for d in self.drives)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,3 +247,4 @@ class Diagnosis:
     untested: Mapping[str, str]
     notes: tuple[str, ...] = ()
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
+    agreement: tuple[Agreement, ...] = ()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose import isolate
+from aqualog.diagnose.agreement import agreements, widened
 from aqualog.diagnose.bench import Bench, Stack, without_deviations
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.consequence import consequences
@@ -16,11 +17,11 @@ from aqualog.diagnose.defects import Defect, accelerometer_defect
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.heldout import measured_gain
-from aqualog.diagnose.hypotheses import hypotheses, residual, with_values
+from aqualog.diagnose.hypotheses import hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
-from aqualog.diagnose.records import Consequence, Diagnosis, Remainder, ResidualView, Verdict
+from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.support import supported
 from aqualog.diagnose.unknown import find_remainders
@@ -113,6 +114,7 @@ def diagnose(
     bench = supported(bench)
     found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(bench, found.candidates, model, p_value=found.tests[0].p_value)
+    outcome, agreed = _by_drive(bench, found, outcome, model)
     tell("describing what is left", 0.8)
     outcome, remainders = _remainders(bench, found, outcome, options)
     if road is not None:
@@ -160,7 +162,20 @@ def diagnose(
         untested=untested,
         notes=(*notes, *_unnamed(outcome, found, options), *outcome.small),
         views=_views(ready, before, after) if options.views else (),
+        agreement=agreed if outcome.causes else (),
     )
+
+
+def _by_drive(bench: Bench, found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
+    """What the drives say one by one of the chosen set, whose intervals grow where they differ."""
+    chosen = next((c for c in found.candidates if c.refit is outcome.chosen), None)
+    if chosen is None:
+        return outcome, ()
+    r = chosen.refit
+    agreed = agreements(bench, chosen, found.noises, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
+    named = {c.key for c in outcome.causes}
+    causes = tuple(widened(c, agreed) for c in outcome.causes)
+    return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)
 
 
 def _road(drives: Sequence[Drive], model: Model) -> Profile | None:

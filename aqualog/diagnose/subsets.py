@@ -16,6 +16,7 @@ __all__ = ["PRIOR_WIDTH", "SetFit", "best_sets", "compatible", "fit_set", "gains
 
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
+TWINS = 0.1  # the same between two effects that are each other's twins, to stand in one set
 CANDIDATES = 40  # hypotheses that sets of three and more are made of
 
 
@@ -39,11 +40,23 @@ def fit_set(bench: Bench, gram: FloatArray, members: Sequence[int]) -> SetFit | 
     # a ridge keeps the direction in which exact twins cancel, which a pseudoinverse would leave out
     if len(c) > 1 and 1.0 / np.max(np.diag(np.linalg.inv(unit + 1e-9 * np.eye(len(c))))) < SINGULAR:
         return None
+    if any(_cancel(bench, gram, pair) for pair in combinations(members, 2)):
+        return None
     P = np.diag(1.0 / (PRIOR_WIDTH * bench.prior[c]) ** 2)
     theta: FloatArray = np.linalg.solve(G + P, b).astype(np.float64)
     if np.any(theta < bench.low[c]) or np.any(theta > bench.high[c]):
         return None
     return SetFit(tuple(members), columns, theta, float(b @ theta))
+
+
+def _cancel(bench: Bench, gram: FloatArray, pair: tuple[int, int]) -> bool:
+    """Whether two effects are known twins and alike on these drives: large ones that cancel could be anything else."""
+    a, b = (bench.asked[m].effect for m in pair)
+    if b.name not in a.twins and a.name not in b.twins:
+        return False
+    i, j = (bench.columns[m][0] for m in pair)
+    energy = gram[i, i] * gram[j, j]
+    return bool(energy > 0.0 and 1.0 - gram[i, j] ** 2 / energy < TWINS)
 
 
 def gains_on_top(bench: Bench, gram: FloatArray, base: Sequence[int]) -> FloatArray:

@@ -66,8 +66,8 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
     vehicle : Vehicle
     course : Course
     model : Model
-        Its terms act on car, road and sensors. What a term does to the sensors of torque and steering is undone before
-        they drive the simulation: a torque that is reported late is applied earlier.
+        Its terms act on car, road and sensors. What a term does to the sensors of torque, steering and velocity is
+        undone before they drive the simulation: a torque that is reported late is applied earlier.
     rate : float
         How fast the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
 
@@ -116,7 +116,7 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
     torque = np.array([
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
-    speed = np.maximum(np.interp(fine, course.t, course.v_x), 0.0)
+    speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
     controls = _controls(speed, _undone(course.t, course.steer, setup.sensors, "steer_angle", fine), rate)
     road = build_road(scenario, float(speed.sum()) * STEP_S * 1.02 + 50.0)
     start = _start(plant, torque[:, 0], float(max(speed[0], V_START)), float(road.fields[0, GRADE]))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from aqualog.diagnose.records import (
+    Agreement,
     Alternative,
     Cause,
     ChannelGain,
@@ -75,6 +76,7 @@ def diagnosis_document(
         "causes": [_cause(c) for c in d.causes],
         "alternatives": [[c.key for c in a.causes] for a in d.alternatives],
         "alternative_sets": [_alternative(a) for a in d.alternatives],
+        "agreement": [_agreement(a) for a in d.agreement],
         "unexplained": [_remainder(r) for r in d.remainders],
         "gain": _gain(d.gain) if d.gain is not None else None,
         "false_alarm_level": _number(d.significance.level) if d.significance is not None else None,
@@ -101,6 +103,7 @@ def diagnosis_text(document: Mapping[str, Any]) -> str:
     if document["causes"]:
         lines += ["", table(_CAUSE_HEADER, _cause_rows(document))]
     lines += _block("explains as well", said["alternatives"])
+    lines += _block("drive by drive", said["agreement"])
     lines += _block("left over", said["unexplained"])
     same = _first(said["causes_relations"] + said["causes_confused"], _MOST_CONFUSED)
     lines += _block("this log cannot tell apart", same)
@@ -144,6 +147,26 @@ def _cause(c: Cause) -> dict[str, Any]:
 
 def _alternative(a: Alternative) -> dict[str, Any]:
     return {"causes": [_cause(c) for c in a.causes], "evidence_ratio": _number(a.evidence_ratio)}
+
+
+def _agreement(a: Agreement) -> dict[str, Any]:
+    return {
+        "key": a.key,
+        "parameter": a.parameter,
+        "p_value": _number(a.p_value),
+        "holds": a.holds,
+        "drives": [
+            {
+                "drive": d.drive,
+                "value": _number(d.alone.value),
+                "ci95": [_number(d.alone.low), _number(d.alone.high)],
+                "unit": d.alone.unit,
+                "from_others": _number(d.others),
+                "log_score_gain": _number(d.gain),
+            }
+            for d in a.drives
+        ],
+    }
 
 
 def _remainder(r: Remainder) -> dict[str, Any]:

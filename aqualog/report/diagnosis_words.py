@@ -83,7 +83,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
     """All sentences of the page by section.
 
     `headline` holds one; `test`, `score`, `channels` (error of each, the most changed first), `gain_notes`,
-    `consequences`, `manoeuvre`, `causes` (without the headline), `alternatives`, `relations`, `confused`,
+    `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations`, `confused`,
     `unexplained`, `untested`, `notes` any number. `causes_relations` and `causes_confused` are those that one of the
     causes takes part in.
     """
@@ -104,6 +104,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "gain_notes": list(gain["notes"]),
         "consequences": [_consequence(c) for c in gain["consequences"]],
         "manoeuvre": _manoeuvre(document["next_manoeuvre"]),
+        "agreement": [_agreement(a) for a in document["agreement"]],
         "unexplained": [_unexplained(r) for r in document["unexplained"]],
         "untested": [f"{effect_title(k)}: {why}" for k, why in document["untested"].items()],
         "notes": list(document["notes"]),
@@ -166,6 +167,20 @@ def _alternative(a: Mapping[str, Any]) -> str:
     ratio = a["evidence_ratio"]
     how = f", {short(ratio)} times less likely" if ratio is not None else ""
     return f"{names}{f': {values}' if values else ''}{how}"
+
+
+def _agreement(a: Mapping[str, Any]) -> str:
+    """Whether drives say the same of a value, each by itself, and whether what the others say predicts each better."""
+    values = "; ".join(
+        f"{d['drive']} {value} ({interval})" for d in a["drives"] for value, interval in [interval_text(d)] if value
+    )
+    worse = [d["drive"] for d in a["drives"] if d["log_score_gain"] is not None and d["log_score_gain"] <= 0.0]
+    how = "the drives agree" if a["holds"] else "the drives differ" if not worse else "not borne out by every drive"
+    told = f" (p {short(a['p_value'])})" if a["p_value"] is not None else ""
+    left = f"; {', '.join(worse)} is predicted no better with what the others say" if worse else ""
+    unit = unit_text(a["drives"][0]["unit"])
+    name = a["parameter"].replace("_", " ") + (f" [{unit}]" if unit not in ("", "–", "-") else "")
+    return f"{effect_title(a['key'])}, {name}: {how}{told}: {values}{left}"
 
 
 def _parties(c: Mapping[str, Any]) -> set[str]:

@@ -175,6 +175,21 @@ def test_nothing_is_named_twice():
     assert compatible(b, (AT["tyre_radius@fl"], AT["slip_stiffness@r"]))
 
 
+def test_twins_that_a_drive_cannot_part_are_not_both_in_a_set():
+    rng = np.random.default_rng(3)
+    a, other = waves(1500, 2, seed=5)
+    asked = tuple(hypothesis(n) for n in ("payload_mass", "torque_gain", "cornering_drag"))
+    for near, together in ((0.05, False), (0.6, True)):
+        s = np.array([a, a + near * other, a + near * other])
+        b = bench_of(
+            a + rng.standard_normal(a.shape),
+            s / np.array([x.effect.parameters[0].sigma for x in asked])[:, None, None],
+            asked,
+        )
+        assert (fit_set(b, gram(b), (0, 1)) is not None) == together
+        assert fit_set(b, gram(b), (0, 2)) is not None  # no twin of it
+
+
 def test_a_car_carries_one_load():
     b = made(asked=(hypothesis("payload_mass", "f"), hypothesis("payload_mass", "r"), hypothesis("tyre_radius", "f")))
     assert not compatible(b, (0, 1))

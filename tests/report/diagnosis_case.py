@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from aqualog.diagnose.records import (
+    Agreement,
     Alternative,
+    ByDrive,
     Cause,
     ChannelGain,
     Confusion,
@@ -94,13 +96,21 @@ GAIN = Gain(
     ),
     ("The intervals treat a drive as the unit.",),
 )  # fmt: skip
+AGREED = Agreement(
+    "payload_mass", "delta_mass",
+    (
+        ByDrive("b24.mf4", Estimate(268.1, 243.2, 293.0, "kg"), 255.3, 31.2),
+        ByDrive(HOSTILE, Estimate(255.3, 228.9, 281.7, "kg"), 268.1, -0.72),
+    ),
+    0.482,
+)  # fmt: skip
 BASE = Diagnosis(
     verdict="named", sentence=MASS.sentence, drives=("b24.mf4", HOSTILE), duration_s=1265.0, used_s=1103.4,
     causes=(MASS,), alternatives=(Alternative((RADIUS, GROWTH), 14.3),), significance=FOUND, limits=LIMITS,
     confusions=CONFUSIONS, remainders=(), manoeuvre=None, gain=GAIN,
     model=Model((Term(EFFECTS["payload_mass"], {"delta_mass": 262.0}),)), channels=CHANNELS,
     untested={"relaxation_length": "needs torque above 2 Hz", "water_drag": "no water on these drives <b>"},
-    notes=("The noise model is of order 18.",),
+    notes=("The noise model is of order 18.",), agreement=(AGREED,),
 )  # fmt: skip
 
 
@@ -158,11 +168,11 @@ def cases():
             sentence="Force balance and speed hang together in a way that no known effect has.",
         ),
         "no_effect": replace(
-            BASE, verdict="no_effect", causes=(), alternatives=(), significance=NOTHING, gain=None, model=Model(),
+            BASE, verdict="no_effect", agreement=(), causes=(), alternatives=(), significance=NOTHING, gain=None, model=Model(),
             sentence="Nothing is missing: a payload of 14.2 kg would have been seen.",
         ),
         "not_testable": replace(
-            BASE, verdict="not_testable", causes=(), alternatives=(), significance=None, gain=None, limits=(),
+            BASE, verdict="not_testable", agreement=(), causes=(), alternatives=(), significance=None, gain=None, limits=(),
             confusions=(), channels=(), used_s=0.0, model=Model(), untested={"all": "the log has no torque"},
             sentence="These drives cannot be tested: there is no wheel torque.",
         ),

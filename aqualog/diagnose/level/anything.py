@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,9 +9,10 @@ import numpy as np
 
 from aqualog.diagnose.level.noise import Design, Fit, Scatter, design_of, fit, prior_of
 from aqualog.diagnose.level.refit import conditioned
+from aqualog.intervals import chi2_log_p
 from aqualog.types import FloatArray
 
-__all__ = ["Anything", "Group", "anything", "chi2_log_p", "whole_fit"]
+__all__ = ["Anything", "Group", "anything", "whole_fit"]
 
 AGAIN = 4  # rounds of the scatter of a surrogate, which begins at that of the data
 ROUNDS = 25
@@ -41,23 +41,6 @@ def whole_fit(
 def _design(y: FloatArray, x: FloatArray, road: FloatArray, nuisances: FloatArray) -> Design:
     prior = prior_of(nuisances.shape[-1], x.shape[-1])
     return design_of(y, np.concatenate([nuisances, x], axis=-1), road, prior)
-
-
-def chi2_log_p(x: float, dof: int) -> float:
-    """-log10 of the probability that chi^2 with `dof` degrees of freedom is beyond x."""
-    x = max(x, 1e-12)
-    # log of the upper tail, by the recurrence in steps of two degrees of freedom
-    half = 0.5 * x
-    if dof % 2:
-        tail = math.erfc(math.sqrt(half))
-        log_tail = math.log(tail) if tail > 1e-300 else -half - 0.5 * math.log(math.pi * half)
-        term, first = -half + 0.5 * math.log(half) - math.lgamma(1.5), 3
-    else:
-        log_tail, term, first = -half, -half + math.log(half), 4
-    for k in range(first, dof + 1, 2):
-        log_tail = float(np.logaddexp(log_tail, term))
-        term += math.log(half) - math.log(0.5 * k)
-    return -log_tail / math.log(10.0)
 
 
 def anything(

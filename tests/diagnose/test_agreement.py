@@ -1,0 +1,57 @@
+"""Several drives: each is asked by itself, and predicted from the others."""
+
+import pytest
+from test_drive import CAR, NOISY, signals, term
+
+from aqualog.diagnose.agreement import widened
+from aqualog.diagnose.records import Agreement, ByDrive, Cause, Estimate
+from aqualog.diagnose.run import Options, diagnose
+
+OPTIONS = Options(surrogates=0, views=False, consequences=False)
+
+
+def drives(*loads):
+    return [
+        (f"drive {i}", signals(*((term("payload_mass", delta_mass=x),) if x else ()), sensors=NOISY, seed=3 + i))
+        for i, x in enumerate(loads)
+    ]
+
+
+@pytest.fixture(scope="module")
+def alike():
+    return diagnose(drives(250.0, 250.0), CAR, options=OPTIONS)
+
+
+def test_drives_with_the_same_load_agree_and_foretell_each_other(alike):
+    (found,) = alike.agreement
+    assert found.key == "payload_mass"
+    assert found.holds
+    assert found.p_value > 0.01
+    for d in found.drives:
+        assert d.alone.low < 250.0 < d.alone.high
+        assert d.gain > 10.0
+    a, b = found.drives
+    assert (a.others, b.others) == pytest.approx((b.alone.value, a.alone.value), rel=0.02)
+
+
+def test_a_load_that_one_drive_has_is_told_and_makes_the_interval_wide(alike):
+    unlike = diagnose(drives(300.0, 60.0), CAR, options=OPTIONS)
+    found = next(a for a in unlike.agreement if a.key.startswith("payload_mass"))
+    assert found.p_value < 1e-6
+    assert not found.holds
+    assert min(d.gain for d in found.drives) < 0.0
+
+    def width(d):
+        e = next(iter(d.causes[0].parameters.values()))
+        return e.high - e.low
+
+    assert width(unlike) > 5.0 * width(alike)
+    assert f"{next(iter(unlike.causes[0].parameters.values())).high:.3g} kg" in unlike.sentence
+
+
+def test_intervals_stay_where_drives_agree():
+    cause = Cause("payload_mass", None, {"delta_mass": Estimate(100.0, 90.0, 110.0, "kg")}, (), "")
+    said = tuple(ByDrive(n, Estimate(v, v - 9.0, v + 9.0, "kg"), 100.0, 5.0) for n, v in (("a", 95.0), ("b", 105.0)))
+    assert widened(cause, [Agreement("payload_mass", "delta_mass", said, 0.4)]) == cause
+    wide = widened(cause, [Agreement("payload_mass", "delta_mass", said, 0.001)]).parameters["delta_mass"]
+    assert (wide.low, wide.high) == (90.0, 110.0)  # five of their mean is less than ten
