@@ -164,7 +164,7 @@ def cases():
             sentence="262 kg more mass or 0.865 of the torque: this log cannot tell which.",
         ),
         "unexplained": replace(
-            BASE, verdict="unexplained", causes=(), alternatives=(), remainders=(remainder(), surface()), gain=nothing,
+            BASE, verdict="unexplained", agreement=(), causes=(), alternatives=(), remainders=(remainder(), surface()), gain=nothing,
             sentence="Force balance and speed hang together in a way that no known effect has.",
         ),
         "no_effect": replace(
