@@ -88,7 +88,7 @@ def make_bench(
             prior.append(p.sigma)
             low.append(p.low - now)
             high.append(p.high - now)
-            smallest.append(p.smallest)
+            smallest.append(h.worth_naming(name))
             spread.append(day_to_day(h, name, drives[0].vehicle))
             tolerance.append(h.tolerance(name))
     flat = [np.concatenate(list(s)) for s in signatures]

@@ -59,6 +59,7 @@ _LOOSE: Mapping[str, float] = {
 }  # fmt: skip
 _SHIFTS = ("signal_delay", "clock_skew")
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
+WORTH = 2.0  # tolerances
 LEAKS = 5  # moments at which a tyre may begin to lose its air
 
 
@@ -101,6 +102,10 @@ class Hypothesis:
             return 0.0
         usual = self.parameter(name).smallest * TOLERANCE
         return _LOOSE.get(self.key, _LOOSE.get(self.effect.name, usual))
+
+    def worth_naming(self, name: str) -> float:
+        """Smallest deviation that is worth a word: the effect's own, or twice what a file is off by anyway."""
+        return max(self.parameter(name).smallest, WORTH * self.tolerance(name))
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""

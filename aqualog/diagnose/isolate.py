@@ -68,7 +68,7 @@ def limits(bench: Bench, sizes: FloatArray) -> tuple[Limit, ...]:
         size = float(sizes[columns[0]])
         old = out.get(h.key)
         if old is None or (math.isfinite(size) and not (old.size <= size)):
-            out[h.key] = Limit(h.effect.name, h.where, size, h.parameter(h.free[0]).unit)
+            out[h.key] = Limit(h.effect.name, h.where, size, h.parameter(h.free[0]).unit, h.worth_naming(h.free[0]))
     return tuple(out.values())
 
 

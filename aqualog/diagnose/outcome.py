@@ -108,7 +108,7 @@ def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
         if i != member:
             continue
         off = abs(float(r.values[k]) - value_in(model, h, name))
-        if off >= max(h.parameter(name).smallest, Z * float(sd[k])):
+        if off >= max(h.worth_naming(name), Z * float(sd[k])):
             return True
     return False
 

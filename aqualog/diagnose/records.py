@@ -99,13 +99,14 @@ class Significance:
 class Limit:
     """Smallest size of an effect that this log shows with a power of 0.9, in the unit of its first parameter.
 
-    NaN where the log does not show it at any physical size.
+    NaN where the log does not show it at any physical size. `smallest` is what is worth naming.
     """
 
     effect: str
     where: str | None
     size: float
     unit: str
+    smallest: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -298,7 +298,7 @@ def _at(fit: SetFit, r: Refit, model: Model) -> SetFit:
 def _all_there(r: Refit, model: Model) -> bool:
     """Whether every value is worth naming."""
     return all(
-        abs(v - value_in(model, r.members[i], n)) >= r.members[i].parameter(n).smallest
+        abs(v - value_in(model, r.members[i], n)) >= r.members[i].worth_naming(n)
         for (i, n), v in zip(r.names, r.values.tolist(), strict=True)
     )
 

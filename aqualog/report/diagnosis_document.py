@@ -247,7 +247,9 @@ def _significance(s: Significance) -> dict[str, Any]:
 def _limit(x: Limit) -> dict[str, Any]:
     effect = EFFECTS.get(x.effect)
     # the limit is that of the first parameter, so is what is worth naming
-    smallest = effect.parameters[0].smallest if effect is not None and effect.parameters else math.nan
+    smallest = x.smallest
+    if math.isnan(smallest) and effect is not None and effect.parameters:
+        smallest = effect.parameters[0].smallest
     return {
         "key": _key(x.effect, x.where),
         "effect": x.effect,

@@ -113,6 +113,8 @@ def test_events_are_not_tolerated_and_all_else_is():
     assert one("trailer").tolerance("mass") == 0.0
     assert one("payload_mass").tolerance("delta_mass") == pytest.approx(20.0 / 3.0)
     assert one("slip_stiffness", "fl").tolerance("gain") == 0.05
+    assert one("slip_stiffness", "fl").worth_naming("gain") == 0.1
+    assert one("payload_mass").worth_naming("delta_mass") == 20.0
     assert one("accelerometer_bias", "a_y").tolerance("bias") > one("accelerometer_bias", "a_x").tolerance("bias")
 
 

@@ -69,12 +69,12 @@ def test_limits_shrink_with_energy():
     assert {x.effect for x in far} == {h.effect.name for h in ASKED}
     for a, b in zip(far, near, strict=True):
         smallest = ASKED[[h.key for h in ASKED].index(a.effect if a.where is None else f"{a.effect}@{a.where}")]
-        least = smallest.parameter(smallest.free[0]).smallest
+        least = smallest.worth_naming(smallest.free[0])
         assert a.unit == b.unit
         if b.size > least:
             assert b.size == pytest.approx(0.5 * a.size, rel=0.01)
         else:
-            assert b.size == least
+            assert b.size == b.smallest == least
 
 
 def test_the_limit_has_the_power_it_says():
