@@ -117,8 +117,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     speed = smooth(v, dt, SPEED_S)
     t = np.arange(n, dtype=np.float64) * dt
     measured = Course(
-        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels
-    )
+        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels,
+        position=np.cumsum(v) * dt,
+    )  # fmt: skip
     course = _without_lag(vehicle, measured, Model())
     floats = floating(filled, v, vehicle, course)
     bad = gaps | floats | (v < V_MIN)
