@@ -90,7 +90,7 @@ def make_bench(
             high.append(p.high - now)
             smallest.append(p.smallest)
             spread.append(day_to_day(h, name, drives[0].vehicle))
-            tolerance.append(h.tolerance(name))
+            tolerance.append(h.tolerance_of(name, drives[0].vehicle))
     flat = [np.concatenate(list(s)) for s in signatures]
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Bench(
