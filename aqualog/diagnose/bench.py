@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.day_to_day import day_to_day
+from aqualog.diagnose.day_to_day import Kind, as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
@@ -56,6 +56,8 @@ class Bench:
     tolerance: FloatArray  # (K,) by which each may be off without being worth a word
     barred: BoolArray  # (H,) hypotheses that the drives speak against: neither tested nor put into sets
     spread: FloatArray  # (K,) by which drives of the same car have been seen to differ, 0 where nobody has looked
+    kinds: tuple[Kind, ...]  # (K,) the difference of days that each looks like
+    as_values: FloatArray  # (K,) what the differences of its kind look like as its value
 
     @property
     def count(self) -> int:
@@ -78,6 +80,9 @@ def make_bench(
     """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
     columns: list[tuple[int, ...]] = []
     prior, low, high, smallest, tolerance, spread = [], [], [], [], [], []
+    kinds: list[Kind] = []
+    as_values = []
+    speed = _drag_speed(drives)
     k = 0
     for i, h in enumerate(asked):
         columns.append(tuple(range(k, k + len(h.free))))
@@ -90,14 +95,22 @@ def make_bench(
             high.append(p.high - now)
             smallest.append(h.worth_naming(name))
             spread.append(day_to_day(h, name, drives[0].vehicle))
-            tolerance.append(h.tolerance(name))
+            kinds.append(kind_of(h, name))
+            as_values.append(as_value(h, name, drives[0].vehicle, speed))
+            tolerance.append(h.tolerance_of(name, drives[0].vehicle))
     flat = [np.concatenate(list(s)) for s in signatures]
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Bench(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
         np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
-        np.array(spread),
+        np.array(spread), tuple(kinds), np.array(as_values),
     )  # fmt: skip
+
+
+def _drag_speed(drives: Sequence[Drive]) -> float:
+    """Speed at which drag counts: a head wind's v w is nearest to drag's v^2 by least squares there. [m/s]"""
+    v = np.concatenate([d.coordinates["v_x"][d.mask] for d in drives])
+    return float((v**3).sum() / max(float((v**2).sum()), 1e-9))
 
 
 def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:

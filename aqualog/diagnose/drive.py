@@ -16,10 +16,11 @@ from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
+from aqualog.notation import AXLES, WHEELS
 from aqualog.physics.kinematics import kinematic_steer_angle
 from aqualog.physics.load import G
 from aqualog.types import BoolArray, FloatArray, Signals
+from aqualog.units import is_unit, parse_unit
 from aqualog.vehicle import Vehicle
 
 __all__ = ["Drive", "led_by", "prepare"]
@@ -92,6 +93,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
             "nothing to compare", where=name, expected="accelerometer or wheel speeds, and a velocity",
             hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
         )  # fmt: skip
+    vehicle = _as_known(vehicle, signals)
     columns = {s: signals.array(s) for s in present}
     dt = signals.dt
     n = signals.frame.height
@@ -117,8 +119,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     speed = smooth(v, dt, SPEED_S)
     t = np.arange(n, dtype=np.float64) * dt
     measured = Course(
-        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels
-    )
+        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels,
+        position=np.cumsum(v) * dt,
+    )  # fmt: skip
     course = _without_lag(vehicle, measured, Model())
     floats = floating(filled, v, vehicle, course)
     bad = gaps | floats | (v < V_MIN)
@@ -165,6 +168,17 @@ def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
     """
     nudge = follow(vehicle, course, model)["nudge"]
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
+
+
+def _as_known(vehicle: Vehicle, signals: Signals) -> Vehicle:
+    """The vehicle without radii where wheel speeds are told in km/h.
+
+    The control unit used radii of its own; with the vehicle file's they are wheel speeds again, whatever these are.
+    """
+    wheels = [o for n, o in signals.origins.items() if n.startswith("omega_")]
+    if not any(is_unit(o.unit) and parse_unit(o.unit).dimension == "speed" for o in wheels):
+        return vehicle
+    return replace(vehicle, given=vehicle.given - {f"wheels.r_e_{axle}" for axle in AXLES})
 
 
 def _velocity(columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, present: frozenset[str]) -> FloatArray:

@@ -15,8 +15,9 @@ from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.term import Effect, Model, Parameter, Term
-from aqualog.notation import WHEELS
+from aqualog.notation import AXLES, WHEELS
 from aqualog.types import FloatArray
+from aqualog.vehicle import Vehicle
 
 __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "value_in", "with_values"]
 
@@ -56,6 +57,12 @@ _EVENTS = ("pressure_loss", "trailer", "tyre_warmup")
 _LOOSE: Mapping[str, float] = {
     "slip_stiffness": 0.05, "load_sensitivity": 0.25, "wheel_inertia": 0.15, "relaxation_length": 0.15,
     "signal_delay": 0.005, "cornering_drag": 0.003, "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
+}  # fmt: skip
+# tolerances of what the vehicle file leaves to a default, by axle, as a share of the value: tyres of one size differ by
+# 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K)
+_NOT_GIVEN: Mapping[str, tuple[str, float]] = {
+    "tyre_radius": ("wheels.r_e_", 0.01), "wheel_inertia": ("wheels.inertia_", 0.3),
+    "slip_stiffness": ("tyre.slip_slope_", 0.2),
 }  # fmt: skip
 _SHIFTS = ("signal_delay", "clock_skew")
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
@@ -106,6 +113,15 @@ class Hypothesis:
     def worth_naming(self, name: str) -> float:
         """Smallest deviation that is worth a word: the effect's own, or twice what a file is off by anyway."""
         return max(self.parameter(name).smallest, WORTH * self.tolerance(name))
+
+    def tolerance_of(self, name: str, vehicle: Vehicle) -> float:
+        """`tolerance` for this vehicle file: wide for an axle whose key it does not set."""
+        own = self.tolerance(name)
+        key, share = _NOT_GIVEN.get(self.effect.name, ("", 0.0))
+        if self.where not in AXLES or not key or key + self.where in vehicle.given:
+            return own
+        # radius and slope are told relative to the file's
+        return max(own, share * (vehicle.inertia(self.where) if self.effect.name == "wheel_inertia" else 1.0))
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""

@@ -74,14 +74,16 @@ def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside:
     what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows. What
     the laws of water are off by is no matter of words: whatever the share, it counts `DOUBT` times. What the car's
     drives have been seen to differ by counts in full: this drive is off by it, too. Of the columns `beside`, whose
-    values are sought, it comes on top of the values, which is the same (D) where a signature stays what it was, and
-    still right where it does not.
+    values are sought, and of all that looks the same it comes on top of the values, which is the same (D) where a
+    signature stays what it was, and still right where it does not.
     """
     apart = np.zeros(bench.count)
-    apart[list(beside)] = bench.spread[list(beside)]
+    apart[list(beside)] = bench.as_values[list(beside)]
+    sought = {bench.kinds[c] for c in beside} - {""}
+    known = np.where([k in sought for k in bench.kinds], 0.0, bench.spread)
     owner = {c: h for h, columns in zip(bench.asked, bench.columns, strict=True) for c in columns}
     shares = np.array([DOUBT if owner[c].of_water else share for c in range(bench.count)])
-    sd = np.maximum(shares * bench.tolerance, bench.spread - apart)
+    sd = np.maximum(shares * bench.tolerance, known)
     k = np.flatnonzero(sd > 0.0).tolist()
     A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
     seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)

@@ -187,9 +187,15 @@ def _with_road(outcome: Outcome, road: Profile, *, named: bool) -> Outcome:
     if not named:
         told = f"Significant, but too small to be worth naming: {road.cause.sentence}"
         return outcome._replace(small=(*outcome.small, told))
-    verdict: Verdict = {"no_effect": "named", "named": "compound"}.get(outcome.verdict, outcome.verdict)  # type: ignore[assignment]
-    certain = outcome.certain | {road.cause.effect}
-    return outcome._replace(verdict=verdict, causes=(*outcome.causes, road.cause), certain=certain)
+    cause, own = road.cause, outcome.causes
+    if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
+        # one road: a constant slope is its mean, whose interval knows that it is an offset as well
+        own = tuple(c for c in own if c.effect != cause.effect)
+    verdict: Verdict = outcome.verdict
+    if verdict in ("no_effect", "named", "compound"):
+        verdict = "compound" if own else "named"
+    certain = outcome.certain | {cause.effect}
+    return outcome._replace(verdict=verdict, causes=(*own, cause), certain=certain)
 
 
 def _without_road(extended: Model, given: Model) -> Model:

@@ -11,7 +11,7 @@ import numpy as np
 from aqualog.errors import ConfigError
 from aqualog.model import kernel
 from aqualog.model.plant import Plant, build_plant
-from aqualog.model.road import GRADE, build_road
+from aqualog.model.road import build_road
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
@@ -46,6 +46,7 @@ class Course:
     v_x: FloatArray
     lanes: tuple[Lane, ...] = field(default=())
     has_rods: bool = False
+    position: FloatArray | None = None
 
 
 def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
@@ -117,9 +118,12 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
     speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
-    controls = _controls(speed, _undone(course.t, course.steer, setup.sensors, "steer_angle", fine), rate)
-    road = build_road(scenario, float(speed.sum()) * STEP_S * 1.02 + 50.0)
-    start = _start(plant, torque[:, 0], float(max(speed[0], V_START)), float(road.fields[0, GRADE]))
+    # a led car is where the measured one was: another resistance must not move it along its road
+    grade = _grade_along(course, scenario, fine)
+    steer = _undone(course.t, course.steer, setup.sensors, "steer_angle", fine)
+    controls = _controls(speed, steer, grade, rate)
+    road = build_road(replace(scenario, grade=()), float(speed.sum()) * STEP_S * 1.02 + 50.0)
+    start = _start(plant, torque[:, 0], float(max(speed[0], V_START)), float(grade[0]))
     every = round(RECORD_S / STEP_S)
     rows = kernel.run(n, STEP_S, every, start, plant, road, controls, np.ascontiguousarray(torque.T))
     if not np.isfinite(rows).all():
@@ -128,7 +132,18 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
     return Truth(t, _columns(rows, plant, scenario, rods=course.has_rods))
 
 
-def _controls(speed: FloatArray, steer: FloatArray, rate: float) -> kernel.Controls:
+def _grade_along(course: Course, scenario: Scenario, at: FloatArray) -> FloatArray:
+    """Slope angle of the road where the measured car was. [rad]"""
+    if not scenario.grade:
+        return np.zeros_like(at)
+    position = course.position
+    if position is None:
+        position = np.cumsum(course.v_x) * float(course.t[1] - course.t[0])
+    s, theta = np.array(scenario.grade).T
+    return np.asarray(np.interp(np.interp(at, course.t, position), s, theta))
+
+
+def _controls(speed: FloatArray, steer: FloatArray, grade: FloatArray, rate: float) -> kernel.Controls:
     still = np.zeros_like(speed)
     return kernel.Controls(
         v_target=speed,
@@ -138,7 +153,7 @@ def _controls(speed: FloatArray, steer: FloatArray, rate: float) -> kernel.Contr
         split_rear=still + 0.5,
         steer=steer,
         exc=still,
-        grade=still,
+        grade=grade,
         wind=still,
         gain=still + 1.0,
         has_driver=False,

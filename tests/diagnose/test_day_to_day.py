@@ -8,7 +8,7 @@ import pytest
 from test_drive import CAR, NOISY, signals, term
 
 from aqualog.diagnose.bench import gram_of, noises_after, tolerant, without_deviations
-from aqualog.diagnose.day_to_day import day_to_day
+from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
@@ -66,6 +66,44 @@ def test_keys_of_the_file_in_units_of_the_effects():
     assert day_to_day(one("rolling_resistance", "f"), "delta_r_w", car) == 0.0
     assert day_to_day(one("payload_mass"), "delta_mass", car) == 0.0
     assert day_to_day(one("head_wind"), "speed", car) == 0.0
+
+
+SPREAD = {"torque_gain": 0.03, "drag_area": 0.09, "rolling_resistance": 2e-3}
+SEEN = replace(CAR, mass=1400.0, torque_gain=0.9, drag_area=0.45, spread=SPREAD)
+
+
+@pytest.mark.parametrize(
+    ("name", "where", "parameter", "sd"),
+    [
+        ("torque_gain", None, "gain", 1 / 30),
+        ("payload_mass", None, "delta_mass", 1400 / 30),  # the mass was given, so its gain has the spread
+        ("payload_mass", "f", "delta_mass", 1400 / 30),
+        ("payload_mass", "r", "delta_mass", 1400 / 30),
+        ("trailer", None, "mass", 1400 / 30),
+        ("trailer", None, "delta_drag_area", 0.09),
+        ("wheel_inertia", None, "delta_inertia", 1400 / 30 / 4 * CAR.r_l_f**2),
+        ("head_wind", None, "speed", 2.0),  # a tenth of 20 m/s: drag goes with the square
+        ("rolling_resistance", "f", "delta_r_w", 2e-3 * CAR.wheelbase / CAR.l_r),
+        ("brake_drag", "fl", "torque", 2e-3 * 1400 * 9.81 * CAR.r_l_f),
+        ("tyre_radius", None, "delta", 0.0),
+    ],
+)
+def test_one_difference_of_days_as_a_value_of_all_that_looks_like_it(name, where, parameter, sd):
+    assert as_value(one(name, where), parameter, SEEN, 20.0) == pytest.approx(sd, rel=1e-3)
+    assert as_value(one(name, where), parameter, CAR, 20.0) == 0.0
+
+
+@pytest.mark.parametrize("where", [None, "r"])
+def test_a_load_is_as_unsure_as_the_gain_that_looks_like_it(where):
+    """And no more: the gain's spread is in its interval once."""
+    d = prepare(
+        signals(term("payload_mass", delta_mass=120.0), sensors=NOISY), replace(CAR, spread={"torque_gain": 0.03}), "a"
+    )
+    bench = simulated([d], (one("payload_mass", where), one("torque_gain")), Model(), lambda _t, _s: None)
+    noises = noises_after(bench, bench.residuals, {0: 120.0})
+    gram = tolerant(bench, gram_of(bench, noises, bench.residuals))
+    r = refit(bench, fit_set(bench, gram, (0,)), metric(bench, noises, share=KNOWN, beside=(0,)), Model())
+    assert 0.03 * CAR.mass < np.sqrt(r.covariance[0, 0]) < 0.035 * CAR.mass
 
 
 def spread_of(bench):

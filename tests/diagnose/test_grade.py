@@ -11,6 +11,7 @@ from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.grade import find_profile, with_profile
 from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.outcome import Outcome
+from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.term import Model
 
 HILLY = Spec("hilly", "gusts", (), 8, "compact_fwd", holdout=0)
@@ -103,3 +104,17 @@ def test_a_road_too_small_to_be_named_is_in_the_model_all_the_same(hilly):
     assert (silent.verdict, silent.causes) == ("no_effect", ())
     assert "too small" in silent.small[0]
     assert run._with_road(nothing, small, named=True).verdict == "named"
+
+
+def test_profile_and_mean_are_one_road(hilly):
+    _, _, found = hilly
+    grade = Estimate(0.012, 0.008, 0.016, "rad")
+    mean = Cause("road_grade", None, {"grade": grade}, ("kinematic",), "The road climbs by 1.2%.")
+    late = Cause("signal_delay", "a_x", {}, ("kinematic",), "The signal comes late.")
+    alone = run._with_road(Outcome("named", (mean,), (), None, ()), found, named=True)
+    both = run._with_road(Outcome("compound", (late, mean), (), None, ()), found, named=True)
+    open_ = run._with_road(Outcome("cannot_tell", (mean, late), (), None, ()), found, named=True)
+    assert (alone.verdict, [c.key for c in alone.causes]) == ("named", ["road_grade"])
+    assert (both.verdict, [c.key for c in both.causes]) == ("compound", ["signal_delay@a_x", "road_grade"])
+    assert alone.causes[0].parameters == {"grade_rms": found.rms, "grade_mean": found.mean}
+    assert len(open_.causes) == 3  # then it is not known whether it is the road's mean or another effect

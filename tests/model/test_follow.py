@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.model import kernel
 from aqualog.model.effects import EFFECTS
+from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.follow import Course, follow
 from aqualog.model.road import build_road
 from aqualog.model.scenario import Scenario
@@ -162,3 +163,21 @@ def test_a_driven_simulation_knows_no_nudge():
     b = simulate(Scenario(CAR, duration_s=3.0, sensors=IDEAL))
     assert all(np.array_equal(a.truth.columns[n], b.truth.columns[n], equal_nan=True) for n in a.truth.columns)
     assert "nudge" not in a.truth.columns
+
+
+def test_another_resistance_does_not_move_the_car_along_its_road():
+    """It lags by a third of a metre per second; hills that came later would show in the accelerometer."""
+    way = np.arange(0.0, 1600.0, 10.0)
+    hills = tuple(zip(way.tolist(), (0.03 * np.sin(way / 25.0)).tolist(), strict=True))
+    t, c = drive(grade=hills)
+    position = np.cumsum(c["v_x"]) * (t[1] - t[0])
+    model = Model((Term(EMPIRICAL["unexplained_grade"], knots=hills),))
+
+    def felt(m):
+        shown = follow(CAR, replace(course(t, c), position=position), m)
+        return (shown["a_x"] + shown["nudge"] - np.gradient(shown["v_x"], t))[INSIDE]
+
+    other = Model((*model.terms, term("rolling_resistance", delta_r_w=0.01)))
+    assert felt(model).std() > 0.15
+    np.testing.assert_allclose(felt(other), felt(model), atol=0.02)
+    np.testing.assert_allclose(felt(other), c["a_x"][INSIDE] - np.gradient(c["v_x"], t)[INSIDE], atol=0.05)
