@@ -56,7 +56,8 @@ _EVENTS = ("pressure_loss", "trailer")
 # crowned roads differ, tyres follow their load by other laws and warm up a little on every drive (K)
 _LOOSE: Mapping[str, float] = {
     "slip_stiffness": 0.05, "load_sensitivity": 0.25, "wheel_inertia": 0.15, "relaxation_length": 0.15,
-    "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1, "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
+    "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1,
+    "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
 }  # fmt: skip
 # tolerances of what the vehicle file leaves to a default, by axle, as a share of the value: tyres of one size differ by
 # 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K)
