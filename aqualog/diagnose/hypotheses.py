@@ -50,13 +50,13 @@ _NOT_ASKED: Mapping[str, str] = {
 # effects that may well sit at a single wheel; others are asked about by axle
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
 # what a car may have or not; all else is known to within a tolerance
-_EVENTS = ("pressure_loss", "trailer")
+_EVENTS = ("trailer",)
 # tolerances of what a vehicle file or a simulator is off by more than a third of the smallest size: slip slopes change
 # by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
-# crowned roads differ, tyres follow their load by other laws and warm up a little on every drive (K)
+# crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K)
 _LOOSE: Mapping[str, float] = {
     "slip_stiffness": 0.05, "load_sensitivity": 0.25, "wheel_inertia": 0.15, "relaxation_length": 0.15,
-    "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1,
+    "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1, "pressure_loss": 1e-3,
     "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
 }  # fmt: skip
 # tolerances of what the vehicle file leaves to a default, by axle, as a share of the value: tyres of one size differ by
