@@ -45,12 +45,13 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
     r = candidate.refit
     if len(bench.drives) < 2:
         return ()
-    G, b = _normal(bench, r, noises)
+    columns = [c for h in r.members for c in bench.columns[bench.asked.index(h)]]
+    G, b, apart = _normal(bench, r, noises, columns)
     G, b = G / candidate.inflation, b / candidate.inflation
     keep = np.diag((PRIOR_WIDTH * _prior(bench, r)) ** -2.0)
-    joint = np.linalg.solve(G.sum(axis=0) + keep, b.sum(axis=0))
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
-    sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep))) for g in G])
+    # what drives of the car have been seen to differ by is on top of what one of them tells
+    sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
     others = np.array([np.linalg.solve(G.sum(axis=0) - g + keep, b.sum(axis=0) - x) for g, x in zip(G, b, strict=True)])
     without = base - r.values
     gains = [
@@ -59,38 +60,49 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
     out = []
     for k, (i, name) in enumerate(r.names):
         unit = r.members[i].parameter(name).unit
-        q = float((((alone[:, k] - joint[k]) / sd[:, k]) ** 2).sum())
-        p = 10.0 ** -chi2_log_p(q, len(bench.drives) - 1)
         values = r.values[k] + alone[:, k]
         half = Z * sd[:, k]
+        each = [Estimate(float(v), float(v - h), float(v + h), unit) for v, h in zip(values, half, strict=True)]
+        p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(bench.drives) - 1)
         of_drives = tuple(
-            ByDrive(d.name, Estimate(float(v), float(v - h), float(v + h), unit), float(r.values[k] + o), float(gain))
-            for d, v, h, o, gain in zip(bench.drives, values, half, others[:, k], gains, strict=True)
+            ByDrive(d.name, e, float(r.values[k] + o), float(gain))
+            for d, e, o, gain in zip(bench.drives, each, others[:, k], gains, strict=True)
         )
         out.append(Agreement(r.members[i].key, name, of_drives, p))
     return tuple(out)
 
 
 def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
-    """The cause with intervals as wide as the drives differ, where they do (Birge's ratio, K)."""
+    """The cause with intervals wider by as much as the drives differ more than they should (Birge's ratio, K)."""
     parameters = dict(cause.parameters)
+    bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     for a in found:
         if a.key != cause.key or a.p_value >= AGREES or a.parameter not in parameters:
             continue
         e = parameters[a.parameter]
-        spread = np.std([d.alone.value for d in a.drives], ddof=1) / math.sqrt(len(a.drives))
-        half = max(0.5 * (e.high - e.low), Z * float(spread))
-        parameters[a.parameter] = replace(e, low=e.value - half, high=e.value + half)
+        ratio = math.sqrt(max(_heterogeneity([d.alone for d in a.drives]) / (len(a.drives) - 1), 1.0))
+        half = 0.5 * (e.high - e.low) * ratio
+        low, high = bounds[a.parameter]
+        parameters[a.parameter] = replace(e, low=max(e.value - half, low), high=min(e.value + half, high))
     if parameters == dict(cause.parameters):
         return cause
     sentence = cause_sentence(cause.effect, cause.where, EFFECTS[cause.effect].sentence, parameters)
     return replace(cause, parameters=parameters, sentence=sentence)
 
 
-def _normal(bench: Bench, r: Refit, noises: Sequence[Noise]) -> tuple[FloatArray, FloatArray]:
-    """Normal equations of each drive around the set's values: (D, k, k), (D, k)."""
-    columns = [c for h in r.members for c in bench.columns[bench.asked.index(h)]]
+def _heterogeneity(each: Sequence[Estimate]) -> float:
+    """Sum of squared deviations from the weighted mean in standard deviations: chi^2 of one degree less than values."""
+    values = np.array([e.value for e in each])
+    weight = np.array([(2.0 * Z / (e.high - e.low)) ** 2 for e in each])
+    return float((weight * (values - float(weight @ values) / float(weight.sum())) ** 2).sum())
+
+
+def _normal(
+    bench: Bench, r: Refit, noises: Sequence[Noise], columns: Sequence[int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Normal equations of each drive around the set's values (D, k, k), (D, k), and the spread between drives (k,)."""
     G, b = [], []
+    apart: FloatArray = np.zeros(len(columns))
     for d, noise, residual, own, s, p in zip(
         bench.drives, noises, r.residuals, r.signatures, bench.signatures, bench.prepared, strict=True
     ):
@@ -100,7 +112,8 @@ def _normal(bench: Bench, r: Refit, noises: Sequence[Noise]) -> tuple[FloatArray
         y = whitened_residual(one, [noise], [residual])
         G.append(measure.inner(J, J))
         b.append(measure.inner(J, y[None])[:, 0])
-    return np.array(G), np.array(b)
+        apart = measure.apart[list(columns)]
+    return np.array(G), np.array(b), apart
 
 
 def _prior(bench: Bench, r: Refit) -> FloatArray:

@@ -56,11 +56,12 @@ def floating(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle,
     for shown in (columns, follow(vehicle, course, Model()), follow(vehicle, course, more)):
         if all(f"omega_{w}" in shown for w in WHEELS):
             speed = shown.get("v_x", v)
-            slip = centre_line_speeds(shown, vehicle) / np.maximum(speed, V_LEAST) - 1.0
+            # over a speed that is not too small: a standing car does not slip
+            slip = (centre_line_speeds(shown, vehicle) - speed) / np.maximum(speed, V_LEAST)
             out |= np.abs(slip).max(axis=0) > BEYOND_GRIP
+    left_out = out.copy()
     for lane in course.lanes:
-        passed = (course.t >= lane.start) & (course.t < lane.end + RECOVERY_S)
-        first = np.flatnonzero(passed & out)
+        first = np.flatnonzero(out & (course.t >= lane.start) & (course.t < lane.end))
         if first.size:
-            out |= passed & (course.t >= course.t[first[0]])
-    return out
+            left_out |= (course.t >= course.t[first[0]]) & (course.t < lane.end + RECOVERY_S)
+    return left_out

@@ -113,7 +113,8 @@ class Hypothesis:
 
     def worth_naming(self, name: str) -> float:
         """Smallest deviation that is worth a word: the effect's own, or twice what a file is off by anyway."""
-        return max(self.parameter(name).smallest, WORTH * self.tolerance(name))
+        smallest = self.parameter(name).smallest
+        return max(smallest, WORTH * _LOOSE.get(self.key, _LOOSE.get(self.effect.name, 0.0)))
 
     def tolerance_of(self, name: str, vehicle: Vehicle) -> float:
         """`tolerance` for this vehicle file: wide for an axle whose key it does not set."""

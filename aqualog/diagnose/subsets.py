@@ -32,6 +32,8 @@ class SetFit:
 
 def fit_set(bench: Bench, gram: FloatArray, members: Sequence[int]) -> SetFit | None:
     """Least squares of one set; None if its members cannot be told apart or a value is outside its bounds."""
+    if bench.barred[list(members)].any():
+        return None
     columns = tuple(c for m in members for c in bench.columns[m])
     c = list(columns)
     G, b = gram[np.ix_(c, c)], gram[c, -1]
