@@ -99,6 +99,15 @@ def test_a_torque_that_arrives_in_part_is_undone(made):
     np.testing.assert_allclose(right["torque_rl"][INSIDE], c["torque_rl"][INSIDE], atol=1.0)
 
 
+def test_a_velocity_that_reads_too_much_leads_the_car_at_its_true_speed(made):
+    t, c = made
+    scaled = Model((term("velocity_scale", "v_x", scale=1.03),))
+    knows, not_ = (follow(CAR, course(t, c, 1.03 * c["v_x"]), m) for m in (scaled, Model()))
+    np.testing.assert_allclose(knows["omega_fl"][INSIDE], c["omega_fl"][INSIDE], rtol=2e-3)
+    np.testing.assert_allclose(knows["v_x"][INSIDE], 1.03 * c["v_x"][INSIDE], rtol=2e-3)
+    assert (not_["omega_fl"] / c["omega_fl"])[INSIDE].mean() > 1.01
+
+
 def test_terms_of_the_sensors_show_in_their_own_column_alone(made):
     t, c = made
     base = follow(CAR, course(t, c), Model())
