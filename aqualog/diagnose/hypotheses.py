@@ -248,8 +248,10 @@ def signatures(
             at, step = value_in(model, h, name), h.step(name)
             if h.effect.name in _SHIFTS:
                 # noise of an input, shifted one way only, would meet itself in the residual
-                later = residual(drive, with_values(model, [(h, {name: at + step})]))
-                out.append((residual(drive, with_values(model, [(h, {name: at - step})])) - later) / (2.0 * step))
+                p = h.parameter(name)
+                low, high = max(at - step, p.low), min(at + step, p.high)
+                later = residual(drive, with_values(model, [(h, {name: high})]))
+                out.append((residual(drive, with_values(model, [(h, {name: low})])) - later) / (high - low))
                 continue
             try:
                 changed = with_values(model, [(h, {name: at + step})])

@@ -142,3 +142,12 @@ def test_what_the_vehicle_file_does_not_set_is_hardly_known(name, where, key, sd
 def test_a_deviation_is_allowed_for_once(name, where):
     h = one(name, where)
     assert h.tolerance(h.free[0]) == 0.0
+
+
+@pytest.mark.parametrize("edge", ["low", "high"])
+def test_a_shift_at_the_edge_of_its_bounds_has_a_signature(drive, edge):
+    h = one("signal_delay", "a_x")
+    at = getattr(h.parameter("delay"), edge)
+    (s,) = signatures(drive, with_values(Model(), [(h, {"delay": at})]), [h], base=residual(drive, Model()))
+    assert np.isfinite(s).all()
+    assert np.abs(s).max() > 0.0
