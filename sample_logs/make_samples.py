@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,11 @@ from rosbags.typesys import Stores, get_typestore
 from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.io.write_table import TableColumn, write_csv, write_parquet
+from aqualog.model.effects import EFFECTS
 from aqualog.model.log import START_NS, table_of, write_simulation
+from aqualog.model.sensors import Channel
 from aqualog.model.simulate import simulate
+from aqualog.model.term import Model, Term
 from aqualog.notation import SYMBOLS, WHEELS
 
 HERE = Path(__file__).resolve().parent
@@ -26,9 +30,44 @@ ROS_TYPES = {
 }
 
 
+# two drives of the car with four people more in it than its vehicle file says
+LOAD_KG = 290.0
+LOADED = {  # seed, and speed over time [s, m/s]
+    "loaded_monday": (11, (
+        (0.0, 16.0), (10.0, 16.0), (30.0, 30.0), (55.0, 31.0), (75.0, 22.0), (95.0, 33.0), (125.0, 33.0), (150.0, 24.0),
+    )),
+    "loaded_friday": (12, (
+        (0.0, 25.0), (20.0, 25.0), (35.0, 34.0), (60.0, 33.0), (90.0, 19.0), (105.0, 28.0), (140.0, 28.0), (150.0, 31.0),
+    )),
+}  # fmt: skip
+
+
+def loaded_drive(name):
+    """A dry drive with the load, 20 Hz: t [s], name -> samples."""
+    seed, speed = LOADED[name]
+    own = load_scenario(HERE / "scenario.toml")
+    scenario = replace(
+        own, lanes=(), duration_s=150.0, rate_hz=20.0, seed=seed, speed=speed, sensors=calibrated(own.sensors)
+    )
+    load = Model((Term(EFFECTS["payload_mass"], {"delta_mass": LOAD_KG}),))
+    return columns_of(simulate(scenario, load))
+
+
+def calibrated(sensors):
+    """The sensors with their noise and resolution, without what calibration and time stamps take out."""
+    for name, channel in sensors.channels.items():
+        own = Channel(noise=channel.noise, resolution=channel.resolution)
+        sensors = sensors.with_channel(name, own)
+    return sensors
+
+
 def sample_drive():
-    """The drive of all sample logs on one time base, without the simulated truth: t [s], name -> samples."""
-    simulation = simulate(load_scenario(HERE / "scenario.toml"))
+    """The drive over the lane on one time base, without the simulated truth: t [s], name -> samples."""
+    return columns_of(simulate(load_scenario(HERE / "scenario.toml")))
+
+
+def columns_of(simulation):
+    """Measured signals of a simulation: t [s], name -> samples."""
     columns = {n: x for g in table_of(simulation) for n, (_, _, x) in g.columns.items()}
     rate = simulation.setup.scenario.rate_hz
     t = np.arange(next(iter(columns.values())).size) / rate
@@ -97,7 +136,7 @@ def csv_columns(t, s, ratio):
 
 
 def main(folder):
-    """Write all four logs."""
+    """Write all logs."""
     folder.mkdir(parents=True, exist_ok=True)
     t, s = sample_drive()
     simulation = simulate(load_scenario(HERE / "scenario.toml"))
@@ -109,6 +148,10 @@ def main(folder):
               decimal_comma=True)  # fmt: skip
     columns = [TableColumn("t", "s", t), *(TableColumn(n, SYMBOLS[n].unit, x) for n, x in s.items())]
     write_parquet(folder / "lane_drive.parquet", columns, start_ns=START_NS)
+    for name in LOADED:
+        t, s = loaded_drive(name)
+        columns = [TableColumn("t", "s", t), *(TableColumn(n, SYMBOLS[n].unit, x) for n, x in s.items())]
+        write_parquet(folder / f"{name}.parquet", columns, start_ns=START_NS)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ from aqualog.cli.options import (
     Quiet,
     Rate,
     Signals,
-    Vehicle,
     Verbose,
 )  # fmt: skip
 
@@ -46,7 +45,14 @@ def diagnose(
             show_default=False,
         ),
     ],
-    vehicle: Vehicle = None,
+    vehicle: Annotated[
+        Path | None,
+        typer.Option(
+            "--vehicle",
+            help="Vehicle file (TOML): what the simulation believes. Drives need one; a campaign names its own.",
+            metavar="FILE",
+        ),
+    ] = None,
     model: Annotated[
         Path | None,
         typer.Option("--model", help="Model file (TOML): what is known already, on top of the base.", metavar="FILE"),
@@ -146,7 +152,7 @@ def _diagnose(
     console: Console,
 ) -> int:
     from aqualog.cli.console import clean, told_if_interrupted
-    from aqualog.cli.diagnose_drives import check_apart, find_drives, load_drives
+    from aqualog.cli.diagnose_drives import check_apart, check_once, find_drives, load_drives
     from aqualog.cli.diagnose_results import tell
     from aqualog.cli.files import expand, list_files, refuse_existing
     from aqualog.cli.setup import prepare
@@ -158,11 +164,17 @@ def _diagnose(
         logs, map_file=map_file, dbc=dbc, targets=targets.paths, force=targets.force, quiet=console.quiet,
         verbose=console.verbose, progress=console.progress, vehicle_file=vehicle_file,
     )  # fmt: skip
+    missing = next((p for p in expand(holdout) if not p.exists()), None)
+    if missing is not None:
+        raise ConfigError(
+            "no such file or folder", where=f"--holdout {missing}", expected="a drive to measure the gain on"
+        )
     others = [*expand(holdout), *list_files(holdout), *([model_file] if model_file is not None else [])]
     refuse_existing(targets.paths, force=True, sources=others)
     known = _model(model_file)
     drives, unseen = find_drives(logs, holdout)
     check_apart(drives, unseen)
+    repeated = check_once(logs, drives)
     with console.steps() as steps, told_if_interrupted("nothing was written"):
         given = load_drives([*drives, *unseen], setup, dbc, rate, steps)
         from aqualog.diagnose.run import Options
@@ -176,7 +188,7 @@ def _diagnose(
     if result is None:
         return int(ExitCode.NOTHING_USABLE)
     paths = [str(p) for n, files in drives if n in given.loaded for p in files]
-    tell(result, targets, paths, given.notes, setup.vehicle.name, console)
+    tell(result, targets, paths, [*repeated, *given.notes], setup.vehicle.name, console)
     asked = [n for n, _ in drives if n in given.loaded]
     is_partial = given.failed or given.is_lossy or len(result.drives) < len(asked)
     return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)

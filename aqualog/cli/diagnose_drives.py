@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aqualog.cli.setup import Setup
     from aqualog.types import Signals
 
-__all__ = ["Drives", "check_apart", "find_drives", "load_drives"]
+__all__ = ["Drives", "check_apart", "check_once", "find_drives", "load_drives"]
 
 Named = list[tuple[str, list[Path]]]
 
@@ -76,6 +76,13 @@ def check_apart(drives: Named, unseen: Named) -> None:
     twice = next((p for _, paths in unseen for p in paths if p.resolve() in own), None)
     if twice is not None:
         raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives after --holdout")
+
+
+def check_once(logs: Sequence[str], drives: Named) -> list[str]:
+    """A note for files that are given more than once, of which each counts once."""
+    given = [p.resolve() for a in logs for p in expand([a])]
+    more = len(given) - len({p.resolve() for _, paths in drives for p in paths})
+    return [f"{more} of {len(given)} logs given more than once: each counts once"] if more else []
 
 
 def load_drives(drives: Named, setup: Setup, dbc: Sequence[Path], rate: float | None, steps: Steps) -> Drives:

@@ -11,14 +11,20 @@ import numpy as np
 from aqualog.diagnose.channels import block_means, channels_of
 from aqualog.diagnose.floating import floating
 from aqualog.diagnose.inputs import quiet_torque, smooth
+from aqualog.diagnose.unlogged import (
+    BRAKE_PRESSURE,
+    brakes_in_torque,
+    brakes_unlogged,
+    needed_torque,
+    road_wheel_angle,
+    roll_out,
+)
 from aqualog.errors import SignalError
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
 from aqualog.notation import AXLES, WHEELS
-from aqualog.physics.kinematics import kinematic_steer_angle
-from aqualog.physics.load import G
 from aqualog.types import BoolArray, FloatArray, Signals
 from aqualog.units import is_unit, parse_unit
 from aqualog.vehicle import Vehicle
@@ -34,10 +40,9 @@ A_X_MAX = 6.0  # [m/s^2]
 JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 # noise of what drives the simulation must not pass for motion: it would meet itself in the residual
-SPEED_S, STEER_S = 1.0, 0.5  # [s]
-UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
+SPEED_S = 1.0  # [s]
 LEAST_S = 20.0  # [s] of usable driving
-BRAKE_PRESSURE = 0.5e5  # [Pa]
+ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %: a road does not count as a brake
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +102,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     columns = {s: signals.array(s) for s in present}
     dt = signals.dt
     n = signals.frame.height
-    notes: list[str] = []
+    notes = _silent(signals, present)
     velocity = _velocity(columns, vehicle, dt, present)
     gaps = np.zeros(n, dtype=bool)
     v = _bridged(velocity, dt, gaps)
@@ -114,14 +119,14 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         # signals have the file's torque gain already: it is applied on reading
         torque = quiet_torque(np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS]), dt)
     else:
-        torque = _needed_torque(v, vehicle, dt)
+        torque = needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
     speed = smooth(v, dt, SPEED_S)
     t = np.arange(n, dtype=np.float64) * dt
+    steer = road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
     measured = Course(
-        t, torque, _steer(filled, v, vehicle, dt), speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels,
-        position=np.cumsum(v) * dt,
-    )  # fmt: skip
+        t, torque, steer, speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels, position=np.cumsum(v) * dt
+    )
     course = _without_lag(vehicle, measured, Model())
     floats = floating(filled, v, vehicle, course)
     bad = gaps | floats | (v < V_MIN)
@@ -132,13 +137,16 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
-    if "brake_pressure" in filled and not (every_wheel and _brakes_in_torque(filled, torque)):
+    if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):
         bad |= filled["brake_pressure"] > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
+    elif not torqued:
+        bad |= smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
+        notes.append("neither torque nor brakes in the log: what is slower than rolling out is left out")
     elif torqued and "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | _on_water(course), BESIDE_S, dt)
-        if every_wheel and _brakes_unlogged(torque, v, wet, vehicle, dt):
+        if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):
             unlogged = "the car slows down more than its torque says"
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
@@ -168,6 +176,14 @@ def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
     """
     nudge = follow(vehicle, course, model)["nudge"]
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
+
+
+def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
+    """Signals that are in the log and never have a value, with what goes with them."""
+    silent = [s for s in signals.symbols if s not in present]
+    lost = any(s.startswith("omega_") for s in silent) or 0 < sum(f"omega_{w}" in present for w in WHEELS) < len(WHEELS)
+    out = [f"{', '.join(silent)}: no value in the whole drive"] if silent else []
+    return [*out, "not all four wheel speeds: the slip of the wheels is not judged"] if lost else out
 
 
 def _as_known(vehicle: Vehicle, signals: Signals) -> Vehicle:
@@ -205,29 +221,6 @@ def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
     after = np.minimum.accumulate(np.where(good, np.arange(x.size), 2 * x.size)[::-1])[::-1]
     gaps |= ~good & ((after - before) * dt > GAP_S)
     return np.interp(np.arange(x.size), where, x[where])
-
-
-def _needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N m]"""
-    # brakes are on all wheels, and left out; the engine's share alone would lock an axle
-    inertia = np.clip(np.gradient(smooth(v, dt, SPEED_S), dt), 0.0, 2.0)
-    force = vehicle.mass * inertia + vehicle.mass * G * vehicle.rolling_resistance
-    force = force + 0.5 * vehicle.air_density * vehicle.drag_area * v * v
-    rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
-    return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.r_l(w) for w in WHEELS])
-
-
-def _steer(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """Road-wheel angle, or else that of the curve that the gyro shows."""
-    if "steer_angle" in columns:
-        angle = columns["steer_angle"]
-    elif "yaw_rate" in columns:
-        angle = kinematic_steer_angle(columns["yaw_rate"], v, wheelbase=vehicle.wheelbase)
-    else:
-        return np.zeros_like(v)
-    # beyond what is used anyway the led car could spin
-    most = vehicle.wheelbase * 1.2 * A_Y_MAX / np.maximum(v, V_MIN) ** 2
-    return smooth(np.clip(angle, -most, most), dt, STEER_S)
 
 
 def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
@@ -275,30 +268,11 @@ def _frozen(x: FloatArray, dt: float) -> BoolArray:
     return out
 
 
-def _brakes_in_torque(columns: Mapping[str, FloatArray], torque: FloatArray) -> bool:
-    """Whether the torque holds the brakes: it is far below zero where the brakes are pressed."""
-    braked = columns["brake_pressure"] > 4.0 * BRAKE_PRESSURE
-    if braked.sum() < 10:
-        return True
-    total = torque.sum(axis=0)
-    return bool(np.median(total[braked]) < -300.0)
-
-
 def _on_water(course: Course) -> BoolArray:
     out: BoolArray = np.zeros(course.t.shape, dtype=bool)
     for lane in course.lanes:
         out |= (course.t >= lane.start) & (course.t < lane.end)
     return out
-
-
-def _brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
-    """Whether the car often slows down much more than its torque explains off the water: then somebody else brakes."""
-    a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
-    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.r_l("fl") * vehicle.mass)
-    moving = (v > V_MIN) & ~wet
-    if moving.sum() * dt < LEAST_S:
-        return False
-    return bool(((a < explained - UNEXPLAINED) & moving).sum() > 0.01 * moving.sum())
 
 
 def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from aqualog.diagnose.channels import CHANNELS, block_means
-from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.gain import HeldOut, block_scores, gain
 from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
@@ -49,7 +50,8 @@ def measured_gain(
     held = []
     for d in drives:
         own = for_mask(noise, d.mask)
-        residuals = [residual(d, m) for m in (before, after)]
+        # each model is led so that it meets the measured speed itself
+        residuals = [residual(led_by(d, m), m) for m in (before, after)]
         rows = [whitened(spectra(bridged(r, d.mask)[None]), own)[0].reshape(r.shape) for r in residuals]
         used = (own.weights > 0.0).any(axis=0)
         scores = [block_scores(np.where(used, w, np.nan), dt=max(0.1, d.dt)) for w in rows]
@@ -69,5 +71,6 @@ def measured_gain(
 
 
 def _free_speed(d: Drive, model: Model) -> FloatArray:
-    shown = follow(d.vehicle, d.course, model, rate=FREE_RATE)
-    return block_means(shown["v_x"] - d.course.v_x, d.dt)
+    # the measured speed, not the one that leads: its lead is another model's
+    shown = follow(d.vehicle, replace(d.course, v_x=d.speed), model, rate=FREE_RATE)
+    return block_means(shown["v_x"] - d.speed, d.dt)

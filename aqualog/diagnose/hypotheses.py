@@ -177,7 +177,7 @@ def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> 
     if where in ("v_x", "a_x"):
         return where in present
     if where == "omega":
-        return "omega_fl" in present
+        return all(f"omega_{w}" in present for w in WHEELS)
     if where in ("torque", "torque_fl"):
         return torque
     return True
@@ -223,6 +223,8 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
 def residual(drive: Drive, model: Model) -> FloatArray:
     """Residual channels of a drive under a model. (C, m)"""
     shown = follow(drive.vehicle, drive.course, model)
+    # of the same signals: a speed that is the reference's on one side must not be the wheels' on the other
+    shown = {n: x for n, x in shown.items() if n in drive.present or n == "nudge"}
     measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
     return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
 

@@ -103,7 +103,7 @@ def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
     """Whether a value of a member is as large as its smallest size, and its interval leaves out that it is nothing."""
     r = candidate.refit
     h = r.members[member]
-    sd = np.sqrt(np.diag(r.covariance) * candidate.inflation)
+    sd = candidate.sd
     for k, (i, name) in enumerate(r.names):
         if i != member:
             continue
@@ -116,7 +116,7 @@ def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
 def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
     """The members of a set with values, intervals and sentences."""
     r = candidate.refit
-    sd = np.sqrt(np.diag(r.covariance) * candidate.inflation)
+    sd = candidate.sd
     explained = _explained(bench, r, model)
     out = []
     for i, h in enumerate(r.members):

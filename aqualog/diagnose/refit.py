@@ -35,7 +35,7 @@ class Refit:
     `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
     tolerances, and what values cost by their usual sizes; `residuals` (C, n) and `signatures` (k, C, n)
     per drive at these values; `at_bound` if a value sits at its physical bound; `unlikely`: the share of `loss` that
-    the sizes of the values have.
+    the sizes of the values have; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
     """
 
     members: tuple[Hypothesis, ...]
@@ -48,6 +48,7 @@ class Refit:
     signatures: tuple[FloatArray, ...]
     at_bound: bool
     unlikely: float = 0.0
+    apart: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +165,17 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
     unlikely = _unlikely((values - base) / bench.prior[columns])
     loss += unlikely - float((((values - base) / width) ** 2).sum())
     return Refit(
-        members, names, values, np.asarray(covariance), loss, extended, tuple(residuals), slopes, at_bound, unlikely
+        members,
+        names,
+        values,
+        np.asarray(covariance),
+        loss,
+        extended,
+        tuple(residuals),
+        slopes,
+        at_bound,
+        unlikely,
+        measure.apart[columns],
     )
 
 

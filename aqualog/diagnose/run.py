@@ -14,7 +14,7 @@ from aqualog.diagnose.bench import Bench, Stack, without_deviations
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
-from aqualog.diagnose.drive import Drive, prepare
+from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.heldout import measured_gain
 from aqualog.diagnose.hypotheses import hypotheses, residual, value_in, with_values
@@ -104,11 +104,14 @@ def diagnose(
     if used < LEAST_USED_S:
         return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
     given = model
+    if given.terms:
+        ready = [led_by(d, given) for d in ready]
     road = _road(ready, model)
     hilly = road is not None and road.rms.value >= HILLY
     if road is not None:
         # named or not: a car pulls uphill, and the torque would pass for the cause
         model = with_profile(model, road)
+        ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
     bench = simulated(ready, asked, model, tell)
     bench = supported(bench)
@@ -121,8 +124,8 @@ def diagnose(
         outcome = _with_road(outcome, road, named=hilly)
     extended = _extended(outcome, remainders, model if hilly else given, vehicle)
     sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
-    before = [residual(d, given) for d in ready] if road is not None else list(bench.residuals)
-    after = [residual(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
+    before = [_led(d, given) for d in ready] if road is not None else list(bench.residuals)
+    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
     gained = None
     if extended.terms != given.terms:
         tell("measuring the gain", 0.88)
@@ -176,6 +179,10 @@ def _by_drive(bench: Bench, found: Found, outcome: Outcome, model: Model) -> tup
     named = {c.key for c in outcome.causes}
     causes = tuple(widened(c, agreed) for c in outcome.causes)
     return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)
+
+
+def _led(drive: Drive, model: Model) -> FloatArray:
+    return residual(led_by(drive, model), model)
 
 
 def _road(drives: Sequence[Drive], model: Model) -> Profile | None:

@@ -43,11 +43,18 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of its variances."""
+    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of the noise's variances."""
 
     refit: Refit
     evidence_ratio: float
     inflation: float
+
+    @property
+    def sd(self) -> FloatArray:
+        """Standard deviations of the values; what drives differ by is known without the noise. (k,)"""
+        variance = np.diag(self.refit.covariance)
+        days = self.refit.apart**2 if self.refit.apart is not None else np.zeros_like(variance)
+        return np.asarray(np.sqrt((variance - days) * self.inflation + days))
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +114,7 @@ def search(
         least = FURTHER * calibration.threshold if accepted else 0.0
         if tests[-1].p_value > level or tests[-1].statistic < least or not sets:
             break
-        now = candidates[0].refit.residuals if candidates else bench.residuals
+        now = candidates[0].refit if candidates else None
         found = _refitted(work, gram, accepted, calibration, model, now, tell, 0.35 + 0.1 * len(tests))
         if not found:
             break
@@ -115,6 +122,7 @@ def search(
         best = found[0].refit
         accepted = tuple(_index(bench, h) for h in best.members)
         work = _around(bench, best, accepted, model)
+        work = replace(work, drives=tuple(led_by(d, best.model) for d in bench.drives))
     assert first is not None
     quiet = list(candidates[0].refit.residuals) if candidates else list(bench.residuals)
     noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, bench.drives, strict=True))
@@ -169,14 +177,14 @@ def _refitted(
     base: Sequence[int],
     calibration: Calibration,
     model: Model,
-    now: Sequence[FloatArray],
+    now: Refit | None,
     tell: Tell,
     share: float,
 ) -> tuple[Candidate, ...]:
     """Sets of one effect more than `base`, refitted in the simulator, best first; those at a physical bound are out.
 
-    None if the best of them does not take away from the residuals `now` what the test asks of an effect: then what the
-    test found is not of the form of any effect.
+    None if the best of them does not take away from what the known set `now` leaves what the test asks of an effect:
+    then what the test found is not of the form of any effect.
     """
     size = len(base) + 1
     top = best_sets(bench, gram, size, within=0.0, most=1)
@@ -204,8 +212,9 @@ def _refitted(
     # what is too small to be worth a word is another effect's disguise, if that one explains as much
     if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
         done = large
-    y = whitened_residual(bench, noises, now)[None]
-    known_loss = float(measure.inner(y, y)[0, 0])
+    y = whitened_residual(bench, noises, now.residuals if now is not None else bench.residuals)[None]
+    # how unlikely known values are is in the loss of every set that has them
+    known_loss = float(measure.inner(y, y)[0, 0]) + (now.unlikely if now is not None else 0.0)
     if known is not None and (again := refit(bench, known, measure, model)) is not None:
         known_loss = min(known_loss, again.loss)
     if not done or known_loss - done[0].loss < HALF * calibration.threshold * inflation:

@@ -14,7 +14,7 @@ from aqualog.physics.rolling import pressure_factor
 from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "with_mass_at"]
+__all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "understeer_gradient", "with_mass_at"]
 
 P_NOMINAL = 2.2e5  # [Pa] nominal pressure of the MF6.1 pressure law
 P_HALF_LENGTH, F_Z_HALF_LENGTH = 2.2e5, 4000.0  # [Pa, N] reference of a tyre's half_length
@@ -79,6 +79,14 @@ class Plant(NamedTuple):
     leak_radius: FloatArray  # share of the radius that is lost by then
     leak_slope: FloatArray  # relative change of the slip slope by then
     drag_over_v: FloatArray  # (k, 2) knots: v [m/s], extra force against the motion [N]
+
+
+def understeer_gradient(cornering_slope: float) -> float:
+    """Road-wheel angle per lateral acceleration beyond that of rolling around the curve. [1/rad] to [rad/(m/s^2)]
+
+    Difference of the axles' slip angles, a_y / (g c) each, where the front axle's slope is `FRONT_COMPLIANCE` c.
+    """
+    return (1.0 / (FRONT_COMPLIANCE * cornering_slope) - 1.0 / cornering_slope) / G
 
 
 def build_plant(

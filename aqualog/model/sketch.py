@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from aqualog.model.effects import EFFECTS
-from aqualog.model.plant import F_Z_ANCHOR, FRONT_COMPLIANCE, H_ANCHOR, P_ANCHOR
+from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, understeer_gradient
 from aqualog.model.pools import Pool
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Sensors
@@ -122,9 +122,7 @@ def slalom_angle(vehicle: Vehicle, tyre: Tyre, v: float, a_y: float) -> float:
 
     For a_y well below the friction; near it tyres give less.
     """
-    slope = tyre.cornering_slope
-    understeer = (1.0 / (FRONT_COMPLIANCE * slope) - 1.0 / slope) / G
-    return a_y * (vehicle.wheelbase / (v * v) + understeer)
+    return a_y * (vehicle.wheelbase / (v * v) + understeer_gradient(tyre.cornering_slope))
 
 
 def lagging_torque(sensors: Sensors, lag_s: float) -> Sensors:

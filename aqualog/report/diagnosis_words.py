@@ -14,6 +14,7 @@ __all__ = [
     "sentences", "verdict_title",
 ]  # fmt: skip
 
+WORSE = 0.01  # rise of a channel's error that is told
 _VERDICTS = {
     "no_effect": "Nothing is missing",
     "named": "One cause",
@@ -99,7 +100,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "causes_relations": _relations(c for c in document["isolability"] if _parties(c) & causes),
         "confused": [_confusion(c) for c in confused][:_MOST_CONFUSED],
         "causes_confused": [_confusion(c) for c in confused if _parties(c) & causes][:_MOST_CONFUSED],
-        "score": _score(document["gain"]),
+        "score": _score(document["gain"]) + _worse(document),
         "channels": [s for name, c in by_change(document) for s in _channel(name, c)],
         "gain_notes": list(gain["notes"]),
         "consequences": [_consequence(c) for c in gain["consequences"]],
@@ -225,12 +226,25 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
     if score is None:
         return []
     interval = f" (95 %: {short(low)} … {short(high)})" if low is not None and high is not None else ""
-    what = f"{where} the log score rises by {short(score)} {g['unit']}{interval}"
-    if score < 0.0:
-        what = f"{where} the log score falls: {short(score)} {g['unit']}{interval}"
-    if low is None or low > 0.0:
-        return [f"{what}."]
-    return [f"{what}: no gain that could be measured."]
+    if high is not None and high < 0.0:
+        return [f"{where} the log score falls by {short(-score)} {g['unit']}{interval}: the model predicts worse."]
+    if low is not None and low <= 0.0:
+        return [
+            f"{where} the log score changes by {short(score)} {g['unit']}{interval}: no gain that could be measured."
+        ]
+    change = "rises" if score >= 0.0 else "falls"
+    return [f"{where} the log score {change} by {short(abs(score))} {g['unit']}{interval}."]
+
+
+def _worse(document: Mapping[str, Any]) -> list[str]:
+    """Channels whose error grows, wherever they stand in the list of all."""
+    grown = [
+        f"{channel_title(name)} +{percent(c[f'{kind}_change'])} {words}"
+        for name, c in by_change(document)
+        for kind, words in (("rmse", "one step ahead"), ("free", "running free"))
+        if (c[f"{kind}_change"] or 0.0) > WORSE
+    ]
+    return [f"Predicted worse with it: {'; '.join(grown)}."] if grown else []
 
 
 def _channel(name: str, c: Mapping[str, Any]) -> list[str]:

@@ -23,6 +23,7 @@ from aqualog.errors import ConfigError
 
 SAMPLE = ROOT / "sample_logs" / "lane_drive.mf4"
 CAR = ROOT / "sample_logs" / "vehicle.toml"
+LOADED = ("loaded_monday.parquet", "loaded_friday.parquet")
 
 
 def first(name, other="zzz.mf4"):
@@ -276,7 +277,7 @@ def test_a_signal_that_few_drives_hold_is_left_out_of_the_map(tmp_path):
 def test_bad_files_are_told_and_left_out(tmp_path):
     logs = tmp_path / "logs"
     shutil.copytree(
-        ROOT / "sample_logs", logs, ignore=lambda *_: {"report.png", "lane_drive.mcap", "lane_drive.parquet"}
+        ROOT / "sample_logs", logs, ignore=lambda *_: {"report.png", "lane_drive.mcap", "lane_drive.parquet", *LOADED}
     )
     (logs / "empty.mf4").write_bytes(b"")
     (logs / "junk.mf4").write_bytes(b"\x01\x02" * 99)

@@ -201,6 +201,7 @@ def test_nothing_is_fitted_and_held_out(run, folder):
         (["--model", "a.parquet"], "a.parquet"),
         (["--model", "absent.toml"], "absent.toml"),
         (["--holdout", "none*.csv"], "nothing matches"),
+        (["--holdout", "typo.parquet"], "--holdout typo.parquet: no such file or folder"),
         (["--progress", "loud"], "--progress"),
         (["more.toml"], "stands among other inputs"),
     ],
@@ -212,6 +213,13 @@ def test_usage(run, folder, monkeypatch, args, said):
     assert said in err
     assert text == ""
     assert run.engine.asked == []
+
+
+def test_a_log_that_is_given_twice_counts_once_and_is_told(run, folder):
+    code, _, err = run(folder / "a.parquet", folder / "b.parquet", folder / "a.parquet")
+    assert code == 0
+    assert run.engine.asked[-1][0] == ["a.parquet", "b.parquet"]
+    assert "1 of 3 logs given more than once: each counts once" in err
 
 
 def test_no_vehicle_and_results_in_the_way(run, folder):
@@ -274,5 +282,6 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
 
 def test_help_of_the_whole_command():
     text = CliRunner().invoke(whole, ["diagnose", "--help"]).stdout
+    assert "default car" not in text
     for part in ("--holdout", "--no-bootstrap", "cannot_tell", "aqualog diagnose drive.mf4 --vehicle car.toml"):
         assert part in text

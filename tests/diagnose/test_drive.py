@@ -7,8 +7,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.diagnose.channels import block_means
+from aqualog.diagnose.channels import CHANNELS, block_means
 from aqualog.diagnose.drive import led_by, prepare
+from aqualog.diagnose.hypotheses import residual
 from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
@@ -179,3 +180,22 @@ def test_too_little_is_said():
     )
     with pytest.raises(SignalError, match="nothing to compare"):
         prepare(bare, CAR, "a")
+
+
+def test_a_wheel_without_values_takes_the_slip_with_it_and_says_so():
+    nothing = pl.Series("omega_rr", [None] * plain().frame.height, dtype=pl.Float64)
+    d = prepare(changed(plain(), plain().frame.with_columns(nothing)), CAR, "a")
+    assert not any(c.startswith("slip") for c in d.channels)
+    assert d.notes[:2] == (
+        "omega_rr: no value in the whole drive", "not all four wheel speeds: the slip of the wheels is not judged"
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("missing", [("omega_rr",), ("yaw_rate", "steer_angle"), ("v_x",)])
+def test_both_sides_are_compared_by_the_same_signals(missing):
+    """A drive of the model itself leaves nothing, whatever signal is missing."""
+    d = prepare(changed(plain(), plain().frame.drop(missing)), CAR, "a")
+    r = residual(d, Model())
+    least = {"m/s^2": 0.02, "m/s": 0.02, "N": 10.0}
+    for c, x in zip(d.channels, r, strict=True):
+        assert x[d.mask].std() < least[CHANNELS[c].unit], c

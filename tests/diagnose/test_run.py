@@ -217,3 +217,11 @@ def test_gain_is_on_unseen_drives_where_there_are_any():
     assert d.gain.log_score > 0.0
     force = next(c for c in d.gain.channels if c.channel == "force_balance")
     assert force.rmse_after < 0.5 * force.rmse_before
+
+
+def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
+    ask(monkeypatch, ("signal_delay@v_x", "signal_delay@a_x", "signal_delay@torque", "clock_skew"))
+    d = told(log=noisy(term("signal_delay", "v_x", delay=0.1), drop=["omega_rr"]))
+    assert keys(d) == {"signal_delay@v_x"}
+    assert d.causes[0].parameters["delay"].value == pytest.approx(0.1, abs=0.01)
+    assert any("not all four wheel speeds" in n for n in d.notes)

@@ -107,7 +107,7 @@ def test_a_gain_within_the_sample_is_not_given_out_as_held_out():
     assert g["heldout_log_score_gain"] is None
     assert g["ci95"] == [None, None]
     assert g["in_sample_log_score_gain"] == 1.4
-    (told,) = sentences(document_of("unexplained"))["score"]
+    told = sentences(document_of("unexplained"))["score"][0]
     assert "none was held out" in told
     assert "no gain that could be measured" in told
 
@@ -220,6 +220,25 @@ def test_no_number_is_told_of_nothing():
     d = round_trip(document_of(gain=g, limits=(), confusions=()))
     assert sentences(d)["score"] == []
     assert np.isfinite(numbers_in(d)).all()
+
+
+def test_a_channel_that_gets_worse_is_told_wherever_it_stands():
+    c = replace(BASE.gain.channels[-1], rmse_before=1.0, rmse_after=1.05, free_before=NAN, free_after=NAN)
+    g = replace(BASE.gain, channels=(*BASE.gain.channels[:-1], c))
+    told = sentences(document_of(gain=g))["score"]
+    assert told[-1].startswith("Predicted worse with it: ")
+    assert "tie rod FL +5 % one step ahead" in told[-1]
+
+
+@pytest.mark.parametrize(
+    ("score", "low", "high", "said"),
+    [(9.0, 5.0, 12.0, "rises by 9 nats"), (9.0, -5.0, 12.0, "no gain"), (-9.0, -12.0, -5.0, "falls by 9 nats")],
+)
+def test_a_score_is_told_by_its_interval(score, low, high, said):
+    g = replace(BASE.gain, log_score=score, low=low, high=high)
+    told = sentences(document_of(gain=g))["score"][0]
+    assert said in told
+    assert ("rises" in told) == (low > 0.0)
 
 
 def test_hostile_names_stay_text():
