@@ -97,7 +97,7 @@ def channel_values(
     Parameters
     ----------
     columns : mapping of array (n,)
-        Canonical signals; of a simulation also `nudge`, the acceleration that drew its speed to the measured one.
+        Canonical signals; of a simulation also `nudge_seen`, the acceleration that drew its speed to the measured one.
     channels : tuple of str
         Of `CHANNELS`.
     vehicle : Vehicle
@@ -114,7 +114,7 @@ def channel_values(
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = max(BLOCK_S, dt)
     # as a speed, so that it passes the same differences as the wheels'
-    drawn = block_means(np.cumsum(columns["nudge"]) * dt, dt) if "nudge" in columns else 0.0
+    drawn = block_means(np.cumsum(columns["nudge_seen"]) * dt, dt) if "nudge_seen" in columns else 0.0
     wheels = centre_line_speeds(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
     v_x = mean.get("v_x")
     out = []

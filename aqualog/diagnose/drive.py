@@ -12,6 +12,7 @@ from aqualog.diagnose.channels import block_means, channels_of
 from aqualog.diagnose.floating import floating
 from aqualog.diagnose.inputs import quiet_torque, smooth
 from aqualog.diagnose.unlogged import (
+    A_MOST,
     BRAKE_PRESSURE,
     brakes_in_torque,
     brakes_unlogged,
@@ -140,7 +141,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):
         bad |= filled["brake_pressure"] > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
-    elif not torqued:
+    if not torqued:
+        bad |= np.gradient(speed, dt) > A_MOST
+    if not torqued and "brake_pressure" not in filled:
         bad |= smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
         notes.append("neither torque nor brakes in the log: what is slower than rolling out is left out")
     elif torqued and "brake_pressure" not in filled:

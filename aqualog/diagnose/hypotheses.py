@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aqualog.diagnose.channels import channel_values
-from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.tolerances import TOLERANCES, WATER_TOLERANCES
+from aqualog.diagnose.drive import Drive, led_by
+from aqualog.diagnose.tolerances import STAND_IN, TOLERANCES, WATER_TOLERANCES
 from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
@@ -44,6 +44,11 @@ _FREE: Mapping[str, tuple[str, ...]] = {
     "pressure_loss": ("radius",),
     "uneven_water": ("depth_gain",),
 }
+# what a force does to the car is seen against the torque; a torque that stands in is made of the file's mass and drag
+_OF_TORQUE = (
+    "torque_gain", "payload_mass", "trailer", "aero_drag", "head_wind", "rolling_resistance", "tyre_warmup",
+    "cornering_drag", "brake_drag", "wheel_inertia", "water_drag", "load_sensitivity",
+)  # fmt: skip
 _NOT_ASKED: Mapping[str, str] = {
     "tone_ring": "once per turn is faster than the residuals, which are means over 0.1 s",
 }
@@ -83,7 +88,7 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: allowed for and never named."""
-        return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES
+        return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES or self.effect is STAND_IN
 
     @property
     def of_water(self) -> bool:
@@ -149,6 +154,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if effect.name in _WET and not wet:
             untested[effect.name] = "no water depth in the log"
             continue
+        if effect.name in _OF_TORQUE and not torque:
+            untested[effect.name] = "no wheel torque in the log"
+            continue
         if effect.name in _AT_WHEELS and not wheels:
             untested[effect.name] = "no wheel speeds in the log"
             continue
@@ -161,7 +169,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in asked:
             out += [Hypothesis(effect, where, free, fixed) for fixed in _variants(effect, drives)]
-    out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(WATER_TOLERANCES if wet else ()))]
+    tolerances = (*TOLERANCES, *(WATER_TOLERANCES if wet else ()), *(() if torque else (STAND_IN,)))
+    out += [Hypothesis(e, None, ("by",)) for e in tolerances]
     return tuple(out), untested
 
 
@@ -221,10 +230,15 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
 
 
 def residual(drive: Drive, model: Model) -> FloatArray:
-    """Residual channels of a drive under a model. (C, m)"""
+    """Residual channels of a drive under a model. (C, m)
+
+    A model that changes the velocity's own sensor changes what leads the car, which is made anew.
+    """
+    if any(t.place == "v_x" for t in model.terms):
+        drive = led_by(drive, model)
     shown = follow(drive.vehicle, drive.course, model)
     # of the same signals: a speed that is the reference's on one side must not be the wheels' on the other
-    shown = {n: x for n, x in shown.items() if n in drive.present or n == "nudge"}
+    shown = {n: x for n, x in shown.items() if n in drive.present or n == "nudge_seen"}
     measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
     return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
 

@@ -81,7 +81,13 @@ def gains_on_top(bench: Bench, gram: FloatArray, base: Sequence[int]) -> FloatAr
 
 
 def compatible(bench: Bench, members: Sequence[int]) -> bool:
-    """Whether a set names nothing twice: one effect at one wheel once, one variant of it."""
+    """Whether a set names nothing twice: one effect at one wheel once, one variant of it; nor a delay of every signal.
+
+    Signals are late against one another: all of them together are another start of the log's clock.
+    """
+    late = {bench.asked[m].where for m in members if bench.asked[m].effect.name == "signal_delay"}
+    if len(late) > 1 and late == {h.where for h in bench.asked if h.effect.name == "signal_delay"}:
+        return False
     seen: set[tuple[str, str]] = set()
     for m in members:
         h = bench.asked[m]

@@ -16,7 +16,7 @@ from aqualog.model.plant import Plant
 from aqualog.model.sensors import Channel
 from aqualog.model.term import Effect, Parameter, Setup
 
-__all__ = ["TOLERANCES", "WATER_TOLERANCES"]
+__all__ = ["STAND_IN", "TOLERANCES", "WATER_TOLERANCES"]
 
 
 def _plant(change: Callable[[Plant, float], Plant]) -> Callable[[Setup, Mapping[str, float], str | None], Setup]:
@@ -52,6 +52,9 @@ TOLERANCES: tuple[Effect, ...] = (
     _of("gyro_offset", "rad/s", 2e-3, _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
     _of("gyro_gain", "-", 0.02, _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
 )  # fmt: skip
+
+# the torque that the model needs on a flat road, for one that nobody logged: load, wind and slopes are not in it
+STAND_IN = _of("stand_in_torque", "-", 0.2, _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))))
 
 # The form of the water's laws; their sizes are effects and have tolerances of their own. What a source leaves open as a
 # range is taken as two standard deviations to either side.

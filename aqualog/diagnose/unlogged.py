@@ -16,6 +16,7 @@ from aqualog.types import BoolArray, FloatArray
 from aqualog.vehicle import Vehicle
 
 __all__ = [
+    "A_MOST",
     "BRAKE_PRESSURE",
     "brakes_in_torque",
     "brakes_unlogged",
@@ -26,7 +27,7 @@ __all__ = [
 
 SPEED_S, STEER_S = 1.0, 0.5  # [s]
 V_MIN = 4.0  # [m/s]
-A_X_MAX = 6.0  # [m/s^2]
+A_MOST = 3.0  # [m/s^2] of standing-in torque beyond resistance: with more a led car spins in a curve
 UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
 OFTEN = 0.01  # share of the driving
 LEAST_S = 20.0  # [s]
@@ -44,10 +45,10 @@ def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N m], >= 0
 
     None where the car slows down faster than it rolls out: brakes are on all wheels, and the engine's share of that
-    deceleration alone would lock an axle.
+    deceleration alone would lock an axle. At most for `A_MOST`.
     """
     inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
-    force = vehicle.mass * np.clip(inertia + roll_out(v, vehicle), 0.0, A_X_MAX)
+    force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
     rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
     return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.r_l(w) for w in WHEELS])
 

@@ -76,7 +76,7 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
     -------
     columns : dict of array (n,)
         Canonical signals on the grid of the course, without noise; `nudge` [m/s^2] is the acceleration that drew the
-        speed to the measured one, `position` [m].
+        speed to the measured one, `nudge_seen` the same as the accelerometer would see it, `position` [m].
 
     Raises
     ------
@@ -97,6 +97,10 @@ def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArra
             out[name] = x if same else _at(group.t, x, course.t)
     for name in ("nudge", "position"):
         out[name] = _at(truth.t, truth.columns[name], course.t)
+    # the accelerometer's delay and gain: a car whose signals all come late is the same car
+    channel = sensors.channels.get("a_x", Channel())
+    true_t = course.t / (1.0 + _skew(sensors, "a_x")) - channel.delay_s - channel.latency_s
+    out["nudge_seen"] = channel.gain * _at(truth.t, truth.columns["nudge"], true_t)
     return {n: x if x.size == course.t.size else np.resize(x, course.t.size) for n, x in out.items()}
 
 

@@ -121,5 +121,5 @@ def test_the_nudge_is_taken_out_of_the_kinematic_channel():
     n = 1000
     a = np.full(n, 0.2)
     speed = 20.0 + np.arange(n) * 0.01 * 0.5
-    columns = {"a_x": a, "v_x": speed, "nudge": np.full(n, 0.3)}
+    columns = {"a_x": a, "v_x": speed, "nudge_seen": np.full(n, 0.3)}
     np.testing.assert_allclose(channel_values(columns, ("kinematic",), CAR, dt=0.01)[0], 0.0, atol=1e-9)

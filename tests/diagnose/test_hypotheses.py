@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_drive import CAR, changed, plain, term
+from test_drive import CAR, NOISY, changed, plain, signals, term
 
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
@@ -40,9 +40,13 @@ def test_every_effect_is_asked_about_or_its_absence_has_a_reason(drive):
 
 def test_what_has_no_signal_is_not_asked_about():
     d = prepare(changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS])), CAR, "a")
-    asked, _ = hypotheses([d], Model())
+    asked, untested = hypotheses([d], Model())
     keys = {h.key for h in asked}
     assert "signal_delay@torque" not in keys
+    # a torque that stands in is made of the file's own mass and drag
+    assert not {"payload_mass", "aero_drag", "torque_gain", "head_wind"} & keys
+    assert untested["payload_mass"] == "no wheel torque in the log"
+    assert "stand_in_torque" in keys
     assert "signal_delay@v_x" in keys
 
 
@@ -151,3 +155,14 @@ def test_a_shift_at_the_edge_of_its_bounds_has_a_signature(drive, edge):
     (s,) = signatures(drive, with_values(Model(), [(h, {"delay": at})]), [h], base=residual(drive, Model()))
     assert np.isfinite(s).all()
     assert np.abs(s).max() > 0.0
+
+
+def test_signals_that_all_come_late_are_the_same_drive():
+    """Ten samples a second, without wheel speeds: what draws the led car is late with them."""
+    log = signals(sensors=NOISY, rate_hz=10.0, drop=[f"omega_{w}" for w in WHEELS])
+    d = prepare(log, CAR, "a")
+    late = [one("signal_delay", w) for w in ("v_x", "a_x", "torque")]
+    each = [s[0][:, 30:-30] for s in signatures(d, Model(), late, base=residual(d, Model()))]
+    kinematic = d.channels.index("kinematic")
+    assert sum(each)[kinematic].std() < 0.03 * each[0][kinematic].std()
+    assert each[2][kinematic].std() < 0.06 * each[0][kinematic].std()

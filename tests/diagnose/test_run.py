@@ -101,7 +101,6 @@ def test_a_slope_and_an_offset_that_cancel_are_no_compound(monkeypatch):
     assert twins.p_correct < 0.7
 
 
-@pytest.mark.xfail(strict=True, reason="the torque that stands in does not grow with a slope, the load on an axle does")
 def test_a_slope_and_an_offset_without_torque(monkeypatch):
     # without torque a slope and an offset of the accelerometer look the same
     ask(monkeypatch, ("accelerometer_bias@a_x", "road_grade", "tyre_radius@fl"))

@@ -204,3 +204,10 @@ def test_sets_come_best_first_and_not_too_many():
     assert [f.gain for f in fits] == sorted((f.gain for f in fits), reverse=True)
     near = best_sets(b, gram(b), 1, within=1.0, most=50)
     assert all(f.gain >= fits[0].gain - 1.0 for f in near)
+
+
+def test_a_delay_of_every_signal_is_another_start_of_the_clock():
+    asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "torque"))
+    bench = made(asked=asked)
+    assert compatible(bench, (0, 1))
+    assert not compatible(bench, (0, 1, 2))

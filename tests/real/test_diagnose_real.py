@@ -126,11 +126,11 @@ def test_no_load_is_told_that_was_not_there(loaded):
 
 
 def test_delay_of_the_loaded_trip_is_the_torques(real_logs, bmw, loaded):
-    """The accelerometer is early against a torque that is late; calibration finds the same by other means."""
-    (delay,) = (c.parameters["delay"] for c in loaded.causes if c.effect == "signal_delay")
+    """Calibration finds the same by other means."""
+    (delay,) = (c.parameters["delay"] for c in loaded.causes if c.key == "signal_delay@torque")
     late = calibrate([trip_of(real_logs, bmw, "B24")], ["B24"], bmw, {"mass": bmw.mass}).drives[0].torque_lag_s
     assert late > 0.02
-    assert delay.low < -late < delay.high
+    assert delay.low < late < delay.high
     assert any("too small to be worth naming: The road" in n for n in loaded.notes)
 
 
@@ -163,6 +163,12 @@ def test_road_of_the_hilly_trip_is_a_cause_and_the_withheld_elevation_agrees(rea
     assert np.corrcoef(*flat)[0, 1] > 0.85
     mean = road.parameters["grade_mean"]
     assert mean.high - mean.low > 0.01  # without elevation a mean slope is an offset of the accelerometer as well
+
+
+def test_both_trips_say_the_same_of_the_torques_delay(hilly, loaded):
+    delays = [c.parameters["delay"] for d in (hilly, loaded) for c in d.causes if c.key == "signal_delay@torque"]
+    assert len(delays) == 2
+    assert max(d.low for d in delays) < min(d.high for d in delays)
 
 
 def test_nothing_about_tyres_without_wheel_speeds(hilly):
@@ -242,6 +248,11 @@ def test_porsche_offset_and_road_are_named(porsche):
     certain = porsche.sentence.split("beside it")[0]
     assert "accelerometer bias" in certain
     assert "road grade" in certain
+
+
+def test_without_torque_nothing_is_told_about_forces(porsche):
+    assert not {c.effect for c in porsche.causes} & {"torque_gain", "payload_mass", "aero_drag", "head_wind"}
+    assert porsche.untested["payload_mass"] == "no wheel torque in the log"
 
 
 def test_what_nobody_told_of_the_porsche_is_no_finding(porsche):
