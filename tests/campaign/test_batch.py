@@ -251,12 +251,11 @@ def test_crash_is_told_and_tried_again(own, monkeypatch):
     assert run_batch(configure(own), store).made == 3
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
-def test_ended_half_way_and_started_again(tmp_path, number):
-    # far more logs than can be done while the signal is on its way
-    campaign = make_campaign(tmp_path, speeds=(70, 80, 90, 100), repeats=24)
+def begun_and_ended(folder, number):
+    """A batch over 64 logs that got a signal after five: campaign, samples that were there, exit code, stderr."""
+    campaign = make_campaign(folder, speeds=(70, 80, 90, 100), repeats=16)
     command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "--jobs", "2", "--progress", "plain"]
-    samples = tmp_path / "campaign.store" / "samples"
+    samples = folder / "campaign.store" / "samples"
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
         for _ in range(6000):
             if samples.is_dir() and sum(p.suffix == ".parquet" for p in samples.iterdir()) >= 5:
@@ -265,8 +264,18 @@ def test_ended_half_way_and_started_again(tmp_path, number):
         process.send_signal(number)
         error = process.stderr.read()
         code = process.wait()
-    there = {p.name: p.read_bytes() for p in samples.glob("*.parquet")}
-    assert 5 <= len(there) < 96
+    return campaign, samples, code, error
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
+def test_ended_half_way_and_started_again(tmp_path, number):
+    for attempt in "abc":  # on a busy machine the batch may be done before the signal is on its way
+        (tmp_path / attempt).mkdir()
+        campaign, samples, code, error = begun_and_ended(tmp_path / attempt, number)
+        there = {p.name: p.read_bytes() for p in samples.glob("*.parquet")}
+        if len(there) < 64:
+            break
+    assert 5 <= len(there) < 64
     if number == signal.SIGINT:
         assert code == 130
         assert "goes on with the rest" in error
@@ -274,7 +283,7 @@ def test_ended_half_way_and_started_again(tmp_path, number):
     done = run("batch", campaign, "--json")
     document = json.loads(done.stdout)
     assert done.exit_code == 0
-    assert document["made"] + document["kept"] == 96
+    assert document["made"] + document["kept"] == 64
     assert document["kept"] >= len(there)
     assert {n: (samples / n).read_bytes() for n in there} == there
 

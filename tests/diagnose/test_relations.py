@@ -4,6 +4,7 @@ import pytest
 from test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is a fixture
 from test_subsets import ASKED, AT
 
+from aqualog.diagnose import run
 from aqualog.diagnose.relations import imitations
 
 BIAS, SLOPE, ROLLING = (AT[k] for k in ("accelerometer_bias@a_x", "road_grade", "rolling_resistance"))
@@ -36,6 +37,7 @@ def test_a_log_that_cannot_part_three_lists_them(monkeypatch, hidden):
     three = ("accelerometer_bias@a_x", "road_grade", "rolling_resistance")
     # radii are not known to the millimetre: else the slip that rolling costs would part them
     radii = [f"tyre_radius@{w}" for w in ("fl", "fr", "rl", "rr")]
+    monkeypatch.setattr(run, "next_manoeuvre", lambda *_: None)
     ask(monkeypatch, (*three, "rolling_resistance@f", "rolling_resistance@r", *radii))
     d = told(log=noisy(hidden))
     assert d.verdict == "cannot_tell"
