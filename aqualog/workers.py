@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
+import faulthandler
 import multiprocessing
 import os
 import signal
+import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from threading import Thread, current_thread, main_thread
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-__all__ = ["Crashed", "most_processes", "work_on"]
+__all__ = ["NO_LIMITS", "Crashed", "Limits", "WorkOn", "most_processes", "work_on"]
 
 _PER_CORE = 4  # more processes than this many a core only take memory
+_THREADS = ("POLARS_MAX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 Name = TypeVar("Name", bound=Hashable)
 
 
-class Crashed(Exception):  # noqa: N818 - what became of a task, not an error of ours
-    """The process that worked on an item ended without a word: out of memory, or killed."""
+class Crashed(NamedTuple):
+    """The process that worked on an item ended without a word: out of memory, killed, or `seconds` beyond its limit."""
+
+    seconds: float = 0.0
+
+
+class Limits(NamedTuple):
+    """What one item may take: wall-clock `seconds`, and `memory_mb` of a process's own data; None: no limit."""
+
+    seconds: float | None = None
+    memory_mb: int | None = None
+
+
+NO_LIMITS = Limits()
+WorkOn = Callable[[Mapping[Any, tuple[Any, ...]], Callable[..., Any], Callable[[Any, Any], None]], None]
+"""Something that calls work(*task) for every task, anywhere, and then record(name, result) here, `Crashed` included."""
 
 
 def work_on(
@@ -29,6 +46,7 @@ def work_on(
     *,
     jobs: int,
     record: Callable[[Name, Any], None],
+    limits: Limits = NO_LIMITS,
 ) -> None:
     """Call `work(*task)` for every task in up to `jobs` processes.
 
@@ -42,19 +60,22 @@ def work_on(
     record : callable
         Called here with name and result as each is done; the result is `Crashed` if the process ended. An item that
         was merely in work beside one that crashed is done again, alone.
+    limits : Limits
+        An item that takes longer ends its process; one that wants more memory gets a MemoryError.
 
     An interrupt lets the items in work finish and records them before it is raised.
     """
     left = dict(tasks)
-    suspects = _round(left, work, min(jobs, len(left), most_processes()), record) if left else []
+    suspects = _round(left, work, min(jobs, len(left), most_processes()), record, limits) if left else []
     while suspects:
         # one of them has taken the pool down; each gets a process of its own, which tells which
         name = suspects.pop(0)
-        if name in left and _round({name: left[name]}, work, 1, lambda n, r: _taken(left, record, n, r)):
+        began = time.monotonic()
+        if name in left and _round({name: left[name]}, work, 1, lambda n, r: _taken(left, record, n, r), limits):
             left.pop(name)
-            record(name, Crashed())
+            record(name, Crashed(time.monotonic() - began))
     if left and len(left) < len(tasks):
-        work_on(left, work, jobs=jobs, record=record)
+        work_on(left, work, jobs=jobs, record=record, limits=limits)
 
 
 def most_processes() -> int:
@@ -68,17 +89,22 @@ def _taken(left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None
 
 
 def _round(
-    left: dict[Name, tuple[Any, ...]], work: Callable[..., Any], jobs: int, record: Callable[[Name, Any], None]
+    left: dict[Name, tuple[Any, ...]],
+    work: Callable[..., Any],
+    jobs: int,
+    record: Callable[[Name, Any], None],
+    limits: Limits,
 ) -> list[Name]:
     """Work until all is done or the pool breaks; what is done leaves `left`. Returns those that were in work then."""
     todo = iter(list(left.items()))
     pending: dict[Future[Any], Name] = {}
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_quiet_worker) as pool:
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, spawn, initializer=_quiet_worker, initargs=(limits.memory_mb,)) as pool:
         try:
             # few in the queue: when a pool breaks, only those that it held are in doubt
             for name, task in todo:
                 with _no_interrupt():
-                    pending[pool.submit(work, *task)] = name
+                    pending[pool.submit(_within, limits.seconds, work, *task)] = name
                 if len(pending) >= 2 * jobs:
                     broken = _collect(pending, left, record)
                     if broken:
@@ -135,13 +161,38 @@ def _no_interrupt() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _quiet_worker() -> None:
+def _within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
+    """`work(*task)`; this process ends if that takes too long, be it in a library that never comes back to Python."""
+    if seconds is None:
+        return work(*task)
+    with open(os.devnull, "w") as nowhere:  # noqa: PTH123 - a file with a number, for the watchdog
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            return work(*task)
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
+def _quiet_worker(memory_mb: int | None = None) -> None:
     """An interrupt is the parent's business; a worker finishes what it has in hand, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    os.environ["POLARS_MAX_THREADS"] = "1"
+    os.environ.update(dict.fromkeys(_THREADS, "1"))  # one a process: these are as many as the cores
+    if memory_mb is not None:
+        _bound_memory(memory_mb)
     Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _bound_memory(megabytes: int) -> None:
+    """Private memory of this process; what is only mapped (files, code) is not counted."""
+    try:
+        import resource
+    except ImportError:  # no such limit on this system
+        return
+    most = megabytes * 1_000_000
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (most if hard < 0 else min(most, hard), hard))
 
 
 def _end_with_parent() -> None:

@@ -22,7 +22,7 @@ from aqualog.detect.stream import Settings
 from aqualog.errors import AqualogError, ConfigError, FitError, LogError, SignalError
 from aqualog.evaluate.labels import Label
 from aqualog.vehicle import Vehicle
-from aqualog.workers import Crashed, work_on
+from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn, work_on
 
 __all__ = ["BatchOutcome", "Configured", "Fault", "Job", "measure_one", "name_of", "plan_jobs", "run_batch"]
 
@@ -153,6 +153,8 @@ def run_batch(
     *,
     jobs: int = 1,
     force: bool = False,
+    limits: Limits = NO_LIMITS,
+    elsewhere: WorkOn | None = None,
     report: Report = lambda done, total, failed: None,
     told: Callable[[str, str], None] = lambda name, reason: None,
 ) -> BatchOutcome:
@@ -164,7 +166,11 @@ def run_batch(
     store : Store
         Made if it is not there.
     jobs : int
-        Processes.
+        Processes on this machine.
+    limits : Limits
+        What one log may take.
+    elsewhere : callable, optional
+        Works on the logs in place of these processes: `aqualog.campaign.cluster.on_cluster`.
     force : bool
         Also what is there already.
     report : callable
@@ -174,7 +180,8 @@ def run_batch(
 
     A log that fails leaves the others alone; if its content is at fault that is kept too, so that only a change of it,
     of its configuration or of aqualog makes it be tried again. An interrupt loses nothing that is finished. A damaged
-    result counts as none. Where there is nothing to measure, the store may be read-only or in use by another batch.
+    result counts as none. A store that is a shard's gets no tables. Where there is nothing to measure, the store may be
+    read-only or in use by another batch.
 
     Raises
     ------
@@ -184,7 +191,7 @@ def run_batch(
         If it cannot be written or another batch writes there; what is finished stays.
     """
     store.check()
-    contents = Contents(store.read_json("contents.json"))
+    contents = Contents(store.contents())
     todo = plan_jobs(configured, contents)
     plan = _compared(todo, store, force=force)
     with store.held(must=bool(plan.new)) as is_held:
@@ -193,15 +200,16 @@ def run_batch(
             for key in plan.damaged:
                 store.drop(key)
         if is_held and contents.has_changed:
-            store.write_json("contents.json", contents.known)
-        tally = _Tally(configured, store, len(todo), plan, report, told)
+            store.keep_contents(contents.known)
+        tally = _Tally(configured, store, len(todo), plan, limits, report, told)
         try:
-            _work(configured, store, plan.new, jobs, tally.record)
+            _work(configured, store, plan.new, tally.record, jobs=jobs, limits=limits, elsewhere=elsewhere)
         except BaseException:
-            with suppress(AqualogError):  # what has ended the batch is what the user should know
-                write_tables(configured, store, todo)
+            if not store.part:
+                with suppress(AqualogError):  # what has ended the batch is what the user should know
+                    write_tables(configured, store, todo)
             raise
-        if is_held:
+        if is_held and not store.part:
             write_tables(configured, store, todo)
     return BatchOutcome(tally.made, plan.kept, tally.failed)
 
@@ -210,12 +218,12 @@ class _Tally:
     """What has come of the logs so far."""
 
     def __init__(
-        self, configured: Configured, store: Store, total: int, plan: _Plan, report: Report,
+        self, configured: Configured, store: Store, total: int, plan: _Plan, limits: Limits, report: Report,
         told: Callable[[str, str], None],
     ) -> None:  # fmt: skip
         self.made = 0
         self.failed: dict[str, str] = {}
-        self._configured, self._store, self._total, self._plan = configured, store, total, plan
+        self._configured, self._store, self._total, self._plan, self._limits = configured, store, total, plan, limits
         self._report, self._told = report, told
         for job, reason in plan.failed:
             self._fail(job, reason)
@@ -231,7 +239,10 @@ class _Tally:
         """
         job = self._plan.new[key]
         if isinstance(outcome, Crashed):
-            self._fail(job, CRASHED)  # next time there may be more memory
+            # next time there may be more memory, or a quieter machine
+            most = self._limits.seconds
+            late = most is not None and outcome.seconds >= most
+            self._fail(job, f"took longer than {most:g} s (--limit-s)" if late else CRASHED)
         elif outcome is None:
             self.made += 1
         elif outcome.ends_batch:
@@ -255,13 +266,19 @@ def _work(
     configured: Configured,
     store: Store,
     new: Mapping[str, Job],
-    jobs: int,
     record: Callable[[str, Fault | Crashed | None], None],
+    *,
+    jobs: int,
+    limits: Limits,
+    elsewhere: WorkOn | None,
 ) -> None:
     shared = (configured.signal_map, configured.dbc, configured.settings)
     tasks = {k: (store.folder, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
-    if len(tasks) > _HERE and jobs > 1:
-        work_on(tasks, measure_one, jobs=jobs, record=record)
+    if elsewhere is not None:
+        elsewhere(tasks, measure_one, record)
+        return
+    if (len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS:
+        work_on(tasks, measure_one, jobs=jobs, record=record, limits=limits)
         return
     for key, task in tasks.items():
         record(key, measure_one(*task))

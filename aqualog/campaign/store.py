@@ -7,6 +7,7 @@ STORE/events.parquet        a row per event      (as above)
 STORE/manifest.json         state of every log   (as above)
 STORE/contents.json         hashes of the logs by size and time of change
 STORE/lock                  held by the batch that writes here; readers need none
+STORE/parts/                hashes and lock of each shard, which writes samples and failures only
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ MARK = "aqualog_store.json"
 _METADATA_KEY = "aqualog"
 _SCHEMA = 1
 _LOCK = "lock"
-_FOLDERS = ("samples", "failed")
+_FOLDERS = ("samples", "failed", "parts")
+_CONTENTS = "contents.json"
 _FILES = ("runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK, _LOCK)
 _ORPHAN = re.compile(r"\..{1,40}-\w{8}\.(parquet|json)\.tmp", re.DOTALL)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -57,11 +59,14 @@ class Store:
     Parameters
     ----------
     folder : Path
-        Made by `prepare` if it is not there.
+        Made by `held` if it is not there.
+    part : str
+        Name of the shard that works here beside others; it makes no tables.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, part: str = "") -> None:
         self.folder = folder
+        self.part = part
 
     def check(self) -> None:
         """Refuse a folder that is none of a store; one that is not there will do.
@@ -119,8 +124,10 @@ class Store:
             is_held = False
             try:
                 self.folder.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(only_here(self.folder / _LOCK))
+                stack.enter_context(only_here(self.folder / _LOCK, together=bool(self.part)))
                 self._make()
+                if self.part:
+                    stack.enter_context(only_here(self.folder / "parts" / f"{self.part}.lock"))
                 is_held = True
             except BlockingIOError as error:
                 if must:
@@ -138,7 +145,8 @@ class Store:
             write_text(self.folder / MARK, json.dumps({"schema_version": _SCHEMA}) + "\n")
         for name in _FOLDERS:
             (self.folder / name).mkdir(exist_ok=True)
-        self._sweep()
+        if not self.part:  # another shard's file may be in the making
+            self._sweep()
 
     @property
     def exists(self) -> bool:
@@ -235,6 +243,16 @@ class Store:
         if not set(frame.columns) >= _COLUMNS:
             raise _damaged(path)
         return frame
+
+    def contents(self) -> dict[str, Any]:
+        """Hashes that batches and shards have kept."""
+        names = [_CONTENTS, *(f"parts/{p.name}" for p in sorted((self.folder / "parts").glob("*.json")))]
+        known = [self.read_json(n) for n in names]
+        return {path: entry for d in known if isinstance(d, dict) for path, entry in d.items()}
+
+    def keep_contents(self, known: Mapping[str, Any]) -> None:
+        """Keep hashes."""
+        self.write_json(f"parts/{self.part}.json" if self.part else _CONTENTS, known)
 
     def read_json(self, name: str) -> Any:
         """A JSON file of the store; None where it is not there or damaged."""

@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -15,7 +15,9 @@ from aqualog.cli.options import Dbc, Debug, Force, Inputs, Jobs, Json, Progress,
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome
     from aqualog.campaign.samples import CampaignData
+    from aqualog.campaign.shard import Shard
     from aqualog.cli.console import Console
+    from aqualog.workers import Limits
 
 __all__ = ["batch"]
 
@@ -39,6 +41,21 @@ def batch(
         Path | None, typer.Option("--thresholds", help="Thresholds file; default: built in.", metavar="FILE")
     ] = None,
     jobs: Jobs = None,
+    limit_s: Annotated[
+        float | None, typer.Option("--limit-s", help="Longest time for one log, in seconds.", min=1.0, metavar="S")
+    ] = None,
+    limit_mb: Annotated[
+        int | None,
+        typer.Option("--limit-mb", help="Most memory for one process, in megabytes.", min=300, metavar="MB"),
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", help="Only the I-th of N parts, for N machines on one folder.", metavar="I/N"),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", help="Work on the workers of this dask scheduler.", metavar="tcp://HOST:8786"),
+    ] = None,
     as_json: Json = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -59,16 +76,20 @@ def batch(
     Examples:
       aqualog batch campaign.toml
       aqualog batch campaign.toml -o results --jobs 8 --progress plain
-      aqualog batch logs/*.mf4 --vehicle car.toml -o results
+      aqualog batch logs/*.mf4 --vehicle car.toml -o results --limit-s 60 --limit-mb 2000
+      aqualog batch campaign.toml --shard 3/8
+      aqualog batch campaign.toml --cluster tcp://scheduler:8786
       duckdb -c "select tyre, avg(events_joint_criteria) from 'campaign.store/runs.parquet' group by tyre"
     """  # fmt: skip
     from aqualog.cli.console import Console, guarded
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
+        placed = _placed(limit_s, limit_mb, shard, cluster, jobs)
         code = _batch(
-            inputs, out, vehicle, signals, dbc or [], thresholds, jobs, as_json=as_json, force=force, console=console
-        )
+            inputs, out, vehicle, signals, dbc or [], thresholds, jobs, placed, as_json=as_json, force=force,
+            console=console,
+        )  # fmt: skip
     if code:
         raise typer.Exit(code)
 
@@ -81,23 +102,63 @@ def _batch(
     dbc: list[Path],
     thresholds: Path | None,
     jobs: int | None,
+    placed: Placed,
     *,
     as_json: bool,
     force: bool,
     console: Console,
 ) -> int:
+    from dataclasses import replace
+
+    from aqualog.campaign.shard import part_of
     from aqualog.cli.campaign_results import exit_code, opened, results, store_of
 
     began = time.monotonic()
     configured = opened(inputs, vehicle=vehicle, map_file=map_file, dbc=dbc, thresholds=thresholds)
-    data, outcome = results(configured, out, console=console, jobs=jobs, force=force)
     folder = store_of(configured, out)
+    if placed.shard is not None:
+        configured = replace(configured, campaign=part_of(configured.campaign, placed.shard))
+        if not configured.campaign.runs:  # a matrix may have more jobs than there are logs
+            console.note(f"shard {placed.shard.index} of {placed.shard.count} has no log")
+            return 0
+    data, outcome = results(
+        configured, folder, console=console, jobs=jobs, force=force, shard=placed.shard, cluster=placed.cluster,
+        limits=placed.limits,
+    )  # fmt: skip
     if as_json:
         sys.stdout.write(json.dumps(_document(data, outcome, folder), indent=1, allow_nan=False) + "\n")
     else:
         sys.stdout.write(_text(data, outcome))
     console.note(f"results are in {folder}, {time.monotonic() - began:.0f} s")
+    if placed.shard is not None:
+        console.note("tables are made by the same command without --shard, when all parts are done")
     return exit_code(outcome, data)
+
+
+class Placed(NamedTuple):
+    """Where the work is done, and what one log may take."""
+
+    limits: Limits
+    shard: Shard | None
+    cluster: str | None
+
+
+def _placed(
+    limit_s: float | None, limit_mb: int | None, shard: str | None, cluster: str | None, jobs: int | None
+) -> Placed:
+    from aqualog.campaign.shard import shard_of
+    from aqualog.errors import ConfigError
+    from aqualog.workers import NO_LIMITS, Limits
+
+    limits = Limits(limit_s, limit_mb)
+    if cluster is not None:
+        if limits != NO_LIMITS:
+            raise ConfigError("--limit-s and --limit-mb beside --cluster", expected="limits of the workers themselves")
+        if jobs is not None:
+            raise ConfigError("--jobs beside --cluster", expected="as many as there are workers")
+        if not cluster.strip():
+            raise ConfigError("--cluster is empty", expected="tcp://host:8786")
+    return Placed(limits, shard_of(shard) if shard is not None else None, cluster)
 
 
 def _document(data: CampaignData, outcome: BatchOutcome, folder: Path) -> dict[str, object]:

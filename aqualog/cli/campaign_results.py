@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,9 @@ from aqualog.errors import ConfigError, ExitCode
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome, Configured
     from aqualog.campaign.samples import CampaignData
+    from aqualog.campaign.shard import Shard
+    from aqualog.cli.console import Steps
+    from aqualog.workers import Limits, WorkOn
 
 __all__ = ["check_targets", "exit_code", "opened", "results", "store_of"]
 
@@ -98,8 +102,13 @@ def results(
     console: Console,
     jobs: int | None = None,
     force: bool = False,
+    shard: Shard | None = None,
+    cluster: str | None = None,
+    limits: Limits | None = None,
 ) -> tuple[CampaignData, BatchOutcome]:
     """Bring the store up to date and load it; every log that gives nothing is told on stderr.
+
+    With `shard` the campaign is that shard's already.
 
     Raises
     ------
@@ -108,7 +117,7 @@ def results(
     AqualogError
         If logs must be measured and the store cannot be written, or another batch writes there.
     """
-    from aqualog.workers import most_processes
+    from aqualog.workers import NO_LIMITS, most_processes
 
     if jobs is not None and jobs > most_processes():
         console.note(f"--jobs {jobs}: {most_processes()} processes are the most on this machine")
@@ -118,7 +127,7 @@ def results(
         from aqualog.campaign.samples import load_results
         from aqualog.campaign.store import Store
 
-        place = Store(store_of(configured, store))
+        place = Store(store_of(configured, store), shard.name if shard is not None else "")
         _check_apart(configured, place.folder)
         told: list[str] = []
 
@@ -128,16 +137,30 @@ def results(
                 steps.clear()
                 sys.stderr.write(f"error: {clean(_with_name(name, reason))}\n")
 
-        with told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"):
+        with (
+            told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"),
+            _elsewhere(cluster, steps) as elsewhere,
+        ):
             outcome = run_batch(
-                configured, place, jobs=jobs or os.cpu_count() or 1, force=force, report=Progress(steps, "logs"),
-                told=tell,
+                configured, place, jobs=jobs or os.cpu_count() or 1, force=force, limits=limits or NO_LIMITS,
+                elsewhere=elsewhere, report=Progress(steps, "logs"), told=tell,
             )  # fmt: skip
         steps("loading the results")
         data = load_results(configured, place)
     if len(told) > _TOLD_AT_ONCE:
         sys.stderr.write(f"error: and {len(told) - _TOLD_AT_ONCE} more; all are in {place.folder / 'manifest.json'}\n")
     return data, outcome
+
+
+@contextmanager
+def _elsewhere(address: str | None, steps: Steps) -> Iterator[WorkOn | None]:
+    if address is None:
+        yield None
+        return
+    from aqualog.campaign.cluster import on_cluster
+
+    with on_cluster(address, tell=lambda text: steps(f"{address}: {text}")) as work_on:
+        yield work_on
 
 
 def exit_code(outcome: BatchOutcome, data: CampaignData) -> int:

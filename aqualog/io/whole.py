@@ -37,8 +37,10 @@ def write_text(path: Path, text: str) -> None:
 
 
 @contextmanager
-def only_here(lock: Path) -> Iterator[None]:
+def only_here(lock: Path, *, together: bool = False) -> Iterator[None]:
     """Hold a lock file. The system releases it when the process ends, however it does, where there is `flock`.
+
+    `together`: beside others that do so, and not beside one that does not; without `flock` that is not looked after.
 
     Raises
     ------
@@ -50,11 +52,14 @@ def only_here(lock: Path) -> Iterator[None]:
     try:
         import fcntl
     except ImportError:
+        if together:
+            yield
+            return
         handle = _made_here(lock)
     else:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except OSError as error:
             holder = os.read(handle, 20).decode("ascii", "replace").strip()
             os.close(handle)

@@ -242,7 +242,7 @@ def test_a_process_that_dies_is_one_item():
 
 def test_crash_is_told_and_tried_again(own, monkeypatch):
     monkeypatch.setattr(
-        batch, "work_on", lambda tasks, work, *, jobs, record: [record(k, Crashed()) for k in tasks]
+        batch, "work_on", lambda tasks, work, *, jobs, record, limits: [record(k, Crashed()) for k in tasks]
     )  # fmt: skip
     monkeypatch.setattr(batch, "_HERE", 0)
     store = Store(own.parent / "s")

@@ -1,0 +1,58 @@
+"""A part of a campaign for one of several machines: the same part everywhere, whatever the others do."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from dataclasses import dataclass, replace
+
+from aqualog.campaign.records import Campaign
+from aqualog.errors import ConfigError
+
+__all__ = ["Shard", "part_of", "shard_of"]
+
+_MOST = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """The `index`-th of `count` parts, counted from 1."""
+
+    index: int
+    count: int
+
+    @property
+    def name(self) -> str:
+        """As a part of a file's name."""
+        return f"{self.index}-of-{self.count}"
+
+
+def shard_of(text: str) -> Shard:
+    """The shard that `2/8` means.
+
+    Raises
+    ------
+    ConfigError
+    """
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+    shard = Shard(int(match[1]), int(match[2])) if match else Shard(0, 0)
+    if not 1 <= shard.index <= shard.count <= _MOST:
+        raise ConfigError(
+            f"--shard {text}", expected="I/N with I from 1 to N", hint="--shard 2/8 is the second of eight parts"
+        )
+    return shard
+
+
+def part_of(campaign: Campaign, shard: Shard) -> Campaign:
+    """The campaign with the runs of one shard.
+
+    A run belongs to a shard by the names of its logs: no log must be read to know, runs on the same logs stay together,
+    and a log that comes later moves none of the others.
+    """
+    base = campaign.path.parent
+    own = []
+    for run in campaign.runs:
+        names = [p.relative_to(base) if p.is_relative_to(base) else p for p in run.logs]
+        if zlib.crc32("\n".join(p.as_posix() for p in names).encode()) % shard.count == shard.index - 1:
+            own.append(run)
+    return replace(campaign, runs=tuple(own))

@@ -1,0 +1,220 @@
+"""A batch in parts, on a cluster, and with limits: the store is that of one undisturbed batch."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager, suppress
+
+import polars as pl
+import pytest
+from campaign.made import make_campaign
+from typer.testing import CliRunner
+
+from aqualog.campaign.shard import Shard, part_of, shard_of
+from aqualog.cli.main import app
+from aqualog.config.configured import configure
+from aqualog.errors import ConfigError
+from aqualog.workers import Crashed, Limits, work_on
+
+
+def run(*args):
+    return CliRunner().invoke(app, [str(a) for a in args])
+
+
+def samples_of(store):
+    return {p.name: p.read_bytes() for p in (store / "samples").glob("*.parquet")}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A campaign of twelve runs and the store of a plain batch."""
+    folder = tmp_path_factory.mktemp("whole")
+    campaign = make_campaign(folder, speeds=(70, 80, 90, 100), repeats=3)
+    assert run("batch", campaign, "-o", folder / "plain").exit_code == 0
+    return campaign, folder / "plain"
+
+
+def test_parts_are_disjoint_and_complete_and_stay_as_logs_are_added(whole):
+    campaign = configure(whole[0]).campaign
+    parts = [part_of(campaign, Shard(i, 5)).runs for i in range(1, 6)]
+    assert sorted(r.logs for p in parts for r in p) == sorted(r.logs for r in campaign.runs)
+    fewer = type(campaign)(campaign.name, campaign.path, None, campaign.runs[:-1])
+    for i, p in enumerate(parts, 1):
+        assert [r for r in p if r is not campaign.runs[-1]] == list(part_of(fewer, Shard(i, 5)).runs)
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/9999999", ""])
+def test_what_is_no_shard(text):
+    with pytest.raises(ConfigError):
+        shard_of(text)
+
+
+def test_shards_side_by_side_and_then_the_tables(whole, tmp_path):
+    campaign, plain = whole
+    store = tmp_path / "s"
+    command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "-o", str(store), "--jobs", "1", "-q"]
+    running = [subprocess.Popen([*command, "--shard", f"{i}/3"], stdout=subprocess.DEVNULL) for i in (1, 2, 3)]
+    assert [p.wait() for p in running] == [0, 0, 0]
+    assert samples_of(store) == samples_of(plain)
+    assert not (store / "runs.parquet").exists()
+    done = json.loads(run("batch", campaign, "-o", store, "--json").stdout)
+    assert (done["made"], done["kept"]) == (0, 12)
+    assert pl.read_parquet(store / "runs.parquet").equals(pl.read_parquet(plain / "runs.parquet"))
+
+
+def test_a_part_without_logs_is_no_fault(whole, tmp_path):
+    codes = [run("batch", whole[0], "-o", tmp_path / "s", "--shard", f"{i}/40").exit_code for i in (1, 2, 3, 38, 39, 40)]
+    assert set(codes) == {0}
+
+
+def test_the_same_shard_twice_and_a_batch_beside_a_shard_are_refused(whole, tmp_path):
+    from aqualog.campaign.store import Store
+
+    with Store(tmp_path / "s", "1-of-3").held(must=True):
+        again = run("batch", whole[0], "-o", tmp_path / "s", "--shard", "1/3")
+        plain = run("batch", whole[0], "-o", tmp_path / "s")
+        assert run("batch", whole[0], "-o", tmp_path / "s", "--shard", "2/3").exit_code == 0
+    assert again.exit_code != 0
+    assert "in use by another batch" in again.stderr
+    assert plain.exit_code != 0
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+@contextmanager
+def dask(*args, **kw):
+    """A process of dask's command line, ended at the end."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli." + args[0], *map(str, args[1:])],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, **kw,
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            with_children(process, signal.SIGTERM)
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                with_children(process, signal.SIGKILL)
+
+
+def with_children(process, number):
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, number)
+
+
+@contextmanager
+def cluster(tmp_path):
+    """A scheduler and two workers in processes of their own: address, workers."""
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    worker = ("dask_worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", tmp_path / "dask")
+    with (
+        dask("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"),
+        dask(*worker) as a, dask(*worker) as b,
+    ):  # fmt: skip
+        yield address, (a, b)
+
+
+def test_a_worker_that_is_killed_half_way_leaves_no_trace(tmp_path):
+    campaign = make_campaign(tmp_path, speeds=(70, 80, 90, 100), repeats=12)
+    assert run("batch", campaign, "-o", tmp_path / "plain").exit_code == 0
+    store = tmp_path / "s"
+    command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "-o", str(store), "--json", "--progress", "off"]
+    with (
+        cluster(tmp_path) as (address, (first, _)),
+        subprocess.Popen([*command, "--cluster", address], stdout=subprocess.PIPE, text=True) as process,
+    ):
+        for _ in range(6000):
+            if (store / "samples").is_dir() and sum(1 for _ in (store / "samples").glob("*.parquet")) >= 8:
+                break
+            time.sleep(0.01)
+        with_children(first, signal.SIGKILL)
+        text = process.stdout.read()
+        assert process.wait() == 0
+    document = json.loads(text)
+    assert document["made"] == 48
+    assert document["failed"] == []
+    assert samples_of(store) == samples_of(tmp_path / "plain")
+    assert pl.read_parquet(store / "runs.parquet").equals(pl.read_parquet(tmp_path / "plain" / "runs.parquet"))
+
+
+def test_no_scheduler_is_a_clear_error(whole, tmp_path):
+    for address in (f"tcp://127.0.0.1:{free_port()}", "nonsense", "http://x"):
+        result = run("batch", whole[0], "-o", tmp_path / "s", "--cluster", address)
+        assert result.exit_code == 2
+        assert "no dask scheduler answers" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "more",
+    [["--cluster", "tcp://h:1", "--jobs", "2"], ["--cluster", "tcp://h:1", "--limit-s", "5"], ["--cluster", " "]],
+)
+def test_options_that_do_not_go_together(whole, tmp_path, more):
+    assert run("batch", whole[0], "-o", tmp_path / "s", *more).exit_code == 2
+
+
+def sleep(seconds):
+    time.sleep(seconds)
+    return seconds
+
+
+def hang():
+    # in C, with the interpreter's lock held: no exception can end it
+    import re
+
+    re.match(r"(a+)+$", "a" * 40 + "b")
+
+
+def want(megabytes):
+    try:
+        return len(bytearray(megabytes * 1_000_000))
+    except MemoryError:
+        return "no memory"
+
+
+def test_what_takes_too_long_is_ended_and_the_others_are_not():
+    tasks = {"a": (0.0,), "b": (60.0,), "c": (0.1,), "d": (0.2,)}
+    found = {}
+    work_on(tasks, sleep, jobs=2, record=found.__setitem__, limits=Limits(seconds=1.0))
+    assert {n: r for n, r in found.items() if n != "b"} == {"a": 0.0, "c": 0.1, "d": 0.2}
+    assert isinstance(found["b"], Crashed)
+    assert found["b"].seconds >= 1.0
+
+
+def test_what_never_comes_back_to_python_is_ended():
+    found = {}
+    began = time.monotonic()
+    work_on({"a": ()}, hang, jobs=1, record=found.__setitem__, limits=Limits(seconds=1.0))
+    assert isinstance(found["a"], Crashed)
+    assert time.monotonic() - began < 30.0
+
+
+def test_too_much_memory_is_an_error_of_one_item():
+    found = {}
+    work_on({"a": (100,), "b": (3000,)}, want, jobs=2, record=found.__setitem__, limits=Limits(memory_mb=1500))
+    assert found == {"a": 100_000_000, "b": "no memory"}
+
+
+def test_a_log_that_takes_too_long_is_told_and_tried_again(whole, tmp_path, monkeypatch):
+    import aqualog.campaign.batch as batch
+
+    def late(tasks, work, *, jobs, record, limits):
+        first = next(iter(tasks))
+        for key, task in tasks.items():
+            record(key, Crashed(6.0) if key == first else work(*task))
+
+    monkeypatch.setattr(batch, "work_on", late)
+    result = run("batch", whole[0], "-o", tmp_path / "s", "--limit-s", "5")
+    assert result.exit_code == 3
+    assert "took longer than 5 s (--limit-s)" in result.stderr
+    monkeypatch.undo()
+    assert json.loads(run("batch", whole[0], "-o", tmp_path / "s", "--json").stdout)["made"] == 1
