@@ -231,7 +231,7 @@ _ALL = [
     Effect(
         "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
         "15-50 over tyres (K); temperature, wear (V, Carlson/Gerdes)",
-        (Parameter("gain", "-", 1.0, 0.2, 0.1, 5.0, 0.05, "on the dry slope"),),
+        (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _on_plant(lambda p, v, w: p._replace(slip_slope=_scaled(p.slip_slope, w, v["gain"]))), _WHEEL_PLACES,
     ),
     Effect(
