@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, pgn, selected
+from aqualog.io.mdf_blocks import raw_columns
 from aqualog.io.mdf_conversion import formula_text, is_text_only, physical, refusal
 from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
 
@@ -207,9 +208,11 @@ class MdfReader:
             self._check_space()
             self._faults.notes.append("file was not finalised by the logger; a temporary copy was repaired for reading")
         source = self._path
+        self._is_as_written = not unfinished
         if not unfinished and _records_are_cut(source):
             self._check_space()
             source = _marked_copy(source, Path(self._scratch.name))
+            self._is_as_written = False
         with redirect_stdout(io.StringIO()):  # asammdf prints tracebacks
             opened = asammdf.MDF(
                 str(source), temporary_folder=self._scratch.name, process_bus_logging=False,
@@ -219,6 +222,7 @@ class MdfReader:
         self._inner = opened._mdf
         self._inner.extract_attachment = _no_attachment
         self._version4 = opened.version >= "4"
+        self._is_as_written &= self._version4
         self._start_ns, self._absolute = self._start()
 
     def _check_space(self) -> None:
@@ -329,6 +333,10 @@ class MdfReader:
 
         `MDF.select` is not used: where records are missing behind a cut it returns uninitialised memory.
         """
+        whole = self._whole(group, indexes)
+        if whole is not None:
+            yield whole
+            return
         inner = self._inner
         for fragment in inner._load_data(inner.groups[group]):
             if self._version4:
@@ -338,6 +346,28 @@ class MdfReader:
             yield t.astype(np.float64), {i: self._values(group, i, fragment, len(t)) for i in indexes}
         with suppress(AttributeError):
             inner._invalidation_cache.clear()
+
+    def _whole(self, group: int, indexes: Sequence[int]) -> tuple[_Array, dict[int, _Array]] | None:
+        """The same of all records at once where blocks are plain and sound; asammdf says what is wrong otherwise."""
+        master = self._inner.masters_db.get(group)
+        if not self._is_as_written or master is None:
+            return None
+        channels = self._inner.groups[group].channels
+        try:
+            raw = raw_columns(self._path, self._inner, group, [*indexes, master])
+        except Exception:
+            return None
+        if raw is None:
+            return None
+        clock = channels[master].conversion
+        t = raw[master] if clock is None else clock.convert(raw[master])
+        columns = {}
+        for i in indexes:
+            is_nothing = channels[i].flags & _CHANNEL_ALL_INVALID
+            columns[i] = (
+                np.full(len(t), np.nan) if is_nothing else physical(channels[i].conversion, raw[i], version4=True)
+            )
+        return np.asarray(t, dtype=np.float64), columns
 
     def _raw(self, group: int, index: int, fragment: Any) -> tuple[_Array, _Array | None]:
         raw, invalid = self._inner.get(

@@ -67,7 +67,9 @@ def test_shards_side_by_side_and_then_the_tables(whole, tmp_path):
 
 
 def test_a_part_without_logs_is_no_fault(whole, tmp_path):
-    codes = [run("batch", whole[0], "-o", tmp_path / "s", "--shard", f"{i}/40").exit_code for i in (1, 2, 3, 38, 39, 40)]
+    codes = [
+        run("batch", whole[0], "-o", tmp_path / "s", "--shard", f"{i}/40").exit_code for i in (1, 2, 3, 38, 39, 40)
+    ]
     assert set(codes) == {0}
 
 
