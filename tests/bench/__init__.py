@@ -1,1 +1,1 @@
-"""Measurements of speed, each run by hand."""
+"""Measurements of speed, each beside a peer in the same run: `python -m tests.bench`."""
