@@ -46,8 +46,9 @@ def _filter() -> list[Row]:
 def _simulator() -> list[Row]:
     from aqualog.model.scenario import Scenario
     from aqualog.model.simulate import simulate
+    from aqualog.vehicle import Vehicle
 
-    scenario = Scenario(duration_s=120.0, rate_hz=100.0)
+    scenario = Scenario(Vehicle(name="sedan"), duration_s=120.0, rate_hz=100.0)
     return [Row(
         "four-wheel simulation with sensors", "real time", 200.0, lambda: simulate(scenario), 120.0,
         conditions="120 s, 5 ms steps, one core",
