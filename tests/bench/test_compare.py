@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from tests.bench.compare import Row, line, measured
+from bench.compare import Row, line, measured
 
 
 def test_results_that_differ_are_no_benchmark():

@@ -256,7 +256,11 @@ def begun_and_ended(folder, number):
     campaign = make_campaign(folder, speeds=(70, 80, 90, 100), repeats=16)
     command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "--jobs", "2", "--progress", "plain"]
     samples = folder / "campaign.store" / "samples"
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        # a shell that runs the tests in its background has children ignore interrupts
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:  # fmt: skip
         for _ in range(6000):
             if samples.is_dir() and sum(p.suffix == ".parquet" for p in samples.iterdir()) >= 5:
                 break

@@ -19,7 +19,10 @@ def diagnosed(folder, seed, *of, **hidden):
     return diagnose([("log", load_signals([log], vehicle=vehicle))], vehicle, options=OPTIONS)
 
 
-@pytest.mark.parametrize(("seed", "programme", "noise"), [(2, "mixed", "ou1"), (20, "stop_and_go", "white")])
+@pytest.mark.parametrize(
+    ("seed", "programme", "noise"),
+    [(2, "mixed", "ou1"), pytest.param(20, "stop_and_go", "white", marks=pytest.mark.long)],
+)
 def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     assert diagnosed(tmp_path, seed, programme, noise).verdict == "no_effect"
 

@@ -150,6 +150,7 @@ def hilly(real_logs, bmw):
     return diagnose([("A12", trip_of(real_logs, bmw, "A12"))], bmw, options=QUICK)
 
 
+@pytest.mark.long
 def test_road_of_the_hilly_trip_is_a_cause_and_the_withheld_elevation_agrees(real_logs, bmw, hilly):
     assert hilly.verdict in ("named", "compound", "cannot_tell")
     (road,) = (c for c in hilly.causes if c.effect == "road_grade")
@@ -165,12 +166,14 @@ def test_road_of_the_hilly_trip_is_a_cause_and_the_withheld_elevation_agrees(rea
     assert mean.high - mean.low > 0.01  # without elevation a mean slope is an offset of the accelerometer as well
 
 
+@pytest.mark.long
 def test_both_trips_say_the_same_of_the_torques_delay(hilly, loaded):
     delays = [c.parameters["delay"] for d in (hilly, loaded) for c in d.causes if c.key == "signal_delay@torque"]
     assert len(delays) == 2
     assert max(d.low for d in delays) < min(d.high for d in delays)
 
 
+@pytest.mark.long
 def test_nothing_about_tyres_without_wheel_speeds(hilly):
     named = {c.effect for c in hilly.causes}
     assert not named & {"slip_stiffness_drift", "slip_stiffness", "pressure_loss", "tyre_radius"}
