@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.diagnose.channels import block_means, channels_of
 from aqualog.diagnose.floating import floating
-from aqualog.diagnose.inputs import quiet_torque, smooth
+from aqualog.diagnose.inputs import quiet_speed, quiet_torque, smooth
 from aqualog.diagnose.unlogged import (
     A_MOST,
     BRAKE_PRESSURE,
@@ -122,7 +122,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     else:
         torque = needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
-    speed = smooth(v, dt, SPEED_S)
+    speed = quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt
     steer = road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
     measured = Course(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.inputs import quiet, quiet_torque, smooth
+from aqualog.diagnose.inputs import quiet, quiet_speed, quiet_torque, smooth
 
 DT = 0.01
 T = np.arange(9000) * DT
@@ -57,3 +57,19 @@ def test_a_real_difference_of_left_and_right_stays():
     out = quiet_torque(torque, DT)
     half = 0.5 * (out[2] - out[3])
     assert (half - apart)[200:-200].std() < 4.0
+
+
+@pytest.mark.parametrize("every", [1, 5])  # a bus as fast as the grid, and one of 20 Hz
+def test_a_constant_speed_has_little_motion_left_of_its_noise(every):
+    shares = []
+    for seed in range(10):
+        v = 25.0 + np.repeat(0.02 * np.random.default_rng(seed).standard_normal(6000 // every), every)
+        shares.append(np.diff(quiet_speed(v, DT)).std() / np.diff(smooth(v, DT, 1.0)).std())
+    assert np.mean(shares) < 0.5
+
+
+def test_a_speed_that_changes_is_kept():
+    t = np.arange(0.0, 120.0, 0.01)
+    v = 22.0 + 6.0 * np.sin(2.0 * np.pi * t / 35.0) + 0.5 * np.sin(2.0 * np.pi * t / 8.0)
+    noisy = v + 0.03 * np.random.default_rng(5).standard_normal(t.size)
+    assert np.abs(quiet_speed(noisy, 0.01) - smooth(v, 0.01, 1.0))[300:-300].max() < 0.02
