@@ -10,10 +10,12 @@ import numpy as np
 
 from aqualog.diagnose.channels import block_means, channels_of
 from aqualog.diagnose.floating import floating
-from aqualog.diagnose.inputs import quiet_speed, quiet_torque, smooth
+from aqualog.diagnose.inputs import SPEED_S, quiet_speed, quiet_torque, smooth
 from aqualog.diagnose.unlogged import (
     A_MOST,
     BRAKE_PRESSURE,
+    LEAST_S,
+    V_MIN,
     brakes_in_torque,
     brakes_unlogged,
     needed_torque,
@@ -32,7 +34,6 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["Drive", "led_by", "prepare"]
 
-V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
 BESIDE_S = 1.0  # [s] before and after what is left out
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
@@ -40,9 +41,6 @@ A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] steeper torque, and those few samples show clocks, filters and tyres' lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
-# noise of what drives the simulation must not pass for motion: it would meet itself in the residual
-SPEED_S = 1.0  # [s]
-LEAST_S = 20.0  # [s] of usable driving
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %: a road does not count as a brake
 
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["quiet", "quiet_speed", "quiet_torque", "smooth"]
+__all__ = ["SPEED_S", "quiet", "quiet_speed", "quiet_torque", "smooth"]
 
 NOISE_BAND_HZ = 3.0  # above, a drive torque is noise
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
-SPEED_S = 1.0  # [s]
+SPEED_S = 1.0  # [s] over which a measured speed is averaged: its noise must not pass for motion
 NOT_TORQUE = 15.0  # [N m] rms of a difference that is a sensor's, not the car's
 NOT_TORQUE_SHARE = 0.05  # of the rms of all wheels
 LOCAL = 9  # frequencies over which a spectrum is smoothed

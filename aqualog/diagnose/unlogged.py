@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from aqualog.diagnose.inputs import smooth
+from aqualog.diagnose.inputs import SPEED_S, smooth
 from aqualog.model.plant import understeer_gradient
 from aqualog.model.tyre import Tyre
 from aqualog.notation import WHEELS
@@ -18,6 +18,8 @@ from aqualog.vehicle import Vehicle
 __all__ = [
     "A_MOST",
     "BRAKE_PRESSURE",
+    "LEAST_S",
+    "V_MIN",
     "brakes_in_torque",
     "brakes_unlogged",
     "needed_torque",
@@ -25,12 +27,12 @@ __all__ = [
     "roll_out",
 ]
 
-SPEED_S, STEER_S = 1.0, 0.5  # [s]
-V_MIN = 4.0  # [m/s]
+STEER_S = 0.5  # [s]
+V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
 A_MOST = 3.0  # [m/s^2] of standing-in torque beyond resistance: with more a led car spins in a curve
 UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
 OFTEN = 0.01  # share of the driving
-LEAST_S = 20.0  # [s]
+LEAST_S = 20.0  # [s] of usable driving
 BRAKE_PRESSURE = 0.5e5  # [Pa]
 HOLDS_BRAKES = -300.0  # [N m] of all wheels, where the brakes are pressed hard
 

@@ -1,5 +1,7 @@
 """The grammar of verdicts, on sets that are made up."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_subsets import ASKED, AT, bench_of, waves
@@ -155,3 +157,9 @@ def test_what_is_certain_is_not_called_open():
     assert said == "Certain: payload mass; beside it this log cannot tell aero drag or head wind apart."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
     assert both == "Something is different, but this log cannot tell aero drag or head wind apart."
+
+
+def test_what_days_differ_by_is_not_multiplied_with_the_noise():
+    c = candidate(payload_mass=200.0, inflation=4.0)  # 20 kg of noise, twice
+    days = replace(c.refit, covariance=c.refit.covariance + 30.0**2, apart=np.array([30.0]))
+    assert replace(c, refit=days).sd[0] == pytest.approx(np.hypot(40.0, 30.0))
