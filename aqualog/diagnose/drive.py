@@ -116,9 +116,11 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
             gaps |= own
     if torqued:
         # signals have the file's torque gain already: it is applied on reading
-        torque = quiet_torque(np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS]), dt)
+        logged = np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
+        told = [signals.origins[f"torque_{w}"].rate_hz for w in vehicle.driven if f"torque_{w}" in signals.origins]
+        torque = quiet_torque(logged, dt, min(told, default=None))
     else:
-        torque = needed_torque(v, vehicle, dt)
+        logged = torque = needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
     speed = quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt
@@ -152,7 +154,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
-    left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(torque, vehicle, dt) > JERK_MAX, JERK_S, dt)
+    left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, v, dt), present,

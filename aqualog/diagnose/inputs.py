@@ -8,16 +8,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.types import FloatArray
 
 __all__ = ["SPEED_S", "quiet", "quiet_speed", "quiet_torque", "smooth"]
 
-NOISE_BAND_HZ = 3.0  # above, a drive torque is noise
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
+TORQUE_BAND = (0.1, 0.2)  # of the rate at which a torque is sampled: there it is noise, pedals and tyres are slower
+LEAST_BAND_HZ = (3.0, 4.5)  # at least
 SPEED_S = 1.0  # [s] over which a measured speed is averaged: its noise must not pass for motion
 NOT_TORQUE = 15.0  # [N m] rms of a difference that is a sensor's, not the car's
 NOT_TORQUE_SHARE = 0.05  # of the rms of all wheels
+# of the mean power of noise: the spectrum of what is mirrored is real but for a phase, its squares have one degree of
+# freedom (D)
+MEDIAN = 0.4549
+END_S = 1.0  # [s] that tell where a signal begins and ends
 LOCAL = 9  # frequencies over which a spectrum is smoothed
+OVER = 3.0  # times the noise that a frequency must have to pass: one of a thousand does by chance (D)
 
 
 def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
@@ -29,17 +35,26 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
     return np.convolve(np.pad(x, k // 2, mode="edge"), window / window.sum(), "valid")
 
 
-def quiet(x: FloatArray, dt: float) -> FloatArray:
+def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
     """A signal by Wiener's filter: each frequency by the share of it that stands out of the white noise.
 
-    The noise is what the signal has above 3 Hz; a signal that is not sampled fast enough to tell stays as it is. Zero
-    phase: nothing is delayed. (n,) to (n,)
+    The noise is what the signal has in a band well above what drivers do. One that is not sampled fast enough to tell
+    stays as it is. Zero phase: nothing is delayed.
+
+    Parameters
+    ----------
+    x : array (n,)
+    dt : float
+        Step of the grid. [s]
+    rate_hz : float, optional
+        At which the bus told the signal, if that is slower than the grid: between, it is a straight line, and at high
+        frequencies there is less of the noise. [Hz]
     """
-    frequency = np.fft.rfftfreq(2 * x.size, dt)
-    high = frequency > NOISE_BAND_HZ
-    if high.sum() < 0.3 * high.size:
+    rate = min(rate_hz or 1.0 / dt, 1.0 / dt)
+    low, high = (max(share * rate, least) for share, least in zip(TORQUE_BAND, LEAST_BAND_HZ, strict=True))
+    if 0.5 * rate < high:
         return x
-    return _filtered(x, high)
+    return _filtered(x, dt, (low, high), lines=1.0 / rate if rate < 0.99 / dt else 0.0)
 
 
 def quiet_speed(v: FloatArray, dt: float) -> FloatArray:
@@ -48,26 +63,43 @@ def quiet_speed(v: FloatArray, dt: float) -> FloatArray:
     At a constant speed what is left of the noise after a mean would be all of the motion: led along it, the car shows
     it again, and a shift of it finds itself.
     """
-    frequency = np.fft.rfftfreq(2 * v.size, dt)
-    band = (frequency > SPEED_BAND_HZ[0]) & (frequency < SPEED_BAND_HZ[1])
-    return smooth(_filtered(v, band) if band.sum() > LOCAL else v, dt, SPEED_S)
+    return smooth(_filtered(v, dt, SPEED_BAND_HZ), dt, SPEED_S)
 
 
-def _filtered(x: FloatArray, band: BoolArray) -> FloatArray:
-    """The signal by the share of each frequency that stands out of the noise that the band shows."""
+def _filtered(x: FloatArray, dt: float, band_hz: tuple[float, float], lines: float = 0.0) -> FloatArray:
+    """The signal by the share of each frequency that stands out of the noise that the band shows.
+
+    `lines`: time between samples that straight lines connect. [s]
+    """
     n = x.size
-    line = np.linspace(x[0], x[-1], n)
+    frequency = np.fft.rfftfreq(2 * n, dt)
+    band = (frequency > band_hz[0]) & (frequency < band_hz[1])
+    if band.sum() <= LOCAL:
+        return x
+    ends = _ends(x, dt)
+    line = np.linspace(*ends, n)
     # mirrored, so that the ends meet
     f = np.fft.rfft(np.concatenate([x - line, -(x - line)[::-1]]))
     power = np.abs(f) ** 2
-    noise = float(np.median(power[band])) / np.log(2.0)
+    noise = float(np.median(power[band] / np.sinc(frequency[band] * lines) ** 4)) / MEDIAN
     local = np.convolve(np.pad(power, LOCAL // 2, mode="edge"), np.full(LOCAL, 1.0 / LOCAL), "valid")
-    share = np.maximum(1.0 - 2.0 * noise / np.maximum(local, 1e-300), 0.0)
+    share = np.maximum(1.0 - OVER * noise / np.maximum(local, 1e-300), 0.0)
     return np.asarray(line + np.fft.irfft(f * share, 2 * n)[:n])
 
 
-def quiet_torque(torque: FloatArray, dt: float) -> FloatArray:
-    """Wheel torques (4, n) [N m] without noise.
+def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
+    """Where a signal begins and ends, by lines through its first and last seconds: one noisy sample would be a jump."""
+    k = min(max(2, round(END_S / dt)), x.size)
+    at = np.arange(k) - 0.5 * (k - 1)
+    out = []
+    for part in (x[:k], x[::-1][:k]):
+        slope = float(at @ part) / float(at @ at)
+        out.append(float(part.mean()) + slope * float(at[0]))
+    return out[0], out[1]
+
+
+def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
+    """Wheel torques (4, n) [N m] without noise; `rate_hz` as in `quiet`.
 
     Left and right of an axle get its mean, unless they differ by more than sensors do; an axle without torque gets its
     mean over the drive; the axle with most of it never does.
@@ -78,7 +110,8 @@ def quiet_torque(torque: FloatArray, dt: float) -> FloatArray:
     driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     for a, b in ((0, 1), (2, 3)):
         both, half = torque[a] + torque[b], 0.5 * (torque[a] - torque[b])
-        axle = quiet(both, dt) if a == driven or float(both.std()) > NOT_TORQUE else np.full_like(both, both.mean())
-        apart = quiet(half, dt) if float(np.sqrt((half**2).mean())) > least else np.zeros_like(half)
+        seen = a == driven or float(both.std()) > NOT_TORQUE
+        axle = quiet(both, dt, rate_hz) if seen else np.full_like(both, both.mean())
+        apart = quiet(half, dt, rate_hz) if float(np.sqrt((half**2).mean())) > least else np.zeros_like(half)
         out[a], out[b] = 0.5 * axle + apart, 0.5 * axle - apart
     return out

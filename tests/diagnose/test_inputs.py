@@ -25,6 +25,16 @@ def test_a_signal_without_noise_stays():
     np.testing.assert_allclose(quiet(MOTION, DT), MOTION, atol=1.0)
 
 
+@pytest.mark.parametrize("every", [1, 2, 5], ids=["100 Hz", "50 Hz bus", "20 Hz bus"])
+def test_a_constant_torque_has_hardly_anything_left_of_its_noise(every):
+    """What is left of it would look like torque to which neither wheel nor accelerometer answers."""
+    noise = np.array([np.random.default_rng(k).normal(0.0, 2.0, T.size) for k in range(8)])[:, ::every]
+    noise = np.array([np.interp(T, T[::every], x) for x in noise])
+    left = np.array([quiet(130.0 + x, DT, 100.0 / every) - 130.0 for x in noise])
+    assert np.median(left.std(axis=1) / noise.std(axis=1)) < 0.11
+    np.testing.assert_allclose(left.mean(axis=1), noise.mean(axis=1), atol=0.2)
+
+
 def test_a_slow_signal_stays_as_it_is():
     slow = MOTION[::20]
     assert quiet(slow, 0.2) is slow
