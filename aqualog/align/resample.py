@@ -6,25 +6,29 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns"]
+__all__ = ["MEDIAN_OF", "bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns"]
+
+
+MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has the same median
 
 
 def median_period_ns(t_ns: TimeArray) -> int:
-    """Median sample time. [ns] 0 for fewer than two samples."""
-    return int(np.median(np.diff(t_ns))) if t_ns.size > 1 else 0
+    """Median sample time of the first 2^18 steps. [ns] 0 for fewer than two samples."""
+    return int(np.median(np.diff(t_ns[: MEDIAN_OF + 1]))) if t_ns.size > 1 else 0
 
 
-def gap_limit_ns(t_ns: TimeArray, *, is_state: bool) -> int:
-    """Longest interval across which a value may be carried. [ns]
+def gap_limit_ns(period_ns: int, *, is_state: bool) -> int:
+    """Longest interval across which a value may be carried, by the median sample time. [ns]
 
     Five sample times for a continuous signal (at least 50 ms), ten for a state (at least 2 s): a lost frame or two is
     bridged, an outage is not.
     """
-    period = median_period_ns(t_ns)
-    return max(10 * period, 2_000_000_000) if is_state else max(5 * period, 50_000_000)
+    return max(10 * period_ns, 2_000_000_000) if is_state else max(5 * period_ns, 50_000_000)
 
 
-def linear(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> tuple[FloatArray, BoolArray]:
+def linear(
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, period_ns: int | None = None
+) -> tuple[FloatArray, BoolArray]:
     """Linear interpolation.
 
     Parameters
@@ -37,6 +41,8 @@ def linear(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -
         Where values are wanted.
     gap_ns : int
         Longest interval that may be bridged.
+    period_ns : int, optional
+        Median sample time; default that of the stamps.
 
     Returns
     -------
@@ -59,7 +65,7 @@ def linear(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -
     share = (grid_ns[between] - t_ns[i - 1]).astype(np.float64) / span.astype(np.float64)
     values = x[i - 1] + share * (x[i] - x[i - 1])
     y[between] = np.where(span <= gap_ns, values, np.nan)
-    bridged[between] = span > 1.5 * median_period_ns(t_ns)
+    bridged[between] = span > 1.5 * (median_period_ns(t_ns) if period_ns is None else period_ns)
     return y, bridged
 
 
@@ -76,14 +82,14 @@ def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> 
 
 
 def bin_mean(
-    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int, period_ns: int | None = None
 ) -> tuple[FloatArray, BoolArray]:
     """Mean of the samples within half a grid step on either side, for signals much faster than the grid.
 
     Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
     Returns as `linear`.
     """
-    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns)
+    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns)
     if t_ns.size == 0:
         return y, bridged
     low = np.searchsorted(t_ns, grid_ns - dt_ns // 2, side="left")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.align.resample import MEDIAN_OF
 from aqualog.types import TimeArray, TimeFaults
 
 __all__ = ["ClockRepair"]
@@ -92,7 +93,7 @@ class ClockRepair:
 
 
 def _median_period(steps: TimeArray) -> int:
-    positive = steps[steps > 0]
+    positive = steps[:MEDIAN_OF][steps[:MEDIAN_OF] > 0]
     return int(np.median(positive)) if positive.size else 0
 
 

@@ -62,7 +62,7 @@ def _onto(grid: TimeArray, t_ns: TimeArray, name: str, x: FloatArray) -> FloatAr
     """Linear; states held; means where a signal is much faster than the grid."""
     symbol = SYMBOLS.get(name)
     is_state = symbol is not None and symbol.kind == "state"
-    gap_ns = gap_limit_ns(t_ns, is_state=is_state)
+    gap_ns = gap_limit_ns(median_period_ns(t_ns), is_state=is_state)
     if is_state:
         return hold(t_ns, x, grid, gap_ns=gap_ns)
     dt_ns = int(grid[1] - grid[0])

@@ -67,6 +67,6 @@ def test_empty_channel():
 
 
 def test_gap_limits():
-    assert gap_limit_ns(grid(10), is_state=False) == 50 * MS
-    assert gap_limit_ns(grid(10, 100 * MS), is_state=False) == 500 * MS
-    assert gap_limit_ns(grid(10), is_state=True) == 2000 * MS
+    assert gap_limit_ns(10 * MS, is_state=False) == 50 * MS
+    assert gap_limit_ns(100 * MS, is_state=False) == 500 * MS
+    assert gap_limit_ns(10 * MS, is_state=True) == 2000 * MS

@@ -1,0 +1,190 @@
+"""Samples of one channel: into SI, bad ones out, stamps repaired and counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.align.glitches import sensor_glitches
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.align.resample import median_period_ns
+from aqualog.align.timebase import ClockRepair
+from aqualog.errors import ConfigError, SignalError
+from aqualog.notation import ACCEPTED, SYMBOLS, Symbol
+from aqualog.types import BoolArray, Channel, FloatArray, Origin, TimeArray
+from aqualog.units import convert, parse_unit
+from aqualog.vehicle import Vehicle
+
+__all__ = [
+    "Clean", "Judged", "Span", "clean_channel", "corrected", "glitch_note", "judged", "mean_of_steps", "out_note",
+    "symbol_of",
+]  # fmt: skip
+
+BURST = 5  # median sample times; longer steps are gaps and no sample time
+
+
+class Span(NamedTuple):
+    """Where the usable samples of a signal lie: first and last stamp, their number, median and mean sample time. [ns]
+
+    The mean is without gaps: stamps that arrive in bursts have a median far from their rate.
+    """
+
+    first_ns: int
+    last_ns: int
+    samples: int
+    period_ns: int
+    mean_period_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Clean:
+    """One signal in SI on its own repaired time stamps."""
+
+    symbol: Symbol
+    origin: Origin
+    span: Span
+    t_ns: TimeArray
+    x: FloatArray
+
+
+class Judged(NamedTuple):
+    """Samples (n,) in SI, and which of them are not numbers, codes for a bad one, or beyond what can be."""
+
+    values: FloatArray
+    is_bad: BoolArray
+    is_code: BoolArray
+    is_out: BoolArray
+
+    @property
+    def keep(self) -> BoolArray:
+        """Which samples are used."""
+        return ~(self.is_bad | self.is_code | self.is_out)
+
+
+def clean_channel(
+    name: str,
+    entry: Entry,
+    channel: Channel,
+    signal_map: SignalMap,
+    vehicle: Vehicle,
+    repairs: dict[str, ClockRepair],
+    notes: list[str],
+) -> Clean | None:
+    """Bad samples out, SI, stamps repaired; None (with a note) for a channel without a map whose unit is unknown."""
+    symbol = symbol_of(name)
+    info = channel.info
+    where = f"{info.file}:{info.path}"
+    unit = entry.unit or info.unit
+    is_explicit = name in signal_map.entries
+    t_ns = corrected(channel.t_ns, signal_map, info.file)
+    t_ns, order, faults = repairs.setdefault(info.file, ClockRepair()).repair(t_ns)
+    try:
+        own = judged(symbol, entry, channel.values[order], unit, vehicle, where)
+    except SignalError as error:
+        if is_explicit:
+            raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
+        notes.append(f"{error.line()}; the signal is left out")
+        return None
+    if not unit and is_explicit:
+        notes.append(f"{where} has no unit; taken as {symbol.unit}")
+    keep, is_out = own.keep, own.is_out
+    if name.startswith("omega_") and keep.any():
+        glitch = np.zeros(keep.size, dtype=bool)
+        glitch[keep] = sensor_glitches(t_ns[keep], own.values[keep], r_e=vehicle.r_e(name[-2:]))
+        if glitch.any():
+            notes.append(glitch_note(where, int(glitch.sum()), int(t_ns[np.argmax(glitch)] - t_ns[0])))
+            keep, is_out = keep & ~glitch, is_out | glitch
+    if is_out.any():
+        first = float(own.values[np.argmax(is_out)])
+        notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, first))
+    period = median_period_ns(t_ns)
+    origin = Origin(
+        symbol=name,
+        channel=info.path,
+        file=info.file,
+        unit=unit or symbol.unit,
+        rate_hz=1e9 / period if period else 0.0,
+        samples=int(channel.values.size),
+        not_finite=int(own.is_bad.sum()),
+        out_of_range=int(is_out.sum()),
+        invalid_code=int(own.is_code.sum()),
+        faults=faults,
+    )
+    return Clean(symbol, origin, _span(t_ns[keep]), t_ns[keep], own.values[keep])
+
+
+def symbol_of(name: str) -> Symbol:
+    """The symbol of a name that a map may have."""
+    return SYMBOLS.get(name) or ACCEPTED[name]
+
+
+def judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> Judged:
+    """Samples (n,) of a channel, each by itself.
+
+    Raises
+    ------
+    SignalError
+        If the unit is not one of the symbol.
+    """
+    values = _to_si(symbol, raw, unit, vehicle, where) * entry.scale + entry.offset
+    is_code = np.isin(raw, np.array(entry.invalid)) if entry.invalid else np.zeros(raw.size, dtype=bool)
+    is_bad = ~np.isfinite(values)
+    is_out = ~is_bad & ~is_code & ((values < symbol.low) | (values > symbol.high))
+    return Judged(values, is_bad, is_code, is_out)
+
+
+def glitch_note(where: str, count: int, after_ns: int) -> str:
+    """What was left out because no wheel can have turned so."""
+    return (
+        f"{where}: {count} samples (first at {float(after_ns) * 1e-9:.2f} s) step faster than a wheel can; sensor "
+        "dropouts or spikes, left out"
+    )
+
+
+def out_note(where: str, symbol: Symbol, count: int, of: int, first: float) -> str:
+    """What was left out because the signal cannot be so large or small."""
+    return (
+        f"{where}: {count} of {of} samples outside {symbol.low:g} ... {symbol.high:g} "
+        f"{symbol.unit} (first: {first:.6g}) are left out"
+    )
+
+
+def _span(t_ns: TimeArray) -> Span:
+    if t_ns.size == 0:
+        return Span(0, 0, 0, 0, 0)
+    period = median_period_ns(t_ns)
+    steps = np.diff(t_ns)
+    steps = steps[steps < BURST * period]
+    return Span(int(t_ns[0]), int(t_ns[-1]), t_ns.size, period, mean_of_steps(int(steps.sum()), steps.size))
+
+
+def mean_of_steps(total_ns: int, count: int) -> int:
+    """Mean sample time, 0 without any. [ns]"""
+    return round(total_ns / count) if count else 0
+
+
+def _to_si(symbol: Symbol, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> FloatArray:
+    if symbol.unit == "bool" or (not unit and not symbol.name.startswith("torque_")):
+        return raw
+    if symbol.name.startswith("omega_") and parse_unit(unit, where=where).dimension == "speed":
+        # speed at the rim: the control unit used some radius of its own; the vehicle's makes it a wheel speed again
+        return convert(raw, unit, "m/s", where=where) / vehicle.r_e(symbol.name[-2:])
+    if symbol.unit == "-":
+        return raw
+    values = convert(raw, unit, symbol.unit, where=where) if unit else raw
+    if symbol.name.startswith("torque_") and vehicle.torque_gain != 1.0:
+        values = vehicle.torque_gain * values
+    return values
+
+
+def corrected(t_ns: TimeArray, signal_map: SignalMap, file: str) -> TimeArray:
+    """Stamps by the clock that the map gives the file."""
+    clock = signal_map.clock_of(file)
+    if not (clock.offset_s or clock.drift_ppm) or t_ns.size == 0:
+        return t_ns
+    shift = np.int64(round(clock.offset_s * 1e9))
+    elapsed = t_ns - np.int64(round(clock.at_s * 1e9))
+    drift: TimeArray = np.rint(elapsed * (clock.drift_ppm * 1e-6)).astype(np.int64)
+    return np.asarray(t_ns - shift - drift)
