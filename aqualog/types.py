@@ -115,6 +115,7 @@ class Signals:
 
     `frame` has `t` [s] from the first sample and one column per canonical symbol in SI; a value that could not be
     had is null. `origins` has one entry per symbol; `start_ns` is the absolute time of `t = 0` where the log has it.
+    `full`: rows and step [ns] of a drive of which `frame` is but a picture, coarser than the drive is.
     """
 
     frame: pl.DataFrame
@@ -123,6 +124,22 @@ class Signals:
     origins: Mapping[str, Origin]
     quality: Quality
     files: tuple[str, ...]
+    full: tuple[int, int] | None = None
+
+    @property
+    def rows(self) -> int:
+        """Points of the drive's grid."""
+        return self.full[0] if self.full else self.frame.height
+
+    @property
+    def step_ns(self) -> int:
+        """Step of the drive's grid. [ns]"""
+        return self.full[1] if self.full else self.dt_ns
+
+    @property
+    def duration_s(self) -> float:
+        """Points times step. [s]"""
+        return self.rows * self.step_ns * 1e-9
 
     @property
     def dt(self) -> float:

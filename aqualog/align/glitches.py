@@ -6,11 +6,11 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["RIM_LIMIT", "sensor_glitches"]
+__all__ = ["RETURN_NS", "RIM_LIMIT", "sensor_glitches"]
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
 _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
-_RETURN_NS = 1_000_000_000
+RETURN_NS = 1_000_000_000
 
 
 def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
@@ -45,7 +45,7 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
             (
                 j
                 for j in jumps[position + 1 :].tolist()
-                if t_ns[j] - t_ns[i] <= _RETURN_NS
+                if t_ns[j] - t_ns[i] <= RETURN_NS
                 and abs(v[j + 1] - v[i]) <= RIM_LIMIT * 0.25 * float(t_ns[j + 1] - t_ns[i]) * 1e-9 + _SLACK
             ),
             None,

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from aqualog.align.mapping import SignalMap, resolve
+from aqualog.align.mapping import Entry, SignalMap, resolve
 from aqualog.align.table import build_signals
 from aqualog.errors import SignalError
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.types import Signals
+from aqualog.types import ChannelInfo, Signals
 from aqualog.vehicle import Vehicle
 
-__all__ = ["load_signals", "read_options"]
+__all__ = ["find_channels", "load_signals", "read_options", "read_signals"]
 
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
@@ -58,22 +58,49 @@ def load_signals(
     signal_map = signal_map or SignalMap()
     with DriveLog(paths, read_options(signal_map, dbc)) as log:
         report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-        faults = log.faults
-        notes = [n for f in faults for n in f.notes if f.truncated or "CAN frames" in n]
-        try:
-            found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
-        except SignalError as error:
-            if not notes:
-                raise
-            raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
-        if not found:
-            raise _nothing_mapped(paths, len(log.channels()), notes)
-        report(f"reading {len(found)} channels")
-        channels = log.read(info for _, info in found.values())
-        faults = log.faults
+        found = find_channels(log, signal_map, wanted)
+        return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+
+
+def read_signals(
+    log: DriveLog,
+    found: Mapping[str, tuple[Entry, ChannelInfo]],
+    *,
+    signal_map: SignalMap,
+    vehicle: Vehicle,
+    rate_hz: float | None,
+    report: Callable[[str], None],
+) -> Signals:
+    """The table of channels that `find_channels` has found in an open log."""
+    report(f"reading {len(found)} channels")
+    channels = log.read(info for _, info in found.values())
+    faults = log.faults
+    log.close()
     report("aligning")
     mapped = {s: (entry, channels[info.file, info.path]) for s, (entry, info) in found.items()}
     return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)
+
+
+def find_channels(
+    log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], bool] = lambda _: True
+) -> dict[str, tuple[Entry, ChannelInfo]]:
+    """Channels of a drive that are signals, by symbol.
+
+    Raises
+    ------
+    SignalError
+        If there is none, or the map names one that is not there.
+    """
+    notes = [n for f in log.faults for n in f.notes if f.truncated or "CAN frames" in n]
+    try:
+        found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+    except SignalError as error:
+        if not notes:
+            raise
+        raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
+    if not found:
+        raise _nothing_mapped(log.paths, len(log.channels()), notes)
+    return found
 
 
 def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:

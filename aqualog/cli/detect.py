@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,9 +25,12 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
+    from aqualog.cli.console import Console
     from aqualog.detect.slip_slope.watch import Memory
     from aqualog.model.term import Model
     from aqualog.types import DriveResult
+    from aqualog.types import Signals as LoadedSignals
+    from aqualog.vehicle import Vehicle as Car
 
 __all__ = ["detect"]
 
@@ -148,7 +152,6 @@ def _detect(
     verbose: bool,
     progress: str,
 ) -> int:
-    from contextlib import nullcontext
     from dataclasses import replace
 
     from aqualog.cli.files import refuse_existing
@@ -181,27 +184,30 @@ def _detect(
 
         model = load_model(model_file)
     with console.steps() as steps:
-        from aqualog.align.load import load_signals
-        from aqualog.detect.stream import detect_drive
+        from aqualog.align.load_long import LoadedLong, load_drive
 
-        loaded = load_signals(paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps)
-        _something_to_do(loaded, vehicle, paths)
-        console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
-        for name, origin in loaded.origins.items():
-            console.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
-        steps("detecting")
-        # what an earlier look at this very drive has left is not what it is compared with
-        key = drive_key(loaded) if history_file else ""
+        options = (("--write", write), ("--model", model), ("--history", history_file))
+        drive = load_drive(
+            paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps,
+            note=console.note, whole_for=", ".join(name for name, given in options if given is not None),
+        )  # fmt: skip
         told: tuple[str, ...] = ()
-        if model is not None:
-            from aqualog.diagnose.extended import extended_inputs
+        key = ""
+        if isinstance(drive, LoadedLong):
+            from aqualog.cli.detect_long import detect_in_windows
 
-            loaded, vehicle, told = extended_inputs(loaded, vehicle, model)
-        # what takes long of a short drive is the compiler; of a long one it is the drive
-        with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
-            known = replace(memory, history=memory.history.without(key))
-            result = detect_drive(loaded, vehicle, settings=settings, memory=known)
+            grid = drive.drive.grid
+            _something_to_do(drive.drive.symbols, 1e9 / grid.dt_ns, drive.drive.notes, vehicle, paths)
+            console.detail(f"{grid.rows} samples at {1e9 / grid.dt_ns:g} Hz, gone through in windows")
+            result = detect_in_windows(drive, vehicle, settings=settings, memory=memory, out=out, report=steps)
+        else:
+            _something_to_do(drive.symbols, 1e9 / drive.dt_ns, drive.quality.notes, vehicle, paths)
+            steps("detecting")
+            # what an earlier look at this very drive has left is not what it is compared with
+            key = drive_key(drive) if history_file else ""
+            result, told = _whole(drive, vehicle, model, settings, memory, key, console)
         result = replace(result, notes=(*told, *result.notes))
+        loaded = result.signals
         terms = _model_document(model)
         name = ", ".join(str(p) for p in paths)
         title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
@@ -227,6 +233,29 @@ def _detect(
     if out is not None:
         console.note(f"results are in {out}: {', '.join(_RESULTS)}")
     return _exit_code(result, fail_on_event=fail_on_event)
+
+
+def _whole(
+    loaded: LoadedSignals, vehicle: Car, model: Model | None, settings: Any, memory: Memory, key: str, console: Console
+) -> tuple[DriveResult, tuple[str, ...]]:
+    """Detection in one go: the result, and what the model said."""
+    from contextlib import nullcontext
+    from dataclasses import replace
+
+    from aqualog.detect.stream import detect_drive
+
+    console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
+    for name, origin in loaded.origins.items():
+        console.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
+    told: tuple[str, ...] = ()
+    if model is not None:
+        from aqualog.diagnose.extended import extended_inputs
+
+        loaded, vehicle, told = extended_inputs(loaded, vehicle, model)
+    # what takes long of a short drive is the compiler; of a long one it is the drive
+    with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
+        known = replace(memory, history=memory.history.without(key))
+        return detect_drive(loaded, vehicle, settings=settings, memory=known), told
 
 
 def _memory(history_file: Path | None, configuration: str, reference: str, out: Path | None) -> Memory:
@@ -276,13 +305,14 @@ def _model_document(model: Model | None) -> list[dict[str, Any]] | None:
     ]
 
 
-def _something_to_do(loaded: Any, vehicle: Any, paths: list[Path]) -> None:
+def _something_to_do(
+    symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Any, paths: list[Path]
+) -> None:
     """Stop with one line if no detector can run."""
     from aqualog.detect.needs import DETECTORS, check_needs
     from aqualog.errors import SignalError
 
-    unavailable, _ = check_needs(vehicle, loaded.symbols, rate_hz=1e9 / loaded.dt_ns)
-    notes = loaded.quality.notes
+    unavailable, _ = check_needs(vehicle, symbols, rate_hz=rate_hz)
     if len(unavailable) < len(DETECTORS):
         return
     asked = ("omega_", "torque_", "a_x", "wheel speeds", "signals at")
@@ -306,7 +336,8 @@ def _write_results(result: DriveResult, out: Path, name: str, title: str, model:
     write_text(out / "events.json", text)
     t_ns, start_ns = _times(result)
     groups = result_groups(result)
-    write_whole(out / "signals.parquet", lambda p: write_log(p, t_ns, groups, suffix=".parquet", start_ns=start_ns))
+    if result.signals.full is None:
+        write_whole(out / "signals.parquet", lambda p: write_log(p, t_ns, groups, suffix=".parquet", start_ns=start_ns))
     write_whole(out / "report.html", lambda p: write_page(result, p, title=title))
 
 

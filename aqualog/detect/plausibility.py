@@ -2,56 +2,97 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from aqualog.notation import AXLES, WHEELS
-from aqualog.types import FloatArray, Signals
+from aqualog.types import FloatArray
 from aqualog.vehicle import Vehicle
 
-__all__ = ["implausible"]
+__all__ = ["Plausibility"]
 
 WINDOW = 0.5  # [s] over which changes are compared: longer than latencies, shorter than manoeuvres
+SAMPLE = 0.1  # [s] between the samples of which a median is taken
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
+LEAST_SAMPLES = 50
 RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
 LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less tells no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 
 
-def implausible(signals: Signals, features: Mapping[str, FloatArray], vehicle: Vehicle) -> tuple[str, ...]:
-    """Sentences on what does not fit, for the user to check.
+class Plausibility:
+    """What of a drive is compared, gathered piece by piece: a few values for each half second.
 
     Parameters
     ----------
-    signals : Signals
-    features : mapping name -> array (n,)
-        Of the whole drive.
+    available : collection of str
+        Symbols of the drive.
     vehicle : Vehicle
-
-    Returns
-    -------
-    tuple of str
-        Empty where all fits or too little moved to tell.
+    dt : float
+        [s]
     """
-    step = max(1, round(WINDOW / signals.dt))
-    wheels = {
-        w: signals.array(f"omega_{w}")[::step] * vehicle.r_e(w) for w in WHEELS if f"omega_{w}" in signals.symbols
-    }
-    notes = [
-        *_acceleration(signals, wheels, step), *_yaw(signals, wheels, step), *_resistance(features),
-        *_drivetrain(signals, vehicle),
-    ]  # fmt: skip
-    return tuple(notes)
+
+    def __init__(self, available: Collection[str], vehicle: Vehicle, dt: float) -> None:
+        self._vehicle = vehicle
+        self._dt = dt
+        self._step = max(1, round(WINDOW / dt))
+        self._every = max(1, round(SAMPLE / dt))
+        self._available = frozenset(available)
+        self._n = 0
+        self._rest: FloatArray = np.zeros(0)
+        self._kept: dict[str, list[FloatArray]] = {}
+
+    def push(self, columns: Mapping[str, FloatArray], features: Mapping[str, FloatArray]) -> None:
+        """Take the signals and features of the next piece, arrays (n,)."""
+        n = next(iter(columns.values())).size
+        own = [s for s in (*(f"omega_{w}" for w in WHEELS), "yaw_rate") if s in self._available]
+        for s in own:
+            self._keep(s, columns[s][-self._n % self._step :: self._step])
+        if "a_x" in self._available:
+            a_x = np.concatenate([self._rest, columns["a_x"]])
+            whole = a_x.size // self._step * self._step
+            self._keep("a_x", a_x[:whole].reshape(-1, self._step).mean(axis=1))
+            self._rest = a_x[whole:].copy()
+        every = slice(-self._n % self._every, None, self._every)
+        for axle, wheels in AXLES.items():
+            known = [columns[f"torque_{w}"][every] for w in wheels if f"torque_{w}" in self._available]
+            if known:
+                sums = np.sum(known, axis=0)
+                self._keep(f"torque_{axle}", sums[np.isfinite(sums)])
+        if "delta_a_x" in features:
+            x, v, a = (features[f][every] for f in ("delta_a_x", "v_x_hat", "a_kin_slow"))
+            with np.errstate(invalid="ignore"):
+                self._keep("delta_a_x", x[np.isfinite(x) & (v > 14.0) & (a > -1.0)])
+        self._n += n
+
+    def _keep(self, name: str, x: FloatArray) -> None:
+        self._kept.setdefault(name, []).append(x.copy())
+
+    def _whole(self, name: str) -> FloatArray:
+        parts = self._kept.get(name)
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what does not fit, for the user to check; none where all fits or too little moved to tell."""
+        wheels = {
+            w: self._whole(f"omega_{w}") * self._vehicle.r_e(w) for w in WHEELS if f"omega_{w}" in self._available
+        }
+        drive = {a: self._whole(f"torque_{a}") for a in AXLES}
+        return (
+            *_acceleration(self._whole("a_x"), wheels, self._step * self._dt),
+            *_yaw(self._whole("yaw_rate"), wheels),
+            *_resistance(self._whole("delta_a_x")),
+            *_drivetrain(drive, self._vehicle),
+        )
 
 
-def _acceleration(signals: Signals, wheels: Mapping[str, FloatArray], step: int) -> list[str]:
-    a_x = _means(signals.array("a_x"), step)
+def _acceleration(a_x: FloatArray, wheels: Mapping[str, FloatArray], step_s: float) -> list[str]:
     if not wheels or a_x.size < LEAST_WINDOWS:
         return []
     speed = np.mean(list(wheels.values()), axis=0)
-    change = np.diff(speed) / (step * signals.dt)
+    change = np.diff(speed) / step_s
     n = min(change.size, a_x.size)
     good = np.isfinite(change[:n]) & np.isfinite(a_x[:n])
     x, y = a_x[:n][good], change[:n][good]
@@ -66,12 +107,11 @@ def _acceleration(signals: Signals, wheels: Mapping[str, FloatArray], step: int)
     return [f"wheel speeds change {ratio:.1f} times as much as a_x says: check the units of both (km/h, g)"]
 
 
-def _yaw(signals: Signals, wheels: Mapping[str, FloatArray], step: int) -> list[str]:
-    yaw_rate = signals.array("yaw_rate")[::step]
+def _yaw(yaw_rate: FloatArray, wheels: Mapping[str, FloatArray]) -> list[str]:
     found = [
         _correlation(*_both(yaw_rate, wheels[right] - wheels[left]))
         for left, right in (("fl", "fr"), ("rl", "rr"))
-        if left in wheels and right in wheels
+        if left in wheels and right in wheels and yaw_rate.size
     ]
     strongest = max(found, key=abs, default=0.0)
     if strongest > -LEAST_CORRELATION:
@@ -79,13 +119,8 @@ def _yaw(signals: Signals, wheels: Mapping[str, FloatArray], step: int) -> list[
     return ["yaw_rate has the opposite sign of the wheels' difference: scale = -1 in the signal map?"]
 
 
-def _resistance(features: Mapping[str, FloatArray]) -> list[str]:
-    if "delta_a_x" not in features:
-        return []
-    measure = features["delta_a_x"]
-    with np.errstate(invalid="ignore"):
-        measure = measure[np.isfinite(measure) & (features["v_x_hat"] > 14.0) & (features["a_kin_slow"] > -1.0)]
-    if measure.size < 500 or abs(float(np.median(measure))) < RESISTANCE:
+def _resistance(measure: FloatArray) -> list[str]:
+    if measure.size < LEAST_SAMPLES or abs(float(np.median(measure))) < RESISTANCE:
         return []
     return [
         f"the resistance measure lies at {np.median(measure):+.2f} m/s^2 in the middle of this drive: check mass, "
@@ -93,14 +128,9 @@ def _resistance(features: Mapping[str, FloatArray]) -> list[str]:
     ]
 
 
-def _drivetrain(signals: Signals, vehicle: Vehicle) -> list[str]:
+def _drivetrain(sums: Mapping[str, FloatArray], vehicle: Vehicle) -> list[str]:
     """Which axles the torques drive, against which the vehicle file says."""
-    drive = {}
-    for axle, wheels in AXLES.items():
-        known = [signals.array(f"torque_{w}") for w in wheels if f"torque_{w}" in signals.symbols]
-        sums = np.sum(known, axis=0) if known else np.zeros(0)
-        sums = sums[np.isfinite(sums)]
-        drive[axle] = float(np.quantile(sums, 0.9)) if sums.size >= 500 else float("nan")
+    drive = {a: float(np.quantile(x, 0.9)) if x.size >= LEAST_SAMPLES else float("nan") for a, x in sums.items()}
     most = max((v for v in drive.values() if v == v), default=0.0)
     if most < LEAST_DRIVE:
         return []
@@ -118,11 +148,6 @@ def _drivetrain(signals: Signals, vehicle: Vehicle) -> list[str]:
                 f'drivetrain = "{"rwd" if axle == "f" else "fwd"}"?'
             ]
     return []
-
-
-def _means(x: FloatArray, step: int) -> FloatArray:
-    whole = x[: x.size // step * step].reshape(-1, step)
-    return np.asarray(whole.mean(axis=1), dtype=np.float64)
 
 
 def _both(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,7 @@ from aqualog.detect.force_watch import ResistanceWatch, TieRodWatch
 from aqualog.detect.joint_cusum import JointCusumParams
 from aqualog.detect.joint_watch import JointCriteriaWatch, JointCusumWatch, SlopeJudge
 from aqualog.detect.needs import check_needs
-from aqualog.detect.plausibility import implausible
+from aqualog.detect.plausibility import Plausibility
 from aqualog.detect.scene import BrakeWatch, Scene
 from aqualog.detect.slip_slope.estimator import INACTIVE
 from aqualog.detect.slip_slope.remarks import remarks
@@ -24,7 +24,7 @@ from aqualog.features.stream import Features, FeatureStream
 from aqualog.types import DriveResult, Event, FloatArray, Signals, Track, Unavailable
 from aqualog.vehicle import Vehicle
 
-__all__ = ["DriveStream", "Piece", "Settings", "detect_drive"]
+__all__ = ["DriveStream", "Piece", "Settings", "detect_drive", "in_order"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +178,11 @@ def _partial(_: Mapping[str, Any]) -> str:
     return "partial"
 
 
+def in_order(events: Iterable[Event]) -> tuple[Event, ...]:
+    """Events by their beginning."""
+    return tuple(sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")))
+
+
 def detect_drive(
     signals: Signals, vehicle: Vehicle, *, settings: Settings | None = None, memory: Memory | None = None
 ) -> DriveResult:
@@ -203,18 +208,18 @@ def detect_drive(
     stream = DriveStream(vehicle, signals.dt_ns, present, settings=settings, memory=memory)
     columns = {s: signals.array(s) for s in (present or ["v_x"])}
     piece = stream.push(columns)
-    events = sorted(
-        (*piece.events, *stream.finish()), key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")
-    )
+    plausibility = Plausibility(present, vehicle, signals.dt)
+    plausibility.push(columns, piece.features)
+    events = in_order((*piece.events, *stream.finish()))
     slopes = tuple(w.summary() for w in stream.slope_watches)
     return DriveResult(
         signals=signals,
         features=pl.DataFrame(dict(piece.features)),
         tracks=piece.tracks,
-        events=tuple(events),
+        events=events,
         unavailable=stream.unavailable,
         limited=stream.limited,
         vehicle_name=vehicle.name,
-        notes=(*implausible(signals, piece.features, vehicle), *remarks(slopes)),
+        notes=(*plausibility.notes(), *remarks(slopes)),
         slopes=slopes,
     )

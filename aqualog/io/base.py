@@ -6,15 +6,15 @@ decodes only the channels that are asked for.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
-__all__ = ["FaultLog", "ReadOptions", "Reader"]
+__all__ = ["FaultLog", "Part", "ReadOptions", "Reader", "part_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,20 @@ class Reader(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
+
+
+class Part(NamedTuple):
+    """Channels of a file, by (file, path), that are read piece by piece together: each piece goes on where the one
+    before has ended, in the order of the file.
+    """  # fmt: skip
+
+    channels: frozenset[tuple[str, str]]
+    pieces: Iterator[Sequence[Channel]]
+
+
+def part_of(wanted: Sequence[ChannelInfo], pieces: Iterator[Sequence[Channel]]) -> Part:
+    """Pieces of these channels."""
+    return Part(frozenset((w.file, w.path) for w in wanted), pieces)
 
 
 @dataclass(slots=True)

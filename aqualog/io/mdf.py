@@ -28,9 +28,9 @@ from asammdf.blocks.utils import extract_xml_comment
 from numpy.typing import NDArray
 
 from aqualog.errors import LogError
-from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, pgn, selected
-from aqualog.io.mdf_blocks import raw_columns
+from aqualog.io.mdf_blocks import raw_columns, raw_pieces
 from aqualog.io.mdf_conversion import formula_text, is_text_only, physical, refusal
 from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
 
@@ -59,6 +59,8 @@ _disarm_asammdf()
 
 _VIRTUAL = (3, 6)  # channel types without bytes in the record
 _VARIABLE_LENGTH = 1
+_PIECE = 1 << 17  # records of a piece
+_FRAGMENT = 1 << 25  # [bytes] of records that asammdf gives at a time
 _LONGEST_RECORD = 1 << 30
 _LONGEST_PAYLOAD = 64
 _NUMERIC_V4_CHANNELS = (0, 6)  # fixed length, virtual
@@ -156,6 +158,31 @@ class MdfReader:
             found = self._read_measured([w for w in wanted if isinstance(w.key, _Measured)])
             found |= self._read_signals([w for w in wanted if isinstance(w.key, _Signal)])
         return [found[w.path] for w in wanted]
+
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
+        """The same piece by piece: a part for each group of records; signals of a DBC are one piece."""
+        wanted = list(wanted)
+        by_group: dict[int, list[ChannelInfo]] = defaultdict(list)
+        for info in wanted:
+            if isinstance(info.key, _Measured):
+                by_group[info.key.group].append(info)
+        out = [part_of(infos, self._pieces(group, infos)) for group, infos in by_group.items()]
+        signals = [w for w in wanted if isinstance(w.key, _Signal)]
+        return [*out, part_of(signals, (self.read(signals) for _ in range(1)))] if signals else out
+
+    def _pieces(self, group: int, infos: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
+        n = n_bad = 0
+        pieces = self._in_pieces(group, [i.key.index for i in infos])
+        while True:
+            with self._guard("cannot be decoded"):
+                piece = next(pieces, None)
+            if piece is None:
+                break
+            t, columns = piece
+            t_ns, usable = self._nanoseconds(t)
+            n, n_bad = n + len(t), n_bad + len(t) - len(t_ns)
+            yield [Channel(i, t_ns, columns[i.key.index][usable], self._absolute) for i in infos]
+        self._count_records(group, n, n_bad, len(infos))
 
     @property
     def faults(self) -> FileFaults:
@@ -337,6 +364,9 @@ class MdfReader:
         if whole is not None:
             yield whole
             return
+        yield from self._fragments(group, indexes)
+
+    def _fragments(self, group: int, indexes: Sequence[int]) -> Iterator[tuple[_Array, dict[int, _Array]]]:
         inner = self._inner
         for fragment in inner._load_data(inner.groups[group]):
             if self._version4:
@@ -352,13 +382,18 @@ class MdfReader:
         master = self._inner.masters_db.get(group)
         if not self._is_as_written or master is None:
             return None
-        channels = self._inner.groups[group].channels
         try:
             raw = raw_columns(self._path, self._inner, group, [*indexes, master])
         except Exception:
             return None
-        if raw is None:
-            return None
+        return None if raw is None else self._converted(group, indexes, raw)
+
+    def _converted(
+        self, group: int, indexes: Sequence[int], raw: dict[int, _Array]
+    ) -> tuple[_Array, dict[int, _Array]]:
+        """Time stamps [s] and physical values of raw samples; the time is among them."""
+        master = self._inner.masters_db[group]
+        channels = self._inner.groups[group].channels
         clock = channels[master].conversion
         t = raw[master] if clock is None else clock.convert(raw[master])
         columns = {}
@@ -368,6 +403,25 @@ class MdfReader:
                 np.full(len(t), np.nan) if is_nothing else physical(channels[i].conversion, raw[i], version4=True)
             )
         return np.asarray(t, dtype=np.float64), columns
+
+    def _in_pieces(self, group: int, indexes: Sequence[int]) -> Iterator[tuple[_Array, dict[int, _Array]]]:
+        """`_columns` a stretch of records at a time wherever the blocks are; what is unsound goes on with asammdf."""
+        done = 0
+        master = self._inner.masters_db.get(group)
+        if self._is_as_written and master is not None:
+            with suppress(Exception):
+                pieces = raw_pieces(self._path, self._inner, group, [*indexes, master], _PIECE)
+                for raw in pieces if pieces is not None else ():
+                    converted = self._converted(group, indexes, raw)
+                    yield converted
+                    done += len(converted[0])
+        if done == int(self._inner.groups[group].channel_group.cycles_nr):
+            return
+        self._inner.configure(read_fragment_size=_FRAGMENT)
+        for t, columns in self._fragments(group, indexes):
+            new = slice(min(done, len(t)), None)
+            done -= min(done, len(t))
+            yield t[new], {i: x[new] for i, x in columns.items()}
 
     def _raw(self, group: int, index: int, fragment: Any) -> tuple[_Array, _Array | None]:
         raw, invalid = self._inner.get(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ try:
 except ImportError:
     _libdeflate = None
 
-__all__ = ["raw_columns"]
+__all__ = ["raw_columns", "raw_pieces"]
 
 _PLAIN, _DEFLATED, _TRANSPOSED = 0, 1, 2  # asammdf's kinds of blocks
 _FIXED_LENGTH, _MASTER = 0, 2
@@ -69,7 +69,27 @@ def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> di
     OSError, zlib.error, deflate.DeflateError
         If a block cannot be read or inflated to the size that it tells.
     """
-    group = inner.groups[index]
+    plan = _plan(inner.groups[index], wanted)
+    return None if plan is None else _decoded(path, plan, plan.blocks)
+
+
+def raw_pieces(
+    path: Path, inner: Any, index: int, wanted: Sequence[int], records: int
+) -> Iterator[dict[int, _Array]] | None:
+    """The same in pieces of whole blocks with at least so many records, in order."""
+    plan = _plan(inner.groups[index], wanted)
+    return None if plan is None else (_decoded(path, plan, run) for run in _runs(plan, records))
+
+
+class _Plan(NamedTuple):
+    """Where wanted channels lie: their fields, the blocks, and the size of a record. [bytes]"""
+
+    fields: dict[int, _Field]
+    blocks: list[_Block]
+    size: int
+
+
+def _plan(group: Any, wanted: Sequence[int]) -> _Plan | None:
     size, cycles = int(group.channel_group.samples_byte_nr), int(group.channel_group.cycles_nr)
     if not _is_plain(group) or size == 0:
         return None
@@ -77,15 +97,30 @@ def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> di
     if any(f is None for f in fields.values()):
         return None
     blocks = _blocks(group, size, cycles)
-    if blocks is None:
-        return None
-    known = {i: f for i, f in fields.items() if f is not None}
-    out = {i: np.empty(cycles, dtype=f.dtype) for i, f in known.items()}
+    return None if blocks is None else _Plan({i: f for i, f in fields.items() if f is not None}, blocks, size)
+
+
+def _runs(plan: _Plan, records: int) -> Iterator[list[_Block]]:
+    run: list[_Block] = []
+    for block in plan.blocks:
+        run.append(block)
+        if sum(b.size for b in run) >= records * plan.size:
+            yield run
+            run = []
+    if run:
+        yield run
+
+
+def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> dict[int, _Array]:
+    """Raw samples of consecutive blocks."""
+    begin = blocks[0].first if blocks else 0
+    rows = sum(b.size for b in blocks) // plan.size
+    out = {i: np.empty(rows, dtype=f.dtype) for i, f in plan.fields.items()}
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
     try:
 
         def take(block: _Block) -> None:
-            _fill(out, known, block, _inflated(handle, block), size)
+            _fill(out, plan.fields, block._replace(first=block.first - begin), _inflated(handle, block), plan.size)
 
         threads = min(len(blocks), _threads())
         if threads < 2:

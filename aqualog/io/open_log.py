@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from aqualog.errors import LogError
-from aqualog.io.base import Reader, ReadOptions
+from aqualog.io.base import Part, Reader, ReadOptions, part_of
 from aqualog.io.sniff import sniff
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
@@ -63,6 +63,10 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
     return _READERS[sniff(path)](path, options or ReadOptions())
 
 
+def _whole(reader: Reader, wanted: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
+    yield reader.read(wanted)
+
+
 class DriveLog:
     """The files of one drive as one reader; a context manager.
 
@@ -102,6 +106,17 @@ class DriveLog:
             if own:
                 result |= {(c.info.file, c.info.path): c for c in reader.read(own)}
         return result
+
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
+        """The same piece by piece, for logs that are longer than memory; a reader that cannot gives one piece."""
+        asked = list({(w.file, w.path): w for w in wanted}.values())
+        out: list[Part] = []
+        for path, reader in zip(self.paths, self._readers, strict=True):
+            own = [w for w in asked if w.file == path.name]
+            if own:
+                piecewise = getattr(reader, "parts", None)
+                out += piecewise(own) if piecewise is not None else [part_of(own, _whole(reader, own))]
+        return out
 
     def close(self) -> None:
         """Close all files."""

@@ -18,7 +18,7 @@ from aqualog.errors import LogError
 from aqualog.io.table_names import split_unit
 from aqualog.types import FloatArray
 
-__all__ = ["METADATA_KEY", "TableColumn", "write_csv", "write_parquet"]
+__all__ = ["METADATA_KEY", "TableColumn", "join_parquet", "write_csv", "write_parquet"]
 
 METADATA_KEY = "aqualog"
 _SCHEMA_VERSION = 1
@@ -79,6 +79,20 @@ def write_parquet(path: Path, columns: Sequence[TableColumn], *, start_ns: int |
     metadata = {METADATA_KEY: json.dumps(about, ensure_ascii=True)}
     _frame(columns, [c.name for c in columns]).write_parquet(buffer, metadata=metadata)
     _write(path, buffer)
+
+
+def join_parquet(path: Path, parts: Sequence[Path]) -> None:
+    """Write tables of equal columns below each other without holding them; what the first one tells of itself is kept.
+
+    Parameters
+    ----------
+    path : Path
+        Overwritten.
+    parts : sequence of Path
+        As `write_parquet` makes them, in order.
+    """
+    about = pl.read_parquet_metadata(parts[0])[METADATA_KEY]
+    pl.scan_parquet(list(parts)).sink_parquet(path, metadata={METADATA_KEY: about}, maintain_order=True)
 
 
 def _frame(columns: Sequence[TableColumn], names: Sequence[str]) -> pl.DataFrame:

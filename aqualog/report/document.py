@@ -23,15 +23,14 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
     """The JSON document of `detect`. NaN and infinities become null; floats keep 9 significant digits."""
     signals = result.signals
     quality = signals.quality
-    duration = signals.frame.height * signals.dt
     return {
         "schema_version": SCHEMA_VERSION,
         "tool_version": __version__,
         "log": log,
         "files": list(signals.files),
         "start_time": _start(signals),
-        "duration_s": _number(duration),
-        "sample_rate_hz": _number(1e9 / signals.dt_ns),
+        "duration_s": _number(signals.duration_s),
+        "sample_rate_hz": _number(1e9 / signals.step_ns),
         "vehicle": result.vehicle_name,
         "signals": {name: _signal(signals, name) for name in signals.symbols},
         "events": [_event(e) for e in result.events],
@@ -66,7 +65,7 @@ def _value(x: Any) -> Any:
 def _signal(signals: Signals, name: str) -> dict[str, Any]:
     origin = signals.origins.get(name)
     if origin is None:
-        return {"channel": name, "unit": SYMBOLS[name].unit, "rate_hz": _number(1e9 / signals.dt_ns)}
+        return {"channel": name, "unit": SYMBOLS[name].unit, "rate_hz": _number(1e9 / signals.step_ns)}
     return {
         "channel": origin.channel,
         "file": origin.file,

@@ -35,8 +35,8 @@ def head_facts(result: DriveResult) -> list[tuple[str, str]]:
     signals = result.signals
     facts = [
         ("Vehicle", result.vehicle_name),
-        ("Duration", _duration(signals.frame.height * signals.dt)),
-        ("Sample rate", f"{1e9 / signals.dt_ns:g} Hz"),
+        ("Duration", _duration(signals.duration_s)),
+        ("Sample rate", f"{1e9 / signals.step_ns:g} Hz"),
         ("Signals", str(len(signals.symbols))),
     ]
     if signals.start_ns is not None:

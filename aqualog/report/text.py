@@ -13,8 +13,8 @@ __all__ = ["event_table", "table"]
 def event_table(result: DriveResult) -> str:
     """Events, what could not be judged and why, and what was lost."""
     signals = result.signals
-    duration = signals.frame.height * signals.dt
-    lines = [f"{result.vehicle_name}: {duration:.1f} s at {1e9 / signals.dt_ns:g} Hz, {len(signals.symbols)} signals"]
+    rate = 1e9 / signals.step_ns
+    lines = [f"{result.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz, {len(signals.symbols)} signals"]
     if result.events:
         header = ("detector", "where", "from s", "to s", "severity", "peak", "limit", "v km/h", "evidence")
         lines.append(table(header, [_row(e) for e in result.events]))

@@ -1,0 +1,256 @@
+"""Samples of one signal that arrive piece by piece: the same ones are left out as if they had come in one.
+
+What needs the whole of a channel (stamps out of order, resets, wraps) is not done here but told by `NotInPiecesError`:
+such a log is read in one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aqualog.align.clean import BURST, Clean, Span, corrected, glitch_note, judged, mean_of_steps, out_note, symbol_of
+from aqualog.align.glitches import RETURN_NS, sensor_glitches
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.align.resample import MEDIAN_OF
+from aqualog.errors import ConfigError, SignalError
+from aqualog.types import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
+from aqualog.vehicle import Vehicle
+
+__all__ = ["NotInPiecesError", "PieceCleaner"]
+
+_SECOND = 1_000_000_000
+_NO_TIMES: TimeArray = np.zeros(0, dtype=np.int64)
+_NO_VALUES: FloatArray = np.zeros(0)
+
+
+class NotInPiecesError(Exception):
+    """The log has what only the whole of it tells."""
+
+
+@dataclass(slots=True)
+class _Steps:
+    """Sample times of stamps that arrive in pieces: their median, and the mean of those that are no gaps."""
+
+    first: list[TimeArray] = field(default_factory=list)
+    kept: int = 0
+    median: int = 0
+    total: int = 0
+    count: int = 0
+    late: bool = False  # steps have been counted by the median
+
+    def add(self, steps: TimeArray) -> None:
+        room = MEDIAN_OF - self.kept
+        if room > 0:
+            self.first.append(steps[:room].copy())
+            self.kept += self.first[-1].size
+            if self.kept == MEDIAN_OF:
+                self._settle()
+            steps = steps[room:]
+        if steps.size:
+            self._count(steps)
+
+    def _settle(self) -> None:
+        steps = np.concatenate(self.first) if self.first else _NO_TIMES
+        self.median = int(np.median(steps)) if steps.size else 0
+        self.first, self.late = [], True
+        self._count(steps)
+
+    def _count(self, steps: TimeArray) -> None:
+        steps = steps[steps < BURST * self.median]
+        self.total += int(steps.sum())
+        self.count += steps.size
+
+    def finish(self) -> tuple[int, int]:
+        """Median and mean. [ns]"""
+        if not self.late:
+            self._settle()
+        return self.median, mean_of_steps(self.total, self.count)
+
+
+class PieceCleaner:
+    """One signal of a drive.
+
+    Parameters
+    ----------
+    name : str
+        As the map has it.
+    entry : Entry
+    info : ChannelInfo
+    signal_map : SignalMap
+    vehicle : Vehicle
+
+    Raises
+    ------
+    SignalError, ConfigError
+        If the unit is not one of the signal: the latter where the map gives it.
+    """
+
+    def __init__(self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle) -> None:
+        self.name, self.info = name, info
+        self.symbol = symbol_of(name)
+        self.unit = entry.unit or info.unit
+        self.absolute: bool | None = None
+        self._entry, self._map, self._vehicle = entry, signal_map, vehicle
+        self._where = f"{info.file}:{info.path}"
+        self._is_explicit = name in signal_map.entries
+        try:
+            judged(self.symbol, entry, _NO_VALUES, self.unit, vehicle, self._where)
+        except SignalError as error:
+            if self._is_explicit:
+                raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
+            raise
+        self._r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+        # counts
+        self._samples = self._duplicates = self._bad = self._code = self._out = self._glitches = self._repaired = 0
+        self._pauses: list[int] = []
+        self._first_ns: int | None = None
+        self._first_glitch_ns: int | None = None
+        self._first_out: tuple[int, float] | None = None
+        self._all, self._used = _Steps(), _Steps()
+        self._ends: tuple[int, int] | None = None
+        self._used_count = 0
+        # what is held back
+        self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES  # the last sample: one with the same stamp may follow
+        self._last_ns: int | None = None  # of the stamps let through
+        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # a second in which a wheel's jump may turn back
+        self._done = 0  # of these, let through already
+        self._dead = False
+
+    def push(self, t_ns: TimeArray, raw: FloatArray, *, absolute: bool) -> tuple[TimeArray, FloatArray]:
+        """Usable samples that are now certain, in SI; the rest comes with later pieces."""
+        if t_ns.size == 0:
+            return _NO_TIMES, _NO_VALUES
+        if self.absolute is None:
+            self.absolute = absolute
+        self._samples += t_ns.size
+        t = np.concatenate([self._held_t, corrected(t_ns, self._map, self.info.file)])
+        raw = np.concatenate([self._held_raw, raw])
+        self._held_t, self._held_raw = t[-1:].copy(), raw[-1:].copy()
+        steps = np.diff(t)
+        if (steps < 0).any():
+            raise NotInPiecesError(f"{self._where}: time stamps out of order")
+        same = steps == 0
+        self._duplicates += int(same.sum())
+        return self._settled(t[:-1][~same], raw[:-1][~same])
+
+    def finish(self) -> tuple[TimeArray, FloatArray]:
+        """The samples that were held back."""
+        t, x = self._settled(self._held_t, self._held_raw)
+        self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES
+        if self._r_e is None:
+            return t, x
+        rest_t, rest_x = self._without_glitches(_NO_TIMES, _NO_VALUES, is_last=True)
+        return np.concatenate([t, rest_t]), np.concatenate([x, rest_x])
+
+    def _settled(self, t: TimeArray, raw: FloatArray) -> tuple[TimeArray, FloatArray]:
+        if t.size == 0:
+            return t, raw
+        if self._first_ns is None:
+            self._first_ns = int(t[0])
+        steps = np.diff(t) if self._last_ns is None else np.diff(t, prepend=self._last_ns)
+        self._last_ns = int(t[-1])
+        self._all.add(steps)
+        self._pauses += steps[steps > _SECOND].tolist()
+        self._repaired += t.size
+        own = judged(self.symbol, self._entry, raw, self.unit, self._vehicle, self._where)
+        self._bad += int(own.is_bad.sum())
+        self._code += int(own.is_code.sum())
+        self._out += int(own.is_out.sum())
+        if self._first_out is None and own.is_out.any():
+            k = int(np.argmax(own.is_out))
+            self._first_out = int(t[k]), float(own.values[k])
+        keep = own.keep
+        t, x = t[keep], own.values[keep]
+        return self._let_through(t, x) if self._r_e is None else self._without_glitches(t, x, is_last=False)
+
+    def _let_through(self, t: TimeArray, x: FloatArray) -> tuple[TimeArray, FloatArray]:
+        if t.size:
+            last = None if self._ends is None else self._ends[1]
+            self._used.add(np.diff(t) if last is None else np.diff(t, prepend=last))
+            self._ends = int(t[0]) if self._ends is None else self._ends[0], int(t[-1])
+            self._used_count += t.size
+        return t, x
+
+    def _without_glitches(self, t: TimeArray, x: FloatArray, *, is_last: bool) -> tuple[TimeArray, FloatArray]:
+        """Wheel speeds whose next second is known, less those that no wheel can have turned."""
+        if self._dead:
+            moving = np.flatnonzero(x != 0.0)
+            dead = int(moving[0]) if moving.size else x.size
+            self._found(t[:dead], x[:dead])
+            t, x = t[dead:], x[dead:]
+            self._dead = not moving.size
+            if self._dead:
+                return _NO_TIMES, _NO_VALUES
+            self._wait_t, self._wait_x, self._done = _NO_TIMES, _NO_VALUES, 0
+        t, x = np.concatenate([self._wait_t, t]), np.concatenate([self._wait_x, x])
+        if t.size == 0:
+            return t, x
+        glitch = self._judged_glitches(t, x)
+        # a jump is judged once all within a second behind it is known
+        certain = t.size if is_last else int(np.searchsorted(t, t[-1] - RETURN_NS, side="left"))
+        if not is_last and glitch[-1] and _dead_since(glitch, x) < certain:
+            self._dead, certain = True, t.size
+        while 0 < certain < t.size and glitch[certain - 1 : certain + 1].any():
+            certain -= 1  # neither in a glitch nor at its end
+        new = slice(self._done, max(certain, self._done))
+        out = ~glitch[new]
+        self._found(t[new][~out], x[new][~out])
+        found = self._let_through(t[new][out], x[new][out])
+        start = max(new.stop - 1, 0)  # the sample before is what the next one is compared with
+        self._wait_t, self._wait_x, self._done = t[start:].copy(), x[start:].copy(), new.stop - start
+        return found
+
+    def _judged_glitches(self, t: TimeArray, x: FloatArray) -> BoolArray:
+        assert self._r_e is not None
+        if self._used_count + self._glitches + t.size - self._done < 3:
+            return np.zeros(t.size, dtype=bool)
+        # a rest of two samples is part of a long signal: it goes on to the left as it began
+        t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([x[:1], x[:1], x])
+        return sensor_glitches(t, x, r_e=self._r_e)[2:]
+
+    def _found(self, t: TimeArray, x: FloatArray) -> None:
+        if t.size == 0:
+            return
+        self._glitches += t.size
+        if self._first_glitch_ns is None:
+            self._first_glitch_ns = int(t[0])
+            if self._first_out is None or self._first_out[0] > t[0]:
+                self._first_out = int(t[0]), float(x[0])
+
+    def cleaned(self) -> tuple[Clean, list[str]]:
+        """The signal without its samples, and the notes on it; complete after `finish`."""
+        period, _ = self._all.finish()
+        used, mean = self._used.finish()
+        first, last = self._ends or (0, 0)
+        notes = []
+        if not self.unit and self._is_explicit:
+            notes.append(f"{self._where} has no unit; taken as {self.symbol.unit}")
+        if self._first_glitch_ns is not None:
+            notes.append(glitch_note(self._where, self._glitches, self._first_glitch_ns - (self._first_ns or 0)))
+        out = self._out + self._glitches
+        if self._first_out is not None:
+            notes.append(out_note(self._where, self.symbol, out, self._repaired, self._first_out[1]))
+        faults = TimeFaults(duplicates=self._duplicates, pauses=sum(s > 10 * period for s in self._pauses))
+        origin = Origin(
+            symbol=self.name,
+            channel=self.info.path,
+            file=self.info.file,
+            unit=self.unit or self.symbol.unit,
+            rate_hz=1e9 / period if period else 0.0,
+            samples=self._samples,
+            not_finite=self._bad,
+            out_of_range=out,
+            invalid_code=self._code,
+            faults=faults,
+        )
+        span = Span(first, last, self._used_count, used, mean)
+        return Clean(self.symbol, origin, span, _NO_TIMES, _NO_VALUES), notes
+
+
+def _dead_since(glitch: BoolArray, x: FloatArray) -> int:
+    """Where the zeros begin in which the glitch at the end stands; beyond the end if it is no dead sensor."""
+    last = np.flatnonzero(~glitch)
+    start = int(last[-1]) + 1 if last.size else 0
+    return start if not x[start:].any() else glitch.size

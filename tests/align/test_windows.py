@@ -1,0 +1,173 @@
+"""Windows of a long drive are bit for bit those of the whole table, whatever is wrong with the channels."""
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.align.table import build_signals
+from aqualog.align.windows import NotInPiecesError, long_drive
+from aqualog.errors import SignalError
+from aqualog.io.base import part_of
+from aqualog.types import Channel, ChannelInfo
+from aqualog.vehicle import Vehicle
+
+CAR = Vehicle()
+S = 1_000_000_000
+
+
+def channel(name, t, x, unit="", file="a.mf4"):
+    t_ns = np.round(np.asarray(t) * S).astype(np.int64)
+    return Channel(ChannelInfo(name, name, unit, len(t), file), t_ns, np.asarray(x, dtype=float), False)
+
+
+def pieces(channels, size, rng):
+    """Each channel in a part of its own, in pieces of changing size, some empty."""
+
+    def of(c):
+        at = 0
+        while at < len(c.t_ns):
+            n = int(rng.integers(0, 2 * size + 1))
+            yield [replace(c, t_ns=c.t_ns[at : at + n], values=c.values[at : at + n])]
+            at += n
+
+    return [part_of([c.info], of(c)) for c in channels]
+
+
+def both(channels, *, rows=700, size=300, seed=0, entries=None, rate_hz=None):
+    given = entries or {}
+    entries = {c.info.name: given.get(c.info.name, Entry(c.info.name, c.info.name)) for c in channels}
+    mapped = {c.info.name: (entries[c.info.name], c) for c in channels}
+    signal_map = SignalMap(entries=given)
+    whole = build_signals(mapped, signal_map=signal_map, vehicle=CAR, rate_hz=rate_hz)
+    rng = np.random.default_rng(seed)
+    drive = long_drive(
+        {n: (e, c.info) for n, (e, c) in mapped.items()}, lambda: pieces(channels, size, rng),
+        signal_map=signal_map, vehicle=CAR, rate_hz=rate_hz,
+    )  # fmt: skip
+    windows = list(drive.windows(rows))
+    bridged = frozenset(s for _, gaps in windows for s, b in gaps.items() if b)
+    missing = {n: sum(w.frame[n].null_count() for w, _ in windows) for n in drive.symbols}
+    return whole, pl.concat([w.frame for w, _ in windows]), drive.facts(missing, bridged, ())
+
+
+def same(channels, **kw):
+    whole, frame, facts = both(channels, **kw)
+    assert frame.equals(whole.frame)
+    assert frame.schema == whole.frame.schema
+    assert facts.origins == whole.origins
+    assert list(facts.origins) == list(whole.origins)
+    assert facts.quality == whole.quality
+    assert (facts.dt_ns, facts.start_ns, facts.files) == (whole.dt_ns, whole.start_ns, whole.files)
+    return whole
+
+
+def wheels(n=5000, dt=0.01, **kw):
+    t = np.arange(n) * dt
+    return [channel(f"omega_{w}", t, 60.0 + np.sin(0.1 * t + i), "rad/s", **kw) for i, w in enumerate(("fl", "fr"))]
+
+
+def test_a_plain_drive_with_signals_of_other_rates():
+    rng = np.random.default_rng(1)
+    fast = np.arange(25_000) * 0.002 + 0.0003
+    slow = np.arange(0.05, 50.0, 0.1)
+    same([
+        *wheels(),
+        channel("a_x", fast, rng.standard_normal(fast.size), "m/s^2"),
+        channel("v_x", slow, 20.0 + rng.standard_normal(slow.size), "km/h", file="b.mf4"),
+        channel("on_water", [3.0, 17.0, 18.5, 44.0], [0, 1, 0, 1], "", file="c.mf4"),
+        channel("torque_r", slow, 100.0 * rng.standard_normal(slow.size), "N*m"),
+        channel("steering_wheel_angle", np.sort(rng.uniform(0, 50, 2000)), rng.standard_normal(2000), "deg"),
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_channels_with_faults(seed):
+    """Gaps, jitter, doubled stamps, values that are none or cannot be, dropouts of a wheel, dead wheels."""
+    rng = np.random.default_rng(seed)
+    channels = []
+    for name, unit in (("omega_fl", "rad/s"), ("omega_rr", "km/h"), ("a_x", "g"), ("v_x", "m/s")):
+        t = np.arange(6000) * 0.01 + rng.uniform(0, 0.002, 6000) * (seed % 2)
+        keep = np.ones(t.size, dtype=bool)
+        for _ in range(rng.integers(0, 4)):
+            a = rng.integers(0, t.size)
+            keep[a : a + rng.integers(1, 300)] = False
+        t = np.round(t[keep], 6)
+        if rng.random() < 0.5:
+            again = rng.integers(1, t.size, 5)
+            t[again] = t[again - 1]
+            t = np.sort(t)
+        x = 40.0 + np.cumsum(rng.standard_normal(t.size)) * 0.01
+        if name == "a_x":
+            x = 0.01 * x
+        x[rng.integers(0, x.size, 8)] = [np.nan, np.inf, 1e9, -1e9, 0.0, 300.0, np.nan, 5e4]
+        for _ in range(3):
+            a = rng.integers(0, x.size)
+            x[a : a + rng.choice([1, 2, 30, 99, 101, 400])] = rng.choice([0.0, 0.0, 200.0])
+        if rng.random() < 0.3:
+            x[rng.integers(x.size // 2, x.size) :] = 0.0
+        channels.append(channel(name, t, x, unit))
+    same(channels, size=int(rng.choice([1, 7, 90, 800])), rows=int(rng.choice([13, 500, 5000])), seed=seed)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_many_short_dropouts_of_a_wheel(seed):
+    """Pieces end in dropouts, at their ends and within a second of them."""
+    rng = np.random.default_rng(seed)
+    x = 40.0 + 0.001 * np.arange(3000)
+    for a in np.cumsum(rng.integers(5, 130, 60)):
+        x[a : a + rng.integers(1, 60)] = rng.choice([0.0, 90.0, 41.0])
+    same([channel("omega_fl", np.arange(3000) * 0.01, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
+
+
+def test_codes_scales_and_clocks_of_the_map():
+    entries = {"omega_fr": Entry("omega_fr", "omega_fr", invalid=(60.5,), scale=2.0, offset=0.1)}
+    left, right = wheels(3000)
+    same([left, replace(right, values=np.round(right.values, 1))], entries=entries)
+
+
+def test_a_pause_of_the_whole_log_and_one_signal_that_ends_early():
+    left, right = wheels(4000)
+    keep = np.r_[0:1000, 1900:4000]
+    left = replace(left, t_ns=left.t_ns[keep], values=left.values[keep])
+    assert same([left, replace(right, t_ns=right.t_ns[:500], values=right.values[:500])]).quality.faults.pauses == 1
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_the_shortest_drives(rows):
+    same([channel("omega_fl", np.arange(4) * 0.01, [1.0, 2.0, 0.0, 0.0], "rad/s")], rows=rows, size=1)
+
+
+def test_an_own_rate():
+    same(wheels(), rate_hz=33.0)
+
+
+@pytest.mark.parametrize("at", [1, 2500])
+def test_stamps_that_step_back_need_the_whole_log(at):
+    left, right = wheels()
+    t = left.t_ns.copy()
+    t[at:] -= 15_000_000
+    with pytest.raises(NotInPiecesError, match="out of order"):
+        both([replace(left, t_ns=t), right])
+
+
+def test_a_unit_that_is_none_of_the_signal_leaves_it_out():
+    left, right = wheels()
+    found = same([left, replace(right, info=replace(right.info, unit="V"))])
+    assert any("left out" in n for n in found.quality.notes)
+    assert "omega_fr" not in found.symbols
+
+
+def test_no_usable_signal_is_an_error():
+    left, _ = wheels(10)
+    with pytest.raises(SignalError, match="no usable signal"):
+        both_none(replace(left, values=np.full(10, np.nan)))
+
+
+def both_none(c):
+    return long_drive(
+        {"omega_fl": (Entry("omega_fl", "omega_fl"), c.info)}, lambda: pieces([c], 3, np.random.default_rng(0)), signal_map=SignalMap(),
+        vehicle=CAR,
+    )  # fmt: skip
