@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
 import polars as pl
 
 from aqualog.errors import LogError
-from aqualog.io.base import FaultLog, ReadOptions
-from aqualog.io.csv_cells import Numbers, numbers, plain
+from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.io.csv_cells import numbers, plain
 from aqualog.io.csv_dialect import Column, find_layout
-from aqualog.io.csv_rows import RowFaults, Rows, find_rows
+from aqualog.io.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
 from aqualog.io.csv_text import read_text
-from aqualog.io.table_time import FieldKind, Stamps, TableField, TimeChoice, choose_time, from_dates, from_numbers
-from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults
+from aqualog.io.table_time import (
+    FieldKind,
+    Stamps,
+    TableField,
+    TimeChoice,
+    choose_time,
+    from_dates,
+    from_numbers,
+    judged_unit,
+    no_unit_note,
+)  # fmt: skip
+from aqualog.io.text_file import TextFile, open_text
+from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, FloatArray
 
 __all__ = ["CsvReader"]
 
 # Above this share of short rows the writer leaves out blank cells at the end; below it rows are damaged.
 _HABIT = 0.1
+_TAIL = 1 << 16  # [bytes]
 
 
 class CsvReader:
@@ -39,16 +53,26 @@ class CsvReader:
         self._rows: Rows | None = None
         self._stamps: Stamps | None = None
         self._counted: set[int] = set()
-        text = read_text(path)
-        self._faults.notes += text.notes
-        self._data = text.data
-        self._layout = find_layout(text.data, where=str(path))
-        ends = text.data.count(b"\n") + (not text.data.endswith(b"\n"))
+        self._lost: dict[tuple[int, str], tuple[int, int]] = {}
+        self._data: bytes | TextFile = self._text()
+        self._layout = find_layout(self._data, where=str(path))
+        ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
         self._count = max(0, ends - self._layout.first_line + 1)
         self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
         if self._time.note:
             self._note(self._time.note)
         self._note_columns()
+
+    def _text(self) -> bytes | TextFile:
+        try:
+            large = open_text(self._path)
+        except OSError as error:
+            raise LogError(f"cannot be opened: {error.strerror}", where=str(self._path)) from error
+        if large is not None:
+            return large
+        text = read_text(self._path)
+        self._faults.notes += text.notes
+        return text.data
 
     def channels(self) -> Sequence[ChannelInfo]:
         """All numeric columns but the time; `count` is the number of lines below the header."""
@@ -67,14 +91,52 @@ class CsvReader:
         cells = rows.cells(needed, where=str(self._path)) if needed else {}
         if self._stamps is None:
             self._stamps = self._read_time(cells, rows)
-        columns = self._layout.columns
-        return [self._channel(w, numbers(cells[w.key], columns[w.key].style), self._stamps, rows) for w in asked]
+        found = [self._channel(w, cells, self._stamps, rows) for w in asked]
+        self._counted |= {w.key for w in asked}
+        self._tell_lost()
+        return found
 
-    def _channel(self, info: ChannelInfo, samples: Numbers, stamps: Stamps, rows: Rows) -> Channel:
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
+        """The same piece by piece where the file is large and its time is a number; else in one."""
+        asked = list(wanted)
+        numeric = self._layout.columns[self._time.index].kind == "number"
+        if isinstance(self._data, TextFile) and numeric:
+            return [part_of(asked, self._pieces(asked, self._data))]
+        return [part_of(asked, (self.read(asked) for _ in range(1)))]
+
+    def _pieces(self, asked: Sequence[ChannelInfo], text: TextFile) -> Iterator[Sequence[Channel]]:
+        columns, choice = self._layout.columns, self._time
+        where = str(self._path)
+        faults, count = RowFaults(), 0
+        unit, first = choice.unit, None
+        for body, line, is_last in bodies(text, behind(text, self._layout.first_line - 1), self._layout.first_line):
+            rows = rows_of(body, self._layout, line, is_cut=is_last and text[-1:] not in (b"\n", b"\r"))
+            faults, count = faults + rows.faults, count + len(rows.lines)
+            cells = rows.cells(list({choice.index, *(w.key for w in asked)}), where=where)
+            column = columns[choice.index]
+            values = numbers(cells[choice.index], column.style).values
+            if not unit:
+                unit, reason = judged_unit(np.concatenate([values, self._last_times(text)]))
+                self._note(no_unit_note(unit, reason))
+            stamps = from_numbers(values, unit, cells=plain(cells[choice.index], column.style))
+            first = first or stamps
+            self._count_lost(~stamps.valid, rows, -1, self._no_time(column))
+            yield [self._channel(w, cells, replace(stamps, absolute=first.absolute), rows) for w in asked]
+        self._note_rows(faults, count)
+        self._tell_lost()
+
+    def _last_times(self, text: TextFile) -> FloatArray:
+        """The time at the end of the file: how long a log is tells its unit."""
+        column = self._layout.columns[self._time.index]
+        tail = text[max(len(text) - _TAIL, behind(text, self._layout.first_line - 1)) :].rstrip(b"\r\n")
+        rows = rows_of(tail[tail.find(b"\n") + 1 :], self._layout, 0, is_cut=True)
+        return numbers(rows.cells([column.index], where=str(self._path))[column.index], column.style).values
+
+    def _channel(self, info: ChannelInfo, cells: dict[int, pl.Series], stamps: Stamps, rows: Rows) -> Channel:
+        samples = numbers(cells[info.key], self._layout.columns[info.key].style)
         keep = stamps.valid & ~samples.blank
         if info.key not in self._counted:
-            self._counted.add(info.key)
-            self._lose(samples.unreadable & keep, rows, f'column "{info.path}": {{}} not a number')
+            self._count_lost(samples.unreadable & keep, rows, info.key, f'column "{info.path}": {{}} not a number')
         return Channel(info, stamps.t_ns[keep], samples.values[keep], stamps.absolute)
 
     def _read_time(self, cells: dict[int, pl.Series], rows: Rows) -> Stamps:
@@ -82,8 +144,11 @@ class CsvReader:
         stamps = self._as_stamps(column, cells[choice.index], None if choice.day is None else cells[choice.day])
         for note in stamps.notes:
             self._note(note)
-        self._lose(~stamps.valid, rows, f'time column "{column.name}": {{}} without a time, the row is left out')
+        self._count_lost(~stamps.valid, rows, -1, self._no_time(column))
         return stamps
+
+    def _no_time(self, column: Column) -> str:
+        return f'time column "{column.name}": {{}} without a time, the row is left out'
 
     def _as_stamps(self, column: Column, cells: pl.Series, day: pl.Series | None) -> Stamps:
         if column.kind in ("stamp", "clock"):
@@ -96,16 +161,23 @@ class CsvReader:
 
     def _found_rows(self) -> Rows:
         if self._rows is None:
-            self._rows, self._data = find_rows(self._data, self._layout), b""
+            data = self._data if isinstance(self._data, bytes) else self._data[:]
+            self._rows, self._data = find_rows(data, self._layout), b""
             self._note_rows(self._rows.faults, len(self._rows.lines))
         return self._rows
 
-    def _lose(self, bad: BoolArray, rows: Rows, text: str) -> None:
-        count = int(bad.sum())
-        if count:
+    def _count_lost(self, bad: BoolArray, rows: Rows, column: int, text: str) -> None:
+        """Cells of a column that are lost, by what is told of them."""
+        if bad.any():
+            count, first = self._lost.get((column, text), (0, int(rows.lines[bad][0])))
+            self._lost[column, text] = count + int(bad.sum()), first
+
+    def _tell_lost(self) -> None:
+        for (_, text), (count, first) in sorted(self._lost.items()):
             self._faults.lost_samples += count
             cells = f"{count} cell{'s' if count > 1 else ''}"
-            self._note(f"{text.format(cells)} (first at line {int(rows.lines[bad][0])})")
+            self._note(f"{text.format(cells)} (first at line {first})")
+        self._lost = {}
 
     def _note_rows(self, faults: RowFaults, count: int) -> None:
         if faults.long:
@@ -139,6 +211,8 @@ class CsvReader:
 
     def close(self) -> None:
         """Let go of the text."""
+        if isinstance(self._data, TextFile):
+            self._data.close()
         self._data, self._rows = b"", None
 
     def __enter__(self) -> Self:

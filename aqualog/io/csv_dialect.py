@@ -15,6 +15,7 @@ from typing import Literal
 from aqualog.errors import LogError
 from aqualog.io.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
 from aqualog.io.table_names import split_unit, unique_names
+from aqualog.io.text_file import TextFile
 from aqualog.units import is_unit
 
 __all__ = ["Column", "ColumnKind", "Layout", "find_layout", "is_comment", "split_line"]
@@ -85,12 +86,12 @@ def is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS)
 
 
-def find_layout(data: bytes, *, where: str) -> Layout:
+def find_layout(data: bytes | TextFile, *, where: str) -> Layout:
     """Find and prove the layout of a CSV file.
 
     Parameters
     ----------
-    data : bytes
+    data : bytes or TextFile
         The whole file in UTF-8.
     where : str
         Named in an error.
@@ -125,7 +126,7 @@ def _unproven(reasons: Sequence[str], where: str) -> LogError:
     return LogError(f"{what} (tried {tried})", where=where, expected="a header and columns of numbers", hint=hint)
 
 
-def _sample(data: bytes) -> tuple[list[str], list[str]]:
+def _sample(data: bytes | TextFile) -> tuple[list[str], list[str]]:
     """Lines of the head, and whole lines from places spread over the rest."""
     head = data[:_HEAD_BYTES]
     is_whole = len(head) == len(data)
@@ -138,7 +139,7 @@ def _sample(data: bytes) -> tuple[list[str], list[str]]:
     return [_text(line) for line in lines], [_text(line) for line in spread]
 
 
-def _spread(data: bytes, start: int) -> Iterator[bytes]:
+def _spread(data: bytes | TextFile, start: int) -> Iterator[bytes]:
     step = (len(data) - start) // _SPREAD
     for k in range(_SPREAD if step else 0):
         begin = data.find(b"\n", start + k * step) + 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 
 from aqualog.errors import LogError
 from aqualog.io.csv_dialect import Layout, is_comment, split_line
+from aqualog.io.text_file import TextFile
 
-__all__ = ["RowFaults", "Rows", "find_rows"]
+__all__ = ["RowFaults", "Rows", "behind", "bodies", "find_rows", "rows_of"]
 
+Text = bytes | TextFile
+
+PIECE = 1 << 24  # [bytes]
 _JOIN = "\x1f"  # unit separator: in no cell
 
 
@@ -25,6 +29,12 @@ class RowFaults:
     long: tuple[int, ...] = ()
     comments: tuple[int, ...] = ()
     cut_line: int = 0
+
+    def __add__(self, other: RowFaults) -> RowFaults:
+        return RowFaults(
+            self.short + other.short, self.long + other.long, self.comments + other.comments,
+            self.cut_line or other.cut_line,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,26 +77,65 @@ class Rows:
 
 
 def find_rows(data: bytes, layout: Layout) -> Rows:
-    """Find the rows below the header.
+    """Find the rows below the header; see `rows_of`."""
+    body = data[behind(data, layout.first_line - 1) : _end(data)]
+    return rows_of(body, layout, layout.first_line, is_cut=not data.endswith((b"\n", b"\r")))
+
+
+def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Rows:
+    """Rows of lines below the header.
+
+    Parameters
+    ----------
+    body : bytes
+        Whole lines, without the end of the last one.
+    layout : Layout
+    first_line : int
+        Number of the first of them in the file.
+    is_cut : bool
+        Whether the file ends behind them without the end of a line.
 
     Nearly all files are regular: every line has the separators of a whole row. Only such a file is given to the library
     as it is, which drops the cells of longer rows and fills up shorter ones without a word.
     """
-    body = data[_behind(data, layout.first_line - 1) : _end(data)]
     lines = _regular(body, layout)
     if lines is not None:
-        numbers = layout.first_line + np.arange(lines, dtype=np.int64)
+        numbers = first_line + np.arange(lines, dtype=np.int64)
         rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults())
         if b'"' not in body or _is_quoted_plainly(rows):
             return rows
-    return _irregular(body, layout, is_cut=not data.endswith((b"\n", b"\r")))
+    return _irregular(body, layout, first_line, is_cut=is_cut)
 
 
-def _behind(data: bytes, lines: int) -> int:
+def behind(data: Text, lines: int) -> int:
+    """Where the text goes on behind so many lines."""
     at = 0
     for _ in range(lines):
         at = data.find(b"\n", at) + 1
     return at
+
+
+def bodies(text: TextFile, at: int, line: int) -> Iterator[tuple[bytes, int, bool]]:
+    """Pieces of whole lines from a place on, each with the number of its first line and whether it is the last.
+
+    As of the whole file, what ends no line at its end is no line.
+    """
+    rest, place, size = b"", at, len(text)
+    for block in text.blocks(at, PIECE):
+        place += len(block)
+        data = rest + block
+        last = place >= size
+        end = _end(data) if last else _end(data[: data.rfind(b"\n") + 1])
+        if not end and not last:
+            rest = data
+            continue
+        body, rest = data[:end], data[end:]
+        if body or last:
+            yield body, line, last
+        if not last:
+            line += body.count(b"\n") + 1
+            # the end of this body's last line
+            rest = rest.removeprefix(b"\r").removeprefix(b"\n")
 
 
 def _end(data: bytes) -> int:
@@ -123,13 +172,13 @@ def _is_quoted_plainly(rows: Rows) -> bool:
     return True
 
 
-def _irregular(body: bytes, layout: Layout, *, is_cut: bool) -> Rows:
+def _irregular(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Rows:
     """Line by line: rows that fit are kept, the lines of the others remembered. No cell spans lines."""
     names = len(layout.columns)
     kept: list[list[str]] = []
     lines: list[int] = []
     short, long, comments = [], [], []
-    for line, text in enumerate(body.decode("utf-8").split("\n"), start=layout.first_line):
+    for line, text in enumerate(body.decode("utf-8").split("\n"), start=first_line):
         cells = _split(text, layout.separator)
         if not any(cells):
             continue

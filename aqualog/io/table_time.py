@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from aqualog.errors import ConfigError, LogError
 from aqualog.io.base import ReadOptions
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.types import BoolArray, TimeArray
 from aqualog.units import is_unit, parse_unit
 
-__all__ = ["Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "text_to_ns"]
+__all__ = [
+    "Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "judged_unit", "no_unit_note",
+    "text_to_ns",
+]  # fmt: skip
 
 FieldKind = Literal["number", "stamp", "date", "clock", "text"]
 
@@ -156,8 +159,8 @@ def from_numbers(
     if unit:
         factor = _ns_per(unit)
     else:
-        name, reason = _judged(values[valid].astype(np.float64))
-        factor, notes = _NS[name], (f"the time has no unit; taken as {name} ({reason})",)
+        name, reason = judged_unit(values)
+        factor, notes = _NS[name], (no_unit_note(name, reason),)
     seconds = values.astype(np.float64) * (factor / 1e9)
     valid &= np.abs(seconds) < _LATEST_S
     absolute = bool(valid.any()) and _EPOCH_S[0] < float(np.median(seconds[valid])) < _EPOCH_S[1]
@@ -196,8 +199,14 @@ def _ns_per(unit: str) -> int:
     return round(parse_unit(unit).factor * 1e9)
 
 
-def _judged(values: FloatArray) -> tuple[str, str]:
-    """Unit that makes the stamps plausible, and why."""
+def no_unit_note(name: str, reason: str) -> str:
+    """What is told of a time whose unit is judged."""
+    return f"the time has no unit; taken as {name} ({reason})"
+
+
+def judged_unit(stamps: NDArray[np.float64] | NDArray[np.int64]) -> tuple[str, str]:
+    """Unit that makes the stamps (n,) plausible, and why; NaN where missing."""
+    values = stamps[np.isfinite(stamps)].astype(np.float64)
     if values.size < 2:
         return "s", "nothing speaks against it"
     steps = np.diff(values)
