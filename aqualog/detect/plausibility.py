@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping
 
 import numpy as np
@@ -17,9 +18,30 @@ SAMPLE = 0.1  # [s] between the samples of which a median is taken
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
 LEAST_SAMPLES = 50
+MOST = 1 << 17  # samples of which a median is taken
 RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
 LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less tells no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
+
+
+class _Sampled:
+    """Every k-th value of a signal, k so large that a drive of any length leaves no more than `MOST` of them."""
+
+    def __init__(self) -> None:
+        self._stride = 1
+        self._n = 0
+        self._parts: list[FloatArray] = []
+
+    def push(self, x: FloatArray) -> None:
+        self._parts.append(x[-self._n % self._stride :: self._stride].copy())
+        self._n += x.size
+        while -(-self._n // self._stride) > MOST:
+            self._stride *= 2
+            self._parts = [np.concatenate(self._parts)[::2].copy()]
+
+    def finite(self) -> FloatArray:
+        x = np.concatenate(self._parts) if self._parts else np.zeros(0)
+        return np.asarray(x[np.isfinite(x)])
 
 
 class Plausibility:
@@ -43,6 +65,7 @@ class Plausibility:
         self._n = 0
         self._rest: FloatArray = np.zeros(0)
         self._kept: dict[str, list[FloatArray]] = {}
+        self._sampled: defaultdict[str, _Sampled] = defaultdict(_Sampled)
 
     def push(self, columns: Mapping[str, FloatArray], features: Mapping[str, FloatArray]) -> None:
         """Take the signals and features of the next piece, arrays (n,)."""
@@ -59,12 +82,11 @@ class Plausibility:
         for axle, wheels in AXLES.items():
             known = [columns[f"torque_{w}"][every] for w in wheels if f"torque_{w}" in self._available]
             if known:
-                sums = np.sum(known, axis=0)
-                self._keep(f"torque_{axle}", sums[np.isfinite(sums)])
+                self._sampled[f"torque_{axle}"].push(np.sum(known, axis=0))
         if "delta_a_x" in features:
             x, v, a = (features[f][every] for f in ("delta_a_x", "v_x_hat", "a_kin_slow"))
             with np.errstate(invalid="ignore"):
-                self._keep("delta_a_x", x[np.isfinite(x) & (v > 14.0) & (a > -1.0)])
+                self._sampled["delta_a_x"].push(np.where((v > 14.0) & (a > -1.0), x, np.nan))
         self._n += n
 
     def _keep(self, name: str, x: FloatArray) -> None:
@@ -79,11 +101,11 @@ class Plausibility:
         wheels = {
             w: self._whole(f"omega_{w}") * self._vehicle.r_e(w) for w in WHEELS if f"omega_{w}" in self._available
         }
-        drive = {a: self._whole(f"torque_{a}") for a in AXLES}
+        drive = {a: self._sampled[f"torque_{a}"].finite() for a in AXLES}
         return (
             *_acceleration(self._whole("a_x"), wheels, self._step * self._dt),
             *_yaw(self._whole("yaw_rate"), wheels),
-            *_resistance(self._whole("delta_a_x")),
+            *_resistance(self._sampled["delta_a_x"].finite()),
             *_drivetrain(drive, self._vehicle),
         )
 
