@@ -1,13 +1,16 @@
-"""Reading logs: MF4 beside asammdf, CSV beside pandas, MCAP beside rosbags."""
+"""Reading logs: MF4 beside asammdf, CSV beside pandas."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from tests.bench.compare import Row
+from tests.bench.scale import Scale
 
 FLOATS, INTEGERS = (np.float64, np.float32), (np.int16, np.uint32)
 LAYOUTS = {0: "not compressed", 1: "deflated", 2: "transposed and deflated"}
@@ -77,46 +80,56 @@ def unlike(a: list[np.ndarray], b: list[np.ndarray]) -> str:
     return "" if off < 1e-9 and len(a) == len(b) else f"columns differ by {off:.1e}"
 
 
-def mf4_rows(folder: Path) -> list[Row]:
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Threads that the reader takes, within."""
+    before = os.environ.get("POLARS_MAX_THREADS")
+    os.environ["POLARS_MAX_THREADS"] = str(count)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["POLARS_MAX_THREADS"]
+        else:
+            os.environ["POLARS_MAX_THREADS"] = before
+
+
+def mf4_rows(folder: Path, scale: Scale) -> list[Row]:
     """A wide file of 400 channels, 15 of them wanted, in three layouts; one thread and two."""
-    wide = [f"c{i}" for i in range(0, 400, 27)]
+    records, channels = scale.mf4
+    wide = [f"c{i}" for i in range(0, channels, -(-channels // 15))]
     rows = []
     for compression, layout in LAYOUTS.items():
-        path = made_mf4(folder / f"wide{compression}.mf4", records=180_000, channels=400, compression=compression)
+        path = made_mf4(folder / f"wide{compression}.mf4", records=records, channels=channels, compression=compression)
         size = f"{path.stat().st_size / 1e6:.0f} MB {layout}"
 
-        def ours(path: Path = path, threads: str = "1") -> list[np.ndarray]:
-            os.environ["POLARS_MAX_THREADS"] = threads
-            return with_aqualog(path, wide)
+        def ours(path: Path = path, count: int = 1) -> list[np.ndarray]:
+            with threads(count):
+                return with_aqualog(path, wide)
 
         def peer(path: Path = path) -> list[np.ndarray]:
             return with_asammdf(path, wide)
 
         rows.append(Row(
-            f"MF4, 15 of 400 channels, {layout}", "asammdf select + interp", 2.5, ours, peer, unlike,
+            f"MF4, {len(wide)} of {channels} channels, {layout}", "asammdf select + interp", 2.5, ours, peer, unlike,
             conditions=f"{size}, warm, one thread",
         ))  # fmt: skip
         rows.append(Row(
-            f"same, {layout}, two threads", "asammdf select + interp", 4.0, lambda ours=ours: ours(threads="2"), peer,
+            f"same, {layout}, two threads", "asammdf select + interp", 4.0, lambda ours=ours: ours(count=2), peer,
             unlike, clock="wall", conditions=f"{size}, warm",
         ))  # fmt: skip
         rows.append(Row(
             f"same, {layout}", "inflating (reading) alone", 1.0 / 1.3, ours, lambda path=path: inflated(path),
-            conditions=f"{size}, warm, one thread: the limit",
+            conditions=f"{size}, warm, one thread: the limit", needs=("deflate",),
         ))  # fmt: skip
     return rows
 
 
-def csv_rows(folder: Path) -> list[Row]:
+def csv_rows(folder: Path, scale: Scale) -> list[Row]:
     """An hour of 15 signals as CSV."""
-    import importlib.util
-
-    if importlib.util.find_spec("pandas") is None:
-        print("pandas is not installed and is left out: pip install '.[bench]'")
-        return []
     rng = np.random.default_rng(0)
     path = folder / "hour.csv"
-    n, names = 360_000, [f"c{i}" for i in range(15)]
+    n, names = round(100.0 * scale.hour_s), [f"c{i}" for i in range(15)]
     columns = np.column_stack([np.arange(n) * 0.01, *(rng.standard_normal(n).cumsum() for _ in names)])
     np.savetxt(path, columns, delimiter=",", header=",".join(["t", *names]), comments="", fmt="%.6f")
 
@@ -134,15 +147,7 @@ def csv_rows(folder: Path) -> list[Row]:
         frame = pd.read_csv(path)
         return [frame[n].to_numpy() for n in names]
 
-    return [
-        Row(
-            "CSV, 1 h",
-            "pandas read_csv",
-            1.8,
-            ours,
-            peer,
-            unlike,
-            clock="wall",
-            conditions=f"{path.stat().st_size / 1e6:.0f} MB, warm",
-        )
-    ]
+    return [Row(
+        "CSV, 1 h", "pandas read_csv", 1.8, ours, peer, unlike, clock="wall", needs=("pandas",),
+        conditions=f"{path.stat().st_size / 1e6:.0f} MB, warm",
+    )]  # fmt: skip
