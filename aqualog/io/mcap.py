@@ -21,7 +21,7 @@ import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
+from mcap.reader import SeekingReader
 from mcap.records import Channel as ChannelRecord
 from mcap.records import Schema as SchemaRecord
 from mcap.summary import Summary
@@ -131,7 +131,7 @@ class McapSource:
             if opcode == Opcode.CHUNK and length <= self._size:
                 for channel_id, _, data in self._chunk(chunk.chunk_start_offset, file.read(length), here):
                     _keep(samples, channel_id, data)
-            missing.difference_update(samples)
+            missing = {i for i in missing if len(samples.get(i, ())) < min(SAMPLES, self._counts[i])}
         return samples
 
     def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
@@ -347,8 +347,9 @@ def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
         return None
     if crc and _crc(file, start, size - len(MAGIC) - 4) != crc:
         return None
+    file.seek(0)  # the library looks for the magic bytes where the file stands
     try:
-        summary = make_reader(file, record_size_limit=size).get_summary()
+        summary = SeekingReader(file, record_size_limit=size).get_summary()
     except Exception:  # whatever is wrong with it, the data section is still there to be walked
         return None
     return summary if summary is not None and _is_complete(summary) else None

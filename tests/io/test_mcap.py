@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from aqualog.errors import LogError
 from aqualog.io.base import ReadOptions
-from aqualog.io.mcap import McapReader
+from aqualog.io.mcap import McapReader, McapSource
 from aqualog.io.write_mcap import McapTopic, write_mcap
 from aqualog.types import Channel
 
@@ -326,6 +326,18 @@ def chunk_offsets(path: Path) -> list[tuple[int, int]]:
         summary = make_reader(file).get_summary()
     assert summary is not None
     return [(c.chunk_start_offset, c.chunk_length) for c in summary.chunk_indexes]
+
+
+def test_sound_summary_saves_a_pass_and_tells_the_same_channels(tmp_path, monkeypatch):
+    messages = [{"x": i, "late": [i] * (i // 3)} for i in range(40)]
+    path = write_json(tmp_path / "a.mcap", messages, schema=None, chunk_size=60)
+    cut = write_json(tmp_path / "b.mcap", messages, schema=None, chunk_size=60, use_statistics=False)
+    with McapReader(cut, ReadOptions()) as reader:
+        scanned = [(c.path, c.count) for c in reader.channels()]
+    monkeypatch.setattr(McapSource, "_scan", None)
+    with McapReader(path, ReadOptions()) as reader:
+        assert [(c.path, c.count) for c in reader.channels()] == scanned
+    assert scanned[-1] == ("/car.late[1]", 40)
 
 
 @pytest.mark.parametrize("with_summary", [True, False])
