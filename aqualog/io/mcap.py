@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -28,6 +29,8 @@ from mcap.summary import Summary
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.batches import Batch, Message, batched
+from aqualog.io.mcap_scan import scanned
 from aqualog.io.messages import (
     MAX_UNPACKED,
     SAMPLES,
@@ -51,8 +54,6 @@ _TAIL = _FOOTER.size + len(MAGIC)
 _WALKED = frozenset(
     {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END}
 )
-
-Message = tuple[int, int, bytes]
 
 
 class DamagedError(Exception):
@@ -129,30 +130,30 @@ class McapSource:
             file.seek(chunk.chunk_start_offset)
             opcode, length = _HEAD.unpack(file.read(_HEAD.size))
             if opcode == Opcode.CHUNK and length <= self._size:
-                for channel_id, _, data in self._chunk(chunk.chunk_start_offset, file.read(length), here):
-                    _keep(samples, channel_id, data)
+                for batch in batched(self._chunk(chunk.chunk_start_offset, file.read(length), here)):
+                    _keep(samples, batch)
             missing = {i for i in missing if len(samples.get(i, ())) < min(SAMPLES, self._counts[i])}
         return samples
 
     def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
         """Count all messages and keep the first ones of each channel: for a file without a sound index."""
         samples: dict[int, list[bytes]] = {}
-        for channel_id, _, data in self._walk(file, None):
-            self._counts[channel_id] = self._counts.get(channel_id, 0) + 1
-            _keep(samples, channel_id, data)
+        for batch in batched(self._walk(file, None)):
+            _count(self._counts, batch)
+            _keep(samples, batch)
         orphans = sum(n for i, n in self._counts.items() if i not in self._channels)
         if orphans:
             self._notes.append(f"{self.path.name}: {orphans} messages are left out, their channel records are lost")
         return samples
 
-    def messages(self, ids: frozenset[int]) -> Iterator[Message]:
-        """Channel id, log time and bytes of these channels' messages, in file order."""
+    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
+        """These channels' messages, in file order."""
         self._lost = {}
         seen = dict.fromkeys(ids, 0)
         with self.path.open("rb") as file:
-            for message in self._walk(file, ids):
-                seen[message[0]] += 1
-                yield message
+            for batch in batched(self._walk(file, ids)):
+                _count(seen, batch)
+                yield batch
         if self._indexed:
             self._lost = {i: max(0, self._counts.get(i, 0) - n) for i, n in seen.items()}
 
@@ -168,13 +169,13 @@ class McapSource:
         many = f"{len(self._damaged)} damaged chunk{'s are' if len(self._damaged) > 1 else ' is'} left out"
         return [*self._notes, f"{self.path.name}: {many} (first at byte {offset}: {reason})"]
 
-    def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Message]:
+    def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Batch | Message]:
         """All messages of the data section; `None` asks for all channels and keeps their records."""
         in_damaged = loose = False
         for offset, opcode, body in self._records(file):
             if opcode == Opcode.CHUNK:
-                yield from (messages := self._chunk(offset, body, ids))
-                in_damaged = not messages and offset in self._damaged
+                yield from (pieces := self._chunk(offset, body, ids))
+                in_damaged = not pieces and offset in self._damaged
             elif opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
                 loose = True
                 channel_id, _, log_time, _ = _MESSAGE.unpack_from(body)
@@ -210,10 +211,18 @@ class McapSource:
             "closed; what stands before is read"
         )
 
-    def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> list[Message]:
+    def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> Sequence[Batch | Message]:
         """Messages of one chunk; none if it is damaged, for then no byte of it can be trusted."""
         try:
-            return list(_split(_unpacked(body), ids, self._note_record))
+            data = _unpacked(body)
+            if (scan := scanned(data)) is None:
+                return list(_split(data, ids, self._note_record))
+            for opcode, record in scan.records:
+                self._note_record(opcode, record)
+            batch = scan.messages
+            if ids is not None:
+                batch = batch.only(np.isin(batch.ids, list(ids)))
+            return [batch] if batch.ids.size else []
         except (DamagedError, struct.error, UnicodeDecodeError) as error:
             self._damaged[offset] = str(error)
             return []
@@ -256,10 +265,18 @@ def _check_magic(path: Path) -> None:
         raise LogError(what, where=str(path), expected="a file that begins with \\x89MCAP0", hint="record it again")
 
 
-def _keep(samples: dict[int, list[bytes]], channel_id: int, data: bytes) -> None:
-    kept = samples.setdefault(channel_id, [])
-    if len(kept) < SAMPLES:
-        kept.append(data)
+def _count(counts: dict[int, int], batch: Batch) -> None:
+    for channel_id, n in zip(*(found.tolist() for found in np.unique(batch.ids, return_counts=True)), strict=True):
+        counts[channel_id] = counts.get(channel_id, 0) + n
+
+
+def _keep(samples: dict[int, list[bytes]], batch: Batch) -> None:
+    """Add to the first messages of each channel what is missing of them."""
+    for channel_id in np.unique(batch.ids).tolist():
+        kept = samples.setdefault(channel_id, [])
+        if len(kept) < SAMPLES:
+            first = batch.only(np.flatnonzero(batch.ids == channel_id)[: SAMPLES - len(kept)])
+            kept += [data for _, _, data in first.messages()]
 
 
 def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, bytes], None]) -> Iterator[Message]:

@@ -2,6 +2,8 @@
 
 A `Source` is one file of recorded messages; a `Codec` turns the bytes of one message type into numbers; `MessageReader`
 lists the numeric leaf fields of all topics as channels and decodes those that are asked for, in one pass per file.
+Messages that are all laid out alike are cut into columns; the codec decodes the others, and says whether the cut is
+right.
 """
 
 from __future__ import annotations
@@ -22,12 +24,16 @@ import numpy as np
 from google.protobuf.message import Message as ProtobufMessage
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
+from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.msg import normalize_msgtype
+from rosbags.typesys.store import Typestore
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog
+from aqualog.io.batches import Batch, rows_of
+from aqualog.io.fixed_layout import Layout, ros_layout
 from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
 
 __all__ = [
@@ -46,6 +52,9 @@ _MAX_DEPTH = 12
 _DAY_NS = 86_400 * 10**9
 _YEAR_2000_NS = 946_684_800 * 10**9
 _MAX_INT64 = 2**63 - 1
+_WORTH_A_LAYOUT = 64  # messages of a stream; fewer are decoded sooner than their layout is found
+_TRIALS = 4  # batches in turn that may differ among themselves before a stream is no longer taken for fixed
+_DRAWN = 4  # messages drawn at random by which a layout is compared with the decoder
 
 FieldPath = tuple[str | int, ...]
 Getter = Callable[[Any], Any]
@@ -102,10 +111,17 @@ class Codec(Protocol):
         """Unit and comment of a leaf."""
         ...
 
+    def layout(self, data: bytes, /) -> Layout | None:
+        """Where the fields of messages like this one lie; None if that cannot be said without decoding each."""
+        ...
+
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Stream:
-    """One recorded connection of a topic. `id` is unique within its source."""
+    """One recorded connection of a topic.
+
+    `id` is unique within its source; `stamp_parts` are the fields for seconds and nanoseconds that `stamp` reads.
+    """
 
     id: int
     topic: str
@@ -113,6 +129,7 @@ class Stream:
     codec: Codec
     leaves: tuple[Leaf, ...]
     stamp: Callable[[Any], int] | None
+    stamp_parts: tuple[FieldPath, ...] = ()
 
 
 class Source(Protocol):
@@ -124,12 +141,12 @@ class Source(Protocol):
         """All connections with messages that can be decoded, in file order."""
         ...
 
-    def messages(self, ids: frozenset[int]) -> Iterator[tuple[int, int, bytes]]:
-        """Stream id, log time [ns] and bytes of all messages of these streams, in file order."""
+    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
+        """All messages of these streams, in file order."""
         ...
 
     def lost(self, stream_id: int) -> int:
-        """Messages of a stream that the last pass of `messages` could not get at."""
+        """Messages of a stream that the last pass of `batches` could not get at."""
         ...
 
     def notes(self) -> Sequence[str]:
@@ -171,6 +188,9 @@ class _JsonCodec:
         unit = node.get("unit")
         return (unit if isinstance(unit, str) else _bracket_unit(comment)), comment
 
+    def layout(self, data: bytes, /) -> Layout | None:
+        return None
+
 
 def _mapping(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {}
@@ -210,9 +230,11 @@ def _walker(path: FieldPath) -> Getter:
 
 
 class _RosCodec:
-    def __init__(self, deserialize: Callable[[bytes, str], object], msgtype: str) -> None:
-        self._deserialize = deserialize
+    def __init__(self, store: Typestore, msgtype: str, *, cdr: bool) -> None:
+        self._deserialize = store.deserialize_cdr if cdr else store.deserialize_ros1
+        self._types = store.fielddefs
         self._msgtype = msgtype
+        self._cdr = cdr
 
     def decode(self, data: bytes, /) -> Any:
         return self._deserialize(data, self._msgtype)
@@ -230,6 +252,9 @@ class _RosCodec:
 
     def describe(self, path: FieldPath) -> tuple[str, str]:
         return "", ""
+
+    def layout(self, data: bytes, /) -> Layout | None:
+        return ros_layout(self._types, self._msgtype, data, cdr=self._cdr)
 
 
 def _attribute_getter(path: FieldPath) -> Getter:
@@ -272,6 +297,9 @@ class _ProtobufCodec:
 
     def describe(self, path: FieldPath) -> tuple[str, str]:
         return "", ""
+
+    def layout(self, data: bytes, /) -> Layout | None:
+        return None
 
 
 def _protobuf_fields(message: Any) -> Iterator[tuple[str, Any]]:
@@ -359,8 +387,7 @@ def _ros_codec(name: str, schema_encoding: str, definition: bytes, fallback: Sto
         pending += [used for _, field in types[wanted][1] for used in _used_types(field)]
     store = get_typestore(Stores.EMPTY)
     store.register(types)
-    deserialize = store.deserialize_ros1 if fallback is Stores.ROS1_NOETIC else store.deserialize_cdr
-    return _RosCodec(deserialize, msgtype)
+    return _RosCodec(store, msgtype, cdr=fallback is not Stores.ROS1_NOETIC)
 
 
 def _ros_types(msgtype: str, schema_encoding: str, text: str) -> dict[str, Any]:
@@ -411,9 +438,10 @@ def make_stream(stream_id: int, topic: str, count: int, codec: Codec, samples: S
             leaves.setdefault(leaf.text, leaf)
     if failure is not None and not good:
         raise UndecodableError(f"its messages cannot be decoded ({_brief(failure)})") from failure
-    base, stamp = _find_stamp(codec, {leaf.path for leaf in leaves.values()})
+    base, parts = _find_stamp({leaf.path for leaf in leaves.values()})
+    stamp = _stamp_getter(*(codec.getter(part) for part in parts)) if parts else None
     kept = [x for x in leaves.values() if x.path != _BOOKKEEPING and not (base and x.path[: len(base)] == base)]
-    return Stream(stream_id, topic, count, codec, tuple(kept), stamp)
+    return Stream(stream_id, topic, count, codec, tuple(kept), stamp, parts)
 
 
 def _leaf_paths(codec: Codec, value: Any, path: FieldPath) -> Iterator[FieldPath]:
@@ -424,12 +452,12 @@ def _leaf_paths(codec: Codec, value: Any, path: FieldPath) -> Iterator[FieldPath
             yield from _leaf_paths(codec, child, (*path, step))
 
 
-def _find_stamp(codec: Codec, paths: set[FieldPath]) -> tuple[FieldPath, Callable[[Any], int] | None]:
+def _find_stamp(paths: set[FieldPath]) -> tuple[FieldPath, tuple[FieldPath, ...]]:
     for base in _STAMP_FIELDS:
         for sec, nsec in _STAMP_PARTS:
             if (*base, sec) in paths and (*base, nsec) in paths:
-                return base, _stamp_getter(codec.getter((*base, sec)), codec.getter((*base, nsec)))
-    return (), None
+                return base, ((*base, sec), (*base, nsec))
+    return (), ()
 
 
 def _stamp_getter(seconds: Getter, nanoseconds: Getter) -> Callable[[Any], int]:
@@ -489,6 +517,24 @@ class _Sink:
 
         return take
 
+    def feed_rows(self, stream: Stream) -> Callable[[Batch], None]:
+        """Function that takes messages of a stream, side by side where they are laid out alike."""
+        take = self.feed(stream)
+        cutter = _Cutter(stream, list(self.columns))
+
+        def take_rows(rows: Batch) -> None:
+            if (found := cutter.cut(rows)) is None:
+                for _, log_time, data in rows.messages():
+                    take(log_time, data)
+                return
+            stamps, columns = found
+            self.log_times.frombytes(rows.log_times.tobytes())
+            self.stamps.frombytes(stamps.tobytes())
+            for column, values in zip(self.columns.values(), columns, strict=True):
+                column.frombytes(values.tobytes())
+
+        return take_rows
+
     def times(self, faults: FaultLog) -> TimeArray:
         """Time of each sample: the message's own stamp where it is plausible, else the log time. [ns]"""
         log = np.minimum(np.array(self.log_times, dtype=np.uint64), np.uint64(_MAX_INT64)).astype(np.int64)
@@ -508,6 +554,90 @@ class _Sink:
 
     def values(self, text: str) -> FloatArray:
         return np.array(self.columns[text], dtype=np.float64)
+
+
+class _Cutter:
+    """Cuts a stream's messages into columns while they are laid out alike; `texts` are the leaves that are wanted.
+
+    A layout is believed when it gives the same as the decoder, to the bit, for messages drawn at random.
+    """
+
+    def __init__(self, stream: Stream, texts: Sequence[str]) -> None:
+        leaves = {leaf.text: leaf.path for leaf in stream.leaves}
+        self._stream = stream
+        self._texts = texts
+        self._paths = [leaves.get(text) for text in texts]
+        self._layout: Layout | None = None
+        self._trials = _TRIALS if stream.count >= _WORTH_A_LAYOUT else 0
+
+    def cut(self, rows: Batch) -> tuple[TimeArray, list[FloatArray]] | None:
+        """Stamps and columns of these messages, each (n,); None if they have to be decoded one by one."""
+        if not self._trials:
+            return None
+        layout = self._layout or self._learnt(rows.data[int(rows.starts[0]) : int(rows.ends[0])])
+        block = None if layout is None else _block(rows, len(layout.example))
+        if layout is None or block is None or not layout.holds(block):
+            self._layout = None
+            self._trials -= 1
+            return None
+        self._layout, self._trials = layout, _TRIALS
+        return self._columns(layout, block)
+
+    def _learnt(self, example: bytes) -> Layout | None:
+        layout = self._stream.codec.layout(example)
+        if layout is None or not example:
+            return None
+        for field in map(layout.field, self._stream.stamp_parts):
+            if field is None or field.dtype.kind not in "iu" or field.dtype.itemsize > 4:
+                return None
+        return layout if self._is_right(layout) else None
+
+    def _is_right(self, layout: Layout) -> bool:
+        messages = [layout.example, *layout.drawn(_DRAWN)]
+        sink = _Sink("", self._texts)
+        take = sink.feed(self._stream)
+        for message in messages:
+            take(0, message)
+        stamps, columns = self._columns(
+            layout, np.frombuffer(b"".join(messages), np.dtype((np.void, len(messages[0]))))
+        )
+        cut = [stamps.tobytes(), *(values.tobytes() for values in columns)]
+        return cut == [sink.stamps.tobytes(), *(values.tobytes() for values in sink.columns.values())]
+
+    def _columns(self, layout: Layout, block: NDArray[np.void]) -> tuple[TimeArray, list[FloatArray]]:
+        stamps = np.zeros(block.size, dtype=np.int64)
+        parts = [f.of(block).astype(np.int64) for p in self._stream.stamp_parts if (f := layout.field(p)) is not None]
+        if parts:
+            stamps = np.maximum(parts[0] * 1_000_000_000 + parts[1], 0)
+        fields = [None if path is None else layout.field(path) for path in self._paths]
+        with np.errstate(invalid="ignore"):  # a NaN of float32 may be a signalling one, which is a value here
+            return stamps, [np.full(block.size, np.nan) if f is None else f.floats(block) for f in fields]
+
+
+def _block(rows: Batch, size: int) -> NDArray[np.void] | None:
+    if (rows.ends - rows.starts != size).any():
+        return None
+    return rows_of(rows.data, rows.starts, size)
+
+
+def _taker(sink: _Sink, streams: Sequence[Stream]) -> Callable[[Batch], None]:
+    """Function that feeds a topic with its part of a batch."""
+    if len(streams) > 1:  # their messages are mixed, and the file's order is kept
+        feeds = {stream.id: sink.feed(stream) for stream in streams}
+
+        def take_mixed(batch: Batch) -> None:
+            for stream_id, log_time, data in batch.only(np.isin(batch.ids, list(feeds))).messages():
+                feeds[stream_id](log_time, data)
+
+        return take_mixed
+    feed_rows, only_id = sink.feed_rows(streams[0]), streams[0].id
+
+    def take(batch: Batch) -> None:
+        rows = np.flatnonzero(batch.ids == only_id)
+        if rows.size:
+            feed_rows(batch.only(rows))
+
+    return take
 
 
 class MessageReader:
@@ -573,11 +703,15 @@ class MessageReader:
 
     def _pass(self, index: int, source: Source, sinks: Mapping[str, _Sink]) -> None:
         streams = [s for i, s in self._known_streams() if i == index and s.topic in sinks]
-        feeds = {stream.id: sinks[stream.topic].feed(stream) for stream in streams}
-        if not feeds:
+        if not streams:
             return
-        for stream_id, log_time, data in source.messages(frozenset(feeds)):
-            feeds[stream_id](log_time, data)
+        by_topic: dict[str, list[Stream]] = {}
+        for stream in streams:
+            by_topic.setdefault(stream.topic, []).append(stream)
+        takers = [_taker(sinks[topic], members) for topic, members in by_topic.items()]
+        for batch in source.batches(frozenset(stream.id for stream in streams)):
+            for take in takers:
+                take(batch)
         for stream in streams:
             self._lost[stream.topic, index, stream.id] = source.lost(stream.id)
 

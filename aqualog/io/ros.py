@@ -25,6 +25,7 @@ from rosbags.typesys import Stores
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.batches import Batch, Message, batched
 from aqualog.io.mcap import DamagedError, McapSource, unpack
 from aqualog.io.messages import (
     MAX_UNPACKED,
@@ -45,8 +46,6 @@ _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _U32 = struct.Struct("<I")
 _OP_MESSAGE, _OP_BAG, _OP_INDEX, _OP_CHUNK, _OP_CONNECTION = 2, 3, 4, 5, 7
 _SPLIT = re.compile(r"\.(db3|mcap)(\.zstd)?$")
-
-Message = tuple[int, int, bytes]
 
 
 class RosReader(MessageReader):
@@ -236,8 +235,11 @@ class Db3Source:
             self._cut(error)
         return {topic_id: list(_rows(base, rows)) for topic_id, rows in firsts.items()}
 
-    def messages(self, ids: frozenset[int]) -> Iterator[Message]:
-        """Topic id, time of reception and bytes of these topics' messages, in the order of recording."""
+    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
+        """These topics' messages with their times of reception, in the order of recording."""
+        return batched(self._messages(ids))
+
+    def _messages(self, ids: frozenset[int]) -> Iterator[Message]:
         marks = ",".join("?" * len(ids))
         query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id"
         seen = dict.fromkeys(ids, 0)
@@ -372,8 +374,11 @@ class BagSource:
             _keep(samples, number, data)
         return samples
 
-    def messages(self, ids: frozenset[int]) -> Iterator[Message]:
-        """Connection, time of reception and bytes of these connections' messages, in file order."""
+    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
+        """These connections' messages with their times of reception, in file order."""
+        return batched(self._messages(ids))
+
+    def _messages(self, ids: frozenset[int]) -> Iterator[Message]:
         self._lost = {}
         for message in self._walk():
             if message[0] in ids:

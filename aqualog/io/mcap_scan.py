@@ -1,0 +1,63 @@
+"""The records of an unpacked MCAP chunk: where they are, found by their lengths, their heads read all at once.
+
+Only a chunk without any fault is scanned. Of any other `scanned` gives None, and who walks it record by record says
+what is wrong: there is one set of errors.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+
+from aqualog.io.batches import Batch, rows_of
+
+__all__ = ["Scan", "scanned"]
+
+_HEAD = 9  # bytes: opcode, length
+_STAMPED = 22  # bytes before the content of a message: channel, sequence, log time, publish time
+_PRIVATE = 0x80  # from there on opcodes are private and skipped
+_RECORD = np.dtype({
+    "names": ["length", "channel", "log_time"],
+    "formats": ["<u8", "<u2", "<u8"],
+    "offsets": [1, _HEAD, _HEAD + 6],
+    "itemsize": _HEAD + _STAMPED,
+})  # fmt: skip
+
+
+class Scan(NamedTuple):
+    """What a chunk holds: its messages, and opcode and body of each schema and channel."""
+
+    messages: Batch
+    records: tuple[tuple[int, bytes], ...]
+
+
+def scanned(data: bytes) -> Scan | None:
+    """Records of a chunk, none of them copied; None if anything about them is unusual."""
+    found: list[int] = []
+    position, size = 0, len(data)
+    add, length_at = found.append, struct.Struct("<Q").unpack_from
+    try:
+        while position < size:
+            add(position)
+            position += _HEAD + length_at(data, position + 1)[0]
+    except struct.error:
+        return None
+    if position != size:
+        return None
+    at = np.array(found, dtype=np.int64)
+    ends = np.append(at[1:], size)
+    opcodes = np.frombuffer(data, np.uint8)[at]
+    of_messages = opcodes == Opcode.MESSAGE
+    others = np.flatnonzero(~of_messages & (opcodes < _PRIVATE)).tolist()
+    if any(opcodes[i] not in (Opcode.SCHEMA, Opcode.CHANNEL) for i in others):
+        return None
+    at_message, ends_message = at[of_messages], ends[of_messages]
+    starts = at_message + _HEAD + _STAMPED
+    if (starts > ends_message).any():
+        return None
+    heads = rows_of(data, at_message, _RECORD.itemsize).view(_RECORD) if starts.size else np.zeros(0, _RECORD)
+    batch = Batch(heads["channel"].astype(np.int64), heads["log_time"], starts, ends_message, data)
+    return Scan(batch, tuple((int(opcodes[i]), data[found[i] + _HEAD : int(ends[i])]) for i in others))
