@@ -19,6 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aqualog.io import batches, mcap, messages
 from aqualog.io.base import ReadOptions
+from aqualog.io.mcap_scan import scanned
 from aqualog.io.open_log import open_log
 
 T0 = 1_700_000_000 * 10**9
@@ -378,3 +379,45 @@ def test_the_sample_drive():
     cuts = compared(Path(__file__).resolve().parents[2] / "sample_logs" / "lane_drive.mcap")
     assert cuts
     assert all(cuts)
+
+
+def record(opcode: int, body: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(body)) + body
+
+
+def message_record(channel: int, data: bytes) -> bytes:
+    return record(5, struct.pack("<HIQQ", channel, 0, T0 + channel, 0) + data)
+
+
+SOUND = message_record(1, b"one") + record(0x81, b"private") + message_record(2, b"") + message_record(1, b"three")
+
+
+@pytest.mark.parametrize("data", [b"", SOUND, record(0x80, b""), message_record(9, b"")])
+def test_a_scanned_chunk_holds_what_a_walk_finds(data):
+    assert list(scanned(data).messages.messages()) == list(mcap._split(data, None, lambda *_: None))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        SOUND + record(5, bytes(10)), SOUND + record(5, bytes(10)) + SOUND, SOUND + record(6, b"chunk"), SOUND[:-1],
+        SOUND + b"\5\0", SOUND + b"\5" + b"\xff" * 8, SOUND + record(0, b"") + SOUND,
+    ],
+)  # fmt: skip
+def test_an_unusual_chunk_is_left_to_the_walk(data):
+    assert scanned(data) is None
+
+
+def test_schemas_and_channels_of_a_chunk_are_told():
+    data = record(3, b"schema") + SOUND + record(4, b"channel")
+    assert scanned(data).records == ((3, b"schema"), (4, b"channel"))
+
+
+@pytest.mark.parametrize("enough", [1, 100, 1 << 19])
+def test_batches_keep_the_order_of_messages_in_and_outside_of_chunks(monkeypatch, enough):
+    monkeypatch.setattr(batches, "_ENOUGH", enough)
+    chunk = scanned(SOUND).messages
+    loose = [(7, 5, b"a"), (8, 0, b""), (7, 2**64 - 1, b"bcd")]
+    pieces = [*loose, chunk, loose[0], chunk, chunk, *loose]
+    expected = [m for piece in pieces for m in (piece.messages() if piece is chunk else [piece])]
+    assert [m for batch in batches.batched(pieces) for m in batch.messages()] == expected
