@@ -31,7 +31,7 @@ from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
 
 from aqualog.errors import LogError
-from aqualog.io.base import FaultLog
+from aqualog.io.base import FaultLog, Part, part_of
 from aqualog.io.batches import Batch, rows_of
 from aqualog.io.fixed_layout import Layout, ros_layout
 from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
@@ -52,6 +52,7 @@ _MAX_DEPTH = 12
 _DAY_NS = 86_400 * 10**9
 _YEAR_2000_NS = 946_684_800 * 10**9
 _MAX_INT64 = 2**63 - 1
+_PIECE = 1 << 17  # samples
 _WORTH_A_LAYOUT = 64  # messages of a stream; fewer are decoded sooner than their layout is found
 _TRIALS = 4  # batches in turn that may differ among themselves before a stream is no longer taken for fixed
 _DRAWN = 4  # messages drawn at random by which a layout is compared with the decoder
@@ -489,6 +490,8 @@ class _Sink:
         self.columns = {text: array("d") for text in texts}
         self.undecoded = 0
         self.stamped = False
+        self._unlogged = True
+        self._taken = self._rejected = 0
 
     def feed(self, stream: Stream) -> Callable[[int, bytes], None]:
         """Function that takes one message of a stream."""
@@ -535,22 +538,39 @@ class _Sink:
 
         return take_rows
 
-    def times(self, faults: FaultLog) -> TimeArray:
+    def __len__(self) -> int:
+        return len(self.log_times)
+
+    def times(self) -> TimeArray:
         """Time of each sample: the message's own stamp where it is plausible, else the log time. [ns]"""
         log = np.minimum(np.array(self.log_times, dtype=np.uint64), np.uint64(_MAX_INT64)).astype(np.int64)
+        self._taken += log.size
+        # A recorder that sets no log time at all leaves the stamps as the only clock.
+        self._unlogged &= bool(log.max(initial=0) == 0)
         if not self.stamped:
             return log
         stamps = np.array(self.stamps, dtype=np.int64)
-        # A recorder that sets no log time at all leaves the stamps as the only clock.
-        unlogged = log.max(initial=0) == 0
-        plausible = (stamps > 0) & (unlogged | (np.abs(stamps - log) <= _DAY_NS))
-        rejected = int(np.count_nonzero(~plausible))
-        if rejected:
-            faults.notes.append(
-                f'topic "{self.topic}": {rejected} of {log.size} time stamps are zero or more than a day off the log '
-                "time; the log time stands in for them"
-            )
+        plausible = (stamps > 0) & (self._unlogged | (np.abs(stamps - log) <= _DAY_NS))
+        self._rejected += int(np.count_nonzero(~plausible))
         return np.where(plausible, stamps, log)
+
+    def forget(self) -> None:
+        """Let go of the samples that have been handed on."""
+        del self.log_times[:], self.stamps[:]
+        for column in self.columns.values():
+            del column[:]
+
+    def notes(self) -> list[str]:
+        """What was wrong with the messages."""
+        found = []
+        if self._rejected:
+            found.append(
+                f'topic "{self.topic}": {self._rejected} of {self._taken} time stamps are zero or more than a day off '
+                "the log time; the log time stands in for them"
+            )
+        if self.undecoded:
+            found.append(f'topic "{self.topic}": {self.undecoded} messages cannot be decoded')
+        return found
 
     def values(self, text: str) -> FloatArray:
         return np.array(self.columns[text], dtype=np.float64)
@@ -692,16 +712,37 @@ class MessageReader:
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         """Decode these channels, in the order asked for; one pass over the file."""
         infos = list(wanted)
-        texts: dict[str, list[str]] = {}
-        for info in infos:
-            texts.setdefault(info.key[0], []).append(info.key[1])
-        sinks = {topic: _Sink(topic, list(dict.fromkeys(names))) for topic, names in texts.items()}
+        sinks = _sinks(infos)
         for index, source in enumerate(self._sources):
             with self._guard():
-                self._pass(index, source, sinks)
-        return self._finished(infos, sinks)
+                for _ in self._pass(index, source, sinks):
+                    pass
+        channels = self._channels(infos, sinks, {})
+        self._finish(sinks)
+        return channels
 
-    def _pass(self, index: int, source: Source, sinks: Mapping[str, _Sink]) -> None:
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
+        """The same piece by piece, all topics together as they were recorded."""
+        infos = list(wanted)
+        return [part_of(infos, self._pieces(infos))]
+
+    def _pieces(self, infos: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
+        sinks = _sinks(infos)
+        absolute: dict[str, bool] = {}
+        for index, source in enumerate(self._sources):
+            steps = self._pass(index, source, sinks)
+            while True:
+                with self._guard():
+                    step = next(steps, False)
+                if step is False:
+                    break
+                if sum(map(len, sinks.values())) >= _PIECE:
+                    yield self._channels(infos, sinks, absolute)
+        yield self._channels(infos, sinks, absolute)
+        self._finish(sinks)
+
+    def _pass(self, index: int, source: Source, sinks: Mapping[str, _Sink]) -> Iterator[None]:
+        """Feed one source's messages, a batch a step."""
         streams = [s for i, s in self._known_streams() if i == index and s.topic in sinks]
         if not streams:
             return
@@ -712,22 +753,29 @@ class MessageReader:
         for batch in source.batches(frozenset(stream.id for stream in streams)):
             for take in takers:
                 take(batch)
+            yield
         for stream in streams:
             self._lost[stream.topic, index, stream.id] = source.lost(stream.id)
 
-    def _finished(self, infos: Sequence[ChannelInfo], sinks: Mapping[str, _Sink]) -> list[Channel]:
-        times = {topic: sink.times(self._log) for topic, sink in sinks.items()}
+    def _channels(
+        self, infos: Sequence[ChannelInfo], sinks: Mapping[str, _Sink], absolute: dict[str, bool]
+    ) -> list[Channel]:
+        """What the sinks hold, which is gone from them then; `absolute` is said by a topic's first samples."""
+        times = {topic: sink.times() for topic, sink in sinks.items()}
+        for topic, t_ns in times.items():
+            if t_ns.size:
+                absolute.setdefault(topic, bool(np.median(t_ns) >= _YEAR_2000_NS))
+        channels = [
+            Channel(i, times[i.key[0]], sinks[i.key[0]].values(i.key[1]), absolute.get(i.key[0], False)) for i in infos
+        ]
+        for sink in sinks.values():
+            sink.forget()
+        return channels
+
+    def _finish(self, sinks: Mapping[str, _Sink]) -> None:
         for topic, sink in sinks.items():
             self._lost[topic, -1, -1] = sink.undecoded
-            if sink.undecoded:
-                self._log.notes.append(f'topic "{topic}": {sink.undecoded} messages cannot be decoded')
-        channels = []
-        for info in infos:
-            topic, text = info.key
-            t_ns = times[topic]
-            absolute = bool(t_ns.size and np.median(t_ns) >= _YEAR_2000_NS)
-            channels.append(Channel(info, t_ns, sinks[topic].values(text), absolute))
-        return channels
+            self._log.notes += sink.notes()
 
     def _guard(self) -> _Guard:
         return _Guard(self.path)
@@ -750,6 +798,13 @@ class MessageReader:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _sinks(infos: Iterable[ChannelInfo]) -> dict[str, _Sink]:
+    texts: dict[str, list[str]] = {}
+    for info in infos:
+        texts.setdefault(info.key[0], []).append(info.key[1])
+    return {topic: _Sink(topic, list(dict.fromkeys(names))) for topic, names in texts.items()}
 
 
 class _Guard:
