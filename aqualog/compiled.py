@@ -12,6 +12,8 @@ from typing import Any
 
 from numba import config, njit
 
+from aqualog.places import user_cache
+
 __all__ = ["compiled", "inlined"]
 
 _inlined: dict[FunctionType, Any] = {}
@@ -66,9 +68,8 @@ def inlined(function: Callable[..., Any]) -> Any:
 @cache
 def _user_cache() -> str:
     """A folder for machine code in the user's cache; empty where there is none to write to."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     try:
-        folder = (Path(base) if base else Path.home() / ".cache") / "aqualog" / "compiled"
+        folder = user_cache() / "compiled"
         folder.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):
         return ""

@@ -12,7 +12,7 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "compiled", "workers", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "calibrate",
+    "errors", "places", "compiled", "workers", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "calibrate",
     "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "report", "figures", "reproduce", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
@@ -72,6 +72,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "reproduce",
                 "campaign",
                 "diagnose",
+                "cache",
             )
         ),
     ],

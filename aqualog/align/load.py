@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from aqualog.align.mapping import Entry, SignalMap, resolve
 from aqualog.align.table import build_signals
@@ -13,7 +14,12 @@ from aqualog.io.open_log import DriveLog
 from aqualog.types import ChannelInfo, Signals
 from aqualog.vehicle import Vehicle
 
-__all__ = ["find_channels", "load_signals", "read_options", "read_signals"]
+if TYPE_CHECKING:
+    from aqualog.align.cache import SignalCache
+
+__all__ = ["find_channels", "kept", "load_signals", "read_options", "read_signals"]
+
+_Read = TypeVar("_Read")
 
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
@@ -28,8 +34,9 @@ def load_signals(
     signal_map: SignalMap | None = None,
     dbc: Sequence[Path] = (),
     rate_hz: float | None = None,
-    wanted: Callable[[str], bool] = lambda _: True,
+    wanted: Callable[[str], bool] | None = None,
     report: Callable[[str], None] = lambda _: None,
+    cache: SignalCache | None = None,
 ) -> Signals:
     """Read the files of one drive and bring their signals onto one grid.
 
@@ -46,20 +53,50 @@ def load_signals(
         Databases for raw CAN frames.
     rate_hz : float, optional
         Grid rate; default that of the wheel speeds.
-    wanted : callable
-        Which symbols are of interest.
+    wanted : callable, optional
+        Which symbols are of interest; default all.
     report : callable
         Told what is being done.
+    cache : SignalCache, optional
+        Asked first, and given what was read; not if only some symbols are wanted.
 
     Raises
     ------
     LogError, SignalError, ConfigError
     """
     signal_map = signal_map or SignalMap()
-    with DriveLog(paths, read_options(signal_map, dbc)) as log:
-        report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-        found = find_channels(log, signal_map, wanted)
-        return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+
+    def read() -> Signals:
+        with DriveLog(paths, read_options(signal_map, dbc)) as log:
+            report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
+            found = find_channels(log, signal_map, wanted or (lambda _: True))
+            return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+
+    return read() if wanted is not None else kept(cache, paths, vehicle, signal_map, dbc, rate_hz, report, read)
+
+
+def kept(
+    cache: SignalCache | None,
+    paths: Sequence[Path],
+    vehicle: Vehicle,
+    signal_map: SignalMap,
+    dbc: Sequence[Path],
+    rate_hz: float | None,
+    report: Callable[[str], None],
+    read: Callable[[], _Read],
+) -> _Read | Signals:
+    """The signals that a cache has of a drive; else what is read, which it is given if it is a whole table."""
+    if cache is None:
+        return read()
+    report("looking into the cache")
+    key = cache.key(paths, vehicle, signal_map, dbc, rate_hz)
+    signals = cache.get(key) if key is not None else None
+    if signals is not None:
+        return signals
+    found = read()
+    if key is not None and isinstance(found, Signals):
+        cache.put(key, found)
+    return found
 
 
 def read_signals(

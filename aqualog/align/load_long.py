@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from aqualog.align.load import find_channels, read_options, read_signals
-from aqualog.align.mapping import SignalMap
+from aqualog.align.load import find_channels, kept, read_options, read_signals
+from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
-from aqualog.io.base import Part
+from aqualog.io.base import Part, ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.types import FileFaults, Signals
+from aqualog.types import ChannelInfo, FileFaults, Signals
 from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from aqualog.align.cache import SignalCache
 
 __all__ = ["LONG", "LoadedLong", "load_drive"]
 
@@ -39,12 +42,13 @@ def load_drive(
     note: Callable[[str], None] = lambda _: None,
     whole_for: str = "",
     least: int = LONG,
+    cache: SignalCache | None = None,
 ) -> Signals | LoadedLong:
     """A drive as a whole, or one that is long to be gone through in windows.
 
     Parameters
     ----------
-    paths, vehicle, signal_map, dbc, rate_hz, report
+    paths, vehicle, signal_map, dbc, rate_hz, report, cache
         As of `load_signals`.
     note : callable
         Told why a long drive is read as a whole.
@@ -59,34 +63,49 @@ def load_drive(
     """
     signal_map = signal_map or SignalMap()
     options = read_options(signal_map, dbc)
-    opened = ExitStack()
-    with ExitStack() as stack:
-        stack.push(opened)
-        log = opened.enter_context(DriveLog(paths, options))
-        report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-        found = find_channels(log, signal_map)
-        wanted = [info for _, info in found.values()]
-        total = sum(info.count for info in wanted)
-        reason = whole_for and f"{whole_for} works on whole drives only"
-        if total >= least and not reason:
-            first = iter([log])
 
-            def parts() -> list[Part]:
-                # what a reader has lost is counted once, in the first pass
-                again = next(first, None) or opened.enter_context(DriveLog(paths, options))
-                return again.parts(wanted)
+    def read() -> Signals | LoadedLong:
+        with ExitStack() as stack:
+            log = stack.enter_context(DriveLog(paths, options))
+            report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
+            found = find_channels(log, signal_map)
+            reason = f"{whole_for} works on whole drives only" if whole_for else ""
+            if sum(info.count for _, info in found.values()) >= least:
+                if not reason:
+                    try:
+                        loaded = _in_windows(log, found, options, stack, signal_map, vehicle, rate_hz, report)
+                        return loaded._replace(opened=stack.pop_all())
+                    except NotInPiecesError as error:
+                        reason = str(error)
+                note(f"the drive is read as a whole, which needs much memory: {reason}")
+                log = stack.enter_context(DriveLog(paths, options))
+            return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
 
-            def tell(done: int) -> None:
-                report(f"going through the signals, {100 * done // max(total, 1)} %")
+    return kept(cache, paths, vehicle, signal_map, dbc, rate_hz, report, read)
 
-            try:
-                drive = long_drive(found, parts, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, tell=tell)
-                faults = tuple(log.faults)
-                stack.pop_all()
-                return LoadedLong(drive, faults, opened)
-            except NotInPiecesError as error:
-                reason = str(error)
-                log = opened.enter_context(DriveLog(paths, options))
-        if total >= least:
-            note(f"the drive is read as a whole, which needs much memory: {reason}")
-        return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+
+def _in_windows(
+    log: DriveLog,
+    found: Mapping[str, tuple[Entry, ChannelInfo]],
+    options: ReadOptions,
+    opened: ExitStack,
+    signal_map: SignalMap,
+    vehicle: Vehicle,
+    rate_hz: float | None,
+    report: Callable[[str], None],
+) -> LoadedLong:
+    wanted = [info for _, info in found.values()]
+    total = max(sum(info.count for info in wanted), 1)
+    first = iter([log])
+    again = ExitStack()
+    opened.push(again)
+
+    def parts() -> list[Part]:
+        # what a reader has lost is counted once, in the first pass
+        return (next(first, None) or again.enter_context(DriveLog(log.paths, options))).parts(wanted)
+
+    def tell(done: int) -> None:
+        report(f"going through the signals, {100 * done // total} %")
+
+    drive = long_drive(found, parts, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, tell=tell)
+    return LoadedLong(drive, tuple(log.faults), opened)

@@ -11,7 +11,7 @@ from aqualog.errors import SignalError
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.types import ChannelInfo
 
-__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "matching", "resolve"]
+__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +69,12 @@ def _names(pattern: str, file: str) -> bool:
 def channel_id(info: ChannelInfo) -> str:
     """`file:path`, unique within a drive of several files."""
     return f"{info.file}:{info.path}"
+
+
+def map_text(signal_map: SignalMap) -> str:
+    """All of a map that signals depend on, for keys. Order counts: of two patterns for one clock the first holds."""
+    entries, clocks = tuple(signal_map.entries.items()), tuple(signal_map.clocks.items())
+    return repr((entries, clocks, signal_map.time_channel, signal_map.time_unit))
 
 
 def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aqualog.cli.options import (
+    Cache,
     Dbc,
     Debug,
     Force,
@@ -59,6 +60,7 @@ def calibrate(
         str | None, typer.Option("--page", help="Page with tables and residuals (HTML).", metavar="FILE")
     ] = None,
     rate: Rate = None,
+    cache: Cache = None,
     as_json: Json = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -83,7 +85,7 @@ def calibrate(
     with guarded(debug=debug):
         code = _calibrate(
             logs, vehicle, signals, dbc or [], out, fix or [], page, rate,
-            as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+            cached=cache, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
         raise typer.Exit(code)
@@ -99,6 +101,7 @@ def _calibrate(
     page_name: str | None,
     rate: float | None,
     *,
+    cached: bool | None,
     as_json: bool,
     force: bool,
     quiet: bool,
@@ -115,7 +118,7 @@ def _calibrate(
     targets = [_target(name, option) for name, option in ((out_name, "-o"), (page_name, "--page")) if name is not None]
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file,
+        progress=progress, vehicle_file=vehicle_file, cached=cached,
     )  # fmt: skip
     drives = _drives(logs)
     with setup.console.steps() as steps:
@@ -206,7 +209,7 @@ def _load(name: str, paths: list[Path], setup: Setup, dbc: list[Path], rate: flo
 
     return load_signals(
         paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate,
-        report=lambda step: steps(f"{name}: {step}"),
+        report=lambda step: steps(f"{name}: {step}"), cache=setup.cache,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aqualog.cli.options import (
+    Cache,
     Dbc,
     Debug,
     Force,
@@ -98,6 +99,7 @@ def detect(
     fail_on_event: Annotated[
         bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
     ] = False,
+    cache: Cache = None,
     as_json: Json = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -124,8 +126,8 @@ def detect(
     with guarded(debug=debug):
         code = _detect(
             logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference, thresholds,
-            model, fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet, verbose=verbose,
-            progress=progress,
+            model, cached=cache, fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet,
+            verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
         raise typer.Exit(code)
@@ -145,6 +147,7 @@ def _detect(
     thresholds_file: Path | None,
     model_file: Path | None,
     *,
+    cached: bool | None,
     fail_on_event: bool,
     as_json: bool,
     force: bool,
@@ -169,7 +172,7 @@ def _detect(
     settings = load_settings(thresholds_file) if thresholds_file else None
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file,
+        progress=progress, vehicle_file=vehicle_file, cached=cached,
     )  # fmt: skip
     console, paths = setup.console, setup.paths
     vehicle = setup.vehicle
@@ -188,7 +191,7 @@ def _detect(
 
         options = (("--write", write), ("--model", model), ("--history", history_file))
         drive = load_drive(
-            paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps,
+            paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps, cache=setup.cache,
             note=console.note, whole_for=", ".join(name for name, given in options if given is not None),
         )  # fmt: skip
         told: tuple[str, ...] = ()

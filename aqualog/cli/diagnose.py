@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aqualog.cli.options import (
+    Cache,
     Dbc,
     Debug,
     Force,
@@ -87,6 +88,7 @@ def diagnose(
         bool, typer.Option("--bootstrap/--no-bootstrap", help="Without: quicker, the test by its formula alone.")
     ] = True,
     rate: Rate = None,
+    cache: Cache = None,
     as_json: Json = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -121,7 +123,12 @@ def diagnose(
         number = surrogates if bootstrap else 0
         targets = Targets(target(out, "-o"), target(page, "--page"), as_json, force)
         if is_campaign(logs):
-            strange = {"--holdout": bool(holdout), "--rate": rate is not None, "--no-bootstrap": not bootstrap}
+            strange = {
+                "--holdout": bool(holdout),
+                "--rate": rate is not None,
+                "--no-bootstrap": not bootstrap,
+                "--cache": cache is True,
+            }
             given = [option for option, is_given in strange.items() if is_given]
             code = _campaign(
                 logs, vehicle, model, signals, dbc or [], targets, given, seed=seed, level=level, surrogates=surrogates,
@@ -130,7 +137,7 @@ def diagnose(
         else:
             code = _diagnose(
                 logs, holdout or [], vehicle, model, signals, dbc or [], targets, rate, seed=seed, level=level,
-                surrogates=number, console=console,
+                surrogates=number, console=console, cached=cache,
             )  # fmt: skip
     if code:
         raise typer.Exit(code)
@@ -150,6 +157,7 @@ def _diagnose(
     level: float,
     surrogates: int | None,
     console: Console,
+    cached: bool | None,
 ) -> int:
     from aqualog.cli.console import clean, told_if_interrupted
     from aqualog.cli.diagnose_drives import check_apart, check_once, find_drives, load_drives
@@ -162,7 +170,7 @@ def _diagnose(
         raise ConfigError("no --vehicle", expected="a vehicle file: it is what the simulation believes")
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets.paths, force=targets.force, quiet=console.quiet,
-        verbose=console.verbose, progress=console.progress, vehicle_file=vehicle_file,
+        verbose=console.verbose, progress=console.progress, vehicle_file=vehicle_file, cached=cached,
     )  # fmt: skip
     missing = next((p for p in expand(holdout) if not p.exists()), None)
     if missing is not None:

@@ -103,7 +103,13 @@ def load_drives(drives: Named, setup: Setup, dbc: Sequence[Path], rate: float | 
 
         try:
             given.loaded[name] = load_signals(
-                paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=list(dbc), rate_hz=rate, report=tell
+                paths,
+                vehicle=setup.vehicle,
+                signal_map=setup.signal_map,
+                dbc=list(dbc),
+                rate_hz=rate,
+                report=tell,
+                cache=setup.cache,
             )
         except ConfigError:
             raise

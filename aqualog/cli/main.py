@@ -12,6 +12,7 @@ from aqualog import __version__
 from aqualog.cli.batch import batch
 from aqualog.cli.bin_resistance import bin_resistance
 from aqualog.cli.bin_slipslope import bin_slipslope
+from aqualog.cli.cache import cache
 from aqualog.cli.calibrate import calibrate
 from aqualog.cli.campaign import campaign_app
 from aqualog.cli.clock import align
@@ -52,6 +53,7 @@ app.command(no_args_is_help=True)(evaluate)
 app.command(no_args_is_help=True)(simulate)
 app.command(no_args_is_help=True)(figures)
 app.command(no_args_is_help=True)(reproduce)
+app.command()(cache)
 app.add_typer(campaign_app, name="campaign")
 
 

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 __all__ = [
-    "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals", "StoreOption",
-    "Vehicle", "Verbose",
+    "Cache", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals",
+    "StoreOption", "Vehicle", "Verbose",
 ]  # fmt: skip
 
 Logs = Annotated[
@@ -33,6 +33,14 @@ Dbc = Annotated[
 Rate = Annotated[
     float | None,
     typer.Option("--rate", help="Grid rate in Hz; default that of the wheel speeds.", min=0.1, max=100000.0),
+]
+Cache = Annotated[
+    bool | None,
+    typer.Option(
+        "--cache/--no-cache",
+        help="Keep the aligned signals for the next look at the same log (`aqualog cache`); default: if AQUALOG_CACHE "
+        "is set.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from aqualog.align.mapping import SignalMap
 from aqualog.cli.console import Console
@@ -13,18 +15,25 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.vehicle import Vehicle
 
+if TYPE_CHECKING:
+    from aqualog.align.cache import SignalCache
+
 __all__ = ["Setup", "prepare"]
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Inputs and configuration of one run; `sources` are all files that no result may overwrite."""
+    """Inputs and configuration of one run; `sources` are all files that no result may overwrite.
+
+    `cache` is None where signals are not to be kept.
+    """
 
     console: Console
     paths: list[Path]
     signal_map: SignalMap
     vehicle: Vehicle
     sources: tuple[Path, ...]
+    cache: SignalCache | None = None
 
 
 def prepare(
@@ -38,6 +47,7 @@ def prepare(
     verbose: bool,
     progress: str,
     vehicle_file: Path | None = None,
+    cached: bool | None = False,
 ) -> Setup:
     """Check everything that can be checked before any log is opened.
 
@@ -49,6 +59,8 @@ def prepare(
         Without them: canonical names, default car.
     dbc, targets : paths
         Databases; results to be written. A source is never a target.
+    cached : bool, optional
+        Whether signals are kept; None: if AQUALOG_CACHE is set.
 
     Raises
     ------
@@ -60,4 +72,17 @@ def prepare(
     refuse_existing(targets, force=force, sources=own)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
     vehicle = load_vehicle(vehicle_file) if vehicle_file else Vehicle()
-    return Setup(console, paths, signal_map, vehicle, own)
+    return Setup(console, paths, signal_map, vehicle, own, _cache(cached, console))
+
+
+def _cache(cached: bool | None, console: Console) -> SignalCache | None:
+    if cached is False or (cached is None and not os.environ.get("AQUALOG_CACHE")):
+        return None
+    from aqualog.align.cache import SignalCache, cache_folder, cache_limit
+
+    try:
+        folder = cache_folder()
+    except RuntimeError:
+        console.detail("there is no home folder to keep signals in; AQUALOG_CACHE names another")
+        return None
+    return SignalCache(folder, limit=cache_limit(), tell=console.detail)

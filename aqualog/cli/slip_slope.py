@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aqualog.cli.options import (
+    Cache,
     Dbc,
     Debug,
     Force,
@@ -66,6 +67,7 @@ def slip_slope(
         ),
     ] = None,
     rate: Rate = None,
+    cache: Cache = None,
     as_json: Json = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -91,7 +93,7 @@ def slip_slope(
     with guarded(debug=debug):
         code = _slip_slope(
             logs, vehicle, signals, dbc or [], out, method, traction, mu_max, delay, rate,
-            as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
+            cached=cache, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
         )  # fmt: skip
     if code:
         raise typer.Exit(code)
@@ -109,6 +111,7 @@ def _slip_slope(
     delay: float | None,
     rate: float | None,
     *,
+    cached: bool | None,
     as_json: bool,
     force: bool,
     quiet: bool,
@@ -124,6 +127,7 @@ def _slip_slope(
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=[out / n for n in _RESULTS] if out else [], force=force,
         quiet=quiet, verbose=verbose, progress=progress, vehicle_file=vehicle_file,
+        cached=cached,
     )  # fmt: skip
     console, paths, vehicle = setup.console, setup.paths, setup.vehicle
     name = ", ".join(str(p) for p in paths)
@@ -132,7 +136,9 @@ def _slip_slope(
         from aqualog.align.load import load_signals
         from aqualog.detect.slip_slope.direct import slip_slopes
 
-        loaded = load_signals(paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps)
+        loaded = load_signals(
+            paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps, cache=setup.cache
+        )
         console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
         steps("estimating")
         result = slip_slopes(loaded, vehicle, method=method, traction=traction, mu_max=mu_max, delay=delay)

@@ -1,0 +1,271 @@
+"""Aligned signals of drives kept between runs, found again by all that they depend on.
+
+FOLDER/signals/STAMP-KEY-CRC.parquet   a drive; STAMP of aqualog's reading and aligning code, CRC of the file
+FOLDER/signals/contents.json           hashes of logs by size and time of change, so that a log is hashed once
+
+Nothing here is ever an error to the user: what cannot be kept is not, what is damaged is thrown away and read anew.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import time
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from aqualog.align.mapping import SignalMap, map_text
+from aqualog.errors import ConfigError
+from aqualog.io.content import Contents, Seen, change_since, hash_of, sources_stamp
+from aqualog.io.whole import write_text, write_whole
+from aqualog.notation import WHEELS
+from aqualog.places import user_cache
+from aqualog.types import Signals
+from aqualog.vehicle import Vehicle
+
+__all__ = ["Kept", "Key", "SignalCache", "cache_folder", "cache_limit"]
+
+_BEHIND = (
+    "io", "align", "errors.py", "notation.py", "types.py", "units.py", "vehicle.py",
+)  # fmt: skip
+_LIBRARIES = ("asammdf", "cantools", "mcap", "mcap-protobuf-support", "rosbags", "numpy", "polars")
+_ENTRY = re.compile(r"[0-9a-f]{8}-[0-9a-f]{32}-[0-9a-f]{8}\.parquet")
+_ORPHAN = re.compile(r"\.[0-9a-z-]{1,40}-\w{8}\.(parquet|json)\.tmp")  # as `write_whole` names them
+_CONTENTS = "contents.json"
+_MOST_CONTENTS = 5000
+_LIMIT_MB = 2000
+_SETTLED_S = 2.0  # a file younger than the clock of a file system is coarse may change and look the same
+_ABANDONED_S = 3600.0  # a half-written file so old is nobody's
+
+
+class Key(NamedTuple):
+    """What a drive's signals depend on, and the state of the files for whose content it stands."""
+
+    text: str
+    paths: tuple[Path, ...]
+    seen: Seen
+
+
+class Kept(NamedTuple):
+    """One drive in the cache. `used` is when it was last asked for [s since 1970]; `fits` this version of aqualog."""
+
+    path: Path
+    size: int
+    used: float
+    fits: bool
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the drive's files; empty if that cannot be read."""
+        from aqualog.align.signals_file import files_of
+
+        try:
+            return files_of(self.path)
+        except ValueError:
+            return ()
+
+
+class SignalCache:
+    """A folder of signals; it is made when the first are kept, for the user alone.
+
+    Parameters
+    ----------
+    folder : Path
+    limit : int
+        Most bytes of all drives; what was not asked for longest goes first.
+    tell : callable
+        Told why something was not kept.
+    """
+
+    def __init__(self, folder: Path, *, limit: int, tell: Callable[[str], None] = lambda _: None) -> None:
+        self.folder = folder / "signals"
+        self.limit = limit
+        self._tell = tell
+
+    def key(
+        self, paths: Sequence[Path], vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], rate_hz: float | None
+    ) -> Key | None:
+        """Key of a drive; None where a file cannot be read, which the readers tell better.
+
+        Of the vehicle only what alignment asks for counts, of paths only their names: a copied log is found, too.
+        """
+        contents = Contents(self._known())
+        try:
+            files = [f"{p.name}:{contents.of(p)}" for p in (*paths, *dbc)]
+        except OSError:
+            return None
+        car = (*(vehicle.r_e(w) for w in WHEELS), vehicle.steering_ratio, vehicle.torque_gain)
+        text = hash_of([_stamp(), str(len(paths)), *files, map_text(signal_map), repr(car), repr(rate_hz)])
+        if contents.has_changed:
+            self._keep_known(contents)
+        return Key(text, (*paths, *dbc), contents.seen((*paths, *dbc)))
+
+    def get(self, key: Key) -> Signals | None:
+        """Signals of a drive; None where there are none, or damaged ones."""
+        from aqualog.align.signals_file import from_parquet
+
+        for entry in self.kept():
+            if not entry.path.name.startswith(f"{_stamp()}-{key.text}-"):
+                continue
+            try:
+                data = entry.path.read_bytes()
+                if _check(data) != entry.path.stem[-8:]:
+                    raise ValueError("damaged")
+                found = from_parquet(data)
+            except ValueError:
+                with suppress(OSError):
+                    entry.path.unlink()
+            except OSError:
+                continue
+            else:
+                with suppress(OSError):  # a folder that is only read
+                    os.utime(entry.path)
+                return found
+        return None
+
+    def put(self, key: Key, signals: Signals) -> None:
+        """Keep the signals of a drive, unless its files have changed since the key was made."""
+        from aqualog.align.signals_file import to_parquet
+
+        if change_since(key.paths, key.seen) or _names_folder(signals.quality.notes, key.paths):
+            return
+        buffer = to_parquet(signals)
+        data = buffer.getbuffer()
+        if data.nbytes > self.limit:
+            self._tell(f"the signals ({data.nbytes / 1e6:.0f} MB) are larger than the cache may be; they are not kept")
+            return
+        try:
+            self._make()
+            path = self.folder / f"{_stamp()}-{key.text}-{_check(data)}.parquet"
+            write_whole(path, lambda temporary: _put(temporary, buffer))
+            self._shrink()
+        except OSError as error:
+            self._tell_unwritable(error)
+
+    def kept(self) -> list[Kept]:
+        """All drives, the one that was not asked for longest first."""
+        stamp = _stamp()
+        found = []
+        for path, state in self._files(_ENTRY):
+            found.append(Kept(path, state.st_size, state.st_mtime, path.name.startswith(stamp)))
+        return sorted(found, key=lambda k: (k.used, k.path.name))
+
+    def clean(self) -> tuple[int, int]:
+        """Remove all drives and hashes, nothing else; number and bytes of the drives.
+
+        Raises
+        ------
+        OSError
+        """
+        entries = self.kept()
+        for path in (*(e.path for e in entries), *(p for p, _ in self._files(_ORPHAN)), self.folder / _CONTENTS):
+            path.unlink(missing_ok=True)
+        with suppress(OSError):  # another's file in it, or a process that is at work
+            self.folder.rmdir()
+        return len(entries), sum(e.size for e in entries)
+
+    def _files(self, pattern: re.Pattern[str]) -> Iterator[tuple[Path, os.stat_result]]:
+        try:
+            names = [n for n in os.listdir(self.folder) if pattern.fullmatch(n)]  # noqa: PTH208 - half the time
+        except OSError:
+            return
+        for name in names:
+            with suppress(OSError):  # another process has just thrown it away
+                yield self.folder / name, (self.folder / name).stat()
+
+    def _make(self) -> None:
+        self.folder.parent.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(mode=0o700, exist_ok=True)
+
+    def _shrink(self) -> None:
+        entries = self.kept()
+        total = sum(e.size for e in entries)
+        for entry in entries:
+            if total <= self.limit:
+                break
+            with suppress(OSError):  # another process has it open, or has removed it
+                entry.path.unlink()
+            total -= entry.size
+        for path, state in self._files(_ORPHAN):
+            if time.time() - state.st_mtime > _ABANDONED_S:
+                with suppress(OSError):
+                    path.unlink()
+
+    def _known(self) -> Any:
+        try:
+            return json.loads((self.folder / _CONTENTS).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+
+    def _keep_known(self, contents: Contents) -> None:
+        # of two processes at once one may lose an entry, which costs it a hash the next time
+        latest = time.time_ns() - int(_SETTLED_S * 1e9)
+        settled = [(name, entry) for name, entry in contents.known.items() if int(entry[1]) < latest]
+        try:
+            self._make()
+            write_text(self.folder / _CONTENTS, json.dumps(dict(settled[-_MOST_CONTENTS:]), indent=0) + "\n")
+        except OSError as error:
+            self._tell_unwritable(error)
+
+    def _tell_unwritable(self, error: OSError) -> None:
+        self._tell(f"the cache {self.folder} cannot be written ({error.strerror or error}); nothing is kept")
+
+
+def cache_folder() -> Path:
+    """Where signals are kept: $AQUALOG_CACHE, else the user's cache folder.
+
+    Raises
+    ------
+    RuntimeError
+        If there is no home folder.
+    """
+    given = os.environ.get("AQUALOG_CACHE")
+    return Path(given).expanduser() if given else user_cache()
+
+
+def cache_limit() -> int:
+    """Most bytes that are kept: $AQUALOG_CACHE_MB, else 2 GB.
+
+    Raises
+    ------
+    ConfigError
+    """
+    text = os.environ.get("AQUALOG_CACHE_MB") or str(_LIMIT_MB)
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise ConfigError(f"AQUALOG_CACHE_MB is {text!r}", expected="a whole number of megabytes")
+    return int(text) * 1_000_000
+
+
+@cache
+def _stamp() -> str:
+    """The code that makes signals of logs, and the libraries that it reads them with."""
+    return hash_of([sources_stamp(_BEHIND), *map(_version, _LIBRARIES)])[:8]
+
+
+def _version(library: str) -> str:
+    try:
+        return f"{library} {version(library)}"
+    except PackageNotFoundError:
+        return library
+
+
+def _check(data: bytes | memoryview) -> str:
+    """Parquet has no check sum of its own over numbers: a bit that flips would be a measured value."""
+    return f"{zlib.crc32(data):08x}"
+
+
+def _names_folder(notes: Sequence[str], paths: Sequence[Path]) -> bool:
+    """Whether a note tells where a file lies, which for a copy of it would be wrong."""
+    folders = {f"{p}{os.sep}" for path in paths for p in (path, path.parent)} - {f".{os.sep}"}
+    return any(f in note for f in folders for note in notes)
+
+
+def _put(path: Path, buffer: io.BytesIO) -> None:
+    path.write_bytes(buffer.getbuffer())

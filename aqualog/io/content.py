@@ -1,0 +1,93 @@
+"""What files hold, as hashes, and whether they still hold it."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import stat
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+__all__ = ["Contents", "Seen", "change_since", "hash_of", "sources_stamp"]
+
+Seen = tuple[tuple[str, int, int], ...]
+"""Files with size and time of change."""
+
+_LENGTH = 32  # hexadecimal digits of a key: 128 bit
+
+
+class Contents:
+    """Hashes of files, remembered as long as size and time of change stay; `known` maps path -> [size, mtime, hash]."""
+
+    def __init__(self, known: Any = None) -> None:
+        # it comes from a file: what is not as it should be is not known
+        self.known: dict[str, list[int | str]] = (
+            {k: v for k, v in known.items() if _is_entry(v)} if isinstance(known, dict) else {}
+        )
+        self.has_changed = False
+
+    def of(self, path: Path) -> str:
+        """Hash of a file, or of the files in a folder (a ROS 2 bag).
+
+        Raises
+        ------
+        OSError
+            If it cannot be read, also for a device or a pipe, which has no end or no content of its own.
+        """
+        if path.is_dir():
+            return hash_of(f"{p.relative_to(path)}:{self.of(p)}" for p in _files(path))
+        state = path.stat()
+        if not stat.S_ISREG(state.st_mode):
+            raise OSError(errno.EINVAL, "is a device or a pipe; expected a log", str(path))
+        name = os.path.realpath(path)
+        entry = self.known.get(name)
+        if entry and entry[:2] == [state.st_size, state.st_mtime_ns]:
+            return str(entry[2])
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        self.known[name] = [state.st_size, state.st_mtime_ns, digest]
+        self.has_changed = True
+        return digest
+
+    def seen(self, paths: Iterable[Path]) -> Seen:
+        """The files behind `paths`, in the state in which they were hashed."""
+        files = [f for p in paths for f in _files(p)]
+        entries = (self.known.get(os.path.realpath(f), [-1, -1]) for f in files)
+        return tuple((str(f), int(e[0]), int(e[1])) for f, e in zip(files, entries, strict=True))
+
+
+def change_since(paths: Sequence[Path], seen: Seen) -> str:
+    """What has become of files since they were hashed; empty if their content is still what the key stands for."""
+    try:
+        states = [(str(f), f.stat()) for p in paths for f in _files(p)]
+    except OSError as error:
+        return f"{error.filename}: {error.strerror} while it was read"
+    now = tuple((name, state.st_size, state.st_mtime_ns) for name, state in states)
+    if now == seen:
+        return ""
+    name = min(set(now) ^ set(seen), default=(", ".join(map(str, paths)),))[0]
+    return f"{name}: changed while it was read. Try: run the batch again"
+
+
+@cache
+def sources_stamp(names: tuple[str, ...]) -> str:
+    """Hash of aqualog's own modules and folders of these names: it changes with the code."""
+    package = Path(__file__).resolve().parents[1]
+    paths = [p for n in names for p in ([package / n] if n.endswith(".py") else (package / n).rglob("*.py"))]
+    return hash_of(f"{p.relative_to(package)}:{hashlib.sha256(p.read_bytes()).hexdigest()}" for p in sorted(paths))
+
+
+def hash_of(parts: Iterable[str]) -> str:
+    """One key of many texts; 32 hexadecimal digits."""
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_LENGTH]
+
+
+def _files(path: Path) -> list[Path]:
+    return [p for p in sorted(path.rglob("*")) if p.is_file()] if path.is_dir() else [path]
+
+
+def _is_entry(entry: Any) -> bool:
+    return isinstance(entry, list) and [type(x) for x in entry] == [int, int, str]
