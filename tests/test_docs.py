@@ -31,7 +31,7 @@ def test_signals(name):
     "command",
     [
         "detect", "inspect", "convert", "align", "simulate", "figures", "slip-slope", "calibrate", "evaluate", "batch",
-        "bin-slipslope", "bin-resistance", "report", "reproduce", "campaign", "cache",
+        "bin-slipslope", "bin-resistance", "report", "reproduce", "campaign", "cache", "plan",
     ],
 )  # fmt: skip
 def test_commands(command):

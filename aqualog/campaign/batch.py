@@ -24,7 +24,10 @@ from aqualog.evaluate.labels import Label
 from aqualog.vehicle import Vehicle
 from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn, work_on
 
-__all__ = ["BatchOutcome", "Configured", "Fault", "Job", "measure_one", "name_of", "plan_jobs", "run_batch"]
+__all__ = [
+    "BatchOutcome", "Compared", "Configured", "Fault", "Job", "compared", "measure_one", "name_of",
+    "plan_jobs", "run_batch",
+]  # fmt: skip
 
 Report = Callable[[int, int, int], None]
 """Told logs that are settled, logs in all, and failed ones so far."""
@@ -119,7 +122,7 @@ def _job(
     return Job(key, logs, car, tuple(indices), seen=contents.seen((*logs, *configured.dbc)))
 
 
-class _Plan(NamedTuple):
+class Compared(NamedTuple):
     """Jobs against the store: to measure by key, how many are there, failed before and why, and damaged files."""
 
     new: Mapping[str, Job]
@@ -128,7 +131,8 @@ class _Plan(NamedTuple):
     damaged: Sequence[str]
 
 
-def _compared(todo: Sequence[Job], store: Store, *, force: bool) -> _Plan:
+def compared(todo: Sequence[Job], store: Store, *, force: bool) -> Compared:
+    """Which of the jobs a batch would measure, and what the store knows of the others."""
     done, known_failed = store.keys()
     damaged = [k for k in sorted(done & {j.key for j in todo}) if not store.is_sound(k)]
     done = set() if force else done - set(damaged)
@@ -144,7 +148,7 @@ def _compared(todo: Sequence[Job], store: Store, *, force: bool) -> _Plan:
             failed.append((job, store.failure(job.key)))
         else:
             new[job.key] = job
-    return _Plan(new, kept, failed, damaged)
+    return Compared(new, kept, failed, damaged)
 
 
 def run_batch(
@@ -193,10 +197,10 @@ def run_batch(
     store.check()
     contents = Contents(store.contents())
     todo = plan_jobs(configured, contents)
-    plan = _compared(todo, store, force=force)
+    plan = compared(todo, store, force=force)
     with store.held(must=bool(plan.new)) as is_held:
         if plan.new:
-            plan = _compared(todo, store, force=force)  # another batch may have been at work until now
+            plan = compared(todo, store, force=force)  # another batch may have been at work until now
             for key in plan.damaged:
                 store.drop(key)
         if is_held and contents.has_changed:
@@ -218,7 +222,7 @@ class _Tally:
     """What has come of the logs so far."""
 
     def __init__(
-        self, configured: Configured, store: Store, total: int, plan: _Plan, limits: Limits, report: Report,
+        self, configured: Configured, store: Store, total: int, plan: Compared, limits: Limits, report: Report,
         told: Callable[[str, str], None],
     ) -> None:  # fmt: skip
         self.made = 0

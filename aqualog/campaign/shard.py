@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from aqualog.campaign.records import Campaign
 from aqualog.errors import ConfigError
 
-__all__ = ["Shard", "part_of", "shard_of"]
+__all__ = ["Shard", "number_of", "part_of", "shard_of"]
 
 _MOST = 100_000
 
@@ -49,10 +51,12 @@ def part_of(campaign: Campaign, shard: Shard) -> Campaign:
     A run belongs to a shard by the names of its logs: no log must be read to know, runs on the same logs stay together,
     and a log that comes later moves none of the others.
     """
-    base = campaign.path.parent
-    own = []
-    for run in campaign.runs:
-        names = [p.relative_to(base) if p.is_relative_to(base) else p for p in run.logs]
-        if zlib.crc32("\n".join(p.as_posix() for p in names).encode()) % shard.count == shard.index - 1:
-            own.append(run)
+    own = (r for r in campaign.runs if number_of(campaign, r.logs) % shard.count == shard.index - 1)
     return replace(campaign, runs=tuple(own))
+
+
+def number_of(campaign: Campaign, logs: Sequence[Path]) -> int:
+    """A number of a drive by the names of its logs, whose remainder tells its shard."""
+    base = campaign.path.parent
+    names = [p.relative_to(base) if p.is_relative_to(base) else p for p in logs]
+    return zlib.crc32("\n".join(p.as_posix() for p in names).encode())

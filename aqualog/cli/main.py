@@ -22,6 +22,7 @@ from aqualog.cli.diagnose import diagnose
 from aqualog.cli.evaluate import evaluate
 from aqualog.cli.figures import figures
 from aqualog.cli.inspect import inspect
+from aqualog.cli.plan import plan
 from aqualog.cli.report import report
 from aqualog.cli.reproduce import reproduce
 from aqualog.cli.simulate import simulate
@@ -44,6 +45,7 @@ app.command(no_args_is_help=True)(convert)
 app.command(no_args_is_help=True)(align)
 app.command(no_args_is_help=True)(slip_slope)
 app.command(no_args_is_help=True)(batch)
+app.command(no_args_is_help=True)(plan)
 app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
 app.command("bin-resistance", no_args_is_help=True)(bin_resistance)
 app.command(no_args_is_help=True)(report)

@@ -1,0 +1,299 @@
+"""What a campaign will cost, from what a sample of its logs has cost: time, memory, room, and shards."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from aqualog.campaign.batch import Configured, Job, compared, plan_jobs
+from aqualog.campaign.shard import number_of
+from aqualog.campaign.store import Store
+from aqualog.campaign.trial import Trial, Tried
+from aqualog.errors import LogError
+from aqualog.intervals import student_quantile
+from aqualog.io.content import Remembered
+from aqualog.io.sniff import sniff
+from aqualog.types import FloatArray
+
+__all__ = ["Estimate", "Plan", "Work", "Worker", "choose", "foretell", "makespan", "shards_within", "work_of"]
+
+LEVEL = 0.9  # of the intervals
+_MOST_SHARDS = 2000
+_OWN_LINE = 3  # logs of a format from which its time over size is fitted by itself
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """Logs to measure: job, format and size [byte] of each; how many are in the store, failed there, are not there."""
+
+    new: tuple[tuple[Job, str, int], ...]
+    kept: int
+    failed: int
+    missing: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value with its interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def times(self, factor: float) -> Estimate:
+        """The same in another unit."""
+        return Estimate(factor * self.value, factor * self.low, factor * self.high)
+
+
+@dataclass(frozen=True, slots=True)
+class Worker:
+    """What surrounds the logs: `lead_s` of the process that leads until it looks at the logs, `start_s` of a worker,
+    `hashing_s_per_byte`, `tables_s` per log. [s]
+    """
+
+    lead_s: float
+    start_s: float
+    hashing_s_per_byte: float
+    tables_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What the logs will cost. `seconds` (n,) is the time of each log in its process; `together` how many processes
+    work side by side; `stretch` wall-clock over computing time of a log; times in s, sizes in byte.
+    """
+
+    seconds: FloatArray
+    sizes: FloatArray
+    together: int
+    worker: Worker
+    wall_s: Estimate
+    logs_s: Estimate
+    cpu_s: Estimate
+    store_bytes: Estimate
+    stretch: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def hashing_s(self) -> float:
+        """Time in which the logs are hashed before the work begins."""
+        return self.worker.hashing_s_per_byte * float(self.sizes.sum())
+
+    @property
+    def tables_s(self) -> float:
+        """Time in which the tables are made."""
+        return self.worker.tables_s * self.seconds.size
+
+
+def work_of(configured: Configured, store: Store) -> Work:
+    """What a batch would do. No log is read for it: what was never hashed is new."""
+    todo = plan_jobs(configured, Remembered(store.contents()))
+    found = compared(todo, store, force=False)
+    new, missing = [], []
+    for job in found.new.values():
+        try:
+            forms = sorted({sniff(p) for p in job.logs})
+        except LogError:
+            forms = ["unknown"]
+        new.append((job, "+".join(forms), sum(map(_bytes, job.logs))))
+    missing = [reason for job, reason in found.failed if job.reason]
+    return Work(tuple(new), found.kept, len(found.failed) - len(missing), tuple(missing))
+
+
+def choose(new: Sequence[tuple[Job, str, int]], count: int) -> list[tuple[Job, str, int]]:
+    """A sample of so many logs: every format, and within it every part of the sizes with the smallest and the largest.
+
+    A format gets one at least and more by its share of the bytes; what is no log has no share.
+    """
+    by_form: dict[str, list[tuple[Job, str, int]]] = {}
+    for entry in sorted(new, key=lambda e: (e[2], e[0].logs)):
+        if entry[1] != "unknown":
+            by_form.setdefault(entry[1], []).append(entry)
+    if not by_form:
+        return []
+    total = sum(e[2] for entries in by_form.values() for e in entries) or 1
+    shares = {f: sum(e[2] for e in entries) / total for f, entries in by_form.items()}
+    given = dict.fromkeys(by_form, 1)
+    while sum(given.values()) < count:
+        open_ = [f for f, entries in by_form.items() if given[f] < len(entries)]
+        if not open_:
+            break
+        given[max(open_, key=lambda f: (shares[f] / given[f], f))] += 1
+    return [by_form[f][i] for f, k in given.items() for i in _spread(len(by_form[f]), k)]
+
+
+def _spread(n: int, k: int) -> list[int]:
+    """k of n places, ends included; of one, the last, which tells most about memory."""
+    return [n - 1] if k == 1 else sorted({round(x) for x in np.linspace(0, n - 1, k)})
+
+
+def foretell(work: Work, trial: Trial, *, processes: int, cores: int, lead_s: float, lead_cpu_s: float) -> Plan:
+    """Cost of the whole from that of the sample.
+
+    Computing time is a constant and a part that grows with size, per format where there are enough logs of it;
+    wall-clock time is as many times that as over the sample, which holds the machine's other work and its disks. The
+    interval is that of the sum over all logs, from how far the sample's lie off; not of a machine that is busier later.
+
+    Parameters
+    ----------
+    work : Work
+        At least one log of a known format.
+    trial : Trial
+        At least one log that gave something.
+    processes : int
+        Asked for; no more work side by side than there are cores.
+    lead_s : float
+        Time that the leading process takes to get ready; `lead_cpu_s` computing.
+    """
+    good = [t for t in trial.tried if not t.reason]
+    forms = [f for _, f, _ in work.new]
+    sizes = np.array([s for _, _, s in work.new], dtype=np.float64)
+    cpu, cpu_spread = _over_all(good, lambda t: t.cpu_s, forms, sizes)
+    stretch, uncertain = _stretch(good)
+    seconds = stretch * cpu
+    stored, stored_spread = _over_all(good, lambda t: float(t.store_bytes), forms, sizes)
+    processes = max(1, min(processes, sizes.size))
+    together = min(processes, cores)
+    tried_bytes = sum(t.size for t in trial.tried)
+    worker = Worker(
+        lead_s, trial.start_s + trial.ending_s, trial.hashing_s / max(tried_bytes, 1),
+        trial.tables_s / max(len(trial.tried), 1),
+    )  # fmt: skip
+    around = lead_s + worker.hashing_s_per_byte * float(sizes.sum()) + worker.tables_s * sizes.size
+    half = math.hypot(_half_width(cpu_spread, len(good), sizes.size), uncertain)
+    # processes that share a core get ready one after another
+    starts = trial.start_s * processes / together + trial.ending_s
+    start_cpu = lead_cpu_s + processes * trial.start_cpu_s
+    return Plan(
+        seconds, sizes, together, worker,
+        _interval(makespan(seconds, together), half, around + starts),
+        _interval(float(seconds.sum()), half, 0.0),
+        _interval(float(cpu.sum()), _half_width(cpu_spread, len(good), sizes.size), around - lead_s + start_cpu),
+        _interval(float(stored.sum()), _half_width(stored_spread, len(good), sizes.size), 0.0),
+        stretch, _notes(work, trial, makespan(seconds, together), starts),
+    )  # fmt: skip
+
+
+def shards_within(configured: Configured, work: Work, plan: Plan, seconds: float) -> tuple[int, float] | None:
+    """Fewest parts of `--shard` of which each ends in that time on a machine like this, and time of the longest.
+
+    None if no number does.
+    """
+    numbers = np.array([number_of(configured.campaign, j.logs) for j, _, _ in work.new], dtype=np.int64)
+    fixed = plan.worker.lead_s + plan.worker.start_s
+    per_log = plan.seconds + plan.worker.hashing_s_per_byte * plan.sizes * plan.together
+    longest = float(plan.seconds.max(initial=0.0))
+    if fixed + longest > seconds:
+        return None
+    least = max(1, math.ceil(float(per_log.sum()) / plan.together / (seconds - fixed + 1e-9)))
+    for count in range(least, least + _MOST_SHARDS):
+        parts = np.bincount(numbers % count, weights=per_log, minlength=count)
+        at_most = fixed + float(parts.max()) / plan.together + longest * (1.0 - 1.0 / plan.together)
+        if at_most <= seconds:
+            return count, at_most
+    return None
+
+
+def makespan(seconds: FloatArray, processes: int) -> float:
+    """Time until all are done where each process takes the next as soon as it is free. [s]"""
+    ends = [0.0] * processes
+    for s in seconds:
+        heapq.heapreplace(ends, ends[0] + float(s))
+    return max(ends)
+
+
+def _over_all(
+    good: Sequence[Tried], cost: Callable[[Tried], float], forms: Sequence[str], sizes: FloatArray
+) -> tuple[FloatArray, float]:
+    """Cost of every log, and the relative scatter of the sample about its line."""
+    x = np.array([t.size for t in good], dtype=np.float64)
+    y = np.array([max(cost(t), 1e-6) for t in good])
+    of = [t.format for t in good]
+    lines: dict[str, tuple[float, float]] = {}
+    every = _line(x, y)
+    used = 2
+    for form in dict.fromkeys(of):
+        own = np.array([f == form for f in of])
+        if own.sum() >= _OWN_LINE and x[own].max() > 1.5 * x[own].min():
+            lines[form] = _line(x[own], y[own])
+            used += 2
+        else:
+            factor = float(y[own].sum() / (every[0] + every[1] * x[own]).sum())
+            lines[form] = (factor * every[0], factor * every[1])
+            used += 1
+    fitted = np.array([lines[f][0] + lines[f][1] * s for f, s in zip(of, x, strict=True)])
+    dof = max(len(good) - min(used, len(good) - 1), 1)
+    spread = math.sqrt(float(np.sum((y / fitted - 1.0) ** 2)) / dof)
+    lines["unknown"] = (0.0, 0.0)
+    found = np.array([lines.get(f, every)[0] + lines.get(f, every)[1] * s for f, s in zip(forms, sizes, strict=True)])
+    return found, spread
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """y = a + b x with the least relative deviations and the sum of y, a and b not negative."""
+    a, b = _shape(x, y)
+    # relative deviations alone favour what is small: a sum is asked for, and must come out
+    factor = float(y.sum() / (a * y.size + b * x.sum()))
+    return factor * a, factor * b
+
+
+def _shape(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    one, slope = 1.0 / y, x / y
+    if np.ptp(x) > 0.0:
+        (a, b), *_ = np.linalg.lstsq(np.column_stack([one, slope]), np.ones_like(y), rcond=None)
+        if a >= 0.0 and b >= 0.0:
+            return float(a), float(b)
+        if a < 0.0:
+            return 0.0, float(np.sum(slope) / np.sum(slope**2))
+    return float(np.sum(one) / np.sum(one**2)), 0.0
+
+
+def _stretch(good: Sequence[Tried]) -> tuple[float, float]:
+    """Wall-clock over computing time of the sample, and half its interval relative to it."""
+    wall, cpu = np.array([t.wall_s for t in good]), np.array([t.cpu_s for t in good])
+    ratio = float(wall.sum() / max(cpu.sum(), 1e-6))
+    if wall.size < 2:
+        return ratio, 1.0
+    off = math.sqrt(float(np.sum((wall - ratio * cpu) ** 2)) * wall.size / (wall.size - 1)) / float(wall.sum())
+    return ratio, min(student_quantile(0.5 + 0.5 * LEVEL, wall.size - 1) * off, 5.0)
+
+
+def _half_width(spread: float, sampled: int, total: int) -> float:
+    """Half the interval of a sum over all logs, relative to it; nothing is left to doubt where all were measured."""
+    if sampled < 2 or sampled >= total:
+        return 0.0 if sampled >= total else 1.0
+    t = student_quantile(0.5 + 0.5 * LEVEL, max(sampled - 2, 1))
+    return min(t * spread * math.sqrt(1.0 / sampled + 1.0 / total), 5.0)
+
+
+def _interval(value: float, half: float, around: float) -> Estimate:
+    # a sum of times is not below its share that is certain to be there
+    return Estimate(value + around, value / (1.0 + half) + around, value * (1.0 + half) + around)
+
+
+def _notes(work: Work, trial: Trial, logs_s: float, start_s: float) -> tuple[str, ...]:
+    notes = []
+    failed = [t for t in trial.tried if t.reason]
+    if failed:
+        notes.append(f"{len(failed)} of {len(trial.tried)} logs of the sample give nothing: {failed[0].reason}")
+    unknown = sum(f == "unknown" for _, f, _ in work.new)
+    if unknown:
+        notes.append(f"{unknown} files are no logs; they fail at once")
+    met = {t.format for t in trial.tried if not t.reason}
+    blind = sorted({f for _, f, _ in work.new} - met - {"unknown"})
+    if blind:
+        notes.append(f"no log of format {', '.join(blind)} was measured; the others' times are taken")
+    if logs_s < 5.0 * start_s:
+        notes.append("much of the time is the start of processes, which varies more than that of logs")
+    return tuple(notes)
+
+
+def _bytes(path: Path) -> int:
+    if path.is_dir():
+        return sum(_bytes(p) for p in path.iterdir() if not p.is_dir())
+    return path.stat().st_size
