@@ -20,7 +20,7 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["ROWS", "detect_long"]
 
-ROWS = 120_000  # of a window: 20 min at 100 Hz, some hundred arrays of 1 MB
+ROWS = 20_000  # of a window: 3 min at 100 Hz, some hundred arrays of 160 kB, which a cache holds
 
 
 def detect_long(

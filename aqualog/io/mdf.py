@@ -59,7 +59,7 @@ _disarm_asammdf()
 
 _VIRTUAL = (3, 6)  # channel types without bytes in the record
 _VARIABLE_LENGTH = 1
-_PIECE = 1 << 17  # records of a piece
+_PIECE = 1 << 15  # records of a piece
 _FRAGMENT = 1 << 25  # [bytes] of records that asammdf gives at a time
 _LONGEST_RECORD = 1 << 30
 _LONGEST_PAYLOAD = 64
