@@ -20,6 +20,7 @@ __all__ = [
     "CHANNELS",
     "Kind",
     "block_means",
+    "block_step",
     "centre_line_speeds",
     "channel_values",
     "channels_of",
@@ -112,7 +113,7 @@ def channel_values(
         on the simulated side. ISO 8855 signs.
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
-    step = max(BLOCK_S, dt)
+    step = block_step(dt)
     # as a speed, so that it passes the same differences as the wheels'
     drawn = block_means(np.cumsum(columns["nudge_seen"]) * dt, dt) if "nudge_seen" in columns else 0.0
     wheels = centre_line_speeds(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
@@ -173,9 +174,14 @@ def centre_line_speeds(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> F
     ])  # fmt: skip
 
 
+def block_step(dt: float) -> float:
+    """Length of the blocks of `block_means`. [s]"""
+    return max(1, round(BLOCK_S / dt)) * dt
+
+
 def block_means(x: FloatArray, dt: float) -> FloatArray:
     """Means over blocks of 0.1 s, NaN where any sample is missing; slower signals stay as they are. (n,) to (m,)"""
-    k = max(1, round(BLOCK_S / dt))
+    k = round(block_step(dt) / dt)
     if k == 1:
         return x
     m = x.size // k

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from aqualog.diagnose.channels import block_means, channels_of
+from aqualog.diagnose.channels import block_means, block_step, channels_of
 from aqualog.diagnose.floating import floating
 from aqualog.diagnose.inputs import SPEED_S, quiet_speed, quiet_torque, smooth
 from aqualog.diagnose.unlogged import (
@@ -71,7 +71,7 @@ class Drive:
     @property
     def used_s(self) -> float:
         """Usable driving. [s]"""
-        return float(self.mask.sum()) * max(0.1, self.dt)
+        return float(self.mask.sum()) * block_step(self.dt)
 
 
 def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:

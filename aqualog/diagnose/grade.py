@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.empirical import EMPIRICAL
@@ -195,7 +196,7 @@ class _Bins:
 
 def _motion(drive: Drive) -> list[FloatArray]:
     """Offset, speed, acceleration, jerk, their growth over time: shapes of sensors' and the car's errors. (n,) each"""
-    step = max(0.1, drive.dt)
+    step = block_step(drive.dt)
     v = drive.coordinates["v_x"]
     a = np.gradient(v, step)
     jerk = np.gradient(a, step)

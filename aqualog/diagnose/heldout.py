@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.diagnose.channels import CHANNELS, block_means
+from aqualog.diagnose.channels import CHANNELS, block_means, block_step
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.gain import HeldOut, block_scores, gain
 from aqualog.diagnose.hypotheses import residual
@@ -54,7 +54,7 @@ def measured_gain(
         residuals = [residual(led_by(d, m), m) for m in (before, after)]
         rows = [whitened(spectra(bridged(r, d.mask)[None]), own)[0].reshape(r.shape) for r in residuals]
         used = (own.weights > 0.0).any(axis=0)
-        scores = [block_scores(np.where(used, w, np.nan), dt=max(0.1, d.dt)) for w in rows]
+        scores = [block_scores(np.where(used, w, np.nan), dt=block_step(d.dt)) for w in rows]
         free = [_free_speed(d, m) for m in (before, after)]
         named = [dict(zip(d.channels, r, strict=True)) for r in residuals]
         if not d.untorqued:

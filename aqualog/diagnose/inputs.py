@@ -101,17 +101,15 @@ def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
 def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
     """Wheel torques (4, n) [N m] without noise; `rate_hz` as in `quiet`.
 
-    Left and right of an axle get its mean, unless they differ by more than sensors do; an axle without torque gets its
-    mean over the drive; the axle with most of it never does.
+    Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an axle that is
+    not driven is torque like any other: 50 N m now and then are 3 % of what slow driving takes.
     """
     out = np.empty_like(torque)
     total = float(np.sqrt((torque.sum(axis=0) ** 2).mean()))
     least = max(NOT_TORQUE, NOT_TORQUE_SHARE * total)
-    driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     for a, b in ((0, 1), (2, 3)):
         both, half = torque[a] + torque[b], 0.5 * (torque[a] - torque[b])
-        seen = a == driven or float(both.std()) > NOT_TORQUE
-        axle = quiet(both, dt, rate_hz) if seen else np.full_like(both, both.mean())
+        axle = quiet(both, dt, rate_hz)
         apart = quiet(half, dt, rate_hz) if float(np.sqrt((half**2).mean())) > least else np.zeros_like(half)
         out[a], out[b] = 0.5 * axle + apart, 0.5 * axle - apart
     return out

@@ -51,9 +51,9 @@ def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, thres
             energy = gram[c, c]
             if energy <= 1e-12:
                 continue
-            seen = (math.sqrt(threshold * inflation[i]) + NormalDist().inv_cdf(POWER) * math.sqrt(inflation[i])) / (
-                math.sqrt(energy)
-            )
+            # the test's statistic is the gain per value of the effect
+            asked = math.sqrt(threshold * len(columns) * inflation[i])
+            seen = (asked + NormalDist().inv_cdf(POWER) * math.sqrt(inflation[i])) / math.sqrt(energy)
             if seen <= max(bench.high[c], -bench.low[c]):
                 out[c] = max(seen, bench.smallest[c])
     return out

@@ -46,8 +46,8 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     """
     if not candidates:
         return Outcome("unexplained" if p_value < BEYOND_DOUBT else "no_effect", (), (), None, ())
-    credible = [c for c in candidates if c.evidence_ratio < CREDIBLE]
-    credible = one_per_name(credible)
+    every_place = [c for c in candidates if c.evidence_ratio < CREDIBLE]
+    credible = one_per_name(every_place)
     best = credible[0]
     own = causes_of(bench, best, model)
     worth = [_worth_naming(best, i, model) for i in range(len(best.refit.members))]
@@ -56,6 +56,7 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     )
     if not any(worth):
         return Outcome("no_effect", (), (), None, small)
+    small += _other_places(bench, best, every_place, model)
     named = tuple(c for c, w in zip(own, worth, strict=True) if w)
     others = tuple(
         Alternative(large, c.evidence_ratio)
@@ -74,6 +75,17 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
         c for c in union.values() if c.effect not in certain
     )
     return Outcome("cannot_tell", shown, others, best.refit, small, frozenset(certain))
+
+
+def _other_places(bench: Bench, best: Candidate, credible: Sequence[Candidate], model: Model) -> tuple[str, ...]:
+    """What is told of the same effects at other places, which explain the log as well or nearly so."""
+    names = sorted(h.effect.name for h in best.refit.members)
+    own = {h.key for h in best.refit.members}
+    out = []
+    for c in credible:
+        if c.refit is not best.refit and sorted(h.effect.name for h in c.refit.members) == names:
+            out += [f"As well possible: {x.sentence}" for x in causes_of(bench, c, model) if x.key not in own]
+    return tuple(dict.fromkeys(out))
 
 
 def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:

@@ -11,7 +11,7 @@ import numpy as np
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
 from aqualog.diagnose.bench import Bench, Stack, without_deviations
-from aqualog.diagnose.channels import CHANNELS, contrasts
+from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
@@ -143,11 +143,16 @@ def diagnose(
     if outcome.verdict == "cannot_tell":
         tell("looking for a run that would tell", 0.95)
         next_run = next_manoeuvre(bench, one_per_name(found.candidates), found.noises, model)
-    reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ""
+    reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of what was logged does"
     return Diagnosis(
         verdict=outcome.verdict,
         sentence=verdict_sentence(
-            outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain
+            outcome.verdict,
+            outcome.causes,
+            level=options.level,
+            reason=reason,
+            certain=outcome.certain,
+            seen=found.tests[0].p_value if found.tests[0].p_value <= options.level else None,
         ),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
@@ -248,7 +253,7 @@ def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Op
     # nor is anything else that a file or a tyre may be off by
     left = without_deviations(bench, d, left, range(bench.count), farthest=FARTHEST)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-    stack = Stack(left, drive.mask, max(0.1, drive.dt), drive.channels, drive.coordinates, noise)
+    stack = Stack(left, drive.mask, block_step(drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}
     for h, columns in zip(bench.asked, bench.columns, strict=True):
         if not h.allowed:
@@ -329,7 +334,7 @@ def _views(
             kind = CHANNELS[c]
             out.append(
                 ResidualView(
-                    d.name, c, kind.title, kind.unit, max(0.1, d.dt), d.coordinates, np.where(d.mask, b[i], np.nan),
+                    d.name, c, kind.title, kind.unit, block_step(d.dt), d.coordinates, np.where(d.mask, b[i], np.nan),
                     np.where(d.mask, a[i], np.nan),
                 )
             )  # fmt: skip

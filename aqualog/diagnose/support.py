@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from aqualog.diagnose.bench import Bench, gram_of, tolerant
-from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.channels import block_step, contrasts
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import gains_on_top
@@ -46,6 +46,6 @@ def supported(bench: Bench) -> Bench:
 def _off_water(drive: Drive) -> BoolArray:
     """Usable samples without water, nor shortly after it. (m,)"""
     wet = drive.coordinates.get("water_depth", np.zeros(drive.mask.size))[: drive.mask.size] > 0.0
-    k = round(BESIDE_S / max(0.1, drive.dt))
+    k = round(BESIDE_S / block_step(drive.dt))
     late = np.convolve(wet.astype(np.float64), np.ones(k + 1), "full")[: wet.size] > 0.5
     return drive.mask & ~late

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.isolate import separation
@@ -168,7 +169,7 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
     of_channels = out.reshape(len(out), count, -1)
     missed = (of_channels[0] ** 2).sum(axis=-1) / max(int(drive.mask.sum()), 1)
     out = (of_channels / np.sqrt(1.0 + missed)[:, None]).reshape(len(out), -1)
-    step = max(0.1, drive.dt)
+    step = block_step(drive.dt)
     for c, name in enumerate(drive.channels[count:], count):
         sd = next((x for n, x in _ASSUMED.items() if name.startswith(n)), _ASSUMED_SPEED)
         out = np.concatenate([out, rows[:, c, drive.mask] / sd * math.sqrt(min(step, 1.0))], axis=1)

@@ -17,7 +17,7 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "position": ("place on the road", "m"),
     "t": ("time", "s"),
     "water_depth": ("water depth", "m"),
-    "temperature": ("temperature", "degC"),
+    "ambient_temperature": ("air temperature", "K"),
     "slip": ("slip", "-"),
     "drive_sign": ("driving or braking", "-"),
     "steer_angle": ("steer angle", "rad"),
@@ -27,10 +27,10 @@ _CHANNELS: dict[str, tuple[str, str]] = {
     "force_balance": ("force balance", "m/s^2"),
     "kinematic": ("accelerometer against wheel acceleration", "m/s^2"),
     "lateral": ("lateral acceleration", "m/s^2"),
-    "axle_slip": ("slip between the axles", "-"),
-    "side_slip_f": ("slip between the front wheels", "-"),
-    "side_slip_r": ("slip between the rear wheels", "-"),
-    **{f"slip_{w}": (f"slip {w}", "-") for w in ("fl", "fr", "rl", "rr")},
+    "axle_slip": ("slip between the axles", "m/s"),
+    "side_slip_f": ("slip between the front wheels", "m/s"),
+    "side_slip_r": ("slip between the rear wheels", "m/s"),
+    **{f"slip_{w}": (f"slip {w}", "m/s") for w in ("fl", "fr", "rl", "rr")},
     **{f"tie_rod_{w}": (f"tie rod {w}", "N") for w in ("fl", "fr")},
 }
 ALIKE = 0.9  # cosine from which a known effect looks nearly the same

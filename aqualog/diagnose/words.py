@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from string import Formatter
 
 from aqualog.diagnose.records import Cause, Estimate
 
@@ -35,16 +37,28 @@ def name_of(effect: str, where: str | None) -> str:
 
 def cause_sentence(effect: str, where: str | None, sentence: str, parameters: Mapping[str, Estimate]) -> str:
     """The effect's own sentence with its values and the interval of the first one."""
-    first = next(iter(parameters.values()))
+    name, first = next(iter(parameters.items()))
     values = {n: e.value for n, e in parameters.items()}
+    low, high, unit = first.low, first.high, first.unit
     if effect == "payload_mass" and first.value < 0.0:
         text = f"The car weighed {-first.value:.0f} kg less than the vehicle file says"
+        low, high = -high, -low
     else:
         text = sentence.format(where=where or "", **values).rstrip(".")
-    interval = f"{first.low:.3g} to {first.high:.3g}" + (
-        "" if first.unit == "-" else f" {first.unit.replace('*', ' ')}"
-    )
-    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {interval}."
+    if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
+        # in the unit in which the sentence has the value
+        low, high, unit = 100.0 * low, 100.0 * high, "%"
+    told = "" if unit == "-" else f" {unit.replace('*', ' ')}"
+    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {_span(low, high)}{told}."
+
+
+def _span(low: float, high: float) -> str:
+    """`1.095 to 1.103`: as many digits as tell the two apart."""
+    half = 0.5 * abs(high - low)
+    if not 0.0 < half < math.inf:
+        return f"{low:.3g} to {high:.3g}"
+    digits = max(0, -math.floor(math.log10(0.5 * half)))
+    return f"{low:.{digits}f} to {high:.{digits}f}"
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
@@ -53,10 +67,24 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 
 def verdict_sentence(
-    verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "", certain: frozenset[str] = frozenset()
+    verdict: str,
+    causes: Sequence[Cause],
+    *,
+    level: float,
+    reason: str = "",
+    certain: frozenset[str] = frozenset(),
+    seen: float | None = None,
 ) -> str:
-    """The verdict in one sentence; `certain`: effects that are not in doubt where others cannot be told apart."""
+    """The verdict in one sentence.
+
+    `certain`: effects that are not in doubt where others cannot be told apart; `seen`: the test's p-value where it
+    found more than noise.
+    """
     names = [name_of(c.effect, c.where) for c in causes]
+    if verdict == "no_effect" and seen is not None:
+        return (
+            f"No effect: more than noise is left (p = {seen:.2g}), but nothing that is large enough to be worth naming."
+        )
     if verdict == "no_effect":
         return f"No effect: the model predicts what was measured, at a false-alarm level of {level:g}."
     if verdict == "named":

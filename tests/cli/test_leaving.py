@@ -12,12 +12,12 @@ from aqualog.model.programme import PROGRAMMES
 
 WAITING = """
 import sys, time
-import aqualog.align.load, aqualog.evaluate.run
+import aqualog.align.load, aqualog.align.load_long, aqualog.evaluate.run
 def wait(*_, **__):
     sys.stderr.write("READY\\n")
     sys.stderr.flush()
     time.sleep(30)
-aqualog.align.load.load_signals = wait
+aqualog.align.load.load_signals = aqualog.align.load_long.load_drive = wait
 aqualog.evaluate.run.evaluate = wait
 from aqualog.cli.main import run
 sys.argv = ["aqualog", *sys.argv[1:]]

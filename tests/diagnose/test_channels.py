@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_drive import CAR, plain, signals, term
 
-from aqualog.diagnose.channels import CHANNELS, block_means, channel_values, channels_of, contrasts
+from aqualog.diagnose.channels import CHANNELS, block_means, block_step, channel_values, channels_of, contrasts
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import residual
 from aqualog.model.term import Model
@@ -123,3 +123,14 @@ def test_the_nudge_is_taken_out_of_the_kinematic_channel():
     speed = 20.0 + np.arange(n) * 0.01 * 0.5
     columns = {"a_x": a, "v_x": speed, "nudge_seen": np.full(n, 0.3)}
     np.testing.assert_allclose(channel_values(columns, ("kinematic",), CAR, dt=0.01)[0], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [200, 100, 50, 25, 16, 12.5, 10, 5])
+def test_an_acceleration_of_the_wheels_is_the_same_at_every_rate(rate):
+    """Blocks are 0.1 s only where the rate allows it; the speed's change is over their own length."""
+    dt = 1.0 / rate
+    t = np.arange(round(20.0 * rate)) * dt
+    columns = {"a_x": 0.0 * t, "v_x": 10.0 + 0.8 * t}
+    (kinematic,) = channel_values(columns, ("kinematic",), CAR, dt=dt)
+    np.testing.assert_allclose(kinematic[2:-2], -0.8, rtol=1e-9)
+    assert kinematic.size * block_step(dt) == pytest.approx(20.0, abs=block_step(dt))

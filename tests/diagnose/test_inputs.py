@@ -57,8 +57,17 @@ def test_left_and_right_get_the_mean_of_their_axle():
     torque = np.array([np.zeros(T.size), np.zeros(T.size), MOTION, MOTION]) + 5.0 * RNG.standard_normal((4, T.size))
     out = quiet_torque(torque, DT)
     assert np.array_equal(out[2], out[3])
-    assert np.ptp(out[0]) == 0.0
+    assert out[0].std() < 0.15 * 5.0
     assert out[2].mean() == pytest.approx(MOTION.mean(), abs=2.0)
+
+
+def test_light_braking_at_the_axle_that_is_not_driven_stays():
+    """A few seconds at -70 N m have a small variance, and without them the torque is 3 % too large."""
+    braking = np.where((T > 40.0) & (T < 43.0), -35.0, 0.0)
+    torque = np.array([braking, braking, MOTION, MOTION]) + 2.0 * np.random.default_rng(4).standard_normal((4, T.size))
+    out = quiet_torque(torque, DT)
+    assert out[0][(T > 40.5) & (T < 42.5)].mean() == pytest.approx(-35.0, abs=2.0)
+    assert out[0][T < 38.0].mean() == pytest.approx(0.0, abs=0.5)
 
 
 def test_a_real_difference_of_left_and_right_stays():

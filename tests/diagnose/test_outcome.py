@@ -96,6 +96,7 @@ def test_places_of_one_effect_are_one_cause():
     o = told(candidate(tyre_radius_fl=0.01), candidate(2.0, tyre_radius_f=0.01))
     assert o.verdict == "named"
     assert names(o) == ["tyre_radius@fl"]
+    assert any(n.startswith("As well possible: ") and "front axle" in n for n in o.small)
 
 
 def test_what_is_too_small_is_said_and_not_named():

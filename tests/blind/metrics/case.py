@@ -20,6 +20,7 @@ from blind.rivals.compare import heldout_share, measured
 from blind.world.cases import Case, Hidden, Spec, clean_pair, make_case, truth
 from blind.world.vehicles import CARS
 
+from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.records import Cause, Diagnosis
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
@@ -207,4 +208,4 @@ def _residuals(log: forecast.Log) -> Residuals:
     d = log.drive
     n = log.residual.shape[1]
     coordinates = {k: x[:n] for k, x in d.coordinates.items()}
-    return Residuals(d.channels, log.residual, d.mask, coordinates, max(0.1, d.dt))
+    return Residuals(d.channels, log.residual, d.mask, coordinates, block_step(d.dt))

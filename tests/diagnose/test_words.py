@@ -1,0 +1,37 @@
+"""Sentences say what the numbers say, in one unit."""
+
+import pytest
+
+from aqualog.diagnose.records import Estimate
+from aqualog.diagnose.words import cause_sentence, verdict_sentence
+from aqualog.model.effects import EFFECTS
+
+
+def told(effect, where, **estimates):
+    return cause_sentence(effect, where, EFFECTS[effect].sentence, estimates)
+
+
+@pytest.mark.parametrize(
+    ("effect", "where", "name", "estimate", "ends"),
+    [
+        ("torque_gain", None, "gain", Estimate(1.0990, 1.0954, 1.1030, "-"), "95 % interval 1.095 to 1.103."),
+        ("velocity_scale", None, "scale", Estimate(1.0041, 1.0036, 1.0046, "-"), "95 % interval 1.0036 to 1.0046."),
+        ("payload_mass", None, "delta_mass", Estimate(200.0, 193.6, 207.9, "kg"), "95 % interval 194 to 208 kg."),
+        ("payload_mass", None, "delta_mass", Estimate(-150.0, -157.0, -143.0, "kg"), "95 % interval 143 to 157 kg."),
+        ("signal_delay", "v_x", "delay", Estimate(0.2, 0.196, 0.203, "s"), "95 % interval 0.196 to 0.203 s."),
+    ],
+)
+def test_an_interval_has_the_digits_that_tell_its_ends_apart(effect, where, name, estimate, ends):
+    assert told(effect, where, **{name: estimate}).endswith(ends)
+
+
+def test_an_interval_has_the_unit_of_the_value():
+    text = told("tyre_radius", "fl", delta=Estimate(-0.01, -0.0102, -0.0098, "-"))
+    assert "-1.00%" in text
+    assert text.endswith("95 % interval -1.02 to -0.98 %.")
+
+
+def test_more_than_noise_and_nothing_large_is_one_sentence():
+    text = verdict_sentence("no_effect", (), level=0.01, seen=0.0022)
+    assert "more than noise is left (p = 0.0022)" in text
+    assert "predicts what was measured" not in text
