@@ -281,7 +281,9 @@ def test_quantiles_of_student():
         assert student_quantile(0.975, dof) == pytest.approx(quantile, rel=1e-4)
 
 
-@pytest.mark.parametrize(("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), (150.0, 0.3, 5.0)])
+@pytest.mark.parametrize(
+    ("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), pytest.param(150.0, 0.3, 5.0, marks=pytest.mark.long)]
+)
 def test_intervals_cover_the_truth(seconds, sd, memory_s):
     cases, refusals, hits = 220, 0, np.zeros(5)
     for seed in range(cases):
