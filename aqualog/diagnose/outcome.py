@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = ["Outcome", "causes_of", "conclude", "one_per_name"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 BEYOND_DOUBT = 1e-5  # p-value of a test that no effect and no function bears out, to be told as a finding
+PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 
 
@@ -83,22 +85,33 @@ def _other_places(bench: Bench, best: Candidate, credible: Sequence[Candidate], 
     own = {h.key for h in best.refit.members}
     out = []
     for c in credible:
-        if c.refit is not best.refit and sorted(h.effect.name for h in c.refit.members) == names:
+        is_near = _sharp(c) - _sharp(best) < 2.0 * math.log(CREDIBLE) * best.inflation
+        if c.refit is not best.refit and is_near and sorted(h.effect.name for h in c.refit.members) == names:
             out += [f"As well possible: {x.sentence}" for x in causes_of(bench, c, model) if x.key not in own]
     return tuple(dict.fromkeys(out))
 
 
 def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
-    """One candidate for each set of effects: the one at the whole car if there is one, else the best."""
-    out: dict[tuple[str, ...], Candidate] = {}
+    """One candidate for each set of effects: the one at the whole car, unless another place is clearly better.
+
+    All tolerances together forgive a wrong place (the form of a tyre's curve takes what one wheel shows and its twin
+    does not), so places are compared where only a part of them is forgiven.
+    """
+    groups: dict[tuple[str, ...], list[Candidate]] = {}
     for c in credible:
-        names = tuple(sorted(h.effect.name for h in c.refit.members))
-        old = out.get(names)
-        if old is None:
-            out[names] = c
-        elif _whole(c) > _whole(old) and c.evidence_ratio < 5.0 * old.evidence_ratio:
-            out[names] = Candidate(c.refit, old.evidence_ratio, c.inflation)
-    return list(out.values())
+        groups.setdefault(tuple(sorted(h.effect.name for h in c.refit.members)), []).append(c)
+    out = []
+    for own in groups.values():
+        best = min(own, key=_sharp) if not any(math.isnan(c.sharp) for c in own) else own[0]
+        near = [c for c in own if _sharp(c) - _sharp(best) < 2.0 * math.log(PLACES) * c.inflation]
+        chosen = max([best, *near], key=_whole)
+        out.append(replace(chosen, evidence_ratio=min(c.evidence_ratio for c in own)))
+    return out
+
+
+def _sharp(c: Candidate) -> float:
+    """Where it was not asked: as the evidence has it."""
+    return 2.0 * math.log(c.evidence_ratio) * c.inflation if math.isnan(c.sharp) else c.sharp
 
 
 def _whole(c: Candidate) -> int:

@@ -43,11 +43,16 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of the noise's variances."""
+    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of the noise's variances.
+
+    `sharp`: its loss where only a part of the tolerances is forgiven, in a metric that all candidates share: what tells
+    places of one effect apart. NaN where it was not asked.
+    """
 
     refit: Refit
     evidence_ratio: float
     inflation: float
+    sharp: float = math.nan
 
     @property
     def sd(self) -> FloatArray:
@@ -241,9 +246,14 @@ def _refitted(
 
     with ThreadPoolExecutor(THREADS) as pool:
         sharp = list(pool.map(sharpened, starts, (r for r, _ in credible)))
+    known_only = metric(bench, noises, share=KNOWN)
+
+    def as_candidate(r: Refit, ratio: float) -> Candidate:
+        y = whitened_residual(bench, noises, r.residuals)[None]
+        return Candidate(r, ratio, inflation, float(known_only.inner(y, y)[0, 0]) + r.unlikely)
+
     return tuple(
-        Candidate(s if s is not None and not s.at_bound else r, x, inflation)
-        for (r, x), s in zip(credible, sharp, strict=True)
+        as_candidate(s if s is not None and not s.at_bound else r, x) for (r, x), s in zip(credible, sharp, strict=True)
     )
 
 

@@ -99,6 +99,17 @@ def test_places_of_one_effect_are_one_cause():
     assert any(n.startswith("As well possible: ") and "front axle" in n for n in o.small)
 
 
+@pytest.mark.parametrize(("worse", "place"), [(0.0, "tyre_radius@f"), (12.0, "tyre_radius@fl")])
+def test_the_place_is_where_what_is_known_speaks_for_it(worse, place):
+    """All tolerances together forgive the other place; with a part of them one explains far more."""
+    axle = replace(candidate(tyre_radius_f=0.01), sharp=1000.0 + worse)
+    wheel = replace(candidate(1.2, tyre_radius_fl=0.02), sharp=1000.0 + 0.1 * (worse == 0.0))
+    o = told(axle, wheel)
+    assert o.verdict == "named"
+    assert names(o) == [place]
+    assert any("As well possible" in n for n in o.small) == (worse == 0.0)
+
+
 def test_what_is_too_small_is_said_and_not_named():
     o = told(candidate(payload_mass=10.0))
     assert (o.verdict, o.causes, o.chosen) == ("no_effect", (), None)
