@@ -22,6 +22,8 @@ NOT_TORQUE_SHARE = 0.05  # of the rms of all wheels
 # freedom (D)
 MEDIAN = 0.4549
 END_S = 1.0  # [s] that tell where a signal begins and ends
+STANDS_OUT, LEAST_EVENT = 4.0, 10.0  # standard deviations, and [N m] of an axle: braking, not noise
+BESIDE_EVENT_S = 0.5  # [s]
 LOCAL = 9  # frequencies over which a spectrum is smoothed
 OVER = 3.0  # times the noise that a frequency must have to pass: one of a thousand does by chance (D)
 
@@ -102,14 +104,26 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
     """Wheel torques (4, n) [N m] without noise; `rate_hz` as in `quiet`.
 
     Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an axle that is
-    not driven is torque like any other: 50 N m now and then are 3 % of what slow driving takes.
+    not driven is torque like any other: 50 N m now and then are 3 % of what slow driving takes. Of an axle that has no
+    more than that, what does not stand out is noise, whose colour no filter knows.
     """
     out = np.empty_like(torque)
+    driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     total = float(np.sqrt((torque.sum(axis=0) ** 2).mean()))
     least = max(NOT_TORQUE, NOT_TORQUE_SHARE * total)
     for a, b in ((0, 1), (2, 3)):
         both, half = torque[a] + torque[b], 0.5 * (torque[a] - torque[b])
         axle = quiet(both, dt, rate_hz)
+        if a != driven and float(both.std()) < NOT_TORQUE:
+            axle = _events(axle, dt)
         apart = quiet(half, dt, rate_hz) if float(np.sqrt((half**2).mean())) > least else np.zeros_like(half)
         out[a], out[b] = 0.5 * axle + apart, 0.5 * axle - apart
     return out
+
+
+def _events(x: FloatArray, dt: float) -> FloatArray:
+    """A torque where it stands out of its own scatter, with what is beside that; elsewhere the mean of the rest."""
+    off = np.abs(x - np.median(x))
+    out = off > max(STANDS_OUT * 1.4826 * float(np.median(off)), LEAST_EVENT)
+    out = np.convolve(out, np.ones(2 * round(BESIDE_EVENT_S / dt) + 1), "same") > 0.5
+    return np.where(out, x, x[~out].mean() if not out.all() else 0.0)
