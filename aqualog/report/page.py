@@ -67,7 +67,7 @@ def render_page(result: DriveResult, *, title: str) -> str:
         data=_data(result, rows, plan),
         has_plots=bool(rows) and plan.n > 0,
         toggles=_toggles(rows),
-        note=_reduction_note(plan, len(result.events)),
+        note=_picture_note(result) or _reduction_note(plan, len(result.events)),
         has_water_label="on_water" in result.signals.frame.columns,
         verdict=verdict(result),
         facts=tables.head_facts(result),
@@ -98,6 +98,16 @@ def _toggles(rows: list[Row]) -> list[dict[str, str]]:
         {"group": g, "label": g if g == VEHICLE else g.upper(), "colour": WHEEL_COLOURS.get(g, "")}
         for g in groups(rows)
     ]
+
+
+def _picture_note(result: DriveResult) -> str:
+    """What is drawn of a drive that was gone through in windows: not its samples."""
+    if result.signals.full is None:
+        return ""
+    return (
+        f"Of this long drive the page holds the least and the greatest value of every {2.0 * result.signals.dt:g} s: no "
+        "outlier is lost, and events are too coarse to be looked at here; signals.parquet has every sample."
+    )
 
 
 def _reduction_note(plan: Plan, events: int) -> str:
