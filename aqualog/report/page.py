@@ -105,7 +105,7 @@ def _picture_note(result: DriveResult) -> str:
     if result.signals.full is None:
         return ""
     return (
-        f"Of this long drive the page holds the least and the greatest value of every {2.0 * result.signals.dt:g} s: no "
+        f"Of this long drive the page holds the least and greatest value of every {2.0 * result.signals.dt:g} s: no "
         "outlier is lost, and events are too coarse to be looked at here; signals.parquet has every sample."
     )
 
