@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.align.freezes import freeze_note, in_freezes, watch_of
 from aqualog.align.glitches import sensor_glitches
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import median_period_ns
+from aqualog.align.shared import OfLast
 from aqualog.align.timebase import ClockRepair
 from aqualog.errors import ConfigError, SignalError
 from aqualog.notation import ACCEPTED, SYMBOLS, Symbol
@@ -18,8 +20,8 @@ from aqualog.units import convert, parse_unit
 from aqualog.vehicle import Vehicle
 
 __all__ = [
-    "Clean", "Judged", "Span", "clean_channel", "corrected", "glitch_note", "judged", "mean_of_steps", "out_note",
-    "symbol_of",
+    "Clean", "Judged", "Span", "Stamps", "clean_channel", "corrected", "glitch_note", "judged", "mean_of_steps",
+    "out_note", "symbol_of",
 ]  # fmt: skip
 
 BURST = 5  # median sample times; longer steps are gaps and no sample time
@@ -63,13 +65,26 @@ class Judged(NamedTuple):
         return ~(self.is_bad | self.is_code | self.is_out)
 
 
+class Stamps:
+    """What is known of the time stamps of a drive's files while its channels are gone through."""
+
+    def __init__(self) -> None:
+        self._repairs: dict[str, ClockRepair] = {}
+        self.period_ns = OfLast(median_period_ns)
+        self.span = OfLast(_span)
+
+    def repair(self, file: str) -> ClockRepair:
+        """The repair of a file's stamps."""
+        return self._repairs.setdefault(file, ClockRepair())
+
+
 def clean_channel(
     name: str,
     entry: Entry,
     channel: Channel,
     signal_map: SignalMap,
     vehicle: Vehicle,
-    repairs: dict[str, ClockRepair],
+    stamps: Stamps,
     notes: list[str],
 ) -> Clean | None:
     """Bad samples out, SI, stamps repaired; None (with a note) for a channel without a map whose unit is unknown."""
@@ -79,9 +94,10 @@ def clean_channel(
     unit = entry.unit or info.unit
     is_explicit = name in signal_map.entries
     t_ns = corrected(channel.t_ns, signal_map, info.file)
-    t_ns, order, faults = repairs.setdefault(info.file, ClockRepair()).repair(t_ns)
+    t_ns, order, faults = stamps.repair(info.file).repair(t_ns)
+    raw = channel.values[order] if faults.back_steps or faults.duplicates else channel.values
     try:
-        own = judged(symbol, entry, channel.values[order], unit, vehicle, where)
+        own = judged(symbol, entry, raw, unit, vehicle, where)
     except SignalError as error:
         if is_explicit:
             raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
@@ -99,7 +115,15 @@ def clean_channel(
     if is_out.any():
         first = float(own.values[np.argmax(is_out)])
         notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, first))
-    period = median_period_ns(t_ns)
+    frozen, watch = 0, watch_of(name, vehicle.r_e(name[-2:]) if name.startswith("omega_") else None)
+    if watch is not None:
+        watch.push(t_ns[keep], own.values[keep])
+        if freezes := watch.finish():
+            repeats = keep & in_freezes(t_ns, freezes)
+            frozen = int(repeats.sum())
+            notes.append(freeze_note(where, frozen, int(t_ns[0]), freezes))
+            keep = keep & ~repeats
+    period = stamps.period_ns(t_ns)
     origin = Origin(
         symbol=name,
         channel=info.path,
@@ -110,9 +134,13 @@ def clean_channel(
         not_finite=int(own.is_bad.sum()),
         out_of_range=int(is_out.sum()),
         invalid_code=int(own.is_code.sum()),
+        frozen=frozen,
         faults=faults,
     )
-    return Clean(symbol, origin, _span(t_ns[keep]), t_ns[keep], own.values[keep])
+    values = own.values
+    if not keep.all():
+        t_ns, values = t_ns[keep], values[keep]
+    return Clean(symbol, origin, stamps.span(t_ns), t_ns, values)
 
 
 def symbol_of(name: str) -> Symbol:

@@ -10,7 +10,7 @@ import polars as pl
 
 from aqualog.align.clean import Clean, Span
 from aqualog.align.mapping import SignalMap
-from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear
+from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear, placed
 from aqualog.errors import SignalError
 from aqualog.notation import WHEELS, Symbol
 from aqualog.types import BoolArray, Channel, FloatArray, TimeArray
@@ -101,7 +101,13 @@ def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:
 
 
 def onto_grid(
-    symbol: Symbol, span: Span, t_ns: TimeArray, x: FloatArray, points: TimeArray, dt_ns: int
+    symbol: Symbol,
+    span: Span,
+    t_ns: TimeArray,
+    x: FloatArray,
+    points: TimeArray,
+    dt_ns: int,
+    at: Placed | None = None,
 ) -> tuple[FloatArray, bool]:
     """A signal at points of the grid, and whether a sample was missing there.
 
@@ -116,16 +122,20 @@ def onto_grid(
         [ns]
     dt_ns : int
         Step of the grid. [ns]
+    at : Placed, optional
+        Where the points lie among these stamps, if it is known.
     """
     is_state = symbol.kind == "state"
     gap_ns = gap_limit_ns(span.period_ns, is_state=is_state)
+    if at is None and t_ns.size:
+        at = placed(t_ns, points, dt_ns)
     bridged: BoolArray
     if is_state:
-        return hold(t_ns, x, points, gap_ns=gap_ns), False
+        return hold(t_ns, x, points, gap_ns=gap_ns, at=at), False
     if 0 < span.period_ns < dt_ns / 2:
-        y, bridged = bin_mean(t_ns, x, points, dt_ns=dt_ns, gap_ns=gap_ns, period_ns=span.period_ns)
+        y, bridged = bin_mean(t_ns, x, points, dt_ns=dt_ns, gap_ns=gap_ns, period_ns=span.period_ns, at=at)
     else:
-        y, bridged = linear(t_ns, x, points, gap_ns=gap_ns, period_ns=span.period_ns)
+        y, bridged = linear(t_ns, x, points, gap_ns=gap_ns, period_ns=span.period_ns, at=at)
     return y, bool(bridged.any())
 
 

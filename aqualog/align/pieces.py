@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aqualog.align.clean import BURST, Clean, Span, corrected, glitch_note, judged, mean_of_steps, out_note, symbol_of
+from aqualog.align.freezes import Freeze, freeze_note, in_freezes, watch_of
 from aqualog.align.glitches import RETURN_NS, sensor_glitches
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
@@ -80,6 +81,9 @@ class PieceCleaner:
     info : ChannelInfo
     signal_map : SignalMap
     vehicle : Vehicle
+    freezes : tuple of Freeze, optional
+        Where the signal is known to be frozen, from `frozen` of an earlier pass; without them nothing is left out for
+        that.
 
     Raises
     ------
@@ -87,7 +91,10 @@ class PieceCleaner:
         If the unit is not one of the signal: the latter where the map gives it.
     """
 
-    def __init__(self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle) -> None:
+    def __init__(
+        self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle,
+        freezes: tuple[Freeze, ...] | None = None,
+    ) -> None:  # fmt: skip
         self.name, self.info = name, info
         self.symbol = symbol_of(name)
         self.unit = entry.unit or info.unit
@@ -102,7 +109,10 @@ class PieceCleaner:
                 raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
             raise
         self._r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+        self._freezes = freezes or ()
+        self._watch = watch_of(name, self._r_e) if freezes is None else None
         # counts
+        self._frozen = 0
         self._samples = self._duplicates = self._bad = self._code = self._out = self._glitches = self._repaired = 0
         self._pauses: list[int] = []
         self._first_ns: int | None = None
@@ -166,6 +176,12 @@ class PieceCleaner:
         return self._let_through(t, x) if self._r_e is None else self._without_glitches(t, x, is_last=False)
 
     def _let_through(self, t: TimeArray, x: FloatArray) -> tuple[TimeArray, FloatArray]:
+        if self._watch is not None:
+            self._watch.push(t, x)
+        if self._freezes:
+            repeats = in_freezes(t, self._freezes)
+            self._frozen += int(repeats.sum())
+            t, x = t[~repeats], x[~repeats]
         if t.size:
             last = None if self._ends is None else self._ends[1]
             self._used.add(np.diff(t) if last is None else np.diff(t, prepend=last))
@@ -204,7 +220,7 @@ class PieceCleaner:
 
     def _judged_glitches(self, t: TimeArray, x: FloatArray) -> BoolArray:
         assert self._r_e is not None
-        if self._used_count + self._glitches + t.size - self._done < 3:
+        if self._used_count + self._frozen + self._glitches + t.size - self._done < 3:
             return np.zeros(t.size, dtype=bool)
         # a rest of two samples is part of a long signal: it goes on to the left as it began
         t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([x[:1], x[:1], x])
@@ -219,6 +235,10 @@ class PieceCleaner:
             if self._first_out is None or self._first_out[0] > t[0]:
                 self._first_out = int(t[0]), float(x[0])
 
+    def frozen(self) -> tuple[Freeze, ...]:
+        """Where the signal is frozen; complete after `finish`."""
+        return self._freezes if self._watch is None else self._watch.finish()
+
     def cleaned(self) -> tuple[Clean, list[str]]:
         """The signal without its samples, and the notes on it; complete after `finish`."""
         period, _ = self._all.finish()
@@ -232,6 +252,8 @@ class PieceCleaner:
         out = self._out + self._glitches
         if self._first_out is not None:
             notes.append(out_note(self._where, self.symbol, out, self._repaired, self._first_out[1]))
+        if self._freezes:
+            notes.append(freeze_note(self._where, self._frozen, self._first_ns or 0, self._freezes))
         faults = TimeFaults(duplicates=self._duplicates, pauses=sum(s > 10 * period for s in self._pauses))
         origin = Origin(
             symbol=self.name,
@@ -243,6 +265,7 @@ class PieceCleaner:
             not_finite=self._bad,
             out_of_range=out,
             invalid_code=self._code,
+            frozen=self._frozen,
             faults=faults,
         )
         span = Span(first, last, self._used_count, used, mean)

@@ -7,8 +7,10 @@ accelerometer must move with the derivative of the speed, a yaw rate with the di
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -99,7 +101,7 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
     mapping symbol -> Proposal
         Only what name and unit support; the reason says what the data said. A guess to be checked, never used silently.
     """
-    usable = [c for c in channels if c.values.size > 1 and np.isfinite(c.values).any()]
+    usable = _Named(c for c in channels if c.values.size > 1 and np.isfinite(c.values).any())
     found: dict[str, Proposal] = {}
     for symbol in (*SYMBOLS, *ACCEPTED):
         exact = [c for c in usable if c.info.name == symbol]
@@ -145,10 +147,23 @@ def _keep_best(found: dict[str, Proposal], symbol: str, candidates: list[Proposa
         found[symbol] = max(good, key=lambda p: p.score)
 
 
-def words_of(text: str) -> list[str]:
+@lru_cache(maxsize=1 << 15)  # every rule asks for the words of every name, and a logger has thousands of them
+def words_of(text: str) -> tuple[str, ...]:
     """Words of a name, lower case: `VehSpd_FL` -> veh, spd, fl."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text)
-    return [w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w]
+    return tuple(w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w)
+
+
+class _Named(list[Channel]):
+    """Channels of one drive, found by path or file and path; not changed once made."""
+
+    def __init__(self, channels: Iterable[Channel]) -> None:
+        super().__init__(channels)
+        self.times = Counter(c.info.path for c in self)
+        self.by_address: dict[str, Channel] = {}
+        for channel in self:
+            self.by_address.setdefault(channel.info.path, channel)
+            self.by_address.setdefault(channel_id(channel.info), channel)
 
 
 def _has(wanted: Sequence[str], words: Sequence[str]) -> bool:
@@ -163,14 +178,13 @@ def _dimension(channel: Channel) -> str:
     return parse_unit(unit).dimension if is_unit(unit) else "?"
 
 
-def _address(channel: Channel, channels: Sequence[Channel]) -> str:
+def _address(channel: Channel, channels: _Named) -> str:
     """Shortest unique name: the path where it is unique, else with the file."""
-    same = sum(c.info.path == channel.info.path for c in channels)
-    return channel.info.path if same == 1 else channel_id(channel.info)
+    return channel.info.path if channels.times[channel.info.path] == 1 else channel_id(channel.info)
 
 
 def _proposal(
-    symbol: str, channel: Channel, channels: Sequence[Channel], score: float, unit: str = "", *, may_rest: bool = False
+    symbol: str, channel: Channel, channels: _Named, score: float, unit: str = "", *, may_rest: bool = False
 ) -> Proposal:
     own = channel.info.unit
     entry = Entry(symbol, (_address(channel, channels),), own if own and is_unit(own) else (unit or None))
@@ -187,7 +201,7 @@ def _proposal(
 
 
 def _wheel_candidates(
-    channels: Sequence[Channel],
+    channels: _Named,
     wheel: str,
     words: tuple[str, ...],
     dimensions: tuple[str, ...],
@@ -207,7 +221,7 @@ def _wheel_candidates(
     return result
 
 
-def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Proposal | None:
+def _candidate(rule: _Rule, channel: Channel, channels: _Named) -> Proposal | None:
     words = words_of(channel.info.name)
     path_words = set(words_of(channel_id(channel.info)))
     dimension = _dimension(channel)
@@ -223,7 +237,7 @@ def _candidate(rule: _Rule, channel: Channel, channels: Sequence[Channel]) -> Pr
     return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit, may_rest=rule.may_rest)
 
 
-def _lane_candidate(channel: Channel, channels: Sequence[Channel]) -> Proposal | None:
+def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
     """A channel that is 0 or 1 and is called after a wet lane or the light barriers at its ends."""
     words = words_of(channel.info.name)
     named = _has(_LANE_WORDS, words) or any(w in " ".join(words) for w in _LANE_WORDS if " " in w)
@@ -242,12 +256,8 @@ def _lane_candidate(channel: Channel, channels: Sequence[Channel]) -> Proposal |
 # --- the data's word ---------------------------------------------------------------------------------------------
 
 
-def _file_and_path(p: Proposal, channels: Sequence[Channel]) -> str:
-    return channel_id(_by_address(channels, p.entry.channel[0]).info)
-
-
-def _by_address(channels: Sequence[Channel], address: str) -> Channel:
-    return next(c for c in channels if address in (c.info.path, channel_id(c.info)))
+def _file_and_path(p: Proposal, channels: _Named) -> str:
+    return channel_id(channels.by_address[p.entry.channel[0]].info)
 
 
 def _clean(channel: Channel) -> tuple[TimeArray, FloatArray]:
@@ -266,11 +276,11 @@ _GRID_NS = 100_000_000
 _LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
 
 
-def _speed(found: dict[str, Proposal], channels: Sequence[Channel]) -> tuple[TimeArray, FloatArray] | None:
+def _speed(found: dict[str, Proposal], channels: _Named) -> tuple[TimeArray, FloatArray] | None:
     """Speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
     for symbol in ("omega_rl", "omega_fl", "v_x"):
         if symbol in found:
-            channel = _by_address(channels, found[symbol].entry.channel[0])
+            channel = channels.by_address[found[symbol].entry.channel[0]]
             t, _ = _clean(channel)
             if t.size > 20 and int(t[-1]) - int(t[0]) < _LONGEST_NS:
                 grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
@@ -290,9 +300,9 @@ def _smooth(x: FloatArray, width: int = 11) -> FloatArray:
     return np.convolve(x, kernel, mode="same")
 
 
-def _check_acceleration(p: Proposal, channels: Sequence[Channel], speed: tuple[TimeArray, FloatArray]) -> Proposal:
+def _check_acceleration(p: Proposal, channels: _Named, speed: tuple[TimeArray, FloatArray]) -> Proposal:
     grid, v = speed
-    a = _on_grid(_by_address(channels, p.entry.channel[0]), grid)
+    a = _on_grid(channels.by_address[p.entry.channel[0]], grid)
     r = _correlation(_smooth(np.gradient(v)), _smooth(a))
     if np.isnan(r):
         return p
@@ -305,17 +315,17 @@ def _check_acceleration(p: Proposal, channels: Sequence[Channel], speed: tuple[T
     return replace(p, reason=reason, score=p.score + 2.0 * r)
 
 
-def _check_yaw(p: Proposal, channels: Sequence[Channel], found: dict[str, Proposal]) -> Proposal:
+def _check_yaw(p: Proposal, channels: _Named, found: dict[str, Proposal]) -> Proposal:
     if "omega_rl" not in found or "omega_rr" not in found:
         return p
-    left = _by_address(channels, found["omega_rl"].entry.channel[0])
-    right = _by_address(channels, found["omega_rr"].entry.channel[0])
+    left = channels.by_address[found["omega_rl"].entry.channel[0]]
+    right = channels.by_address[found["omega_rr"].entry.channel[0]]
     t, _ = _clean(left)
     if t.size < 2 or int(t[-1]) - int(t[0]) > _LONGEST_NS:
         return p
     grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
     turn = _on_grid(right, grid) - _on_grid(left, grid)
-    r = _correlation(_smooth(turn), _smooth(_on_grid(_by_address(channels, p.entry.channel[0]), grid)))
+    r = _correlation(_smooth(turn), _smooth(_on_grid(channels.by_address[p.entry.channel[0]], grid)))
     if np.isnan(r) or abs(r) < 0.5:
         return replace(p, reason=f"{p.reason}; the wheels turn too little to check its sign")
     reason = f"{p.reason}; correlation {r:+.2f} with the rear wheels' difference"

@@ -18,9 +18,10 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
         by_file[clean.origin.file] = TimeFaults(*(max(getattr(seen, n), getattr(new, n)) for n in TimeFaults.__slots__))
     faults = sum(by_file.values(), TimeFaults())
     own = sum(
-        c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.faults.duplicates
+        c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
+        + c.origin.faults.duplicates
         for c in cleaned
-    )
+    )  # fmt: skip
     doubled = max((c.origin.faults.duplicates for c in cleaned), default=0)
     # a doubled stamp here and there is a logger's habit; many are samples lost to a wrong clock
     is_lossy = any(c.origin.faults.duplicates > 0.01 * c.origin.samples for c in cleaned)
@@ -29,6 +30,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     return Quality(
         dropped_samples=own + lost,
         lost_in_files=lost,
+        frozen_samples=sum(c.origin.frozen for c in cleaned),
         time_jumps=faults.back_steps + faults.resets + faults.wraps + faults.pauses,
         truncated=any(f.truncated for f in file_faults),
         faults=faults,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["MEDIAN_OF", "bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns"]
+__all__ = ["MEDIAN_OF", "Placed", "bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns", "placed"]
 
 
 MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has the same median
@@ -26,8 +28,51 @@ def gap_limit_ns(period_ns: int, *, is_state: bool) -> int:
     return max(10 * period_ns, 2_000_000_000) if is_state else max(5 * period_ns, 50_000_000)
 
 
+class Placed(NamedTuple):
+    """Where the points (m,) of a grid lie among stamps (n,).
+
+    `right` (m,): the first stamp that is not before the point, n behind the last; `exact` (m,): it is at the point;
+    `between`: indices (k,) of the points with a stamp on either side, `span` (k,) the interval there [ns], and `share`
+    (k,) how much of it lies before the point.
+    """
+
+    right: TimeArray
+    exact: BoolArray
+    between: TimeArray
+    span: TimeArray
+    share: FloatArray
+
+
+def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Placed:
+    """Place points of a grid among strictly increasing stamps, at least one; signals with the same stamps share it.
+
+    With the step [ns] of points that are even, stamps are counted by the step that they fall into; else each point is
+    searched for.
+    """
+    n, m = t_ns.size, grid_ns.size
+    if dt_ns is not None and m:
+        step = np.clip((t_ns - grid_ns[0]) // dt_ns + 1, 0, m)
+        right = np.cumsum(np.bincount(step, minlength=m + 1)[:m])
+    else:
+        right = np.searchsorted(t_ns, grid_ns, side="left")
+    exact = (right < n) & (t_ns[np.minimum(right, n - 1)] == grid_ns)
+    between = np.flatnonzero(~exact & (right > 0) & (right < n))
+    i = right[between]
+    before = t_ns[i - 1]
+    span = t_ns[i] - before
+    # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
+    share = (grid_ns[between] - before).astype(np.float64) / span.astype(np.float64)
+    return Placed(right, exact, between, span, share)
+
+
 def linear(
-    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, period_ns: int | None = None
+    t_ns: TimeArray,
+    x: FloatArray,
+    grid_ns: TimeArray,
+    *,
+    gap_ns: int,
+    period_ns: int | None = None,
+    at: Placed | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Linear interpolation.
 
@@ -43,6 +88,8 @@ def linear(
         Longest interval that may be bridged.
     period_ns : int, optional
         Median sample time; default that of the stamps.
+    at : Placed, optional
+        Of these stamps and points, if it is known.
 
     Returns
     -------
@@ -55,26 +102,22 @@ def linear(
     bridged = np.zeros(grid_ns.size, dtype=bool)
     if t_ns.size == 0:
         return y, bridged
-    right = np.searchsorted(t_ns, grid_ns, side="left")
-    exact = (right < t_ns.size) & (t_ns[np.minimum(right, t_ns.size - 1)] == grid_ns)
+    right, exact, between, span, share = at or placed(t_ns, grid_ns)
     y[exact] = x[right[exact]]
-    between = ~exact & (right > 0) & (right < t_ns.size)
     i = right[between]
-    span = t_ns[i] - t_ns[i - 1]
-    # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
-    share = (grid_ns[between] - t_ns[i - 1]).astype(np.float64) / span.astype(np.float64)
     values = x[i - 1] + share * (x[i] - x[i - 1])
     y[between] = np.where(span <= gap_ns, values, np.nan)
     bridged[between] = span > 1.5 * (median_period_ns(t_ns) if period_ns is None else period_ns)
     return y, bridged
 
 
-def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> FloatArray:
+def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at: Placed | None = None) -> FloatArray:
     """Last value held, at most `gap_ns` long and not beyond the last stamp by more than that. Shapes as `linear`."""
     y = np.full(grid_ns.size, np.nan)
     if t_ns.size == 0:
         return y
-    last = np.searchsorted(t_ns, grid_ns, side="right") - 1
+    right, exact, *_ = at or placed(t_ns, grid_ns)
+    last = right - ~exact
     known = last >= 0
     age = grid_ns[known] - t_ns[last[known]]
     y[known] = np.where(age <= gap_ns, x[last[known]], np.nan)
@@ -82,14 +125,21 @@ def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int) -> 
 
 
 def bin_mean(
-    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int, period_ns: int | None = None
+    t_ns: TimeArray,
+    x: FloatArray,
+    grid_ns: TimeArray,
+    *,
+    dt_ns: int,
+    gap_ns: int,
+    period_ns: int | None = None,
+    at: Placed | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Mean of the samples within half a grid step on either side, for signals much faster than the grid.
 
     Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
     Returns as `linear`.
     """
-    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns)
+    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns, at=at)
     if t_ns.size == 0:
         return y, bridged
     low = np.searchsorted(t_ns, grid_ns - dt_ns // 2, side="left")

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 
-from aqualog.align.clean import clean_channel
+from aqualog.align.clean import Stamps, clean_channel
 from aqualog.align.grid import columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.quality import quality_of
-from aqualog.align.timebase import ClockRepair
+from aqualog.align.resample import placed
+from aqualog.align.shared import OfLast
 from aqualog.errors import SignalError
 from aqualog.notation import SYMBOLS
 from aqualog.types import Channel, FileFaults, Origin, Signals
@@ -54,11 +55,11 @@ def build_signals(
         If no signal is usable, units do not fit, or the sources' clocks cannot be joined.
     """
     notes: list[str] = []
-    repairs: dict[str, ClockRepair] = {}
+    stamps = Stamps()
     cleaned = [
         c
         for symbol, (entry, channel) in mapped.items()
-        if (c := clean_channel(symbol, entry, channel, signal_map, vehicle, repairs, notes)) is not None
+        if (c := clean_channel(symbol, entry, channel, signal_map, vehicle, stamps, notes)) is not None
     ]
     cleaned = [c for c in cleaned if c.span.samples > 0]
     if not cleaned:
@@ -66,10 +67,12 @@ def build_signals(
     absolute = common_clock([mapped[c.origin.symbol][1] for c in cleaned], signal_map)
     grid = grid_of(cleaned, rate_hz)
     points = grid.points()
+    place = OfLast(lambda t_ns: placed(t_ns, points, grid.dt_ns))
     columns: dict[str, pl.Series] = {}
     origins: dict[str, Origin] = {}
     for clean in cleaned:
-        y, bridged = onto_grid(clean.symbol, clean.span, clean.t_ns, clean.x, points, grid.dt_ns)
+        at = place(clean.t_ns)
+        y, bridged = onto_grid(clean.symbol, clean.span, clean.t_ns, clean.x, points, grid.dt_ns, at)
         missing = max(float(np.mean(np.isnan(y))), missing_samples(clean.span, grid) if bridged else 0.0)
         for name, series in columns_of(clean.symbol, y, vehicle):
             if name in columns:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.align.resample import MEDIAN_OF
+from aqualog.align.shared import OfLast
 from aqualog.types import TimeArray, TimeFaults
 
 __all__ = ["ClockRepair"]
@@ -28,11 +29,12 @@ class ClockRepair:
     """Repairs the time vectors of one file.
 
     Channels of one file may have vectors of their own; a reset shifts all of them by the same amount, so that they
-    stay in step.
+    stay in step. A vector that several of them share is repaired once, and so is what is given back for it.
     """
 
     def __init__(self) -> None:
         self._shifts: list[int] = []
+        self._of_last = OfLast(self._repaired)
 
     def repair(self, t_ns: TimeArray) -> tuple[TimeArray, TimeArray, TimeFaults]:
         """Repair one vector.
@@ -50,6 +52,9 @@ class ClockRepair:
             Which sample of the input belongs to each stamp.
         faults : TimeFaults
         """
+        return self._of_last(t_ns)
+
+    def _repaired(self, t_ns: TimeArray) -> tuple[TimeArray, TimeArray, TimeFaults]:
         n = t_ns.size
         if n < 2:
             return t_ns.copy(), np.arange(n), TimeFaults()

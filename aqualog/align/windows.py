@@ -1,9 +1,9 @@
 """A drive that is longer than memory, window by window onto the same grid as in one go.
 
 The files are gone through twice: first for what only the whole of a signal tells (first and last stamp, sample times,
-counts), then for the samples. A window's values are those of `build_signals` bit for bit: every point of the grid has
-the same samples around it. A log for which that cannot be promised raises `NotInPiecesError` before anything is given
-out.
+counts; once more if a signal is frozen somewhere), then for the samples. A window's values are those of `build_signals`
+bit for bit: every point of the grid has the same samples around it. A log for which that cannot be promised raises
+`NotInPiecesError` before anything is given out.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean
+from aqualog.align.freezes import Freeze
 from aqualog.align.grid import Grid, columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.pieces import NotInPiecesError, PieceCleaner
@@ -30,6 +31,7 @@ __all__ = ["LongDrive", "NotInPiecesError", "Parts", "long_drive"]
 _MAX_ROWS = 4_000_000_000
 
 Found = Mapping[str, tuple[Entry, ChannelInfo]]
+Freezes = Mapping[str, tuple[Freeze, ...]]
 Parts = Callable[[], Sequence[Part]]  # every call goes through the files anew
 
 
@@ -48,6 +50,7 @@ class LongDrive:
     _parts: Parts
     _map: SignalMap
     _vehicle: Vehicle
+    _freezes: Freezes
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -70,7 +73,7 @@ class LongDrive:
         bridged : mapping signal of the map -> bool
             Whether a sample of it was missing somewhere in the window.
         """
-        cleaners = _cleaners(self._found, self._map, self._vehicle)
+        cleaners = _cleaners(self._found, self._map, self._vehicle, self._freezes)
         buffers = {c.origin.symbol: _Buffer(c) for c in self.cleaned}
         source = _Source(self._parts(), self._found, cleaners)
         at = 0
@@ -156,7 +159,30 @@ def long_drive(
         As `build_signals`.
     """
     notes: list[str] = []
-    cleaners = _cleaners(found, signal_map, vehicle, notes)
+    cleaners = _cleaners(found, signal_map, vehicle, None, notes)
+    clocks = _gone_through(cleaners, found, parts, tell)
+    freezes = {name: cleaner.frozen() for name, cleaner in cleaners.items()}
+    if any(freezes.values()):  # rare: sample times and counts are those without what is frozen
+        cleaners = _cleaners(found, signal_map, vehicle, freezes)
+        _gone_through(cleaners, found, parts, tell)
+    cleaned = []
+    for name, cleaner in cleaners.items():
+        clean, own = cleaner.cleaned()
+        notes += own
+        if clean.span.samples and name in clocks:
+            cleaned.append(clean)
+    if not cleaned:
+        raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
+    absolute = common_clock([clocks[c.origin.symbol] for c in cleaned], signal_map)
+    grid = grid_of(cleaned, rate_hz, most_rows=_MAX_ROWS)
+    kept = {c.origin.symbol: found[c.origin.symbol] for c in cleaned}
+    return LongDrive(grid, absolute, tuple(cleaned), tuple(notes), kept, parts, signal_map, vehicle, freezes)
+
+
+def _gone_through(
+    cleaners: Mapping[str, PieceCleaner], found: Found, parts: Parts, tell: Callable[[int], None]
+) -> dict[str, Channel]:
+    """Give the cleaners all samples; channels of the signals that have any, without samples."""
     clocks: dict[str, Channel] = {}
     done = 0
     for part in parts():
@@ -168,28 +194,19 @@ def long_drive(
                         clocks.setdefault(name, replace(channel, t_ns=channel.t_ns[:0], values=channel.values[:0]))
                 done += channel.t_ns.size
             tell(done)
-    cleaned = []
-    for name, cleaner in cleaners.items():
+    for cleaner in cleaners.values():
         cleaner.finish()
-        clean, own = cleaner.cleaned()
-        notes += own
-        if clean.span.samples and name in clocks:
-            cleaned.append(clean)
-    if not cleaned:
-        raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
-    absolute = common_clock([clocks[c.origin.symbol] for c in cleaned], signal_map)
-    grid = grid_of(cleaned, rate_hz, most_rows=_MAX_ROWS)
-    kept = {c.origin.symbol: found[c.origin.symbol] for c in cleaned}
-    return LongDrive(grid, absolute, tuple(cleaned), tuple(notes), kept, parts, signal_map, vehicle)
+    return clocks
 
 
 def _cleaners(
-    found: Found, signal_map: SignalMap, vehicle: Vehicle, notes: list[str] | None = None
+    found: Found, signal_map: SignalMap, vehicle: Vehicle, freezes: Freezes | None, notes: list[str] | None = None
 ) -> dict[str, PieceCleaner]:
     out = {}
     for name, (entry, info) in found.items():
         try:
-            out[name] = PieceCleaner(name, entry, info, signal_map, vehicle)
+            known = None if freezes is None else freezes.get(name, ())
+            out[name] = PieceCleaner(name, entry, info, signal_map, vehicle, known)
         except SignalError as error:
             if notes is not None:
                 notes.append(f"{error.line()}; the signal is left out")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Batch", "Message", "batched", "rows_of"]
+__all__ = ["Batch", "Message", "batched", "damage_notes", "rows_of"]
 
 Message = tuple[int, int, bytes]
 """Stream id, log time [ns] and bytes."""
@@ -88,3 +88,12 @@ def _joined(batches: Sequence[Batch]) -> Batch:
 def rows_of(data: bytes, starts: Indices, size: int) -> NDArray[np.void]:
     """The `size` bytes from each of `starts` on, side by side, as (n,) of one void each; all must lie within `data`."""
     return np.ndarray((len(data) - size + 1,), np.dtype((np.void, size)), data, strides=(1,))[starts]
+
+
+def damage_notes(name: str, damaged: Mapping[int, str]) -> list[str]:
+    """What is told of damaged chunks, reason by offset in the file `name`; empty if there is none."""
+    if not damaged:
+        return []
+    offset, reason = min(damaged.items())
+    many = f"{len(damaged)} damaged chunk{'s are' if len(damaged) > 1 else ' is'} left out"
+    return [f"{name}: {many} (first at byte {offset}: {reason})"]

@@ -59,6 +59,7 @@ class CsvReader:
         ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
         self._count = max(0, ends - self._layout.first_line + 1)
         self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
+        self._refuse_two_times(options)
         if self._time.note:
             self._note(self._time.note)
         self._note_columns()
@@ -74,10 +75,18 @@ class CsvReader:
         self._faults.notes += text.notes
         return text.data
 
+    def _refuse_two_times(self, options: ReadOptions) -> None:
+        """Two columns of one name may be the times of different signals."""
+        name = self._layout.columns[self._time.index].header
+        if name in self._layout.twice and not options.time_channel:
+            what = f'has several columns called "{name}", and each may be the time'
+            hint = f'[time] channel = "{name}" in the map if the first is right for all signals'
+            raise LogError(what, where=str(self._path), expected="one time", hint=hint)
+
     def channels(self) -> Sequence[ChannelInfo]:
         """All numeric columns but the time; `count` is the number of lines below the header."""
         return [
-            ChannelInfo(c.name, c.name, c.unit, self._count, self._path.name, key=c.index)
+            ChannelInfo(c.name, c.header, c.unit, self._count, self._path.name, key=c.index)
             for c in self._layout.columns
             if _is_channel(c, self._time)
         ]
@@ -192,10 +201,13 @@ class CsvReader:
         if faults.cut_line:
             self._faults.truncated = True
             self._note(f"ends inside line {faults.cut_line}; its last cell is left out")
+        if faults.doubtful_line:
+            # many writers end no last line: that a number is short is a hint and no proof
+            self._note(f"ends without a line's end; the last number of line {faults.doubtful_line} may be cut")
 
     def _note_columns(self) -> None:
         for name in self._layout.twice:
-            self._note(f'several columns are called "{name}"; the others are "{name}#2" and so on')
+            self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:
             if column.kind == "text" and column.text_share < 1.0:
                 share = f'{100 * column.text_share:.0f} % of its cells are text such as "{column.example[:40]}"'

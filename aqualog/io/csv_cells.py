@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import polars as pl
@@ -74,7 +73,6 @@ def is_stamp(cell: str) -> bool:
     return _STAMP.fullmatch(cell) is not None
 
 
-@lru_cache(maxsize=1 << 16)
 def is_number(cell: str, style: Style) -> bool:
     """Whether a cell is a number in this style, or true or false."""
     if _PLAIN[style.decimal].fullmatch(cell) or cell.lower() in _TRUTH:

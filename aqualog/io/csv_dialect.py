@@ -7,6 +7,7 @@ decides. A reading counts as proven only if at least two columns hold (nearly) n
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
@@ -36,7 +37,10 @@ _HINT = "export it with one header line (name [unit]), one separator and one dec
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column as its header and its sampled cells show it; `text_share` is the share of cells that say nothing."""
+    """One column as its header and its sampled cells show it; `text_share` is the share of cells that say nothing.
+
+    `name` is unique in the file, `header` what stands above it.
+    """
 
     index: int
     name: str
@@ -45,6 +49,7 @@ class Column:
     kind: ColumnKind
     text_share: float = 0.0
     example: str = ""
+    header: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +79,8 @@ class _Candidate:
 
 def split_line(line: str, separator: str) -> Row:
     """Cells of one line, without the blanks around them."""
+    if '"' not in line:
+        return [c.strip() for c in line.split(separator)]
     try:
         cells = next(csv.reader([line], delimiter=separator), [])
     except csv.Error:  # a cell beyond the size limit, or a NUL
@@ -244,14 +251,10 @@ def _prove(
     sound = sum(c.kind != "text" for c in columns)
     if proven < 1 or sound < 2:
         return f"{proven} of {len(names)} columns hold numbers in 99 % of their cells"
-    twice = tuple(dict.fromkeys(n for n in (split_unit(h)[0] for h in names) if n and _count(names, n) > 1))
+    twice = tuple(n for n, count in Counter(split_unit(h)[0] for h in names).items() if n and count > 1)
     widths = [len(r) for r in body]
     width = max(len(names), max(set(widths), key=widths.count))
     return _Candidate(Layout(separator, columns, width, first_line, twice), proven)
-
-
-def _count(headers: Sequence[str], name: str) -> int:
-    return sum(split_unit(h)[0] == name for h in headers)
 
 
 def _trimmed(row: Row) -> Row:
@@ -262,7 +265,7 @@ def _trimmed(row: Row) -> Row:
 
 def _columns(names: Row, units: Row, body: Sequence[Row], separator: str) -> tuple[Column, ...]:
     """Kind and decimal sign of each column; a name or a cell that says neither goes with the rest of the file."""
-    cells = [[r[k] for r in body if k < len(r) and r[k]] for k in range(len(names))]
+    cells = [_Cells(tuple(r[k] for r in body if k < len(r) and r[k])) for k in range(len(names))]
     order = _preferred(cells, separator)
     split = [split_unit(n.removeprefix("'") if _is_defused(n) else n) for n in names]
     paths = unique_names([name for name, _ in split])
@@ -270,44 +273,63 @@ def _columns(names: Row, units: Row, body: Sequence[Row], separator: str) -> tup
     columns = []
     for k, column in enumerate(cells):
         style = _style(column, order)
-        columns.append(Column(k, paths[k], split[k][1] or below[k], style, *_kind(column, style)))
+        kind = _kind(column, style)
+        columns.append(Column(k, paths[k], split[k][1] or below[k], style, *kind, header=split[k][0] or paths[k]))
     return tuple(columns)
 
 
-def _preferred(columns: Sequence[Sequence[str]], separator: str) -> tuple[Style, ...]:
+class _Cells:
+    """The filled cells of a column that were looked at, each judged once in each style."""
+
+    def __init__(self, cells: tuple[str, ...]) -> None:
+        self.cells = cells
+        self._fits: dict[Style, list[bool]] = {}
+
+    def fits(self, style: Style) -> list[bool]:
+        """Whether each cell is a number in this style."""
+        if style not in self._fits:
+            self._fits[style] = [is_number(c, style) for c in self.cells]
+        return self._fits[style]
+
+    def explained(self, style: Style) -> int:
+        """How many cells are numbers in this style."""
+        return sum(self.fits(style))
+
+    def is_all(self, style: Style) -> bool:
+        """Whether every cell is a number in this style."""
+        return all(self.fits(style))
+
+    def proves(self, style: Style) -> bool:
+        """Whether more than a stray cell cannot be a number but with this sign between thousands."""
+        if any(self.is_all(s) for s in STYLES[:2]):
+            return False
+        each = zip(self.fits(style), self.fits(STYLES[0]), self.fits(STYLES[1]), strict=True)
+        return sum(fits and not (point or comma) for fits, point, comma in each) > len(self.cells) // 100
+
+
+def _preferred(columns: Sequence[_Cells], separator: str) -> tuple[Style, ...]:
     """The styles that may be, those first that the file as a whole speaks for: they decide where a column does not.
 
     A group of three behind a sign is as good a fraction as it is thousands: only cells with both signs, or with two
     groups, prove thousands; a damaged cell among hundreds does not. Where commas separate the cells, a comma in quotes
     is one of thousands rather than a decimal sign.
     """
-    point, comma = (sum(_only(column, s, o) for column in columns) for s, o in (STYLES[:2], STYLES[1::-1]))
-    plain: tuple[Style, ...] = STYLES[1::-1] if comma > point else STYLES[:2]
+    by_point, by_comma = STYLES[:2]
+    comma = sum(not c.is_all(by_point) and c.explained(by_comma) > c.explained(by_point) for c in columns)
+    is_comma = comma > 0 and comma > sum(c.explained(by_point) > c.explained(by_comma) for c in columns)
+    plain: tuple[Style, ...] = (by_comma, by_point) if is_comma else (by_point, by_comma)
     if separator == "," and plain[0] == STYLES[0]:
         plain = (STYLES[0], STYLES[3], STYLES[1])
-    proven = [s for s in STYLES if s.thousands and any(_proves(column, s) for column in columns)]
+    proven = [s for s in STYLES if s.thousands and any(c.proves(s) for c in columns)]
     return tuple(dict.fromkeys((*proven, *plain)))
 
 
-def _only(column: Sequence[str], style: Style, other: Style) -> bool:
-    """Whether one decimal sign explains a column better than the other."""
-    return _explained(column, style) > _explained(column, other)
-
-
-def _explained(column: Sequence[str], style: Style) -> int:
-    return sum(is_number(c, style) for c in column)
-
-
-def _proves(column: Sequence[str], style: Style) -> bool:
-    """Whether more than a stray cell cannot be a number but with this sign between thousands."""
-    proofs = sum(is_number(c, style) and not any(is_number(c, s) for s in STYLES[:2]) for c in column)
-    return proofs > len(column) // 100
-
-
-def _style(column: Sequence[str], order: Sequence[Style]) -> Style:
+def _style(column: _Cells, order: Sequence[Style]) -> Style:
     """The style that explains the most cells of a column, the first of equals."""
-    usable = [s for s in order if not (s.thousands and any(_has_leading_zero(c, s.thousands) for c in column))]
-    return max(usable, key=lambda s: _explained(column, s))
+    if not order[0].thousands and column.is_all(order[0]):
+        return order[0]
+    usable = [s for s in order if not (s.thousands and any(_has_leading_zero(c, s.thousands) for c in column.cells))]
+    return max(usable, key=column.explained)
 
 
 def _has_leading_zero(cell: str, thousands: str) -> bool:
@@ -321,11 +343,12 @@ def _is_defused(header: str) -> bool:
     return header[:1] == "'" and header[1:2] in ("=", "+", "-", "@", "\t")
 
 
-def _kind(cells: Sequence[str], style: Style) -> tuple[ColumnKind, float, str]:
+def _kind(column: _Cells, style: Style) -> tuple[ColumnKind, float, str]:
     """Kind of a column by its filled cells, the share of cells that do not fit, and one of these."""
+    cells = column.cells
     if not cells:
         return "blank", 0.0, ""
-    texts = [c for c in cells if not is_number(c, style) and not is_bad(c)]
+    texts = [c for c, fits in zip(cells, column.fits(style), strict=True) if not fits and not is_bad(c)]
     allowed = max(int(len(cells) >= 3), len(cells) // 100)
     if len(texts) <= allowed and len(texts) < len(cells):
         return "number", 0.0, ""

@@ -18,22 +18,27 @@ __all__ = ["RowFaults", "Rows", "behind", "bodies", "find_rows", "rows_of"]
 Text = bytes | TextFile
 
 PIECE = 1 << 24  # [bytes]
+_TAIL, _ABOVE = 1 << 16, 20  # [bytes], lines
 _JOIN = "\x1f"  # unit separator: in no cell
 
 
 @dataclass(frozen=True, slots=True)
 class RowFaults:
-    """Lines, counted from 1, that are not as the header says; `cut_line` is the last one if the file ends inside it."""
+    """Lines, counted from 1, that are not as the header says; `cut_line` is the last one if the file ends inside it.
+
+    `doubtful_line` is the last one if it is whole, but may have lost the end of its last number.
+    """
 
     short: tuple[int, ...] = ()
     long: tuple[int, ...] = ()
     comments: tuple[int, ...] = ()
     cut_line: int = 0
+    doubtful_line: int = 0
 
     def __add__(self, other: RowFaults) -> RowFaults:
         return RowFaults(
             self.short + other.short, self.long + other.long, self.comments + other.comments,
-            self.cut_line or other.cut_line,
+            self.cut_line or other.cut_line, self.doubtful_line or other.doubtful_line,
         )  # fmt: skip
 
 
@@ -101,10 +106,18 @@ def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Ro
     lines = _regular(body, layout)
     if lines is not None:
         numbers = first_line + np.arange(lines, dtype=np.int64)
-        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults())
+        doubtful = int(numbers[-1]) if is_cut and lines and _ends_short(body, layout.separator) else 0
+        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful))
         if b'"' not in body or _is_quoted_plainly(rows):
             return rows
     return _irregular(body, layout, first_line, is_cut=is_cut)
+
+
+def _ends_short(body: bytes, separator: str) -> bool:
+    """Whether the last cell is shorter than those above it: of half a number the rest is missing."""
+    tail = body[-_TAIL:].split(b"\n")[-_ABOVE - 1 :]
+    *above, last = (len(line.rpartition(separator.encode())[2].strip()) for line in tail)
+    return len(above) == _ABOVE and 0 < last < min(above)
 
 
 def behind(data: Text, lines: int) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from aqualog.errors import LogError
 from aqualog.io.table_names import split_unit
+from aqualog.io.text_file import check_lines
 from aqualog.units import is_unit
 
 __all__ = ["LogText", "read_text"]
@@ -41,7 +42,7 @@ def read_text(path: Path) -> LogText:
     Raises
     ------
     LogError
-        If the file cannot be read or is not text in the encoding that it declares.
+        If the file cannot be read, is not text in the encoding that it declares, or has a line without an end.
     """
     try:
         raw = path.read_bytes()
@@ -49,7 +50,8 @@ def read_text(path: Path) -> LogText:
         raise LogError(f"cannot be opened: {error.strerror}", where=str(path)) from error
     text = _decoded(raw, path)
     if b"\n" not in text.data and b"\r" in text.data:
-        return LogText(text.data.replace(b"\r", b"\n"), text.encoding, text.notes)
+        text = LogText(text.data.replace(b"\r", b"\n"), text.encoding, text.notes)
+    check_lines(text.data, where=str(path))
     return text
 
 

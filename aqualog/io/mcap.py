@@ -1,15 +1,14 @@
 """MCAP logs: JSON, protobuf, ROS 1 and ROS 2 messages, indexed or not, whole or damaged.
 
 The data section is walked record by record, and every chunk is unpacked within its declared size and checked against
-its checksum. So a file that was cut off, or whose index is gone, gives all that stands before the cut, and a damaged
-chunk costs that chunk only. The summary at the end, where it is sound, saves a pass over the file.
+its checksum. So a file that was cut off, or whose index is gone, gives all that stands before the cut; a damaged chunk
+or a length that lies costs that chunk only. The summary at the end, where it is sound, saves a pass over the file.
 
 Format: https://mcap.dev/spec
 """
 
 from __future__ import annotations
 
-import bz2
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -17,9 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
-import lz4.frame
 import numpy as np
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
@@ -29,35 +26,18 @@ from mcap.summary import Summary
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
-from aqualog.io.batches import Batch, Message, batched
+from aqualog.io.batches import Batch, Message, batched, damage_notes
+from aqualog.io.mcap_records import HEAD, MAGIC, Records
 from aqualog.io.mcap_scan import scanned
-from aqualog.io.messages import (
-    MAX_UNPACKED,
-    SAMPLES,
-    MessageReader,
-    Stream,
-    UndecodableError,
-    codec_for,
-    make_stream,
-)
+from aqualog.io.messages import SAMPLES, MessageReader, Stream, UndecodableError, codec_for, make_stream
+from aqualog.io.unpack import Allowance, DamagedError, unpack
 
-__all__ = ["MAGIC", "DamagedError", "McapReader", "McapSource", "unpack"]
+__all__ = ["McapReader", "McapSource"]
 
-MAGIC = b"\x89MCAP0\r\n"
-
-_HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct("<QQQII")  # start, end, unpacked size, crc, length of the compression's name
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offsets start, crc
 _TAIL = _FOOTER.size + len(MAGIC)
-
-_WALKED = frozenset(
-    {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END}
-)
-
-
-class DamagedError(Exception):
-    """A chunk cannot be unpacked; its text is the reason."""
 
 
 class McapReader(MessageReader):
@@ -87,7 +67,11 @@ class McapSource:
         self._schemas: dict[int, SchemaRecord] = {}
         self._channels: dict[int, ChannelRecord] = {}
         self._counts: dict[int, int] = {}
+        self._chunks: tuple[int, ...] = ()  # by the summary
         self._indexed = False
+        self._unproven = False  # something without a checksum of its own has been read
+        self.unassigned = 0
+        self._allowance = Allowance()
         _check_magic(path)
         self._size = path.stat().st_size
 
@@ -121,6 +105,8 @@ class McapSource:
         self._schemas, self._channels = dict(summary.schemas), dict(summary.channels)
         self._counts = dict(summary.statistics.channel_message_counts)
         self._indexed = True
+        self._chunks = tuple(c.chunk_start_offset for c in summary.chunk_indexes)
+        self._allowance = Allowance()
         missing = {i for i, n in self._counts.items() if n and i in self._channels}
         samples: dict[int, list[bytes]] = {}
         for chunk in sorted(summary.chunk_indexes, key=lambda c: c.chunk_start_offset):
@@ -128,7 +114,7 @@ class McapSource:
             if not here:
                 continue
             file.seek(chunk.chunk_start_offset)
-            opcode, length = _HEAD.unpack(file.read(_HEAD.size))
+            opcode, length = HEAD.unpack(file.read(HEAD.size))
             if opcode == Opcode.CHUNK and length <= self._size:
                 for batch in batched(self._chunk(chunk.chunk_start_offset, file.read(length), here)):
                     _keep(samples, batch)
@@ -141,9 +127,10 @@ class McapSource:
         for batch in batched(self._walk(file, None)):
             _count(self._counts, batch)
             _keep(samples, batch)
-        orphans = sum(n for i, n in self._counts.items() if i not in self._channels)
-        if orphans:
-            self._notes.append(f"{self.path.name}: {orphans} messages are left out, their channel records are lost")
+        self.unassigned = sum(n for i, n in self._counts.items() if i not in self._channels)
+        if self.unassigned:
+            what = f"{self.unassigned} messages are left out, their channel records are lost"
+            self._notes.append(f"{self.path.name}: {what}")
         return samples
 
     def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
@@ -163,58 +150,55 @@ class McapSource:
 
     def notes(self) -> Sequence[str]:
         """What was left out so far."""
-        if not self._damaged:
-            return self._notes
-        offset, reason = min(self._damaged.items())
-        many = f"{len(self._damaged)} damaged chunk{'s are' if len(self._damaged) > 1 else ' is'} left out"
-        return [*self._notes, f"{self.path.name}: {many} (first at byte {offset}: {reason})"]
+        return [*self._notes, *damage_notes(self.path.name, self._damaged)]
 
     def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Batch | Message]:
         """All messages of the data section; `None` asks for all channels and keeps their records."""
-        in_damaged = loose = False
-        for offset, opcode, body in self._records(file):
+        in_damaged = is_uncounted = False
+        self._allowance, self._unproven = Allowance(), False
+        records = Records(file, self._size, self._chunks)
+        for offset, opcode, body in records:
             if opcode == Opcode.CHUNK:
+                self.truncated |= is_uncounted
                 yield from (pieces := self._chunk(offset, body, ids))
                 in_damaged = not pieces and offset in self._damaged
+                is_uncounted = in_damaged and not self._indexed
+                if in_damaged:
+                    records.doubt()
             elif opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
-                loose = True
+                self._unproven = True
                 channel_id, _, log_time, _ = _MESSAGE.unpack_from(body)
                 if ids is None or channel_id in ids:
                     yield channel_id, log_time, body[_MESSAGE.size :]
             elif opcode == Opcode.MESSAGE_INDEX and in_damaged:
                 self._count_lost(body)
+                is_uncounted = False
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._unproven |= not self._indexed
                 self._note_record(opcode, body)
-            elif opcode == Opcode.DATA_END and loose:
+            elif opcode == Opcode.DATA_END and self._unproven:
                 self._check_data(file, offset, body)
+        self.truncated |= is_uncounted
+        for gap in records.gaps:
+            self._note_gap(*gap)
 
-    def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
-        """Offset, opcode and body of the records up to the end of the data section or the cut."""
-        offset = len(MAGIC)
-        while True:
-            file.seek(offset)
-            head = file.read(_HEAD.size)
-            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-            end = offset + _HEAD.size + length
-            if opcode == 0 or end > self._size:
-                self._cut(offset)
-                return
-            yield offset, opcode, file.read(length) if opcode in _WALKED else b""
-            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                return
-            offset = end
-
-    def _cut(self, offset: int) -> None:
-        self.truncated = True
-        self._notes.append(
-            f"{self.path.name}: no sound record from byte {offset} of {self._size} on: cut off, damaged there or never "
-            "closed; what stands before is read"
-        )
+    def _note_gap(self, start: int, end: int) -> None:
+        # with counts of all messages what a gap costs is known
+        self.truncated |= not self._indexed
+        if end < self._size:
+            what = f"no sound record from byte {start} to {end}: damaged there; what stands before and behind is read"
+        else:
+            what = (
+                f"no sound record from byte {start} of {self._size} on: cut off, damaged there or never closed; "
+                "what stands before is read"
+            )
+        self._notes.append(f"{self.path.name}: {what}")
 
     def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> Sequence[Batch | Message]:
         """Messages of one chunk; none if it is damaged, for then no byte of it can be trusted."""
         try:
-            data = _unpacked(body)
+            data, is_proven = _unpacked(body, self._allowance)
+            self._unproven |= not is_proven
             if (scan := scanned(data)) is None:
                 return list(_split(data, ids, self._note_record))
             for opcode, record in scan.records:
@@ -248,9 +232,10 @@ class McapSource:
             self._lost[channel_id] = self._lost.get(channel_id, 0) + min(size, len(body)) // 16
 
     def _check_data(self, file: BinaryIO, end: int, body: bytes) -> None:
-        """Messages outside of chunks have no other checksum than the one over the whole data section."""
+        """What stands outside of chunks has no other checksum than the one over the whole data section."""
         expected = int.from_bytes(body[:4], "little")
         if expected and _crc(file, 0, end) != expected:
+            self.truncated = True
             self._notes.append(f"{self.path.name}: the checksum of the data is wrong; values may be altered")
 
 
@@ -283,8 +268,8 @@ def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, by
     """Messages of an unpacked chunk."""
     position, size = 0, len(data)
     while position < size:
-        opcode, length = _HEAD.unpack_from(data, position)
-        start = position + _HEAD.size
+        opcode, length = HEAD.unpack_from(data, position)
+        start = position + HEAD.size
         position = start + length
         if position > size:
             raise DamagedError("a record is longer than its chunk")
@@ -298,59 +283,19 @@ def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, by
             raise DamagedError(f"a record of kind {opcode} stands in a chunk")
 
 
-def _unpacked(body: bytes) -> bytes:
-    """Content of a chunk record, checked against its size and checksum."""
+def _unpacked(body: bytes, allowance: Allowance) -> tuple[bytes, bool]:
+    """Content of a chunk record, checked against its size and checksum, and whether it has one."""
     _, _, size, crc, name_length = _CHUNK.unpack_from(body)
     data_start = _CHUNK.size + name_length + 8
     if data_start > len(body):
         raise DamagedError("it is shorter than its head")
+    if int.from_bytes(body[data_start - 8 : data_start], "little") != len(body) - data_start:
+        raise DamagedError("its record is not as long as its content")
     compression = body[_CHUNK.size : _CHUNK.size + name_length].decode()
-    data = unpack(body[data_start:], compression, size)
+    data = unpack(body[data_start:], compression, size, allowance)
     if crc and zlib.crc32(data) != crc:
         raise DamagedError("its checksum is wrong")
-    return data
-
-
-def unpack(data: bytes, compression: str, size: int) -> bytes:
-    """Decompress a block to its declared size and not a byte further.
-
-    Parameters
-    ----------
-    data : bytes
-        Compressed block.
-    compression : str
-        `zstd`, `lz4`, `bz2`, or empty or `none` for plain bytes.
-    size : int
-        Declared size. [byte]
-
-    Raises
-    ------
-    DamagedError
-        If the block is damaged, of another size, larger than `MAX_UNPACKED` or of an unknown compression.
-    """
-    if size > MAX_UNPACKED:
-        raise DamagedError(f"it would unpack to {size} bytes, more than {MAX_UNPACKED}")
-    try:
-        plain = _decompress(data, compression, size + 1)
-    except (zstandard.ZstdError, RuntimeError, EOFError, OSError, ValueError) as error:
-        raise DamagedError(f"{compression} cannot unpack it ({error})") from error
-    if len(plain) != size:
-        raise DamagedError(f"it does not unpack to the {size} bytes that it declares")
-    return plain
-
-
-def _decompress(data: bytes, compression: str, limit: int) -> bytes:
-    if compression in ("", "none"):
-        return data
-    if compression == "zstd":
-        # As a stream, for the one-call form believes the size in the frame and not the limit.
-        with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
-            return stream.read(limit)
-    if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit))
-    if compression == "bz2":
-        return bz2.BZ2Decompressor().decompress(data, max_length=limit)
-    raise DamagedError(f'compression "{compression}" is not known')
+    return data, crc != 0
 
 
 def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
@@ -369,10 +314,10 @@ def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
         summary = SeekingReader(file, record_size_limit=size).get_summary()
     except Exception:  # whatever is wrong with it, the data section is still there to be walked
         return None
-    return summary if summary is not None and _is_complete(summary) else None
+    return summary if summary is not None and _is_complete(summary, size) else None
 
 
-def _is_complete(summary: Summary) -> bool:
+def _is_complete(summary: Summary, size: int) -> bool:
     statistics = summary.statistics
     if statistics is None or not summary.channels or not summary.chunk_indexes:
         return False
@@ -384,6 +329,7 @@ def _is_complete(summary: Summary) -> bool:
         and len(summary.chunk_indexes) == statistics.chunk_count
         and used <= listed
         and used <= summary.channels.keys()
+        and all(len(MAGIC) <= c.chunk_start_offset < size - HEAD.size for c in summary.chunk_indexes)
         and all(c.schema_id == 0 or c.schema_id in summary.schemas for c in summary.channels.values())
     )
 

@@ -1,16 +1,15 @@
 """MDF 3 and 4: measured channels, and raw CAN frames decoded by a DBC.
 
-asammdf parses the blocks. It is kept from everything that a log has no business to cause: it never evaluates a formula
-(see `mdf_conversion`), never opens an attachment, writes only into a folder of our own, and prints nothing.
+asammdf parses the blocks, once a walk through them has found them sound (see `mdf_survey`). It is kept from everything
+that a log has no business to cause (see `mdf_harness`): it never evaluates a formula, never opens an attachment,
+inflates nothing beyond the size that it tells of, writes only into a folder of our own, and prints nothing.
 """
 
 from __future__ import annotations
 
 import io
-import logging
 import re
 import shutil
-import struct
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,19 +18,24 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, Self
 
 import asammdf
 import numpy as np
-from asammdf.blocks import mdf_v3, mdf_v4, v2_v3_blocks, v4_blocks
 from asammdf.blocks.utils import extract_xml_comment
 from numpy.typing import NDArray
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, pgn, selected
-from aqualog.io.mdf_blocks import raw_columns, raw_pieces
+from aqualog.io.mdf3_survey import survey3
+from aqualog.io.mdf4_survey import survey4
+from aqualog.io.mdf_blocks import Raw, let_go, raw_columns, raw_pieces
 from aqualog.io.mdf_conversion import formula_text, is_text_only, physical, refusal
+from aqualog.io.mdf_harness import disarm_asammdf
+from aqualog.io.mdf_survey import Survey, mapped
+from aqualog.io.memory import bytes_text, free_memory
+from aqualog.io.patched_file import PatchedFile
 from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
 
 __all__ = ["MdfReader"]
@@ -39,23 +43,7 @@ __all__ = ["MdfReader"]
 _Array = NDArray[Any]
 
 
-def _disarm_asammdf() -> None:
-    """Switch off, once, what asammdf does behind the back of its caller."""
-    v4_blocks.lambdify = None  # sympy.lambdify executes the text of a formula
-    v2_v3_blocks.lambdify = None
-    # a block that the cut went through is left out instead of the whole file
-    asammdf.set_global_option("raise_on_incomplete_blocks", value=False)
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # faults are reported by the reader, once
-    for kind in (mdf_v4.MDF4, mdf_v3.MDF3):
-        kind.__del__ = _quiet_del  # the original raises, onto stderr, when its constructor has failed
-
-
-def _quiet_del(self: Any) -> None:
-    with suppress(Exception), redirect_stdout(io.StringIO()):
-        self.close()
-
-
-_disarm_asammdf()
+disarm_asammdf()
 
 _VIRTUAL = (3, 6)  # channel types without bytes in the record
 _VARIABLE_LENGTH = 1
@@ -74,8 +62,8 @@ _ARCHIVES = (".bz2", ".gzip", ".mf4z", ".zip")  # asammdf unpacks these by suffi
 _DLC_LENGTH = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64])
 _EXTENDED = np.uint64(1 << 32)  # in a frame code: id in bits 0-28, IDE in bit 32, bus from bit 33
 _OLDEST = int(datetime(1990, 1, 1, tzinfo=UTC).timestamp()) * 10**9
-_FIRST_BLOCK = 64
-_MOST_BLOCKS = 200_000  # looked at to tell a cut file
+_LARGEST_XML = 1 << 20
+_PER_SAMPLE = 24  # [bytes] of a sample while a channel is read as a whole: raw, physical, time
 _LATEST_S = 9.0e9  # int64 nanoseconds end in the year 2262
 _SHOWN = 8  # ids listed in a note
 
@@ -136,6 +124,7 @@ class MdfReader:
         self._path = path
         self._faults = FaultLog()
         self._mdf: Any = None
+        self._patched: PatchedFile | None = None
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._channels: tuple[ChannelInfo, ...] = ()
         try:
@@ -143,6 +132,7 @@ class MdfReader:
             with self._guard("cannot be read as MDF"):
                 self._open()
                 self._channels = _unique(self._listed(dbc))
+            self._list_attachments()
         except BaseException:
             self.close()
             raise
@@ -181,7 +171,7 @@ class MdfReader:
             t, columns = piece
             t_ns, usable = self._nanoseconds(t)
             n, n_bad = n + len(t), n_bad + len(t) - len(t_ns)
-            yield [Channel(i, t_ns, columns[i.key.index][usable], self._absolute) for i in infos]
+            yield [Channel(i, t_ns, _where(usable, columns[i.key.index]), self._absolute) for i in infos]
         self._count_records(group, n, n_bad, len(infos))
 
     @property
@@ -195,6 +185,9 @@ class MdfReader:
             with suppress(Exception):
                 self._mdf.close()
             self._mdf = None
+        if self._patched is not None:
+            self._patched.close()
+            self._patched = None
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None
@@ -217,49 +210,77 @@ class MdfReader:
         except LogError:
             raise
         except Exception as error:
-            if _is_cut(self._path):
-                raise LogError(
-                    "file is cut: it refers to data behind its end", where=str(self._path),
-                    expected="a complete MDF file", hint="copy it from the logger again or stop the recording properly",
-                ) from error  # fmt: skip
             reason = f"{what} ({type(error).__name__}: {error})"
             raise LogError(reason, where=str(self._path), hint="check it with the logger's own tool") from error
 
     def _open(self) -> None:
         if self._path.suffix.lower() in _ARCHIVES:
             raise LogError("is named as an archive", where=str(self._path), hint="unpack or rename it to .mf4")
-        with self._path.open("rb") as file:
-            unfinished = file.read(8) == b"UnFinMF "
+        with mapped(self._path) as data:
+            self._version4 = bytes(data[8:10]) >= b"4."
+            self._survey = (survey4 if self._version4 else survey3)(data, self._path)
+        self._tell(self._survey)
         self._scratch = tempfile.TemporaryDirectory(prefix="aqualog-", ignore_cleanup_errors=True)
-        if unfinished:
-            self._check_space()
-            self._faults.notes.append("file was not finalised by the logger; a temporary copy was repaired for reading")
-        source = self._path
-        self._is_as_written = not unfinished
-        if not unfinished and _records_are_cut(source):
-            self._check_space()
-            source = _marked_copy(source, Path(self._scratch.name))
-            self._is_as_written = False
+        self._check_space()
+        source: Any = str(self._path)
+        if self._survey.patches:
+            source = self._patched = PatchedFile(self._path, self._survey.patches)
         with redirect_stdout(io.StringIO()):  # asammdf prints tracebacks
             opened = asammdf.MDF(
-                str(source), temporary_folder=self._scratch.name, process_bus_logging=False,
+                source, temporary_folder=self._scratch.name, process_bus_logging=False,
                 raise_on_multiple_occurrences=False,
             )  # fmt: skip
         self._mdf = opened
         self._inner = opened._mdf
-        self._inner.extract_attachment = _no_attachment
-        self._version4 = opened.version >= "4"
-        self._is_as_written &= self._version4
+        self._recount()
+        let_go(self._inner)
         self._start_ns, self._absolute = self._start()
 
+    def _tell(self, survey: Survey) -> None:
+        self._faults.truncated |= survey.truncated
+        self._faults.lost_samples += survey.lost_samples
+        self._faults.notes += survey.notes
+
+    def _list_attachments(self) -> None:
+        names = self._survey.attachments
+        if names:
+            told = ", ".join(f"{n!r}" for n in names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
+            self._faults.notes.append(f"{len(names)} attachments are never opened: {told}")
+
     def _check_space(self) -> None:
+        """Records of several kinds in a row are sorted in a temporary file."""
         assert self._scratch is not None
-        size, free = self._path.stat().st_size, shutil.disk_usage(self._scratch.name).free
-        if size > free:
+        need, free = self._survey.unsorted, shutil.disk_usage(self._scratch.name).free
+        if need > free:
             raise LogError(
-                "file is cut or was not finalised, and there is no space for a repaired copy", where=str(self._path),
-                expected=f"{size} bytes in {tempfile.gettempdir()}, {free} are free", hint="set TMPDIR",
+                "has records of several kinds in a row, and there is no space to sort them", where=str(self._path),
+                expected=f"{bytes_text(need)} in {tempfile.gettempdir()}, {bytes_text(free)} are free",
+                hint="set TMPDIR to a folder with more space",
             )  # fmt: skip
+
+    def _check_memory(self, group: int, channels: int) -> None:
+        """Refuse what a group tells of and cannot be held; nothing of it has been inflated."""
+        channel_group = self._inner.groups[group].channel_group
+        declared = self._survey.inflated.get(int(channel_group.address), 0)
+        records = min(int(channel_group.cycles_nr), declared // max(int(channel_group.samples_byte_nr), 1))
+        need, free = records * (channels + 1) * _PER_SAMPLE, free_memory()
+        if need > free:
+            raise LogError(
+                f"{channels} channels of the group {self._group_name(group)} have {records} samples each and would "
+                f"take {bytes_text(need)}", where=str(self._path), expected=f"at most {bytes_text(free)} that are free",
+                hint="give fewer channels in a signal map, or a machine with more memory",
+            )  # fmt: skip
+
+    def _recount(self) -> None:
+        """Numbers of records of an unfinished file, now that records of several kinds have been sorted."""
+        for index, group in enumerate(self._inner.groups):
+            channel_group = group.channel_group
+            if int(channel_group.address) in self._survey.recount:
+                size = int(channel_group.samples_byte_nr) + int(channel_group.invalidation_bytes_nr)
+                held = sum(int(b.original_size) for b in group.get_data_blocks()) if group.sorted else 0
+                is_sorted = group.data_location != 0
+                channel_group.cycles_nr = held // size if size and is_sorted else 0
+                self._inner.virtual_groups[index].cycles_nr = channel_group.cycles_nr
 
     def _start(self) -> tuple[int, bool]:
         """Start time in ns and whether it is a real one; loggers without a clock write 1970 or 1980."""
@@ -312,6 +333,13 @@ class MdfReader:
             return "its time channel lies outside the record"
         if formula_text(channel.conversion, version4=self._version4) is not None:
             return "its time channel has a conversion formula"
+        reason = self._survey.refused.get(int(channel.address)) or self._refusal(channel)
+        if reason is not None:
+            return f"its time channel cannot be read, {reason}"
+        if int(group.channel_group.address) in self._survey.inferred:
+            t = _joined([t for t, _ in self._columns(index, [])])
+            if not (np.isfinite(t).all() and (np.diff(t) >= 0).all()):
+                return "its records cannot be told from its channels, their time does not go up"
         return None
 
     def _group_name(self, index: int) -> str:
@@ -329,7 +357,7 @@ class MdfReader:
             if full.startswith(_FRAME):
                 continue
             name, _, device = full.partition("\\")
-            reason = refusal(channel.conversion, version4=self._version4)
+            reason = self._survey.refused.get(int(channel.address)) or self._refusal(channel)
             if not _fits(group, channel, version4=self._version4):
                 reason = "it lies outside the record"
             if reason is not None:
@@ -342,6 +370,11 @@ class MdfReader:
                 _Measured(index, number), _comment(channel),
             )  # fmt: skip
             yield _Entry(info, (*_sources(group, channel), device))
+
+    def _refusal(self, channel: Any) -> str | None:
+        if channel.conversion is None and channel.conversion_addr:
+            return "its conversion cannot be read"  # asammdf gives raw numbers then
+        return refusal(channel.conversion, version4=self._version4)
 
     def _is_number(self, group: Any, index: int) -> bool:
         channel = group.channels[index]
@@ -380,7 +413,7 @@ class MdfReader:
     def _whole(self, group: int, indexes: Sequence[int]) -> tuple[_Array, dict[int, _Array]] | None:
         """The same of all records at once where blocks are plain and sound; asammdf says what is wrong otherwise."""
         master = self._inner.masters_db.get(group)
-        if not self._is_as_written or master is None:
+        if not self._version4 or master is None:
             return None
         try:
             raw = raw_columns(self._path, self._inner, group, [*indexes, master])
@@ -388,27 +421,29 @@ class MdfReader:
             return None
         return None if raw is None else self._converted(group, indexes, raw)
 
-    def _converted(
-        self, group: int, indexes: Sequence[int], raw: dict[int, _Array]
-    ) -> tuple[_Array, dict[int, _Array]]:
+    def _converted(self, group: int, indexes: Sequence[int], raw: Raw) -> tuple[_Array, dict[int, _Array]]:
         """Time stamps [s] and physical values of raw samples; the time is among them."""
         master = self._inner.masters_db[group]
         channels = self._inner.groups[group].channels
         clock = channels[master].conversion
-        t = raw[master] if clock is None else clock.convert(raw[master])
+        t = raw.samples[master] if clock is None else clock.convert(raw.samples[master])
         columns = {}
         for i in indexes:
             is_nothing = channels[i].flags & _CHANNEL_ALL_INVALID
             columns[i] = (
-                np.full(len(t), np.nan) if is_nothing else physical(channels[i].conversion, raw[i], version4=True)
+                np.full(len(t), np.nan)
+                if is_nothing
+                else physical(channels[i].conversion, raw.samples[i], version4=True)
             )
+            if i in raw.invalid:
+                columns[i] = np.where(raw.invalid[i], np.nan, columns[i])
         return np.asarray(t, dtype=np.float64), columns
 
     def _in_pieces(self, group: int, indexes: Sequence[int]) -> Iterator[tuple[_Array, dict[int, _Array]]]:
         """`_columns` a stretch of records at a time wherever the blocks are; what is unsound goes on with asammdf."""
         done = 0
         master = self._inner.masters_db.get(group)
-        if self._is_as_written and master is not None:
+        if self._version4 and master is not None:
             with suppress(Exception):
                 pieces = raw_pieces(self._path, self._inner, group, [*indexes, master], _PIECE)
                 for raw in pieces if pieces is not None else ():
@@ -417,7 +452,7 @@ class MdfReader:
                     done += len(converted[0])
         if done == int(self._inner.groups[group].channel_group.cycles_nr):
             return
-        self._inner.configure(read_fragment_size=_FRAGMENT)
+        self._mdf.configure(read_fragment_size=_FRAGMENT)
         for t, columns in self._fragments(group, indexes):
             new = slice(min(done, len(t)), None)
             done -= min(done, len(t))
@@ -465,13 +500,14 @@ class MdfReader:
             by_group[info.key.group].append(info)
         found: dict[str, Channel] = {}
         for group, infos in by_group.items():
+            self._check_memory(group, len(infos))
             pieces = list(self._columns(group, [i.key.index for i in infos]))
             t = _joined([p[0] for p in pieces])
             t_ns, usable = self._nanoseconds(t)
             self._count_records(group, len(t), len(t) - len(t_ns), len(infos))
             for info in infos:
                 values = _joined([p[1][info.key.index] for p in pieces])
-                found[info.path] = Channel(info, t_ns, values[usable], self._absolute)
+                found[info.path] = Channel(info, t_ns, _where(usable, values), self._absolute)
         return found
 
     # --- raw CAN frames ---
@@ -479,6 +515,7 @@ class MdfReader:
     def _codes(self, group: int, members: dict[str, int]) -> NDArray[np.uint64]:
         """Code of each frame: bus, IDE flag and id in one integer."""
         heads = [members[m] for m in ("ID", "IDE", "BusChannel") if m in members]
+        self._check_memory(group, len(heads))
         default_bus = _bus_number(self._inner.groups[group])
         codes = []
         for t, columns in self._columns(group, heads):
@@ -614,85 +651,6 @@ class MdfReader:
 # --- single facts about blocks ---
 
 
-def _no_attachment(*_: object, **__: object) -> tuple[bytes, Path, bytes]:
-    """Stands in for asammdf's extraction, which opens any path that the file names."""
-    return b"", Path(), b""
-
-
-def _is_cut(path: Path) -> bool:
-    """Whether a link leads, or a block reaches, behind the end of the file. Asked only when something went wrong."""
-    try:
-        with path.open("rb") as file:
-            return _leads_out(file)
-    except struct.error:  # a block's head is incomplete
-        return True
-    except OSError:
-        return False
-
-
-def _leads_out(file: BinaryIO) -> bool:
-    size = file.seek(0, 2)
-    if size < _FIRST_BLOCK + 24:
-        return True
-    file.seek(8)
-    links_of = _links4 if file.read(2) >= b"4." else _links3
-    seen, pending = {_FIRST_BLOCK}, [_FIRST_BLOCK]
-    while pending and len(seen) < _MOST_BLOCKS:
-        length, links = links_of(file, at := pending.pop())
-        if at + length > size or any(link >= size for link in links):
-            return True
-        new = {link for link in links if link} - seen
-        seen |= new
-        pending += new
-    return False
-
-
-def _records_are_cut(path: Path) -> bool:
-    """Whether the plain record block of a data group of MDF 4.10 and later reaches behind the end of the file."""
-    with suppress(struct.error, OSError), path.open("rb") as file:
-        size = file.seek(0, 2)
-        file.seek(8)
-        if file.read(4) < b"4.10":
-            return False
-        group, seen = _links4(file, _FIRST_BLOCK)[1][0], set[int]()
-        while group and group not in seen:
-            seen.add(group)
-            following, _, records, *_ = _links4(file, group)[1]
-            file.seek(records)
-            mark, length = struct.unpack("<4s4xQ", file.read(16)) if records else (b"", 0)
-            if mark == b"##DT" and records + length > size:
-                return True
-            group = following
-    return False
-
-
-def _marked_copy(path: Path, folder: Path) -> Path:
-    """A copy marked as unfinished: asammdf then corrects the block's length instead of leaving the block out."""
-    copy = folder / "cut.mf4"
-    shutil.copyfile(path, copy)
-    with copy.open("r+b") as file:
-        file.write(b"UnFinMF ")
-        file.seek(60)
-        file.write(struct.pack("<H", 4))
-    return copy
-
-
-def _links4(file: BinaryIO, at: int) -> tuple[int, tuple[int, ...]]:
-    file.seek(at)
-    mark, length, count = struct.unpack("<2s6xQQ", file.read(24))
-    if mark != b"##" or count > 100_000:
-        return 0, ()
-    return length, struct.unpack(f"<{count}Q", file.read(8 * count))
-
-
-def _links3(file: BinaryIO, at: int) -> tuple[int, tuple[int, ...]]:
-    # the blocks of MDF 3 do not say how many links they have
-    file.seek(at)
-    mark, length = struct.unpack("<2sH", file.read(4))
-    count = {b"HD": 1, b"DG": 4, b"CG": 3, b"CN": 5}.get(mark, 0)
-    return length, struct.unpack(f"<{count}I", file.read(4 * count))
-
-
 def _fits(group: Any, channel: Any, *, version4: bool) -> bool:
     """Whether a channel lies inside its record; asammdf's C code reads outside the memory where it does not."""
     size = int(group.channel_group.samples_byte_nr)
@@ -733,19 +691,25 @@ def _sources(group: Any, channel: Any) -> tuple[str, ...]:
 def _unit(channel: Any) -> str:
     unit = (channel.conversion.unit if channel.conversion is not None else "") or getattr(channel, "unit", "") or ""
     text = unit.decode("latin-1") if isinstance(unit, bytes) else str(unit)
-    return (extract_xml_comment(text) if text.startswith("<") else text).strip("\0 \t\r\n")
+    return (_xml_text(text) if text.startswith("<") else text).strip("\0 \t\r\n")
 
 
 def _comment(channel: Any) -> str:
     text = str(channel.comment or "")
     if text.startswith("<"):
-        text = extract_xml_comment(text)
-        if text.startswith("<"):  # XML without a text in it
-            return ""
+        text = _xml_text(text)
     description = getattr(channel, "description", b"")
     if not text and isinstance(description, bytes):
         text = description.split(b"\0")[0].decode("latin-1")
     return _short(text)
+
+
+def _xml_text(text: str) -> str:
+    """What an XML comment says; nothing where it is no XML, has definitions of its own, or is as long as no comment."""
+    if len(text) > _LARGEST_XML or "<!" in text.replace("<![CDATA[", "").replace("<!--", ""):
+        return ""
+    found = str(extract_xml_comment(text))
+    return "" if found.startswith("<") else found
 
 
 def _short(text: str) -> str:
@@ -825,7 +789,13 @@ def _merged(parts: Sequence[tuple[TimeArray, _Array, _Array]]) -> tuple[TimeArra
 
 
 def _joined(parts: Sequence[_Array]) -> _Array:
+    if len(parts) == 1:  # most often there is but one: no copy
+        return parts[0]
     return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _where(usable: BoolArray, values: _Array) -> _Array:
+    return values if usable.all() else values[usable]
 
 
 # --- names ---
@@ -854,11 +824,12 @@ def _prefixed(info: ChannelInfo, entry: _Entry, level: int) -> str:
 
 
 def _numbered(infos: Sequence[ChannelInfo]) -> Iterator[ChannelInfo]:
-    used: set[str] = set()
+    last: dict[str, int] = {}  # number by path: where the search goes on, also of thousands of the same name
     for info in infos:
-        path, k = info.path, 1
-        while path in used:
+        path, k = info.path, last.get(info.path, 1)
+        while path in last:
             k += 1
             path = f"{info.path}#{k}"
-        used.add(path)
-        yield replace(info, path=path)
+        last[info.path] = k
+        last.setdefault(path, 1)
+        yield info if path == info.path else replace(info, path=path)

@@ -7,51 +7,79 @@ channels are touched. Whatever is not plain is left to asammdf: `raw_columns` gi
 
 from __future__ import annotations
 
+import mmap
 import os
 import zlib
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from aqualog.types import BoolArray
 
 try:
     from deflate import zlib_decompress as _libdeflate  # asammdf brings it along where it can
 except ImportError:
     _libdeflate = None
 
-__all__ = ["raw_columns", "raw_pieces"]
+__all__ = ["Raw", "inflated", "let_go", "raw_columns", "raw_pieces"]
 
 _PLAIN, _DEFLATED, _TRANSPOSED = 0, 1, 2  # asammdf's kinds of blocks
 _FIXED_LENGTH, _MASTER = 0, 2
 _KINDS = {0: "<u", 1: ">u", 2: "<i", 3: ">i", 4: "<f", 5: ">f"}  # by MDF's data types
 _BITS = {"u": (8, 16, 32, 64), "i": (8, 16, 32, 64), "f": (32, 64)}
-_LARGEST_BLOCK = 1 << 28  # [bytes] inflated; the standard allows 4 MiB
-_IN_HAND = 64  # blocks
+_SOME_INVALID = 2  # flag of a channel that has an invalidation bit
+_LARGEST_BLOCK = 1 << 28  # [bytes] stored or inflated; the standard allows 4 MiB
+_PIECE = 1 << 21  # [bytes] read at a time where nothing is compressed: what the cache still holds when it is cut
 
 _Array = NDArray[Any]
 
 
+class Raw(NamedTuple):
+    """Raw samples (n,) by channel, and which of them are invalid (n,), for channels with an invalidation bit."""
+
+    samples: dict[int, _Array]
+    invalid: dict[int, BoolArray]
+
+
 class _Field(NamedTuple):
-    """Where a channel lies in a record."""
+    """Where a channel lies in a record: its first byte, how many bytes hold it, its lowest bit and how many bits."""
 
     at: int
+    octets: int
+    shift: int
+    bits: int
     dtype: np.dtype[Any]
+
+    @property
+    def is_whole(self) -> bool:
+        return self.bits == 8 * self.dtype.itemsize
 
 
 class _Block(NamedTuple):
-    """A data block: where it is, its stored and its inflated size, and the first record in it."""
+    """Whole records: where their stored bytes are, their stored and their inflated size, and the first record."""
 
-    address: int
+    extents: tuple[tuple[int, int], ...]  # (address, size)
     stored: int
     size: int
     kind: int
     first: int
 
 
-def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> dict[int, _Array] | None:
+class _Plan(NamedTuple):
+    """Where wanted channels lie: fields, places of invalidation bits (byte, bit), blocks, size of a record. [bytes]"""
+
+    fields: dict[int, _Field]
+    invalid: dict[int, tuple[int, int]]
+    blocks: list[_Block]
+    size: int
+
+
+def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> Raw | None:
     """Raw samples (cycles,) of channels of a group, all of its records; None where only asammdf knows how.
 
     Parameters
@@ -73,65 +101,156 @@ def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> di
     return None if plan is None else _decoded(path, plan, plan.blocks)
 
 
-def raw_pieces(
-    path: Path, inner: Any, index: int, wanted: Sequence[int], records: int
-) -> Iterator[dict[int, _Array]] | None:
+def raw_pieces(path: Path, inner: Any, index: int, wanted: Sequence[int], records: int) -> Iterator[Raw] | None:
     """The same in pieces of whole blocks with at least so many records, in order."""
     plan = _plan(inner.groups[index], wanted)
     return None if plan is None else (_decoded(path, plan, run) for run in _runs(plan, records))
 
 
-class _Plan(NamedTuple):
-    """Where wanted channels lie: their fields, the blocks, and the size of a record. [bytes]"""
+def let_go(inner: Any) -> None:
+    """Give back the memory that looking for the blocks of a file has mapped; it is mapped again where it is read.
 
-    fields: dict[int, _Field]
-    blocks: list[_Block]
-    size: int
+    Around each of the blocks, 64 kB of the file count as this process's: a ninth of it.
+    """
+    mapped = getattr(inner, "_file", None)
+    if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        mapped.madvise(mmap.MADV_DONTNEED)
+
+
+# --- what lies where ---
 
 
 def _plan(group: Any, wanted: Sequence[int]) -> _Plan | None:
-    size, cycles = int(group.channel_group.samples_byte_nr), int(group.channel_group.cycles_nr)
-    if not _is_plain(group) or size == 0:
+    own = int(group.channel_group.samples_byte_nr)
+    size = own + int(group.channel_group.invalidation_bytes_nr)
+    if not _is_plain(group) or not 0 < own <= size <= _LARGEST_BLOCK:
         return None
-    fields = {i: _field(group.channels[i], size) for i in wanted}
+    fields = {i: _field(group.channels[i], own) for i in wanted}
     if any(f is None for f in fields.values()):
         return None
-    blocks = _blocks(group, size, cycles)
-    return None if blocks is None else _Plan({i: f for i, f in fields.items() if f is not None}, blocks, size)
+    invalid = {
+        i: (own + at // 8, at % 8)
+        for i in wanted
+        if group.channels[i].flags & _SOME_INVALID and (at := int(group.channels[i].pos_invalidation_bit)) >= 0
+    }
+    if any(at >= size for at, _ in invalid.values()):
+        return None
+    blocks = _blocks(group, size, int(group.channel_group.cycles_nr))
+    return None if blocks is None else _Plan({i: f for i, f in fields.items() if f is not None}, invalid, blocks, size)
+
+
+def _is_plain(group: Any) -> bool:
+    """Sorted records in the file itself, row by row."""
+    return bool(
+        group.sorted and not group.uses_ld and group.data_location == 0 and int(group.data_group.record_id_len) == 0
+    )
+
+
+def _field(channel: Any, size: int) -> _Field | None:
+    """Whole bytes of a type that NumPy knows, or any bits of a little-endian integer; else None."""
+    letters = _KINDS.get(int(channel.data_type))
+    bits, at, shift = int(channel.bit_count), int(channel.byte_offset), int(channel.bit_offset)
+    octets = (shift + bits + 7) // 8
+    if letters is None or int(channel.channel_type) not in (_FIXED_LENGTH, _MASTER):
+        return None
+    if bits < 1 or not 0 <= shift < 8 or octets > 8 or at < 0 or at + octets > size:
+        return None
+    if (shift or bits not in _BITS[letters[1]]) and letters not in ("<u", "<i"):
+        return None
+    return _Field(at, octets, shift, bits, np.dtype(f"{letters}{1 << (octets - 1).bit_length()}"))
+
+
+def _blocks(group: Any, size: int, cycles: int) -> list[_Block] | None:
+    """Blocks of whole records that make up the group exactly; else None."""
+    out: list[_Block] = []
+    plain: list[tuple[int, int]] = []  # stored one behind the other; a record may begin in one and end in the next
+    for info in group.data_blocks:
+        kind, inflated, stored = int(info.block_type), int(info.original_size), int(info.compressed_size)
+        if info.block_limit is not None or kind not in (_PLAIN, _DEFLATED, _TRANSPOSED):
+            return None
+        if kind == _PLAIN:
+            plain.append((int(info.address), inflated))
+            continue
+        if inflated % size or max(inflated, stored) > _LARGEST_BLOCK or (kind == _TRANSPOSED and info.param != size):
+            return None
+        if not _put_plain(out, plain, size):
+            return None
+        out.append(_Block(((int(info.address), stored),), stored, inflated, kind, _records(out, size)))
+    return out if _put_plain(out, plain, size) and _records(out, size) == cycles else None
+
+
+def _records(blocks: Sequence[_Block], size: int) -> int:
+    return blocks[-1].first + blocks[-1].size // size if blocks else 0
+
+
+def _put_plain(out: list[_Block], plain: list[tuple[int, int]], size: int) -> bool:
+    """Cut consecutive stored bytes into pieces of whole records, and forget them; False if a record is incomplete."""
+    if sum(length for _, length in plain) % size:
+        return False
+    piece = max(_PIECE // size, 1) * size
+    extents: list[tuple[int, int]] = []
+    missing = piece
+    for address, length in plain:
+        while length:
+            taken = min(length, missing)
+            extents.append((address, taken))
+            address, length, missing = address + taken, length - taken, missing - taken
+            if not missing:
+                out.append(_Block(tuple(extents), piece, piece, _PLAIN, _records(out, size)))
+                extents, missing = [], piece
+    if extents:
+        out.append(_Block(tuple(extents), piece - missing, piece - missing, _PLAIN, _records(out, size)))
+    plain.clear()
+    return True
 
 
 def _runs(plan: _Plan, records: int) -> Iterator[list[_Block]]:
     run: list[_Block] = []
     for block in plan.blocks:
         run.append(block)
-        if sum(b.size for b in run) >= records * plan.size:
+        if block.first - run[0].first + block.size // plan.size >= records:
             yield run
             run = []
     if run:
         yield run
 
 
-def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> dict[int, _Array]:
+# --- from bytes to columns ---
+
+
+def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> Raw:
     """Raw samples of consecutive blocks."""
     begin = blocks[0].first if blocks else 0
     rows = sum(b.size for b in blocks) // plan.size
-    out = {i: np.empty(rows, dtype=f.dtype) for i, f in plan.fields.items()}
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
-    try:
+    out = Raw(
+        {i: np.empty(rows, dtype=f.dtype) for i, f in plan.fields.items()},
+        {i: np.empty(rows, dtype=np.bool_) for i in plan.invalid},
+    )
+    pending = deque(b._replace(first=b.first - begin) for b in blocks)
+    longest = max((b.stored for b in blocks), default=0)
 
-        def take(block: _Block) -> None:
-            _fill(out, plan.fields, block._replace(first=block.first - begin), _inflated(handle, block), plan.size)
+    def work() -> None:
+        # one room for all blocks: pages of memory that are fresh for each cost as much as reading them
+        room = np.empty(longest, dtype=np.uint8).data
+        try:
+            with path.open("rb", buffering=0) as file:
+                while pending:
+                    try:
+                        block = pending.popleft()
+                    except IndexError:  # another thread took the last one
+                        return
+                    _fill(out, plan, block, _inflated(_stored(file, block, room), block))
+        except BaseException:
+            pending.clear()  # the other threads need not go on
+            raise
 
-        threads = min(len(blocks), _threads())
-        if threads < 2:
-            for block in blocks:
-                take(block)
-        else:
-            with ThreadPoolExecutor(threads) as pool:
-                for k in range(0, len(blocks), _IN_HAND):
-                    list(pool.map(take, blocks[k : k + _IN_HAND]))
-    finally:
-        os.close(handle)
+    threads = min(len(blocks), _threads())
+    if threads < 2:
+        work()
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            for done in [pool.submit(work) for _ in range(threads)]:
+                done.result()
     return out
 
 
@@ -141,70 +260,68 @@ def _threads() -> int:
     return int(given) if given.isdigit() and int(given) > 0 else min(os.cpu_count() or 1, 4)
 
 
-def _is_plain(group: Any) -> bool:
-    """Sorted records without invalidation bytes, in the file itself."""
-    return bool(
-        hasattr(os, "pread")
-        and group.sorted
-        and not group.uses_ld
-        and group.data_location == 0
-        and int(group.data_group.record_id_len) == 0
-        and int(group.channel_group.invalidation_bytes_nr) == 0
-    )
+def _stored(file: BinaryIO, block: _Block, room: memoryview) -> memoryview:
+    """The bytes of a block as they are in the file; they stand in `room`."""
+    at = 0
+    for address, length in block.extents:
+        file.seek(address)
+        end = at + length
+        while at < end:
+            read = file.readinto(room[at:end])  # type: ignore[attr-defined]
+            if not read:
+                raise OSError(f"{end - at} of {block.stored} bytes of a data block are not there")
+            at += read
+    return room[: block.stored]
 
 
-def _field(channel: Any, size: int) -> _Field | None:
-    """Whole bytes at the start of a byte, of a type that NumPy knows; else None."""
-    letters = _KINDS.get(int(channel.data_type))
-    bits, at = int(channel.bit_count), int(channel.byte_offset)
-    if letters is None or bits not in _BITS[letters[1]] or int(channel.bit_offset):
-        return None
-    if int(channel.channel_type) not in (_FIXED_LENGTH, _MASTER) or at + bits // 8 > size:
-        return None
-    return _Field(at, np.dtype(f"{letters}{bits // 8}"))
+def _inflated(data: memoryview, block: _Block) -> memoryview | bytes | bytearray:
+    return data if block.kind == _PLAIN else inflated(data, block.size)
 
 
-def _blocks(group: Any, size: int, cycles: int) -> list[_Block] | None:
-    """Blocks of whole records that make up the group exactly; else None."""
-    out = []
-    first = 0
-    for info in group.data_blocks:
-        kind, inflated = int(info.block_type), int(info.original_size)
-        if info.block_limit is not None or kind not in (_PLAIN, _DEFLATED, _TRANSPOSED) or inflated % size:
-            return None
-        if inflated > _LARGEST_BLOCK or (kind == _TRANSPOSED and int(info.param) != size):
-            return None
-        out.append(_Block(int(info.address), int(info.compressed_size), inflated, kind, first))
-        first += inflated // size
-    return out if first == cycles else None
+def inflated(data: bytes | memoryview, size: int) -> bytes | bytearray:
+    """A deflated block, whose checksum is right, of at most so many bytes; it may be shorter.
 
-
-def _inflated(handle: int, block: _Block) -> bytes:
-    data = os.pread(handle, block.stored, block.address)
-    if len(data) != block.stored:
-        raise OSError(f"{len(data)} of {block.stored} bytes of a data block")
-    if block.kind == _PLAIN:
-        return data
+    Raises
+    ------
+    OSError, zlib.error, deflate.DeflateError
+        If it is damaged or would be longer.
+    """
     if _libdeflate is not None:
-        return bytes(_libdeflate(data, block.size))
+        found: bytearray = _libdeflate(data, size)
+        return found
     # no more than it tells: a block that inflates without end is none; the checksum stands behind the last byte
     inflater = zlib.decompressobj()
-    out = inflater.decompress(data, block.size)
+    out = inflater.decompress(data, size)
     if not inflater.eof and (inflater.decompress(inflater.unconsumed_tail, 1) or not inflater.eof):
-        raise OSError(f"a data block inflates to more than {block.size} bytes, or its end is missing")
+        raise OSError(f"a data block inflates to more than {size} bytes, or its end is missing")
     return out
 
 
-def _fill(out: dict[int, _Array], fields: dict[int, _Field], block: _Block, data: bytes, size: int) -> None:
+def _fill(out: Raw, plan: _Plan, block: _Block, data: memoryview | bytes | bytearray) -> None:
     if len(data) != block.size:
         raise OSError(f"a data block inflates to {len(data)} bytes, not {block.size}")
-    n = block.size // size
-    here = slice(block.first, block.first + n)
+    n = block.size // plan.size
+    rows = slice(block.first, block.first + n)
     octets = np.frombuffer(data, dtype=np.uint8)
-    if block.kind == _TRANSPOSED:
-        columns = octets.reshape(size, n)
-        for i, f in fields.items():
-            out[i][here] = np.ascontiguousarray(columns[f.at : f.at + f.dtype.itemsize].T).view(f.dtype)[:, 0]
-        return
-    for i, f in fields.items():
-        out[i][here] = np.ndarray((n,), f.dtype, data, f.at, (size,))
+    is_transposed = block.kind == _TRANSPOSED
+    planes = octets.reshape(plan.size, n) if is_transposed else octets.reshape(n, plan.size).T
+    for i, f in plan.fields.items():
+        here = out.samples[i][rows]
+        if f.is_whole and not is_transposed:
+            here[:] = np.ndarray((n,), f.dtype, data, f.at, (plan.size,))
+        else:
+            _gather(here, f, planes)
+    for i, (at, bit) in plan.invalid.items():
+        out.invalid[i][rows] = planes[at] >> bit & 1
+
+
+def _gather(here: _Array, f: _Field, planes: NDArray[np.uint8]) -> None:
+    """Samples out of the bytes of which they are made; `planes[k]` is byte k of each record."""
+    width = f.dtype.itemsize
+    into = here.view(np.uint8).reshape(-1, width)
+    for k in range(f.octets):
+        into[:, k] = planes[f.at + k]
+    if not f.is_whole:
+        # the highest bit to the top, then the lowest to the bottom: spreads the sign, and whatever lay above is gone
+        here <<= 8 * width - f.shift - f.bits
+        here >>= 8 * width - f.bits

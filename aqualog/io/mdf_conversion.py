@@ -29,12 +29,14 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 _UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: np.negative, ast.UAdd: np.positive}
 _FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "log": (1, np.log), "ln": (1, np.log), "log10": (1, np.log10), "exp": (1, np.exp), "sqrt": (1, np.sqrt),
-    "sin": (1, np.sin), "cos": (1, np.cos), "tan": (1, np.tan), "abs": (1, np.abs), "pow": (2, np.power),
+    "sin": (1, np.sin), "cos": (1, np.cos), "tan": (1, np.tan), "asin": (1, np.arcsin), "acos": (1, np.arccos),
+    "atan": (1, np.arctan), "sinh": (1, np.sinh), "cosh": (1, np.cosh), "tanh": (1, np.tanh),
+    "abs": (1, np.abs), "pow": (2, np.power),
 }  # fmt: skip
 
 
 class Formula:
-    """An algebraic conversion: numbers, X or X1, + - * / ** ^ and log ln log10 exp sqrt sin cos tan abs pow.
+    """An algebraic conversion: numbers, X or X1, + - * / ** ^ and the functions of `_FUNCTIONS`.
 
     `^` is the power and `log` the natural logarithm, as in asammdf.
 

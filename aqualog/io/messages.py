@@ -34,17 +34,16 @@ from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, part_of
 from aqualog.io.batches import Batch, rows_of
 from aqualog.io.fixed_layout import Layout, ros_layout
+from aqualog.io.ros_types import MAX_TEXT, RefusedError, checked
 from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
 
 __all__ = [
-    "MAX_UNPACKED", "SAMPLES", "Codec", "Leaf", "MessageReader", "Source", "Stream", "UndecodableError", "codec_for",
+    "SAMPLES", "Codec", "Leaf", "MessageReader", "Source", "Stream", "UndecodableError", "codec_for",
     "make_stream",
 ]  # fmt: skip
 
 SAMPLES = 8
 """Messages per topic that are looked at to learn its fields."""
-MAX_UNPACKED = 1 << 30
-"""Largest chunk that is decompressed. [byte]"""
 
 _MAX_ELEMENTS = 16
 _MAX_LEAVES = 4096
@@ -134,9 +133,13 @@ class Stream:
 
 
 class Source(Protocol):
-    """One file of recorded messages."""
+    """One file of recorded messages.
+
+    `truncated`: something is lost, and how much is not known; `unassigned`: lost messages of no known topic.
+    """
 
     truncated: bool
+    unassigned: int
 
     def streams(self) -> Sequence[Stream]:
         """All connections with messages that can be decoded, in file order."""
@@ -349,6 +352,8 @@ def codec_for(
             return _ros_codec(name, schema_encoding, definition, fallback)
     except UndecodableError:
         raise
+    except RefusedError as error:
+        raise UndecodableError(f'the definition of type "{name}" is refused: {error}') from error
     except Exception as error:  # the parsers run on the file's text and raise whatever it leads them to
         raise UndecodableError(f'the definition of type "{name}" cannot be read ({_brief(error)})') from error
     raise UndecodableError(f'encoding "{encoding}" with schema "{schema_encoding}" is not supported')
@@ -371,23 +376,25 @@ def _protobuf_codec(name: str, definition: bytes) -> _ProtobufCodec:
 
 def _ros_codec(name: str, schema_encoding: str, definition: bytes, fallback: Stores) -> _RosCodec:
     msgtype = normalize_msgtype(name)
+    if len(definition) > MAX_TEXT:
+        raise UndecodableError(f'the definition of type "{name}" has {len(definition)} bytes, more than {MAX_TEXT}')
     types = _ros_types(msgtype, schema_encoding, definition.decode())
     # Recorders leave common types out of a definition, and old ROS 2 bags hold no definitions at all.
     known = get_typestore(Stores.EMPTY).fielddefs
-    pending = [msgtype]
+    pending, reached = [msgtype], dict(known)
     while pending:
         wanted = pending.pop()
-        if wanted in known:
+        if wanted in reached:
             continue
         if wanted not in types:
             common = get_typestore(fallback).fielddefs
             if wanted not in common:
                 raise UndecodableError(f'message type "{wanted}" is not defined in the file and not known')
             types[wanted] = common[wanted]
-        known = {**known, wanted: types[wanted]}
+        reached[wanted] = types[wanted]
         pending += [used for _, field in types[wanted][1] for used in _used_types(field)]
     store = get_typestore(Stores.EMPTY)
-    store.register(types)
+    store.register(checked(reached))
     return _RosCodec(store, msgtype, cdr=fallback is not Stores.ROS1_NOETIC)
 
 
@@ -785,7 +792,8 @@ class MessageReader:
         """What was lost so far; complete after `read`."""
         notes = [*self._log.notes, *(note for source in self._sources for note in source.notes())]
         truncated = self._log.truncated or any(source.truncated for source in self._sources)
-        lost = self._log.lost_samples + sum(self._lost.values())
+        unassigned = sum(source.unassigned for source in self._sources)
+        lost = self._log.lost_samples + sum(self._lost.values()) + unassigned
         return FaultLog(truncated, lost, notes).freeze()
 
     def close(self) -> None:

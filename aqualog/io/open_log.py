@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self, cast
 
 from aqualog.errors import LogError
 from aqualog.io.base import Part, Reader, ReadOptions, part_of
+from aqualog.io.in_hand import reading
 from aqualog.io.sniff import sniff
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
@@ -60,7 +61,60 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
     LogError
         If the file is missing, unknown or damaged beyond reading.
     """
-    return _READERS[sniff(path)](path, options or ReadOptions())
+    with reading(path):
+        reader = _READERS[sniff(path)](path, options or ReadOptions())
+    return (_WatchedInPieces if hasattr(reader, "parts") else _Watched)(path, reader)
+
+
+class _Watched:
+    """A reader each of whose steps is a step of `reading`."""
+
+    def __init__(self, path: Path, reader: Any) -> None:
+        self._path, self._reader = path, reader
+        self.format: str = reader.format
+
+    def channels(self) -> Sequence[ChannelInfo]:
+        with reading(self._path):
+            return cast("Sequence[ChannelInfo]", self._reader.channels())
+
+    def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
+        with reading(self._path):
+            return cast("list[Channel]", self._reader.read(wanted))
+
+    @property
+    def faults(self) -> FileFaults:
+        return cast("FileFaults", self._reader.faults)
+
+    def close(self) -> None:
+        self._reader.close()
+
+    def __enter__(self) -> Self:
+        self._reader.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._reader.__exit__(kind, error, trace)
+
+
+class _WatchedInPieces(_Watched):
+    def parts(self, wanted: Sequence[ChannelInfo]) -> list[Part]:
+        with reading(self._path):
+            parts: list[Part] = self._reader.parts(wanted)
+        return [p._replace(pieces=self._each(p.pieces)) for p in parts]
+
+    def _each(self, pieces: Iterator[Sequence[Channel]]) -> Iterator[Sequence[Channel]]:
+        try:
+            while True:
+                with reading(self._path):
+                    piece = next(pieces, None)
+                if piece is None:
+                    return
+                yield piece
+        finally:
+            if isinstance(pieces, Generator):
+                pieces.close()
 
 
 def _whole(reader: Reader, wanted: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:

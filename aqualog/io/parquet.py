@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -14,28 +14,56 @@ import polars as pl
 
 from aqualog.errors import LogError
 from aqualog.io.arrow_schema import field_metadata
-from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.csv_cells import is_clock, is_stamp
 from aqualog.io.table_names import split_unit, unique_names
-from aqualog.io.table_time import FieldKind, Stamps, TableField, choose_time, from_dates, from_numbers
+from aqualog.io.table_time import (
+    FieldKind,
+    Stamps,
+    TableField,
+    choose_time,
+    from_dates,
+    from_numbers,
+    judged_unit,
+    no_unit_note,
+)
 from aqualog.io.write_table import METADATA_KEY
-from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray
+from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
 
 __all__ = ["ParquetReader"]
 
 _LOOKED_AT = 50
+_PIECE = 1 << 22  # values of all columns together
+_JUDGED = 1 << 16  # rows that tell the unit of a time without one
+_MOST_ROWS = 1 << 26  # what 18 h at 1 kHz have; more are believed of a file that has a byte for 64 of them
 _UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6}
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of the file: `stored` is its name there, `path` the name without the unit."""
+    """A column of the file: `stored` is its name there, `name` that without the unit, `path` the same but unique."""
 
     stored: str
     path: str
+    name: str
     unit: str
     dtype: pl.DataType
     kind: FieldKind
+
+
+@dataclass(slots=True)
+class _Lost:
+    """Rows without a time, and the first of them."""
+
+    rows: int = 0
+    first: int = 0
+
+    def add(self, stamps: Stamps, at: int) -> None:
+        """Count those of a piece that begins at a row."""
+        bad = np.flatnonzero(~stamps.valid)
+        if bad.size:
+            self.first = self.first if self.rows else at + int(bad[0])
+            self.rows += bad.size
 
 
 class ParquetReader:
@@ -61,13 +89,16 @@ class ParquetReader:
         self._rows: int = self._wrapped(
             lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
         )
+        if self._rows > max(_MOST_ROWS, 64 * path.stat().st_size):
+            what = f"declares {self._rows} rows in {path.stat().st_size} bytes"
+            raise LogError(what, where=str(path), expected="a recording", hint="write it again")
         if self._time.note:
             self._note(self._time.note)
 
     def channels(self) -> Sequence[ChannelInfo]:
         """All numeric columns but the time."""
         return [
-            ChannelInfo(c.path, c.path, c.unit, self._rows, self._path.name, key=k)
+            ChannelInfo(c.path, c.name, c.unit, self._rows, self._path.name, key=k)
             for k, c in enumerate(self._columns)
             if c.kind == "number" and k != self._time.index
         ]
@@ -85,6 +116,44 @@ class ParquetReader:
             self._stamps = self._read_time(frame)
         return [self._channel(w, frame[self._columns[w.key].stored], self._stamps) for w in asked]
 
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
+        """The same piece by piece; in one where the time is text, of which only the whole tells day from month."""
+        asked = list(wanted)
+        if self._columns[self._time.index].dtype == pl.String:
+            return [part_of(asked, (self.read(asked) for _ in range(1)))]
+        return [part_of(asked, self._pieces(asked))]
+
+    def _pieces(self, asked: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
+        times = [k for k in (self._time.index, self._time.day) if k is not None]
+        stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
+        rows = max(1, _PIECE // len(stored))
+        unit = self._unit_of_ends()
+        absolute: bool | None = None
+        lost = _Lost()
+        for at in range(0, self._rows, rows):
+            frame: pl.DataFrame = self._wrapped(self._slice(stored, at, rows).collect)
+            stamps = self._stamps_of(frame, unit)
+            if absolute is None and stamps.valid.any():
+                absolute = stamps.absolute
+            stamps = replace(stamps, absolute=bool(absolute))
+            lost.add(stamps, at)
+            yield [self._channel(w, frame[self._columns[w.key].stored], stamps) for w in asked]
+        self._tell_lost(lost)
+
+    def _slice(self, stored: Sequence[str], at: int, rows: int) -> pl.LazyFrame:
+        return pl.scan_parquet(self._path, glob=False).select(stored).slice(at, rows)
+
+    def _unit_of_ends(self) -> str:
+        """Unit of the time; where none is given, by the first rows and the last one: how long a log is tells it."""
+        column, unit = self._columns[self._time.index], self._time.unit
+        if unit or not column.dtype.is_numeric():
+            return unit
+        spans = ((0, _JUDGED), (max(self._rows - 1, 0), 1))
+        ends = [self._wrapped(self._slice([column.stored], at, n).collect) for at, n in spans]
+        unit, reason = judged_unit(np.concatenate([_floats(frame[column.stored]) for frame in ends]))
+        self._note(no_unit_note(unit, reason))
+        return unit
+
     def _channel(self, info: ChannelInfo, column: pl.Series, stamps: Stamps) -> Channel:
         keep = stamps.valid & column.is_not_null().to_numpy()
         values = _floats(column)[keep]
@@ -92,29 +161,37 @@ class ParquetReader:
         return Channel(info, stamps.t_ns[keep], values, stamps.absolute)
 
     def _read_time(self, frame: pl.DataFrame) -> Stamps:
+        stamps = self._stamps_of(frame, self._time.unit)
+        lost = _Lost()
+        lost.add(stamps, 0)
+        self._tell_lost(lost)
+        return stamps
+
+    def _stamps_of(self, frame: pl.DataFrame, unit: str) -> Stamps:
         column, choice = self._columns[self._time.index], self._time
         day = None if choice.day is None else frame[self._columns[choice.day].stored].cast(pl.String)
         try:
-            stamps = _stamps(frame[column.stored], day, choice.unit, column.kind)
+            stamps = _stamps(frame[column.stored], day, unit, column.kind)
         except LogError as error:  # it does not know the file
             raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
         if self._start_ns is not None and not stamps.absolute:
             stamps = replace(stamps, t_ns=stamps.t_ns + self._start_ns, absolute=True)
         for note in stamps.notes:
             self._note(note)
-        lost = np.flatnonzero(~stamps.valid)
-        if lost.size:
-            self._faults.lost_samples += int(lost.size)
-            where = f"(first at row {lost[0] + 1})"
-            self._note(f'time column "{column.path}": {lost.size} rows without a time are left out {where}')
         return stamps
+
+    def _tell_lost(self, lost: _Lost) -> None:
+        if lost.rows:
+            self._faults.lost_samples += lost.rows
+            name, where = self._columns[self._time.index].path, f"(first at row {lost.first + 1})"
+            self._note(f'time column "{name}": {lost.rows} rows without a time are left out {where}')
 
     def _listed(self, schema: Any, units: dict[str, str]) -> tuple[_Column, ...]:
         known = [(n, units[n]) if n in units else split_unit(n) for n in schema]
         paths = unique_names([name for name, _ in known])
         return tuple(
-            _Column(stored, path, unit, dtype, self._kind(stored, dtype))
-            for (stored, dtype), path, (_, unit) in zip(schema.items(), paths, known, strict=True)
+            _Column(stored, path, name or path, unit, dtype, self._kind(stored, dtype))
+            for (stored, dtype), path, (name, unit) in zip(schema.items(), paths, known, strict=True)
         )
 
     def _kind(self, stored: str, dtype: pl.DataType) -> FieldKind:
@@ -193,20 +270,25 @@ def _duration_ns(column: pl.Series) -> pl.Series:
 def _stamps(column: pl.Series, day: pl.Series | None, unit: str, kind: FieldKind) -> Stamps:
     dtype = column.dtype
     if isinstance(dtype, pl.Datetime):
-        return _whole(column.to_physical().cast(pl.Int64) * _UNIT_NS[dtype.time_unit], absolute=True)
+        return _whole(column, _UNIT_NS[dtype.time_unit], absolute=True)
     if isinstance(dtype, pl.Duration):
-        return _whole(_duration_ns(column), absolute=False)
+        return _whole(column, _UNIT_NS[dtype.time_unit], absolute=False)
     if kind in ("stamp", "clock"):
         # a cast of a time of day to text drops the fraction of the second
         text = column.dt.to_string("%H:%M:%S%.9f") if dtype == pl.Time else column.cast(pl.String)
         return from_dates(text, day, kind)
-    if dtype.is_integer() and not column.null_count():
-        return from_numbers(column.cast(pl.Int64).to_numpy(), unit)
+    if dtype.is_integer() and not (whole := column.cast(pl.Int64, strict=False)).null_count():
+        return from_numbers(whole.to_numpy(), unit)
     return from_numbers(_floats(column), unit, cells=column.cast(pl.String) if dtype.is_integer() else None)
 
 
-def _whole(t: pl.Series, *, absolute: bool) -> Stamps:
-    return Stamps(t.fill_null(0).to_numpy().astype(np.int64), t.is_not_null().to_numpy().copy(), absolute)
+def _whole(column: pl.Series, factor: int, *, absolute: bool) -> Stamps:
+    """Whole ticks of `factor` nanoseconds; those beyond what nanoseconds hold are none."""
+    ticks = column.to_physical().cast(pl.Int64)
+    t: TimeArray = ticks.fill_null(0).to_numpy().astype(np.int64)
+    latest = np.iinfo(np.int64).max // factor
+    valid = ticks.is_not_null().to_numpy() & (t <= latest) & (t >= -latest)
+    return Stamps(np.where(valid, t, 0) * factor, valid, absolute)
 
 
 def _head(path: Path) -> tuple[dict[str, pl.DataType], dict[str, str]]:

@@ -40,6 +40,13 @@ def sniff(path: Path) -> str:
             return name
     if _is_text(head):
         return "csv"
+    if _is_text(head.replace(b"\0", b"")):
+        line = head.count(b"\n", 0, head.index(0)) + 1
+        raise LogError(
+            f"is text with NUL bytes (first at line {line})",
+            where=str(path), expected="CSV in UTF-8, or in UTF-16 with its byte order mark",
+            hint="export it as UTF-8; a power cut leaves NULs, too",
+        )  # fmt: skip
     raise LogError(
         f"unknown format (starts with {head[:8]!r})",
         where=str(path),

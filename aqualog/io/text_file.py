@@ -7,10 +7,13 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["LARGE", "TextFile", "open_text"]
+from aqualog.errors import LogError
+
+__all__ = ["LARGE", "LONGEST_LINE", "TextFile", "check_lines", "open_text"]
 
 LARGE = 1 << 28  # [bytes] from which a file is not held as a whole
-_BLOCK = 1 << 24
+LONGEST_LINE = 1 << 24  # [bytes] beyond, a file is no table
+_BLOCK = 1 << 24  # not above the longest line
 _MARKS = (codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)
 
 
@@ -54,10 +57,10 @@ class TextFile:
         """How often one byte stands in the file."""
         return sum(block.count(what) for block in self.blocks())
 
-    def blocks(self, start: int = 0, size: int = _BLOCK) -> Iterator[bytes]:
+    def blocks(self, start: int = 0, size: int | None = None) -> Iterator[bytes]:
         """The file in blocks from a place on."""
         while start < self._size:
-            block = self[start : start + size]
+            block = self[start : start + (size or _BLOCK)]
             yield block
             start += len(block)
 
@@ -68,6 +71,46 @@ class TextFile:
             self._handle = -1
 
 
+def check_lines(data: bytes, *, where: str) -> None:
+    """Refuse a text with a line that is longer than any row of a table.
+
+    Raises
+    ------
+    LogError
+        If there is one.
+    """
+    start = 0
+    while len(data) - start > LONGEST_LINE:
+        end = data.rfind(b"\n", start, start + LONGEST_LINE + 1)
+        if end < 0:
+            raise _too_long(data.count(b"\n", 0, start) + 1, where)
+        start = end + 1
+
+
+def _too_long(line: int, where: str) -> LogError:
+    return LogError(
+        f"line {line} is longer than {LONGEST_LINE} bytes", where=where, expected="a table with one row per line",
+        hint="export it again",
+    )  # fmt: skip
+
+
+class _LineLengths:
+    """Lines of a text that comes in blocks no longer than the longest line."""
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+        self._line, self._open = 1, 0  # number of the line that the last block ended in, and its bytes so far
+
+    def add(self, block: bytes) -> None:
+        first = block.find(b"\n")
+        self._open += len(block) if first < 0 else first
+        if self._open > LONGEST_LINE and b"\r" not in block:
+            raise _too_long(self._line, self._where)
+        if first >= 0:
+            self._line += block.count(b"\n")
+            self._open = len(block) - block.rfind(b"\n") - 1
+
+
 def open_text(path: Path) -> TextFile | None:
     """A large file that is plain UTF-8 with lines that end in `\\n`; None for every other one.
 
@@ -75,17 +118,20 @@ def open_text(path: Path) -> TextFile | None:
     ------
     OSError
         If it cannot be read.
+    LogError
+        If a line is longer than any row of a table.
     """
     if path.stat().st_size < LARGE:
         return None
     text = TextFile(path)
     decoder = codecs.getincrementaldecoder("utf-8")()
-    lines = False
+    lines, lengths = False, _LineLengths(str(path))
     try:
         for k, block in enumerate(text.blocks()):
             if k == 0 and block.startswith(_MARKS):
                 break
             lines |= b"\n" in block
+            lengths.add(block)
             if not block.isascii() or decoder.getstate()[0]:
                 decoder.decode(block)
         else:

@@ -122,6 +122,21 @@ def test_many_short_dropouts_of_a_wheel(seed):
     same([channel("omega_fl", np.arange(3000) * 0.01, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
 
 
+@pytest.mark.parametrize("size", [40, 300, 6000])
+def test_a_signal_that_is_frozen_for_a_while(size):
+    rng = np.random.default_rng(3)
+    signals = [
+        replace(c, values=np.round(c.values + 0.05 * rng.standard_normal(c.values.size), 2)) for c in wheels(12_000)
+    ]
+    for k, (start, end) in enumerate([(1000, 1700), (4000, 11_999)]):
+        signals[k].values[start:end] = signals[k].values[start]
+    signals[0].values[5000:5003] = 0.0  # a dropout of the sensor, too
+    whole = same(signals, size=size)
+    assert whole.quality.frozen_samples > 690 + 7990
+    assert [o.frozen > 690 for o in whole.origins.values()] == [True, True]
+    assert len([n for n in whole.quality.notes if "frozen" in n]) == 2
+
+
 def test_codes_scales_and_clocks_of_the_map():
     entries = {"omega_fr": Entry("omega_fr", "omega_fr", invalid=(60.5,), scale=2.0, offset=0.1)}
     left, right = wheels(3000)

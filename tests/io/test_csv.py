@@ -8,9 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aqualog.errors import ConfigError, LogError
+from aqualog.align.mapping import SignalMap, resolve
+from aqualog.errors import ConfigError, LogError, SignalError
+from aqualog.io import text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.csv import CsvReader
+from aqualog.io.open_log import open_log
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.write_table import TableColumn, write_csv
 
@@ -316,11 +319,40 @@ def test_duplicate_names(read):
     log = read("t [s],v [m/s],v [km/h],v\n0,1,2,3\n1,4,5,6\n")
     assert [(i.path, i.name, i.unit) for i in log.infos] == [
         ("v", "v", "m/s"),
-        ("v#2", "v#2", "km/h"),
-        ("v#3", "v#3", ""),
+        ("v#2", "v", "km/h"),
+        ("v#3", "v", ""),
     ]
     assert log["v#2"] == [2, 5]
     assert log.noted('"v"', "several")
+    with pytest.raises(SignalError, match="several channels bear this name"):
+        resolve(read("t [s],v_x [m/s],v_x [km/h]\n0,1,2\n1,4,5\n").infos, SignalMap())
+
+
+def test_two_times_are_one_too_many(read):
+    text = "t [s],v,t [s],w\n0,1,0.5,3\n1,4,1.5,6\n"
+    with pytest.raises(LogError, match=r'several columns called "t".*channel = "t"'):
+        read(text)
+    assert read(text, time_channel="t").t("w") == [0, 10**9]
+
+
+@pytest.mark.parametrize("is_large", [False, True])
+@pytest.mark.parametrize(("before", "line"), [("", 3), ("9,9\n" * 30, 33)])
+def test_a_line_without_an_end_is_refused(read, monkeypatch, is_large, before, line):
+    monkeypatch.setattr(text_file, "LONGEST_LINE", 100)
+    monkeypatch.setattr(text_file, "_BLOCK", 90)
+    monkeypatch.setattr(text_file, "LARGE", 1 if is_large else 1 << 20)
+    text = "t [s],v\n0,1\n" + before
+    with pytest.raises(LogError, match=rf"line {line} is longer than 100 bytes"):
+        read(text + "1" * 101 + "\n2,3\n")
+    assert read(text + "1,2" + " " * 97 + "\n2,3\n")["v"][-1] == 3
+
+
+@pytest.mark.parametrize("content", [b"t,v\n0,1\n1,\0\0\n", "t,v\n0,1\n1,2\n".encode("utf-16-le")])
+def test_nul_bytes_are_named(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=r"text with NUL bytes \(first at line [13]\)"):
+        open_log(path)
 
 
 # rows
@@ -832,3 +864,15 @@ def test_every_cut_is_read_or_refused(tmp_path, size):
         assert lines < 3
     else:
         assert found["v"].values.tolist()[: lines - 1] == [k * 1.25 - 20 for k in range(lines - 1)]
+
+
+@pytest.mark.parametrize(
+    ("end", "told"), [("21.2345\n", False), ("21.2345", False), ("21.2\n", False), ("21.2", True), ("21.23456", False)]
+)
+def test_a_last_number_that_may_be_cut_is_told(tmp_path, end, told):
+    text = "t [s],v_x [m/s]\n" + "".join(f"{k / 100:.2f},{20 + k / 7000:.4f}\n" for k in range(60)) + "0.60," + end
+    with CsvReader(saved(tmp_path, text), ReadOptions()) as reader:
+        (v,) = reader.read(reader.channels())
+        assert v.values.size == 61
+        assert any("line 62 may be cut" in n for n in reader.faults.notes) is told
+        assert not reader.faults.truncated

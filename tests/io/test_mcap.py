@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import struct
+import tracemalloc
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
 import zstandard
@@ -21,6 +23,8 @@ from rosbags.typesys import Stores, get_typestore
 from aqualog.errors import LogError
 from aqualog.io.base import ReadOptions
 from aqualog.io.mcap import McapReader, McapSource
+from aqualog.io.mcap_scan import scanned
+from aqualog.io.unpack import FREE, Allowance, DamagedError
 from aqualog.io.write_mcap import McapTopic, write_mcap
 from aqualog.types import Channel
 
@@ -375,16 +379,95 @@ def chunk_record(data: bytes, compression: str, size: int) -> bytes:
     return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
 
 
-@pytest.mark.parametrize(("declared", "reason"), [(10, "declares"), (1 << 40, "more than")])
-def test_bomb_is_refused_and_the_rest_is_read(tmp_path, declared, reason):
+def zeros_packed(compression: str, size: int) -> bytes:
+    if compression == "zstd":
+        return zstandard.compress(bytes(size))
+    return lz4.frame.compress(bytes(size))
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize(
+    ("declared", "reason"), [(10, "declares"), (1 << 26, "more than"), (1 << 40, "more than"), (1 << 20, "of kind 0")]
+)
+def test_bomb_is_refused_and_the_rest_is_read(tmp_path, compression, declared, reason):
     path = write_json(tmp_path / "a.mcap", numbered(3), index_types=IndexType.NONE)
     raw = path.read_bytes()
     first = raw.index(bytes([Opcode.CHUNK]), 8 + 9 + struct.unpack_from("<Q", raw, 9)[0])
-    bomb = chunk_record(zstandard.compress(bytes(1 << 26)), "zstd", declared)
-    path.write_bytes(raw[:first] + bomb + raw[first:])
+    size = min(declared, 1 << 26) if declared != 10 else 1 << 26
+    data = zeros_packed("zstd", size) if compression == "zstd" else zeros_packed("lz4", min(size, 1 << 24))
+    if compression == "lz4" and declared == 1 << 26:
+        data = data[:4096]  # a head that lies
+    path.write_bytes(raw[:first] + chunk_record(data, compression, declared) + raw[first:])
+    tracemalloc.start()
     channels, reader = read_all(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
     assert channels["/car.v"].values.tolist() == [0, 1, 2]
     assert any(reason in note for note in reader.faults.notes)
+    assert reader.faults.truncated  # what was in it is not known
+    assert peak < 60e6
+
+
+def test_zeros_are_not_walked_to_their_end():
+    zeros = bytes(1 << 22)
+    tracemalloc.start()
+    assert scanned(zeros) is None
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2e6
+
+
+def test_many_small_bombs_are_no_more_than_one(tmp_path):
+    spare = Allowance()
+    spare.take(1000, FREE)
+    with pytest.raises(DamagedError, match="more than"):
+        spare.take(1000, FREE)
+    spare.take(4_000_000, 40_000_000)  # a sound block fills the store again
+    spare.take(1000, FREE)
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("indexed", [True, False])
+@pytest.mark.parametrize("length", [1 << 60, 30, 9000])
+def test_a_length_that_lies_costs_that_chunk_only(tmp_path, compression, indexed, length):
+    path = write_json(tmp_path / "a.mcap", numbered(2000), chunk_size=4000, compression=compression)
+    offsets = chunk_offsets(path)
+    raw = bytearray(path.read_bytes())
+    struct.pack_into("<Q", raw, offsets[3][0] + 1, length)
+    path.write_bytes(raw if indexed else raw[:-1])
+    channels, reader = read_all(path)
+    v = channels["/car.v"].values
+    assert 1800 < v.size < 2000
+    assert np.all(np.diff(v) > 0)
+    assert v[-1] == 1999
+    assert any(f"{offsets[3][0]}" in note for note in reader.faults.notes)
+    assert reader.faults.lost_samples == 2000 - v.size if indexed else reader.faults.truncated
+
+
+@pytest.mark.parametrize("opcode", [Opcode.DATA_END, Opcode.FOOTER, 0])
+def test_an_end_that_is_none_is_passed_over(tmp_path, opcode):
+    path = write_json(tmp_path / "a.mcap", numbered(2000), chunk_size=4000, use_statistics=False)
+    start, _ = chunk_offsets(path)[3]
+    raw = bytearray(path.read_bytes())
+    raw[start] = opcode
+    raw[start + 1 : start + 9] = {Opcode.DATA_END: 4, Opcode.FOOTER: 20, 0: 0}[opcode].to_bytes(8, "little")
+    path.write_bytes(raw)
+    channels, reader = read_all(path)
+    assert 1800 < channels["/car.v"].values.size < 2000
+    assert channels["/car.v"].values[-1] == 1999
+    assert reader.faults.truncated
+
+
+def test_chunks_without_checksums_are_proven_by_that_of_the_data(tmp_path):
+    options = {"chunk_size": 4000, "compression": CompressionType.NONE, "enable_crcs": False}
+    path = write_json(tmp_path / "a.mcap", numbered(500), enable_data_crcs=True, **options)
+    assert not read_all(path)[1].faults.truncated
+    raw = path.read_bytes()
+    path.write_bytes(raw.replace(b'"v": 123.0', b'"v": 163.0', 1))
+    channels, reader = read_all(path)
+    assert channels["/car.v"].values[123] == 163
+    assert reader.faults.truncated
+    assert any("checksum" in note for note in reader.faults.notes)
 
 
 @pytest.mark.parametrize("content", [b"", b"not an mcap file at all"])

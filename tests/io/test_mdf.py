@@ -148,6 +148,11 @@ def test_same_name_in_several_groups(tmp_path: Path):
     path = save(tmp_path / "b.mf4", *groups, acq_name="10ms")
     channels, _ = read_all(path)
     assert [(p, c.values[0]) for p, c in channels.items()] == [("10ms.v", 0), ("10ms.v#2", 1), ("10ms.v#3", 2)]
+    named = [[signal(n, np.full(200, float(k)))] for k, n in enumerate(("v", "v#2", "v", "v#2", "v"))]
+    channels, _ = read_all(save(tmp_path / "c.mf4", *named, acq_name="g"))
+    assert [(p, c.values[0]) for p, c in channels.items()] == [
+        ("g.v", 0), ("g.v#2", 1), ("g.v#3", 2), ("g.v#2#2", 3), ("g.v#4", 4),
+    ]  # fmt: skip
 
 
 def test_source_tells_equal_paths_apart(tmp_path: Path):
@@ -190,12 +195,34 @@ def is_master(data: bytearray, at: int) -> bool:
 def test_asammdf_cannot_reach_sympy(tmp_path: Path):
     assert v4_blocks.lambdify is None
     assert v2_v3_blocks.lambdify is None
-    # also where sympy is installed
-    (tmp_path / "sympy.py").write_text("lambdify = symbols = print")
-    code = (
-        "from asammdf.blocks import v4_blocks as a, v2_v3_blocks as b; assert a.lambdify is print is b.lambdify;"
-        "import aqualog.io.mdf; assert a.lambdify is None is b.lambdify"
+    # also where sympy is installed, here one that does what the real one does: it executes the text
+    (tmp_path / "sympy.py").write_text(
+        "symbols = str\ndef lambdify(names, text, *_, **__): return eval('lambda X, X1=0: ' + text)\n"
     )
+    hacked = tmp_path / "HACKED"
+    hostile = f"open('{hacked}', 'w').write('x') * X"
+    paths = [
+        save(tmp_path / f"{v}.mf4", [signal("x", T, conversion=from_dict({"formula": hostile}))], version=v)
+        for v in ("4.10", "3.30")
+    ]
+    code = f"""
+from asammdf.blocks import v4_blocks as a, v2_v3_blocks as b
+assert a.lambdify is not None is not b.lambdify
+from asammdf import MDF
+with MDF({str(paths[0])!r}) as mdf:
+    mdf.get("x")
+import pathlib
+hacked = pathlib.Path({str(hacked)!r})
+assert hacked.exists(), "the stand-in does not do what sympy does"
+hacked.unlink()
+from aqualog.io.mdf import MdfReader, ReadOptions
+assert a.lambdify is None is b.lambdify
+for path in {[str(p) for p in paths]!r}:
+    with MdfReader(pathlib.Path(path), ReadOptions()) as reader:
+        assert not reader.channels()
+        assert "is left out: conversion formula" in reader.faults.notes[0], reader.faults
+assert not hacked.exists()
+"""
     path = os.pathsep.join([str(tmp_path), *sys.path])
     subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, check=True)
 
@@ -207,6 +234,7 @@ def test_formulas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str)
         "good": "2*X1 + 1",
         "power": "pow(X1,2) + X1^2",
         "root": "-sqrt(X1)*exp(0)",
+        "angle": "atan(tan(X1/1000)) + 0*tanh(X1)",
         "hostile": "__import__('os').system('touch HACKED') or X1",
         "attribute": "X1.__class__",
         "branch": "X1>1?5:7",
@@ -218,10 +246,11 @@ def test_formulas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str)
     group = [signal(n, x, conversion=from_dict({"formula": f})) for n, f in formulas.items()]
     path = save(tmp_path / "a.mf4", group, version=version)
     channels, faults = read_all(path)
-    assert [c.info.name for c in channels.values()] == ["good", "power", "root"]
+    assert [c.info.name for c in channels.values()] == ["good", "power", "root", "angle"]
     np.testing.assert_array_equal(channels["group0.good"].values, 2 * x + 1)
     np.testing.assert_array_equal(channels["group0.power"].values, 2 * x**2)
     np.testing.assert_array_equal(channels["group0.root"].values, -np.sqrt(x))
+    np.testing.assert_allclose(channels["group0.angle"].values, x / 1000)
     for name in ("hostile", "attribute", "branch", "open"):
         assert any(f"channel group0.{name} is left out" in n for n in faults.notes)
     assert not (tmp_path / "HACKED").exists()
@@ -274,7 +303,7 @@ def test_samples_without_a_time_stamp_are_counted(tmp_path: Path):
 # --- damaged files ---
 
 
-def test_unfinalised_file_is_read_from_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_unfinalised_file_is_read_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = save(tmp_path / "a.mf4", [signal("x", np.arange(200.0))])
     data = bytearray(path.read_bytes())
     data[:8] = b"UnFinMF "
@@ -288,7 +317,7 @@ def test_unfinalised_file_is_read_from_a_copy(tmp_path: Path, monkeypatch: pytes
     assert len(channels["group0.x"].values) == 200
     assert "file was not finalised by the logger" in faults.notes[0]
     assert digest(path) == before
-    assert not list(scratch.iterdir())  # the copy is gone
+    assert not list(scratch.iterdir())
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.9, 0.99])

@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 
 from aqualog.errors import LogError
+from aqualog.io import parquet
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import ReadOptions
 from aqualog.io.parquet import ParquetReader
@@ -166,3 +167,87 @@ def test_metadata_of_others(stored):
     for text in ("not json", "[1]", '{"units": 3, "start_ns": "x"}'):
         channels, _ = read(stored({"t": [0.0], "v [bar]": [1.0]}, metadata={"aqualog": text}))
         assert channels["v"].info.unit == "bar"
+
+
+# parts of a file
+
+
+def in_pieces(path, size, monkeypatch, **options):
+    monkeypatch.setattr(parquet, "_PIECE", size)
+    with ParquetReader(path, ReadOptions(**options)) as reader:
+        infos = reader.channels()
+        (part,) = reader.parts(infos)
+        pieces = list(part.pieces)
+        assert part.channels == {(i.file, i.path) for i in infos}
+        return pieces, reader.faults
+
+
+N = 200
+SECONDS = [None if k == 77 else k * 0.01 for k in range(N)]
+TIMES = {
+    "seconds": {"t [s]": SECONDS},
+    "no unit": {"t": SECONDS},
+    "whole numbers without a unit": {"timestamp": [10**9 * (k if k < N - 1 else 30_000) for k in range(N)]},
+    "epoch": {"time [ns]": [None if k in (3, *range(20, 40)) else START + k * 10**7 for k in range(N)]},
+    "datetime": {"time": [None if k == 9 else dt.datetime(2026, 3, 1, 23) + k * dt.timedelta(minutes=1) for k in range(N)]},
+    "duration": {"t": [k * dt.timedelta(milliseconds=10) for k in range(N)]},
+    "day and clock": {"date": [dt.date(2026, 3, 1)] * N, "time": [dt.time(1, k // 60, k % 60, 500) for k in range(N)]},
+    "text": {"time": [f"01/{2 if k < 150 else 14}/2026 01:{k // 60:02}:{k % 60:02}" for k in range(N)]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [30, 10**6])
+@pytest.mark.parametrize("time", TIMES)
+def test_pieces_are_those_of_the_whole(stored, monkeypatch, time, size):
+    values = [None if k % 7 == 0 else float("nan") if k % 11 == 0 else k / 3 for k in range(N)]
+    path = stored(TIMES[time] | {"v [m/s]": values, "gear": [k // 50 for k in range(N)]})
+    whole, faults = read(path)
+    pieces, own_faults = in_pieces(path, size, monkeypatch)
+    assert len(pieces) == (1 if time == "text" or size == 10**6 else -(-N // max(1, size // (2 + len(TIMES[time])))))
+    assert own_faults == faults
+    for k, name in enumerate(["v", "gear"]):
+        channels = [p[k] for p in pieces]
+        assert {(c.info, c.absolute) for c in channels} == {(whole[name].info, whole[name].absolute)}
+        assert np.concatenate([c.t_ns for c in channels]).tolist() == whole[name].t_ns.tolist()
+        assert np.concatenate([c.values for c in channels]).tobytes() == whole[name].values.tobytes()
+
+
+def test_pieces_of_our_own_file_begin_when_it_does(tmp_path, monkeypatch):
+    path = tmp_path / "a.parquet"
+    t = np.r_[[np.nan] * 30, np.arange(70) * 0.01]
+    write_parquet(path, [TableColumn("t", "s", t), TableColumn("v_x", "m/s", t)], start_ns=START)
+    pieces, faults = in_pieces(path, 20, monkeypatch)
+    assert [len(c.t_ns) for (c,) in pieces] == [0] * 3 + [10] * 7
+    assert pieces[3][0].t_ns[0] == START
+    assert all(c.absolute for (c,) in pieces[3:])
+    assert faults.lost_samples == 30
+    assert "30 rows without a time are left out (first at row 1)" in faults.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "t_ns"),
+    [
+        (pl.Series([2**63, 5, 6], dtype=pl.UInt64), [5 * 10**9, 6 * 10**9]),
+        (pl.Series([2**62, 5, 6], dtype=pl.Int64).cast(pl.Datetime("ms")), [5 * 10**6, 6 * 10**6]),
+        (pl.Series([-(2**62), 5, 6], dtype=pl.Int64).cast(pl.Duration("us")), [5000, 6000]),
+    ],
+)
+def test_times_beyond_what_nanoseconds_hold_cost_their_row(tmp_path, column, t_ns):
+    path = tmp_path / "a.parquet"
+    name = "t [s]" if column.dtype == pl.UInt64 else "t"
+    pl.DataFrame({name: column, "v": [1.0, 2.0, 3.0]}).write_parquet(path)
+    with ParquetReader(path, ReadOptions()) as reader:
+        (v,) = reader.read(reader.channels())
+        assert (v.t_ns.tolist(), v.values.tolist()) == (t_ns, [2.0, 3.0])
+        assert reader.faults.lost_samples == 1
+
+
+def test_more_rows_than_the_file_can_hold_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "_MOST_ROWS", 1000)
+    path = tmp_path / "a.parquet"
+    pl.select(t=pl.repeat(0.0, 1_000_000), v=pl.repeat(1.0, 1_000_000)).write_parquet(path)
+    with pytest.raises(LogError, match=r"declares 1000000 rows in \d+ bytes"):
+        ParquetReader(path, ReadOptions())
+    pl.DataFrame({"t": np.arange(2000.0), "v": np.arange(2000.0)}).write_parquet(path)
+    with ParquetReader(path, ReadOptions()) as reader:
+        assert reader.channels()[0].count == 2000

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import bz2
 import sqlite3
+import struct
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aqualog.errors import LogError
+from aqualog.io.bag_records import CHUNK, BagRecords, kind_of
 from aqualog.io.base import ReadOptions
 from aqualog.io.ros import RosReader
 from aqualog.types import Channel
@@ -122,6 +127,68 @@ def test_damaged_chunk_of_bag1_costs_that_chunk(tmp_path):
     assert any("damaged chunk" in note for note in reader.faults.notes)
 
 
+def bag_record(head: dict[bytes, bytes], data: bytes) -> bytes:
+    fields = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k + b"=" + v for k, v in head.items())
+    return struct.pack("<I", len(fields)) + fields + struct.pack("<I", len(data)) + data
+
+
+def chunk_starts(path: Path) -> list[int]:
+    with path.open("rb") as file:
+        records = BagRecords(file, path.stat().st_size)
+        return [offset for offset, head, _ in records if kind_of(head) == CHUNK]
+
+
+@pytest.mark.parametrize("indexed", [True, False])
+@pytest.mark.parametrize("length", [1 << 31, 9000, 100])
+def test_a_length_that_lies_costs_that_chunk_of_a_bag(tmp_path, indexed, length):
+    path = write_bag1(tmp_path / "a.bag", 600)
+    raw = bytearray(path.read_bytes())
+    start = chunk_starts(path)[4]
+    struct.pack_into("<I", raw, start + 4 + struct.unpack_from("<I", raw, start)[0], length)
+    path.write_bytes(raw if indexed else raw[:-1])
+    channels, reader = read_all(path)
+    omega = channels["/omega_fl.data"].values
+    assert 570 < omega.size < 600
+    assert np.isin(omega, np.arange(600) * 0.1).all()
+    assert omega[-1] == 599 * 0.1
+    lost = sum(600 - channels[p].values.size for p in ("/omega_fl.data", "/slip.slip[0]"))
+    assert reader.faults.lost_samples == lost if indexed else reader.faults.truncated
+
+
+@pytest.mark.parametrize("compression", ["bz2", "lz4"])
+@pytest.mark.parametrize("declared", [10, 1 << 27])
+def test_bomb_in_a_bag_is_refused(tmp_path, compression, declared):
+    path = write_bag1(tmp_path / "a.bag", 100)
+    raw = path.read_bytes()
+    bomb = bz2.compress(bytes(1 << 20)) if compression == "bz2" else lz4.frame.compress(bytes(1 << 20))
+    start = chunk_starts(path)[0]
+    head = {b"op": b"\x05", b"compression": compression.encode(), b"size": struct.pack("<I", declared)}
+    path.write_bytes(raw[:start] + bag_record(head, bomb) + raw[start:])
+    channels, reader = read_all(path)
+    assert channels["/omega_fl.data"].values.size == 100
+    assert any("damaged chunk" in note for note in reader.faults.notes)
+    assert reader.faults.truncated
+
+
+def test_messages_without_their_connection_are_counted(tmp_path):
+    path = write_bag1(tmp_path / "a.bag", 100)
+    raw = path.read_bytes()
+    at = raw.index(b"/slip")
+    # neither the record in the chunk nor the one in the index says what the connection is
+    path.write_bytes(raw.replace(b"message_definition=", b"message_definitian=") if at else raw)
+    _, reader = read_all(path)
+    assert reader.faults.lost_samples == 300
+    assert any("300 messages are left out" in note for note in reader.faults.notes)
+
+
+def test_encrypted_bag_is_named(tmp_path):
+    path = tmp_path / "a.bag"
+    head = {b"op": b"\x03", b"index_pos": bytes(8), b"encryptor": b"rosbag/AesCbcEncryptor"}
+    path.write_bytes(b"#ROSBAG V2.0\n" + bag_record(head, b" " * 50))
+    with pytest.raises(LogError, match="is encrypted"):
+        read_all(path)
+
+
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
 @pytest.mark.parametrize("metadata", [True, False])
 def test_bag2_directory_and_file(tmp_path, plugin, metadata):
@@ -209,6 +276,64 @@ def test_truncated_db3(tmp_path):
     assert 2000 < omega.size < 5000
     np.testing.assert_array_equal(omega, np.arange(omega.size) * 0.1)
     assert reader.faults.truncated
+
+
+def test_damaged_page_of_a_db3_costs_its_rows(tmp_path):
+    path = write_old_db3(tmp_path / "a.db3", 5000, unknown=False)
+    raw = bytearray(path.read_bytes())
+    page = len(raw) // 4096 // 3 * 4096
+    raw[page : page + 4096] = bytes(4096)
+    path.write_bytes(raw)
+    channels, reader = read_all(path)
+    omega = channels["/omega_fl.data"]
+    assert 4500 < omega.values.size < 5000
+    assert omega.values[-1] == 4999 * 0.1
+    np.testing.assert_array_equal(omega.t_ns, T0 + np.rint(omega.values * 10).astype(np.int64) * STEP)
+    assert reader.faults.lost_samples == 5000 - omega.values.size
+    assert any("what stands behind is read" in note for note in reader.faults.notes)
+
+
+ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT"
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        f"ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS {ENDLESS} x id, 1 topic_id, x timestamp, x'00' data FROM c",
+        f"ALTER TABLE topics RENAME TO m; CREATE VIEW topics AS {ENDLESS} x id, 'a' name, '' type, 'cdr' serialization_format FROM c",
+        "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+        "data BLOB GENERATED ALWAYS AS (zeroblob(900000000)) VIRTUAL); INSERT INTO messages VALUES (1, 1, 1)",
+    ],
+)
+def test_nothing_in_a_db3_is_run(tmp_path, script):
+    path = write_old_db3(tmp_path / "a.db3", 3, unknown=False)
+    with sqlite3.connect(path) as base:
+        base.executescript(script)
+    base.close()
+    with pytest.raises(LogError, match="is no plain table"):
+        read_all(path)
+
+
+def test_rows_of_other_kinds_are_counted(tmp_path):
+    path = write_old_db3(tmp_path / "a.db3", 100, unknown=False)
+    with sqlite3.connect(path) as base:
+        base.execute("UPDATE messages SET topic_id = 'x' WHERE id <= 10")
+        base.execute("UPDATE messages SET data = 3.5 WHERE id BETWEEN 41 AND 60")
+        base.execute("INSERT INTO topics VALUES (3, x'FFFE2F61', NULL, NULL, NULL)")
+        base.execute("UPDATE topics SET name = CAST(x'2FFF61' AS TEXT) WHERE id = 1")
+    base.close()
+    channels, reader = read_all(path)
+    assert [c.values.size for c in channels.values()] == [70]
+    assert reader.faults.lost_samples == 30
+
+
+def test_packed_split_is_unpacked_within_its_size(tmp_path):
+    path = write_bag2(tmp_path / "drive", range(3))
+    (path / "drive_9.db3.zstd").write_bytes(zstandard.compress(b"SQLite format 3\0" + bytes(1 << 26)))
+    (path / "metadata.yaml").write_text("\n" * 200_000)  # nor does a file of blank lines take long
+    channels, reader = read_all(path)
+    check(channels, 3)
+    assert any("drive_9" in note and "is not unpacked" in note for note in reader.faults.notes)
 
 
 @pytest.mark.parametrize("content", [b"", b"something else entirely"])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear
+from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, placed
 
 MS = 1_000_000
 EPOCH = 1_760_000_000_000_000_000
@@ -70,3 +70,20 @@ def test_gap_limits():
     assert gap_limit_ns(10 * MS, is_state=False) == 50 * MS
     assert gap_limit_ns(100 * MS, is_state=False) == 500 * MS
     assert gap_limit_ns(10 * MS, is_state=True) == 2000 * MS
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_points_are_placed_by_the_step_as_by_a_search(seed):
+    rng = np.random.default_rng(seed)
+    dt, m = int(rng.integers(1, 50)), int(rng.integers(1, 60))
+    points = (EPOCH if seed % 3 == 0 else -500) + np.arange(m, dtype=np.int64) * dt
+    if seed % 2:
+        t = np.unique(points[0] + rng.integers(-100, m * dt + 100, size=int(rng.integers(1, 80))))
+    else:  # a raster with holes
+        t = np.sort(rng.choice(points, size=int(rng.integers(1, m + 1)), replace=False))
+    for one, other in zip(placed(t, points), placed(t, points, dt), strict=True):
+        np.testing.assert_array_equal(one, other)
+    x = rng.normal(size=t.size)
+    last = np.searchsorted(t, points, side="right") - 1
+    held = np.where(last >= 0, x[last], np.nan)
+    np.testing.assert_array_equal(hold(t, x, points, gap_ns=1 << 40), held)

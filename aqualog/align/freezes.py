@@ -1,0 +1,117 @@
+"""Stretches in which a sensor repeats its last value while the car drives on.
+
+A speed or a torque that is measured never stays the same to the last digit for long: on five measured cars the longest
+such stretch of a moving wheel is 0.9 s, of a torque 18 s. Only signals are judged whose own noise shows elsewhere, so
+that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel and
+a torque of zero may stay as they are for ever.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.types import BoolArray, FloatArray, TimeArray
+
+__all__ = ["Freeze", "FreezeWatch", "freeze_note", "in_freezes", "watch_of"]
+
+Freeze = tuple[int, int]
+"""Stamps of the last sample that counts and of the last that repeats it. [ns]"""
+
+_SPEED = (3.0, 2.0, 0.03)  # least time [s]; speed below which a car counts as standing, coarsest step [m/s]
+_TORQUE = (60.0, 0.0, np.inf)  # [s], [N*m], [N*m]
+_MOST_BETWEEN = 0.3  # [s] mean time between two changes of a signal that is judged
+_TIMES_LONGER = 20  # than that time
+_LEAST_CHANGES = 50
+_NOISE = 0.05  # least share of steps against the step before: measured speeds have 0.11 and more
+_GAP_NS = 1_000_000_000
+
+
+def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
+    """The watch of a signal, with the effective radius [m] of a wheel; None for signals that may stay as they are."""
+    if name == "v_x":
+        return FreezeWatch(*_SPEED)
+    if name.startswith("omega_") and r_e is not None:
+        return FreezeWatch(_SPEED[0], _SPEED[1] / r_e, _SPEED[2] / r_e)
+    return FreezeWatch(*_TORQUE) if name.startswith("torque_") else None
+
+
+class FreezeWatch:
+    """Goes through the samples of one signal, in any pieces.
+
+    Parameters
+    ----------
+    least_s : float
+        Shortest stretch. [s]
+    standing : float
+        Magnitude up to which the signal may stay the same.
+    coarsest : float
+        Smallest step of a signal that is judged, at most.
+    """
+
+    def __init__(self, least_s: float, standing: float, coarsest: float) -> None:
+        self._least_ns, self._standing, self._coarsest = round(least_s * 1e9), standing, coarsest
+        self._t: TimeArray = np.zeros(0, dtype=np.int64)  # the last sample
+        self._x: FloatArray = np.zeros(0)
+        self._since = 0
+        self._sign = 0.0
+        self._changes = self._turns = self._moving_ns = 0
+        self._smallest = np.inf
+        self._long: list[Freeze] = []
+
+    def push(self, t_ns: TimeArray, x: FloatArray) -> None:
+        """Samples (n,) at strictly increasing stamps, finite."""
+        if not t_ns.size:
+            return
+        if not self._t.size:
+            self._since = int(t_ns[0])
+        t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
+        self._t, self._x = t[-1:].copy(), x[-1:].copy()
+        steps, dt = np.diff(x), np.diff(t)
+        is_moving = (np.abs(x[1:]) > self._standing) & (np.abs(x[:-1]) > self._standing) & (dt <= _GAP_NS)
+        self._moving_ns += int(dt[is_moving].sum())
+        self._count(steps[is_moving & (steps != 0.0)])
+        ends = np.flatnonzero((steps != 0.0) | (dt > _GAP_NS))
+        if ends.size:
+            starts = np.append(np.int64(self._since), t[ends[:-1] + 1])
+            self._since = int(t[ends[-1] + 1])
+            found = (t[ends] - starts >= self._least_ns) & (np.abs(x[ends]) > self._standing)
+            self._long += list(zip(starts[found].tolist(), t[ends[found]].tolist(), strict=True))
+
+    def _count(self, changes: FloatArray) -> None:
+        if not changes.size:
+            return
+        signs = np.append(self._sign, np.sign(changes))
+        self._turns += int((signs[1:] * signs[:-1] < 0).sum())
+        self._sign = float(signs[-1])
+        self._changes += changes.size
+        self._smallest = min(self._smallest, float(np.abs(changes).min()))
+
+    def finish(self) -> tuple[Freeze, ...]:
+        """Stretches in which the signal is frozen, in order."""
+        found = list(self._long)
+        if self._t.size and self._t[0] - self._since >= self._least_ns and abs(self._x[0]) > self._standing:
+            found.append((self._since, int(self._t[0])))
+        is_noisy = self._changes >= _LEAST_CHANGES and self._turns >= _NOISE * self._changes
+        if not found or not is_noisy or self._smallest > self._coarsest:
+            return ()
+        between = (self._moving_ns - sum(end - start for start, end in found)) / self._changes
+        if between > _MOST_BETWEEN * 1e9:
+            return ()
+        return tuple((start, end) for start, end in found if end - start >= _TIMES_LONGER * between)
+
+
+def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:
+    """Which samples (n,) repeat one before."""
+    out = np.zeros(t_ns.size, dtype=np.bool_)
+    for start, end in freezes:
+        out[np.searchsorted(t_ns, start, side="right") : np.searchsorted(t_ns, end, side="right")] = True
+    return out
+
+
+def freeze_note(where: str, count: int, first_ns: int, freezes: tuple[Freeze, ...]) -> str:
+    """What was left out because the sensor stood still; `first_ns` is the signal's first stamp."""
+    longest, after = max(end - start for start, end in freezes), freezes[0][0] - first_ns
+    return (
+        f"{where}: {count} samples (first at {after * 1e-9:.2f} s) only repeat the one before, for up to "
+        f"{longest * 1e-9:.1f} s; the signal is frozen there, left out"
+    )

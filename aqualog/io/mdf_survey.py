@@ -1,0 +1,106 @@
+"""What a walk through the blocks of an MDF file finds before any library is given the file.
+
+Every block that a reader would follow is looked at: whether it is there, is what its link says, and is linked once.
+What a cut or damaged file still holds can then be read as if what is missing had never been linked: the survey gives
+the few bytes that say so (`patches`), in place of a copy of the file.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from aqualog.errors import LogError
+
+__all__ = ["BlockError", "Survey", "mapped"]
+
+_COMPLETE = "a complete MDF file"
+_COPY_AGAIN = "copy it from the logger again or stop the recording properly"
+_OWN_TOOL = "check it with the logger's own tool"
+_MOST_NOTES = 30
+
+
+class BlockError(Exception):
+    """A block that cannot be read.
+
+    Parameters
+    ----------
+    kind : str
+        Of the block, as MDF names it (`CG`).
+    at : int
+        Where it is, or should be. [bytes]
+    why : str
+        What is wrong with it.
+    is_cut : bool
+        Whether the file ends before it does.
+    """
+
+    def __init__(self, kind: str, at: int, why: str, *, is_cut: bool = False) -> None:
+        self.kind, self.at, self.why, self.is_cut = kind, at, why, is_cut
+        super().__init__(f"its {kind} block at byte {at} {why}")
+
+
+@dataclass(slots=True)
+class Survey:
+    """What was found: lost parts in words, and what makes the rest readable.
+
+    `patches`: bytes in place of the file's own, by address. `refused`: why a channel is left out, by the address of its
+    block. `recount`: groups whose number of records is only known when their records have been sorted, by address.
+    `inferred`: groups whose records were told from their channels, by address; their time must go up to be believed.
+    `inflated`: what the records of a group take when they are inflated, by address of the group. [bytes]
+    """
+
+    size: int
+    patches: dict[int, bytes] = field(default_factory=dict)
+    refused: dict[int, str] = field(default_factory=dict)
+    recount: set[int] = field(default_factory=set)
+    inferred: set[int] = field(default_factory=set)
+    inflated: dict[int, int] = field(default_factory=dict)
+    unsorted: int = 0
+    notes: list[str] = field(default_factory=list)
+    truncated: bool = False
+    finalised: bool = False
+    lost_samples: int = 0
+    attachments: list[str] = field(default_factory=list)
+
+    def patch(self, at: int, layout: str, *values: int) -> None:
+        """Numbers in place of those in the file."""
+        self.patches[at] = struct.pack(layout, *values)
+
+    def lost(self, what: str, broken: BlockError, samples: int = 0) -> None:
+        """Something is left out because of a block."""
+        self.truncated = True
+        self.lost_samples += samples
+        self.remark(f"{what} is lost: {broken}")
+
+    def remark(self, note: str) -> None:
+        """A note; of very many the first ones are enough."""
+        if len(self.notes) < _MOST_NOTES:
+            self.notes.append(note)
+        elif len(self.notes) == _MOST_NOTES:
+            self.notes.append("more blocks are damaged than are listed here")
+
+    def hopeless(self, path: Path, broken: BlockError) -> LogError:
+        """The error where nothing can be read."""
+        if broken.is_cut:
+            return LogError(f"file is cut: {broken}", where=str(path), expected=_COMPLETE, hint=_COPY_AGAIN)
+        return LogError(f"file is damaged: {broken}", where=str(path), hint=_OWN_TOOL)
+
+
+@contextmanager
+def mapped(path: Path) -> Iterator[Any]:
+    """The bytes of a file, which is not empty, without reading them."""
+    with path.open("rb") as file:
+        if file.seek(0, 2) == 0:
+            yield b""
+            return
+        view = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        try:
+            yield view
+        finally:
+            view.close()

@@ -1,0 +1,145 @@
+"""A frozen signal is left out where it only repeats itself, and told; no detector takes it for the car."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from aqualog.align.freezes import FreezeWatch, in_freezes, watch_of
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.align.table import build_signals
+from aqualog.config.vehicle import load_vehicle
+from aqualog.detect.stream import detect_drive
+from aqualog.report.document import document
+from aqualog.types import Channel, ChannelInfo
+
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
+S = 1_000_000_000
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def moving(seconds=60.0, rate=100.0, step=0.01, noise=0.02, seed=1):
+    """A speed as a control unit gives it, in whole steps."""
+    t = np.arange(round(seconds * rate)) / rate
+    v = 20.0 + 5.0 * np.sin(0.2 * t) + noise * np.random.default_rng(seed).standard_normal(t.size)
+    return np.round(t * S).astype(np.int64), np.round(v / step) * step
+
+
+def found(t, x, name="v_x", pieces=1):
+    watch = watch_of(name, 0.3)
+    for part in np.array_split(np.arange(t.size), pieces):
+        watch.push(t[part], x[part])
+    return watch.finish()
+
+
+def frozen(t, x, start, end):
+    x = x.copy()
+    x[start : end + 1] = x[start]
+    for beside in {max(start - 1, 0), min(end + 1, x.size - 1)} - {start, end}:
+        x[beside] += 1.0 * (x[beside] == x[start])  # where it begins and ends is to be seen
+    return t, x
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 7, 1000])
+@pytest.mark.parametrize("spans", [[], [(100, 441)], [(0, 400), (1000, 1400)], [(5500, 5999)], [(200, 5700)]])
+def test_a_sensor_that_repeats_itself(pieces, spans):
+    t, x = moving()
+    for start, end in spans:
+        t, x = frozen(t, x, start, end)
+    assert found(t, x, pieces=pieces) == tuple((t[a], t[b]) for a, b in spans)
+    assert np.flatnonzero(in_freezes(t, found(t, x))).tolist() == [k for a, b in spans for k in range(a + 1, b + 1)]
+
+
+def held(rate):
+    """A value of 10 Hz, repeated until the next one comes."""
+    t, x = moving(rate=rate)
+    return t, x[np.arange(t.size) // round(rate / 10) * round(rate / 10)]
+
+
+def test_a_slow_signal_on_a_fast_bus():
+    t, x = held(100.0)
+    assert found(t, x) == ()
+    assert found(*frozen(t, x, 1000, 3000))[0][1] >= t[3000]
+
+
+@pytest.mark.parametrize(
+    "case",
+    {
+        "a short stretch": frozen(*moving(), 100, 350),
+        "standing": frozen(moving()[0], np.where(np.arange(6000) < 2000, 1.0, moving()[1]), 0, 1999),
+        "coarse": frozen(*moving(step=0.28, noise=0.2), 1000, 2000),
+        "calculated": (moving()[0], np.clip(moving(noise=0.0, step=1e-9)[1], 18.0, 22.0)),
+        "constant": (moving()[0], np.full(6000, 20.0)),
+        "a pause": (np.where(np.arange(6000) < 3000, 0, 60 * S) + moving()[0], frozen(*moving(), 2900, 3100)[1]),
+    }.items(),
+    ids=lambda c: c[0],
+)
+def test_what_is_not_frozen(case):
+    assert found(*case[1]) == ()
+
+
+def test_torque_may_stay_for_a_minute_and_at_zero():
+    t, x = moving(200.0)
+    x = np.round(30.0 * (x - 20.0))
+    assert found(*frozen(t, x, 1000, 6000), "torque_r") == ()
+    assert found(*frozen(t, x, 1000, 8000), "torque_r") == ((t[1000], t[8000]),)
+    x[1000:18000] = 0.0
+    assert found(t, x, "torque_r") == ()
+    assert watch_of("a_x", None) is None
+
+
+def test_a_single_sample_and_none():
+    watch = FreezeWatch(3.0, 2.0, 0.03)
+    assert watch.finish() == ()
+    watch.push(np.zeros(1, dtype=np.int64), np.ones(1))
+    assert watch.finish() == ()
+
+
+def lane_and_braking():
+    """The sample drive over its wet lane; then the same car brakes by itself for 10 s."""
+    sample = pl.read_parquet(SAMPLES / "lane_drive.parquet")
+    car = load_vehicle(SAMPLES / "vehicle.toml")
+    rng = np.random.default_rng(5)
+    t = np.arange(2500) * 0.01 + 24.01
+    v = np.interp(t, [24.0, 29.0, 39.0, 49.1], [28.0, 28.0, 10.0, 10.0])
+    later = {"a_x": np.gradient(v, 0.01) + 0.05 * rng.standard_normal(t.size), "v_x": v}
+    later |= {
+        f"omega_{w}": np.round((v / car.r_e(w) + 0.05 * rng.standard_normal(t.size)) / 0.006572) * 0.006572
+        for w in WHEELS
+    }
+    later["v_x"] = later["v_x"] + 0.01 * rng.standard_normal(t.size)
+    own = np.round(sample["t"].to_numpy() * S).astype(np.int64)
+    channels = {}
+    for name, values in later.items():
+        before = sample[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+        has = np.isfinite(before)
+        channels[name] = np.append(own[has], np.round(t * S).astype(np.int64)), np.append(before[has], values)
+    return channels, car
+
+
+def detected(channels, car):
+    mapped = {
+        n: (Entry(n, (n,)), Channel(ChannelInfo(n, n, "", t.size, "a.mf4"), t, x, False))
+        for n, (t, x) in channels.items()
+    }
+    signals = build_signals(mapped, signal_map=SignalMap(), vehicle=car)
+    return detect_drive(signals, car)
+
+
+@pytest.mark.parametrize("name", ["omega_fr", "omega_rl", "v_x"])
+def test_no_detector_alarms_on_a_frozen_signal(name):
+    channels, car = lane_and_braking()
+    sound = detected(channels, car)
+    assert sound.events
+    assert max(e.end_s for e in sound.events) < 24.0
+    t, x = channels[name]
+    start = int(np.searchsorted(t, 30 * S))
+    channels[name] = frozen(t, x, start, int(np.searchsorted(t, 36 * S)))
+    result = detected(channels, car)
+    key = [(e.detector, e.wheel, e.start_s, e.severity) for e in result.events]
+    assert key == [(e.detector, e.wheel, e.start_s, e.severity) for e in sound.events]
+    told = document(result, log="a.mf4")
+    assert 590 < told["quality"]["frozen_samples"] == told["signals"][name]["frozen"] < 610
+    assert told["quality"]["dropped_samples"] >= told["quality"]["frozen_samples"]
+    assert any(name in note and "6.0 s; the signal is frozen" in note for note in told["quality"]["notes"])

@@ -1,0 +1,567 @@
+"""MDF that is cut, unfinished, damaged or made to do harm: what is there is read, the rest is told, nothing else happens."""
+
+import shutil
+import struct
+import sys
+import tempfile
+import time
+import zlib
+from pathlib import Path
+
+import asammdf
+import numpy as np
+import pytest
+from mdf_by_hand import Blocks, describe, records, streamed, unsorted
+from typer.testing import CliRunner
+
+import aqualog.io.mdf as reader
+from aqualog.cli.main import app
+from aqualog.errors import LogError
+from aqualog.io import mdf4_survey, mdf_blocks, mdf_harness
+from aqualog.io.base import ReadOptions
+from aqualog.io.mdf import MdfReader
+from aqualog.io.patched_file import PatchedFile
+
+K = np.arange(200)
+X = (np.sin(K) + K) * 2 + 1
+RECORD = 24
+
+
+def read(path):
+    with MdfReader(path, ReadOptions()) as r:
+        return {c.info.path: c.values for c in r.read(r.channels())}, r.faults
+
+
+def read_bytes(folder, data):
+    (folder / "a.mf4").write_bytes(data)
+    return read(folder / "a.mf4")
+
+
+def refused(folder, data) -> str:
+    with pytest.raises(LogError) as caught:
+        read_bytes(folder, data)
+    return caught.value.line()
+
+
+def numbers_at(data, at, layout, *values):
+    out = bytearray(data)
+    struct.pack_into(layout, out, at, *values)
+    return bytes(out)
+
+
+def find(data, mark, which=0):
+    """Address of the block number `which` of a kind."""
+    found = [i for i in range(0, len(data), 8) if data[i : i + 4] == b"##" + mark]
+    return found[which]
+
+
+# --- unfinished ---
+
+
+@pytest.mark.parametrize("flags", [1, 4, 1 | 4, 1 | 4 | 32])
+@pytest.mark.parametrize("make", [streamed, unsorted])
+def test_an_unfinished_file_is_read_without_a_copy_of_it(tmp_path, monkeypatch, make, flags):
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    for copy in ("copy", "copyfile", "copy2"):
+        monkeypatch.setattr(shutil, copy, None)
+    data = make(unfinished=flags)
+    found, faults = read_bytes(tmp_path, data)
+    expected, _ = read_bytes(tmp_path, make())
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+    assert "was not finalised" in faults.notes[0]
+    assert not faults.truncated
+    assert not list(scratch.iterdir())
+    assert (tmp_path / "a.mf4").read_bytes() == make()
+
+
+def test_an_unfinished_list_of_blocks_is_completed(tmp_path):
+    """Blocks that lie behind the list and are not in it yet."""
+    b = Blocks(unfinished=1 | 16)
+    b.header()
+    describe(b, "a", 0)
+    b.group("dg0", None, "acg", "dl")
+    b.listed("dl", ["dz0"], size=50 * RECORD, slots=6)
+    for k in range(4):
+        b.deflated(f"dz{k}", records(50, 50 * k))
+    found, faults = read_bytes(tmp_path, b.bytes())
+    np.testing.assert_array_equal(found["group0.x"], X)
+    assert not faults.truncated
+
+
+def test_unknown_places_of_values_are_no_guess(tmp_path):
+    assert "places of values of variable length are not known" in refused(tmp_path, streamed(unfinished=1 | 64))
+
+
+def test_the_temporary_folder_is_private_and_goes_with_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    modes = []
+
+    def failing(*_, temporary_folder, **__):
+        modes.append(Path(temporary_folder).stat().st_mode & 0o777)
+        raise KeyError("block")
+
+    with monkeypatch.context() as m:
+        m.setattr(asammdf, "MDF", failing)
+        assert "cannot be read as MDF" in refused(tmp_path, unsorted(unfinished=5))
+    assert modes == [0o700]
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mf4"]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10, 10, 100))
+    assert "no space to sort them; expected 3.75 kB" in refused(tmp_path, unsorted())
+    assert read_bytes(tmp_path, streamed())  # needs none
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mf4"]
+
+
+# --- cut ---
+
+
+@pytest.mark.parametrize("cut", [1, 23, 24, 100, 2400, 4799])
+def test_what_precedes_a_cut_is_kept_where_descriptions_come_first(tmp_path, cut):
+    found, faults = read_bytes(tmp_path, streamed()[:-cut])
+    left = 200 - -(-cut // RECORD)
+    np.testing.assert_array_equal(found.get("group0.x", np.zeros(0)), X[:left])
+    assert faults.truncated
+    assert faults.lost_samples == (200 - left) * (2 if left else 1)
+    at = find(streamed(), b"DT")
+    assert f"its DT block at byte {at} is incomplete" in faults.notes[0]
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3])
+def test_deflated_blocks_before_a_cut_are_kept(tmp_path, lost):
+    data = streamed(compressed=True)
+    found, faults = read_bytes(tmp_path, data[: find(data, b"DZ", 4 - lost) + 60])
+    np.testing.assert_array_equal(found["group0.x"], X[: 200 - 50 * lost])
+    assert faults.truncated
+    assert faults.lost_samples == 50 * lost * 2
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        assert r.faults.truncated  # also where nothing is read
+    assert "DZ block" in faults.notes[0]
+
+
+def test_a_cut_through_records_of_several_kinds(tmp_path):
+    found, faults = read_bytes(tmp_path, unsorted()[:-1000])
+    whole, _ = read_bytes(tmp_path, unsorted())
+    assert faults.truncated
+    for name, values in found.items():
+        assert 0 < len(values) < len(whole[name])
+        np.testing.assert_array_equal(values, whole[name][: len(values)])
+
+
+def test_a_cut_file_is_read_with_exit_code_3(tmp_path):
+    (tmp_path / "a.mf4").write_bytes(streamed()[:-1000])
+    result = CliRunner().invoke(app, ["inspect", str(tmp_path / "a.mf4"), "--json"])
+    assert result.exit_code == 3
+    assert "its DT block at byte" in result.stdout
+    (tmp_path / "a.mf4").write_bytes(streamed())
+    assert CliRunner().invoke(app, ["inspect", str(tmp_path / "a.mf4"), "--json"]).exit_code == 0
+
+
+def saved(path, groups, version="4.10", compression=0):
+    mdf = asammdf.MDF(version=version)
+    for k in range(groups):
+        mdf.append([asammdf.Signal(X + k, K * 0.01, name=f"x{k}")], common_timebase=True)
+    mdf.save(path.with_suffix(".mdf" if version < "4" else ".mf4"), compression=compression, overwrite=True)
+    mdf.close()
+    return path.with_suffix(".mdf" if version < "4" else ".mf4").read_bytes()
+
+
+@pytest.mark.parametrize("cut", [1, 16, 1000])
+def test_a_cut_through_the_records_of_mdf_3(tmp_path, cut):
+    data = bytearray(saved(tmp_path / "w", 1, "3.30"))
+    group = struct.unpack_from("<I", data, 68)[0]
+    begin = struct.unpack_from("<I", data, group + 16)[0]
+    struct.pack_into("<I", data, group + 16, len(data))
+    data += data[begin : begin + 200 * 16]
+    (tmp_path / "a.mf4").write_bytes(data[:-cut])
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        assert r.faults.truncated
+        assert f"the file ends at byte {len(data) - cut}" in r.faults.notes[0]
+        (x,) = r.read(r.channels())
+        left = 200 - -(-cut // 16)
+        np.testing.assert_array_equal(x.values, X[:left])
+        assert r.faults.lost_samples == 200 - left
+
+
+@pytest.mark.parametrize("version", ["4.10", "3.30"])
+@pytest.mark.parametrize(("groups", "cut", "left"), [(1, 3, 1), (2, 3, 2), (3, 150, 2), (3, 700, 1)])
+def test_a_cut_where_descriptions_come_last(tmp_path, version, groups, cut, left):
+    """All groups whose description is left; of the last one a part of it may be enough."""
+    found, faults = read_bytes(tmp_path, saved(tmp_path / "w", groups, version)[:-cut])
+    assert list(found) == [f"group{k}.x{k}" for k in range(left)]
+    for k in range(left):
+        np.testing.assert_array_equal(found[f"group{k}.x{k}"], X + k)
+    assert faults.truncated
+    assert "CG block at byte" in faults.notes[0]
+
+
+def test_records_that_are_told_from_channels_must_have_a_time_that_goes_up(tmp_path):
+    """A record that is longer than its channels: 192 records of 17 bytes are 204 of 16."""
+    b = Blocks()
+    rows = np.zeros(192, dtype=[("t", "<f8"), ("x", "<f8"), ("more", "u1")])
+    rows["t"], rows["x"], rows["more"] = np.arange(192) * 0.01, np.arange(192), 3
+    b.header()
+    b.add("data", "DT", [], rows.tobytes())
+    b.group("dg0", None, "cg", "data")
+    b.text("t_name", "t")
+    b.text("x_name", "x")
+    b.channel("t", "x", 0, text="t_name", kind=2, sync=1)
+    b.channel("x", None, 8, text="x_name")
+    b.channel_group("cg", "t", 192, 17)
+    found, _ = read_bytes(tmp_path, b.bytes())
+    np.testing.assert_array_equal(found["group0.x"], np.arange(192))
+    found, faults = read_bytes(tmp_path, b.bytes()[:-30])
+    assert not found
+    assert faults.truncated
+    assert "time does not go up" in " ".join(faults.notes)
+
+
+@pytest.mark.parametrize(("mark", "at"), [(b"HD", 70), (b"DG", None), (b"CG", None)])
+def test_where_nothing_is_left_the_missing_block_is_named(tmp_path, mark, at):
+    data = saved(tmp_path / "w", 1)
+    begin = find(data, mark)
+    line = refused(tmp_path, data[: at or begin + 20])
+    assert "file is cut" in line
+    assert f"{mark.decode()} block at byte {begin}" in line
+    assert f"the file ends at byte {at or begin + 20}" in line
+    assert "Try" in line
+
+
+# --- links ---
+
+KINDS = {"DG": 24, "CG": 24, "CN": 24, "DL": 24}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_link_to_itself_ends(tmp_path, kind):
+    """asammdf would follow it for ever."""
+    data = streamed(compressed=True)
+    at = find(data, kind.encode())
+    begin = time.monotonic()
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 24, "<Q", at))
+    assert time.monotonic() - begin < 5
+    why = "is a second kind of records, which have no ids" if kind == "CG" else "is linked twice"
+    assert f"{kind} block at byte {at} {why}" in " ".join(faults.notes)
+    assert faults.truncated
+    if kind != "CN":  # its first channel is the time
+        np.testing.assert_array_equal(found["group0.x"], X)
+
+
+def test_parts_that_are_linked_twice_each_are_not_followed_without_end(tmp_path):
+    """Forty channels, each with the next one as its part and behind it: 2^40 of them."""
+    b = Blocks()
+    b.header()
+    b.group("dg0", None, "cg", "data")
+    b.text("name", "n")
+    for k in range(40):
+        following = f"c{k + 1}" if k < 39 else None
+        b.channel(f"c{k}", following, 0, text="name", part=following)
+    b.channel_group("cg", "c0", 10, 8)
+    b.add("data", "DT", [], bytes(80))
+    begin = time.monotonic()
+    _, faults = read_bytes(tmp_path, b.bytes())
+    assert time.monotonic() - begin < 5
+    assert "is linked twice" in " ".join(faults.notes)
+
+
+def conversions(depth, width):
+    """Channel x with tables of tables."""
+    b = Blocks()
+    b.header()
+    b.group("dg0", None, "cg", "data")
+    b.text("t", "t")
+    b.text("x", "x")
+    b.channel("ct", "cx", 0, text="t", kind=2, sync=1)
+    b.channel("cx", None, 8, text="x", conversion="cc0")
+    b.channel_group("cg", "ct", 200, RECORD)
+    for k in range(depth):
+        last = k == depth - 1
+        b.conversion(
+            f"cc{k}", 1 if last else 7, () if last else [f"cc{k + 1}"] * width, (0.0, 2.0)[: 2 if last else width - 1]
+        )
+    b.add("data", "DT", [], records(200))
+    return b.bytes()
+
+
+def test_conversions_in_conversions_have_an_end(tmp_path):
+    assert list(read_bytes(tmp_path, conversions(3, 3))[0]) == ["group0.x"]
+    found, faults = read_bytes(tmp_path, conversions(14, 3))  # 3^13 of them
+    assert not found
+    assert "without end" in " ".join(faults.notes)
+    data = conversions(2, 3)
+    at = find(data, b"CC")
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 24 + 32, "<Q", at))
+    assert not found
+    assert "its conversion cannot be read" in " ".join(faults.notes)
+
+
+@pytest.mark.parametrize("damage", ["no block", "behind the end", "size", "type"])
+def test_a_conversion_that_cannot_be_read_leaves_no_raw_numbers(tmp_path, damage):
+    """asammdf gives the raw samples without a word."""
+    data = streamed()
+    at, cn = find(data, b"CC"), find(data, b"CN", 1)
+    data = {
+        "no block": lambda: numbers_at(data, at, "<4s", b"##XX"),
+        "behind the end": lambda: numbers_at(data, cn + 24 + 32, "<Q", 10**9),
+        "size": lambda: numbers_at(data, at + 24 + 32 + 6, "<H", 1),
+        "type": lambda: numbers_at(data, at + 24 + 32, "<B", 77),
+    }[damage]()
+    found, faults = read_bytes(tmp_path, data)
+    assert list(found) == ["group0.y"]
+    assert "channel group0.x is left out: its conversion cannot be read" in " ".join(faults.notes)
+
+
+def test_a_time_without_its_conversion_is_no_time(tmp_path):
+    data = streamed()
+    clock = find(data, b"CN", 0)
+    found, faults = read_bytes(tmp_path, numbers_at(data, clock + 24 + 32, "<Q", 9))
+    assert not found
+    assert "its time channel cannot be read" in " ".join(faults.notes)
+
+
+# --- sizes ---
+
+
+def deflated(raw, *, size=None, invalidation=0, kind=0):
+    b = Blocks()
+    b.header()
+    describe(b, "a", 200, size=RECORD - invalidation)
+    b.group("dg0", None, "acg", "dz")
+    b.deflated("dz", raw, size=size, kind=kind, width=RECORD)
+    data = b.bytes()
+    return numbers_at(data, find(data, b"CG") + 24 + 48 + 28, "<I", invalidation)
+
+
+@pytest.mark.parametrize("size", [2**40, mdf4_survey.LARGEST_BLOCK + 1])
+def test_a_block_of_no_sensible_size_is_refused_before_it_is_inflated(tmp_path, monkeypatch, size):
+    monkeypatch.setattr(mdf_blocks, "inflated", None)
+    line = refused(tmp_path, deflated(records(200), size=size))
+    assert "a data block of it tells of" in line
+    assert ("1.1e+03 GB" if size == 2**40 else "268 MB") in line
+    assert "Try" in line
+
+
+@pytest.mark.parametrize("library", ["libdeflate", "zlib"])
+@pytest.mark.parametrize("invalidation", [0, 1])
+@pytest.mark.parametrize("kind", [0, 1])
+def test_inflating_ends_at_the_size_that_is_told(tmp_path, monkeypatch, library, invalidation, kind):
+    """8 MB in a block that tells of 4800 bytes, by the short cut and through asammdf."""
+    if library == "zlib":
+        monkeypatch.setattr(mdf_blocks, "_libdeflate", None)
+    taken = []
+    original = mdf_blocks.inflated
+
+    def watched(data, size):
+        out = original(data, size)
+        taken.append(len(out))
+        return out
+
+    monkeypatch.setattr("aqualog.io.mdf_harness.inflated", watched)
+    monkeypatch.setattr(mdf_blocks, "inflated", watched)
+    monkeypatch.setattr(zlib, "decompress", None)
+    line = refused(tmp_path, deflated(bytes(1 << 23), size=200 * RECORD, invalidation=invalidation, kind=kind))
+    assert "cannot be decoded" in line
+    assert max(taken, default=0) <= 200 * RECORD
+
+
+def test_a_constant_channel_is_no_bomb(tmp_path):
+    """850 to 1 and more is honest."""
+    n = 20_000
+    rows = np.zeros(n, dtype="V24")
+    b = Blocks()
+    b.header()
+    describe(b, "a", n)
+    b.group("dg0", None, "acg", "dz")
+    b.deflated("dz", rows.tobytes())
+    data = b.bytes()
+    assert n * RECORD > 100 * len(data)
+    found, faults = read_bytes(tmp_path, data)
+    assert len(found["group0.x"]) == n
+    assert not faults.truncated
+
+
+def test_what_does_not_fit_into_memory_is_refused_by_its_size(tmp_path, monkeypatch):
+    (tmp_path / "a.mf4").write_bytes(streamed())
+    monkeypatch.setattr(reader, "free_memory", lambda: 10_000)
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        with pytest.raises(LogError, match=r"have 200 samples each and would take 14.4 kB; expected at most 10 kB"):
+            r.read(r.channels())
+        assert len(r.read(r.channels()[:1])) == 1
+        pieces = [c for part in r.parts(r.channels()) for piece in part.pieces for c in piece]
+    np.testing.assert_array_equal(pieces[0].values, X)
+
+
+def test_records_that_are_told_of_and_not_there_take_nothing(tmp_path):
+    data = streamed()
+    at = find(data, b"CG") + 24 + 48
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 8, "<Q", 2**62))
+    np.testing.assert_array_equal(found["group0.x"], X)
+    assert faults.truncated
+    assert "tells of 4.6e+18 records" in faults.notes[0]
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 24, "<I", 1 << 29))
+    assert not found
+    assert faults.lost_samples == 200
+
+
+def test_groups_that_asammdf_decodes_are_read_in_pieces_too(tmp_path):
+    (tmp_path / "a.mf4").write_bytes(unsorted())
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        whole = {c.info.path: c.values for c in r.read(r.channels())}
+        for part in r.parts(r.channels()):
+            for channels in zip(*part.pieces, strict=True):
+                values = np.concatenate([c.values for c in channels])
+                np.testing.assert_array_equal(values, whole[channels[0].info.path])
+
+
+# --- texts ---
+
+LAUGHS = (
+    '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha">'
+    + "".join(f'<!ENTITY {chr(98 + k)} "{f"&{chr(97 + k)};" * 10}">' for k in range(9))
+    + "]><CNcomment><TX>&j;</TX></CNcomment>"
+)
+
+
+def commented(text, kind="MD", *, of="cx"):
+    b = Blocks()
+    b.header(comment="comment" if of == "hd" else None)
+    b.text("comment", text, kind)
+    b.group("dg0", None, "cg", "data")
+    b.text("t", "t")
+    b.text("x", "x")
+    b.channel("ct", "cx", 0, text="t", kind=2, sync=1)
+    b.channel("cx", None, 8, text="comment" if of == "name" else "x", comment="comment" if of == "cx" else None)
+    b.channel_group("cg", "ct", 200, RECORD)
+    b.add("data", "DT", [], records(200))
+    return b.bytes()
+
+
+@pytest.mark.parametrize("of", ["cx", "hd"])
+@pytest.mark.parametrize("text", [LAUGHS, "<CNcomment><TX>" * 20_000, "<HDcomment><TX>a</HDcomment>", "<" * 3_000_000, b"\xff\xfe<\0a\0>\0"])  # fmt: skip
+def test_comments_that_are_no_comments(tmp_path, capfd, of, text):
+    begin = time.monotonic()
+    (tmp_path / "a.mf4").write_bytes(commented(text, of=of))
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        (x,) = r.channels()
+        assert "haha" not in x.comment
+        assert len(x.comment) <= 120
+    assert time.monotonic() - begin < 5
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_comment_as_long_as_a_book_is_left_out(tmp_path):
+    found, faults = read_bytes(tmp_path, commented("a" * ((1 << 24) + 10)))
+    assert list(found) == ["group0.x"]
+    assert "the comment of the channel" in faults.notes[0]
+    assert "has 16.8 MB of text" in faults.notes[0]
+
+
+def test_one_long_comment_of_very_many_channels_is_not_read_that_often(tmp_path):
+    b = Blocks()
+    b.header()
+    b.text("comment", "a" * (1 << 20))
+    b.group("dg0", None, "cg", None)
+    for k in range(300):
+        b.channel(f"c{k}", f"c{k + 1}" if k < 299 else None, 0, text="comment")
+    b.channel_group("cg", "c0", 0, 8)
+    assert "names and comments take more than 268 MB" in refused(tmp_path, b.bytes())
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [("Räder".encode(), "Räder"), ("Drehzahl_Räder_größer".encode("latin-1"), None), (bytes(range(128, 256)), None),
+     (b"\xff\xff\xff", None), (b"a\0b", "a"), ("\N{SNOWMAN}\x1b[31m".encode(), None)],
+)  # fmt: skip
+def test_names_in_any_encoding(tmp_path, text, name):
+    found, _ = read_bytes(tmp_path, commented(text, "TX", of="name"))
+    (path,) = found
+    assert path.startswith("group0.")
+    assert name is None or path == f"group0.{name}"
+    path.encode()  # no halves of characters
+
+
+def test_an_encoding_is_told_from_the_beginning(tmp_path, monkeypatch):
+    """asammdf would look at all of a text of megabytes."""
+    seen = []
+    monkeypatch.setattr(mdf_harness, "_guess_encoding", lambda text: seen.append(len(text)) or {"encoding": "cp1252"})
+    read_bytes(tmp_path, commented(bytes([200, 201, 32, 230] * 400_000), "TX"))
+    assert seen == [512]
+
+
+def test_definitions_in_a_comment_are_not_followed(tmp_path):
+    text = '<!DOCTYPE l [<!ENTITY a "haha">]><CNcomment><TX>&a;</TX></CNcomment>'
+    (tmp_path / "a.mf4").write_bytes(commented(text))
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        assert r.channels()[0].comment == ""
+    (tmp_path / "a.mf4").write_bytes(commented("<CNcomment><TX>speed<!-- of what --></TX></CNcomment>"))
+    with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+        assert r.channels()[0].comment == "speed"
+
+
+# --- attachments ---
+
+OPENED: list[str] = []
+WATCHED = [False]
+sys.addaudithook(lambda event, args: OPENED.append(str(args[0])) if WATCHED[0] and event == "open" else None)
+
+
+def test_an_external_attachment_is_listed_and_never_opened(tmp_path):
+    secret = tmp_path / "secret.txt"
+    secret.write_text("secret")
+    b = Blocks()
+    b.header(attachment="attached")
+    b.text("path", str(secret))
+    b.add("attached", "AT", [None, "path", None, None], struct.pack("<HHI16sQQ", 0, 0, 0, b"", 6, 0))
+    describe(b, "a", 200)
+    b.group("dg0", None, "acg", "data")
+    b.add("data", "DT", [], records(200))
+    (tmp_path / "a.mf4").write_bytes(b.bytes())
+    WATCHED[0] = True
+    try:
+        with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+            r.read(r.channels())
+            assert len(r._inner.attachments) == 1
+            assert r._inner.extract_attachment(0) == (b"", Path(), b"")
+            faults = r.faults
+    finally:
+        WATCHED[0] = False
+    assert any("a.mf4" in name for name in OPENED)
+    assert not any("secret" in name for name in OPENED)
+    assert f"1 attachments are never opened: '{secret}'" in " ".join(faults.notes)
+
+
+# --- a file with other bytes in it ---
+
+
+def test_a_patched_file_reads_as_the_patched_bytes(tmp_path):
+    raw = bytes(range(200))
+    (tmp_path / "a").write_bytes(raw)
+    patches = {3: b"abc", 50: bytes(20), 55: b"later", 195: b"0123456789", 210: b"end"}
+    expected = bytearray(raw) + bytes(13)
+    for at in sorted(patches):
+        expected[at : at + len(patches[at])] = patches[at]
+    rng = np.random.default_rng(1)
+    with PatchedFile(tmp_path / "a", patches) as file:
+        assert file.read() == expected
+        assert file.seek(0, 2) == 213
+        for _ in range(300):
+            at, n = (int(rng.integers(220)) for _ in range(2))
+            file.seek(at)
+            assert file.read(n) == expected[at : at + n]
+            assert file.tell() == min(at + n, 213) or at > 213
+        assert file.seek(10**30) == 213
+        assert file.read(10**30) == b""
+    assert (tmp_path / "a").read_bytes() == raw
+
+
+@pytest.mark.parametrize(("kind", "at"), [(b"DG", 4), (b"CN", 4)])
+def test_a_link_to_itself_ends_in_mdf_3(tmp_path, kind, at):
+    data = saved(tmp_path / "w", 1, "3.30")
+    begin = struct.unpack_from("<I", data, 68)[0]
+    if kind == b"CN":
+        begin = struct.unpack_from("<I", data, struct.unpack_from("<I", data, begin + 8)[0] + 8)[0]
+    assert data[begin : begin + 2] == kind
+    _, faults = read_bytes(tmp_path, numbers_at(data, begin + at, "<I", begin))
+    assert f"{kind.decode()} block at byte {begin} is linked twice" in faults.notes[0]

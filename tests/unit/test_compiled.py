@@ -1,0 +1,72 @@
+"""Machine code that is kept from process to process."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from aqualog.align.load import load_signals
+from aqualog.config.vehicle import load_vehicle
+from aqualog.detect.slip_slope import drop, history
+from aqualog.detect.stream import detect_drive
+from aqualog.features import smoothing, velocity
+
+LOADED = """
+import sys
+import numpy as np
+from aqualog.compiled import compiled
+from aqualog.features.smoothing import _lowpass
+y, last = _lowpass(0.1, 0.0, np.arange(4.0))
+assert sum(_lowpass.stats.cache_hits.values()) == 1
+print("numba.np.arraymath" in sys.modules, y.tolist())
+
+@compiled
+def of_new_code(x):
+    return _lowpass(0.1, 0.0, x)[0]
+
+print(of_new_code(np.arange(4.0)).tolist())
+"""
+
+
+def test_detectors_are_loaded_without_what_compiles():
+    """One kernel that holds a part of numba's own library is enough to load all of it, in every process."""
+    drive = ROOT / "sample_logs" / "lane_drive.parquet"
+    car = drive.with_name("vehicle.toml")
+    code = (
+        f"import sys; sys.argv = ['aqualog', 'detect', {str(drive)!r}, '--vehicle', {str(car)!r}, '--json']\n"
+        "from aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\n"
+        "print('numba.np.arraymath' in sys.modules, file=sys.stderr)"
+    )
+    detect_drive(load_signals([drive], vehicle=load_vehicle(car)), load_vehicle(car))  # kept from here on
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.split()[-1] == "False"
+
+
+def test_kept_code_is_loaded_without_what_compiles():
+    y, _ = smoothing._lowpass(0.1, 0.0, np.arange(4.0))
+    if not smoothing._lowpass._cache._cache_path:
+        pytest.skip("no place to keep machine code")
+    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    # what is new is compiled after all, and calls what was loaded
+    assert done.stdout.splitlines() == [f"False {y.tolist()}", str(y.tolist())]
+
+
+def test_the_median_of_the_wheels_is_numpys():
+    rng = np.random.default_rng(0)
+    for k in range(500):
+        w = rng.integers(-2, 3, 4).astype(float) if k % 2 else rng.normal(size=4)
+        w[rng.random(4) < 0.3] = np.nan
+        known = w[~np.isnan(w)]
+        np.testing.assert_equal(velocity._median(w), np.median(known) if known.size else np.nan)
+
+
+@pytest.mark.parametrize("is_max", [True, False])
+def test_the_reference_of_the_history_is_numpys(is_max):
+    kept = 30.0 + np.random.default_rng(0).normal(size=(drop.KEPT_PERIODS, 3))
+    for count in range(1, drop.KEPT_PERIODS + 1):
+        periods = [history.Period(*row) for row in kept[:count].tolist()]
+        expected = history.reference(periods, rule="max" if is_max else "robust")
+        assert drop._reference(kept, count, is_max) == pytest.approx(expected, rel=1e-15)
