@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from polars.exceptions import PanicException
 
-from aqualog.align.load import load_signals
+from aqualog.align.load_long import load_drive
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.key import Contents, Seen, change_since, result_key
 from aqualog.campaign.loaded import loaded
-from aqualog.campaign.measure import Measurement, measure
+from aqualog.campaign.measure import Measurement, measure, measure_long
+from aqualog.campaign.place import Address
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.store import Store
 from aqualog.campaign.tables import write_tables
 from aqualog.detect.stream import Settings
 from aqualog.errors import AqualogError, ConfigError, FitError, LogError, SignalError
 from aqualog.evaluate.labels import Label
+from aqualog.io.limits import VARIABLES, limits_from, size_of
+from aqualog.types import Signals
 from aqualog.vehicle import Vehicle
 from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn, work_on
 
@@ -134,7 +138,9 @@ class Compared(NamedTuple):
 def compared(todo: Sequence[Job], store: Store, *, force: bool) -> Compared:
     """Which of the jobs a batch would measure, and what the store knows of the others."""
     done, known_failed = store.keys()
-    damaged = [k for k in sorted(done & {j.key for j in todo}) if not store.is_sound(k)]
+    asked = sorted(done & {j.key for j in todo})
+    store.look_at(asked)
+    damaged = [k for k in asked if not store.is_sound(k)]
     done = set() if force else done - set(damaged)
     new: dict[str, Job] = {}
     kept = 0
@@ -190,11 +196,14 @@ def run_batch(
     Raises
     ------
     ConfigError
-        If the folder is none of a store.
+        If the folder is none of a store, or one that only this process sees while others are to work.
     AqualogError
-        If it cannot be written or another batch writes there; what is finished stays.
+        If it cannot be written or another batch writes there, or what other machines have written is not there; what
+        is finished stays.
     """
     store.check()
+    if not store.is_shared and (elsewhere is not None or limits != NO_LIMITS):
+        raise ConfigError("is in the memory of one process", where=store.name, expected="a store that others see too")
     contents = Contents(store.contents())
     todo = plan_jobs(configured, contents)
     plan = compared(todo, store, force=force)
@@ -244,9 +253,7 @@ class _Tally:
         job = self._plan.new[key]
         if isinstance(outcome, Crashed):
             # next time there may be more memory, or a quieter machine
-            most = self._limits.seconds
-            late = most is not None and outcome.seconds >= most
-            self._fail(job, f"took longer than {most:g} s (--limit-s)" if late else CRASHED)
+            self._fail(job, _how_it_ended(outcome, job, self._limits))
         elif outcome is None:
             self.made += 1
         elif outcome.ends_batch:
@@ -266,6 +273,14 @@ class _Tally:
         self._report(self._plan.kept + self.made + len(self.failed), self._total, len(self.failed))
 
 
+def _how_it_ended(crashed: Crashed, job: Job, limits: Limits) -> str:
+    own = limits.seconds
+    most = own if own is not None else limits_from(os.environ).wall_for(max(map(size_of, job.logs)))
+    if most and crashed.seconds >= most:
+        return f"took longer than {most:g} s ({VARIABLES['wall'] if own is None else '--limit-s'})"
+    return CRASHED
+
+
 def _work(
     configured: Configured,
     store: Store,
@@ -277,19 +292,42 @@ def _work(
     elsewhere: WorkOn | None,
 ) -> None:
     shared = (configured.signal_map, configured.dbc, configured.settings)
-    tasks = {k: (store.folder, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
+    tasks = {k: (store.address, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
     if elsewhere is not None:
-        elsewhere(tasks, measure_one, record)
+        _work_elsewhere(store, tasks, elsewhere, record)
         return
-    if (len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS:
+    if store.is_shared and ((len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS):
         work_on(tasks, measure_one, jobs=jobs, record=record, limits=limits)
         return
     for key, task in tasks.items():
         record(key, measure_one(*task))
 
 
+def _work_elsewhere(
+    store: Store,
+    tasks: Mapping[str, tuple[Any, ...]],
+    elsewhere: WorkOn,
+    record: Callable[[str, Fault | Crashed | None], None],
+) -> None:
+    """Work on other machines, and see that what they have written is here."""
+    made: set[str] = set()
+
+    def taken(key: str, outcome: Fault | Crashed | None) -> None:
+        if outcome is None:
+            made.add(key)
+        record(key, outcome)
+
+    elsewhere(tasks, measure_one, taken)
+    lost = made - store.keys()[0]
+    if lost:
+        raise AqualogError(
+            f"{len(lost)} results that workers have written are not here", where=store.name,
+            expected="the same store on every machine", hint="a shared disk, or a URL that means the same everywhere",
+        )  # fmt: skip
+
+
 def measure_one(
-    folder: Path,
+    address: Address,
     key: str,
     seen: Seen,
     logs: tuple[Path, ...],
@@ -299,6 +337,10 @@ def measure_one(
     settings: Settings,
 ) -> Fault | None:
     """Measure one log into the store; none, or why it gave nothing."""
+    try:
+        store = Store(address)
+    except AqualogError as error:
+        return Fault(error.line(), ends_batch=True)
     try:
         measurement = _measured(logs, vehicle, signal_map, dbc, settings)
         found = None
@@ -310,7 +352,7 @@ def measure_one(
     if found is not None:
         return found
     try:
-        Store(folder).put(key, measurement)
+        store.put(key, measurement)
     except AqualogError as error:
         return Fault(error.line(), ends_batch=True)
     except Exception as error:
@@ -341,8 +383,11 @@ def _told(error: BaseException, logs: Sequence[Path]) -> str:
 def _measured(
     logs: Sequence[Path], vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], settings: Settings
 ) -> Measurement:
-    signals = load_signals(logs, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
-    return measure(signals, vehicle, settings=settings)
+    loaded_drive = load_drive(logs, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
+    if isinstance(loaded_drive, Signals):
+        return measure(loaded_drive, vehicle, settings=settings)
+    with loaded_drive.opened:
+        return measure_long(loaded_drive.drive, vehicle, settings=settings, faults=loaded_drive.faults)
 
 
 def name_of(campaign: Campaign, logs: Sequence[Path]) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
+from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.errors import AqualogError, ConfigError
 from aqualog.workers import Crashed, WorkOn
 
@@ -18,6 +21,9 @@ _TASKS_PER_THREAD = 4  # of the whole work, so that the last ones end together
 _IN_HAND = 3  # tasks per thread that the scheduler knows of at a time
 _ANSWER_S = 10.0
 _WORKERS_S = 30.0
+_ALONE_S = 120.0  # without any worker half way; queues need a while to start the next
+_WATCH_S = 2.0
+_LOOK_S = 0.02
 
 
 @contextmanager
@@ -33,45 +39,99 @@ def on_cluster(address: str, *, tell: Callable[[str], None] = lambda _: None) ->
 
     A worker that ends is replaced by another one: dask gives its task to the next; a task that has ended several
     is taken apart, and the item that ends one by itself is recorded as `Crashed`. All paths of the tasks must mean the
-    same on every worker.
+    same on every worker, also on those that join later.
 
     Raises
     ------
     ConfigError
-        If dask is not installed, no scheduler answers, it has no workers, or these run another aqualog.
+        If dask is not installed, no scheduler answers, it has no workers, or one of these runs another aqualog or does
+        not see the files.
     AqualogError
-        If the scheduler is lost at work.
+        If the scheduler, or the last worker, is lost at work.
     """
     try:
         from distributed import Client
     except ImportError as error:
         raise ConfigError("--cluster needs dask", hint="pip install 'aqualog[cluster]'") from error
+    with _quiet():
+        try:
+            # a client waits for ever where something else answers
+            asyncio.run(asyncio.wait_for(_answer(address), 2.0 * _ANSWER_S))
+            client: Any = Client(address, timeout=_ANSWER_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise ConfigError(
+                "no dask scheduler answers", where=address, expected="its address, tcp://host:8786",
+                hint="`dask scheduler` there, then `dask worker tcp://host:8786` on each machine",
+            ) from error  # fmt: skip
+        try:
+            threads = _ready(client, address)
+            tell(f"{len(client.scheduler_info(n_workers=-1)['workers'])} workers, {threads} threads")
+            yield lambda tasks, work, record: _work_on(client, address, threads, tasks, work, record)
+        finally:
+            client.close(timeout=_ANSWER_S)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep dask's own words off the terminal: what counts is told as one line."""
+    names = ["asyncio", *(n for n in logging.root.manager.loggerDict if n.split(".")[0] in ("distributed", "tornado"))]
+    levels = {n: logging.getLogger(n).level for n in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
-        client: Any = Client(address, timeout=_ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise ConfigError(
-            "no dask scheduler answers", where=address, expected="its address, tcp://host:8786",
-            hint="`dask scheduler` there, then `dask worker tcp://host:8786` on each machine",
-        ) from error  # fmt: skip
-    try:
-        threads = _ready(client, address)
-        tell(f"{len(client.scheduler_info(n_workers=-1)['workers'])} workers, {threads} threads")
-        yield lambda tasks, work, record: _work_on(client, address, threads, tasks, work, record)
+        yield
     finally:
-        client.close(timeout=_ANSWER_S)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+async def _answer(address: str) -> None:
+    """See that a scheduler answers there.
+
+    Raises
+    ------
+    OSError, ValueError, TypeError
+        If not.
+    """
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    comm: Any = await connect(address, timeout=_ANSWER_S, **Security().get_connection_args("client"))
+    try:
+        await comm.write({"op": "identity", "reply": True})
+        found = await comm.read()
+    finally:
+        comm.abort()
+    kind = found.get("type") if isinstance(found, dict) else None
+    if kind != "Scheduler":
+        raise ValueError(f"a {kind} answers")
 
 
 def _ready(client: Any, address: str) -> int:
     """Threads of all workers, which run this very code."""
-    from distributed.comm import CommClosedError
-
     try:
         client.wait_for_workers(1, timeout=_WORKERS_S)
-        stamps = client.run(_stamp)
     except TimeoutError as error:
         raise ConfigError(
             f"has no workers after {_WORKERS_S:.0f} s", where=address, hint=f"`dask worker {address}` on each machine"
         ) from error
+    except (OSError, RuntimeError) as error:
+        raise _lost(address, error) from error
+    own = own_stamp()
+    for worker, stamp in _everywhere(client, address, own_stamp).items():
+        if stamp != own:
+            raise ConfigError(
+                f"worker {worker} runs another aqualog ({stamp[0]}, here {own[0]})", where=address,
+                expected="the same code everywhere, or results would differ",
+            )  # fmt: skip
+    return max(1, sum(int(n) for n in client.nthreads().values()))
+
+
+def _everywhere(client: Any, address: str, ask: Callable[..., Any], *args: Any) -> dict[str, Any]:
+    from distributed.comm import CommClosedError
+
+    try:
+        return dict(client.run(ask, *args))
     except (OSError, CommClosedError) as error:
         raise _lost(address, error) from error
     except Exception as error:
@@ -79,22 +139,6 @@ def _ready(client: Any, address: str) -> int:
             f"a worker cannot run aqualog ({type(error).__name__}: {error})", where=address,
             hint="the same aqualog in every worker's environment",
         ) from error  # fmt: skip
-    own = _stamp()
-    other = {worker: stamp for worker, stamp in stamps.items() if stamp != own}
-    if other:
-        worker, (version, _) = next(iter(other.items()))
-        raise ConfigError(
-            f"worker {worker} runs another aqualog ({version}, here {own[0]})", where=address,
-            expected="the same code everywhere, or results would differ",
-        )  # fmt: skip
-    return max(1, sum(int(n) for n in client.nthreads().values()))
-
-
-def _stamp() -> tuple[str, str]:
-    from aqualog import __version__
-    from aqualog.campaign.key import code_stamp
-
-    return __version__, code_stamp()
 
 
 def _work_on(
@@ -105,7 +149,24 @@ def _work_on(
     work: Callable[..., Any],
     record: Callable[[Any, Any], None],
 ) -> None:
+    with asked_of(tasks) as asked:
+        for worker, lack in _everywhere(client, address, unlike, asked).items():
+            if lack is not None:
+                raise _unfit(address, worker, lack)
+        _all(client, address, threads, asked, tasks, work, record)
+
+
+def _all(
+    client: Any,
+    address: str,
+    threads: int,
+    asked: Asked,
+    tasks: Mapping[Any, tuple[Any, ...]],
+    work: Callable[..., Any],
+    record: Callable[[Any, Any], None],
+) -> None:
     from distributed import as_completed
+    from distributed.client import FutureCancelledError
     from distributed.comm import CommClosedError
     from distributed.scheduler import KilledWorker
 
@@ -116,7 +177,7 @@ def _work_on(
     held: dict[Any, Sequence[tuple[Any, tuple[Any, ...]]]] = {}
 
     def submit(part: Sequence[tuple[Any, tuple[Any, ...]]]) -> Any:
-        future = client.submit(_part, work, [t for _, t in part], pure=False)
+        future = client.submit(_part, asked, work, [t for _, t in part], pure=False)
         held[future] = part
         return future
 
@@ -124,7 +185,13 @@ def _work_on(
     try:
         first = [submit(p) for p in islice(waiting, _IN_HAND * threads)]
         done: Any = as_completed(first, loop=client.loop)
-        for future in done:
+        watch = _Watch(client, address)
+        while held:
+            if not done.has_ready():
+                watch.look()
+                time.sleep(_LOOK_S)
+                continue
+            future = next(done)
             part = held.pop(future)
             error = future.exception()
             if isinstance(error, KilledWorker):
@@ -135,20 +202,69 @@ def _work_on(
             elif error is not None:
                 raise _lost(address, error) from error
             else:
-                for (name, _), result in zip(part, future.result(), strict=True):
+                results = future.result()
+                if isinstance(results, Unfit):
+                    raise _unfit(address, *results)
+                for (name, _), result in zip(part, results, strict=True):
                     record(name, result)
             future.release()
             done.update([submit(p) for p in islice(waiting, 1)])
-    except (OSError, CommClosedError) as error:
+    except (OSError, CommClosedError, FutureCancelledError) as error:
         raise _lost(address, error) from error
     except BaseException:
         # what is in work is finished there and kept; what is not begun must not be
-        client.cancel(list(held), force=True)
+        with suppress(OSError, CommClosedError, FutureCancelledError, RuntimeError):
+            client.cancel(list(held), force=True)
         raise
 
 
-def _part(work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> list[Any]:
+class _Watch:
+    """Sees that there are workers at all: a scheduler without any keeps work for ever."""
+
+    def __init__(self, client: Any, address: str) -> None:
+        self._client, self._address = client, address
+        self._seen = self._looked = time.monotonic()
+
+    def look(self) -> None:
+        """Ask now and then.
+
+        Raises
+        ------
+        AqualogError
+            If there have been no workers for a while.
+        """
+        now = time.monotonic()
+        if now - self._looked < _WATCH_S:
+            return
+        self._looked = now
+        if self._client.nthreads():
+            self._seen = now
+        elif now - self._seen > _ALONE_S:
+            raise AqualogError(
+                f"has had no workers for {now - self._seen:.0f} s", where=self._address,
+                hint=f"`dask worker {self._address}` on each machine; what is done is kept, the same command "
+                "goes on with the rest",
+            )  # fmt: skip
+
+
+class Unfit(NamedTuple):
+    """A worker that cannot take part, and what it lacks."""
+
+    worker: str
+    lack: ConfigError
+
+
+def _part(asked: Asked, work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> list[Any] | Unfit:
+    lack = unlike(asked)
+    if lack is not None:
+        from distributed import get_worker
+
+        return Unfit(str(get_worker().address), lack)
     return [work(*t) for t in tasks]
+
+
+def _unfit(address: str, worker: str, lack: ConfigError) -> ConfigError:
+    return ConfigError(f"worker {worker} {lack.what}", where=address, expected=lack.expected, hint=lack.hint)
 
 
 def _lost(address: str, error: BaseException) -> AqualogError:

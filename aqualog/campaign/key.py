@@ -13,7 +13,8 @@ from aqualog.vehicle import Vehicle
 __all__ = ["Contents", "Seen", "change_since", "code_stamp", "result_key"]
 
 _BEHIND = (
-    "physics", "io", "align", "features", "calibrate", "detect", "campaign/measure.py", "compiled.py", "errors.py",
+    "physics", "io", "align", "features", "calibrate", "detect", "campaign/measure.py",
+    "campaign/thin.py", "compiled.py", "errors.py",
     "intervals.py", "notation.py", "places.py", "types.py", "units.py", "vehicle.py",
 )  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.compiled import compiled
 from aqualog.types import FloatArray
 
 __all__ = [
@@ -163,19 +164,83 @@ def _between(m: Moments, variance: float, scatters: NDArray[np.bool_]) -> FloatA
 
 def _unlikelihood(m: Moments, variance: float, grid: FloatArray) -> FloatArray:
     """-2 log of the restricted likelihood, but for a constant, for each row of `grid` (q, p)."""
-    eye = np.eye(m.c.shape[1])
-    inner = variance * eye + m.h[None] * grid[:, None, None, :]  # sigma^2 I + H T
-    k = np.linalg.inv(inner)
-    a = np.einsum("qgij,gjk->qik", k, m.h)
-    b = np.einsum("qgij,gj->qi", k, m.c)
+    k, a, b, spread = _weighed(variance, m.h, m.c, grid)
     value = np.einsum("qij,qj->qi", np.linalg.pinv(a, rcond=1e-10, hermitian=False), b)
-    s = m.c[None] - np.einsum("gij,qj->qgi", m.h, value)
     # residual sum of squares but for y'y, which is the same for all
     rss = -2.0 * value @ m.c.sum(axis=0) + np.einsum("qi,ij,qj->q", value, m.h.sum(axis=0), value)
-    explained = np.einsum("qgi,qi,qgij,qgj->q", s, grid, k, s)
-    spread = np.linalg.slogdet(inner / variance)[1].sum(axis=1)
+    explained = _explained(k, m.h, m.c, grid, value)
     result: FloatArray = spread + np.linalg.slogdet(a)[1] + (rss - explained) / variance
     return result
+
+
+@compiled
+def _inverse(x, out):  # type: ignore[no-untyped-def]
+    """|det x| of a small matrix (p, p), which is used up; its inverse into `out`. Gauss and Jordan with pivots."""
+    p = x.shape[0]
+    for i in range(p):
+        for j in range(p):
+            out[i, j] = 1.0 if i == j else 0.0
+    determinant = 1.0
+    for i in range(p):
+        best = i
+        for r in range(i + 1, p):
+            if abs(x[r, i]) > abs(x[best, i]):
+                best = r
+        for j in range(p):
+            x[i, j], x[best, j] = x[best, j], x[i, j]
+            out[i, j], out[best, j] = out[best, j], out[i, j]
+        pivot = x[i, i]
+        determinant *= abs(pivot)
+        for j in range(p):
+            x[i, j] /= pivot
+            out[i, j] /= pivot
+        for r in range(p):
+            if r != i:
+                factor = x[r, i]
+                for j in range(p):
+                    x[r, j] -= factor * x[i, j]
+                    out[r, j] -= factor * out[i, j]
+    return determinant
+
+
+@compiled
+def _weighed(variance, h, c, grid):  # type: ignore[no-untyped-def]
+    """For each row T of `grid`: K = (sigma^2 I + H T)^-1 of the runs (q, g, p, p), sums of K H and of K c over them,
+    and the sum of log |I + H T / sigma^2|.
+    """
+    q, (g, p) = grid.shape[0], c.shape
+    k, a, b, spread = np.empty((q, g, p, p)), np.zeros((q, p, p)), np.zeros((q, p)), np.zeros(q)
+    inner = np.empty((p, p))
+    for n in range(q):
+        for r in range(g):
+            for i in range(p):
+                for j in range(p):
+                    inner[i, j] = (variance if i == j else 0.0) + h[r, i, j] * grid[n, j]
+            own = k[n, r]
+            spread[n] += math.log(_inverse(inner, own) / variance**p)
+            for i in range(p):
+                for j in range(p):
+                    b[n, i] += own[i, j] * c[r, j]
+                    for other in range(p):
+                        a[n, i, other] += own[i, j] * h[r, j, other]
+    return k, a, b, spread
+
+
+@compiled
+def _explained(k, h, c, grid, value):  # type: ignore[no-untyped-def]
+    """Sum over the runs of s' T K s with s = c - H value, for each row of `grid`. (q,)"""
+    q, (g, p) = grid.shape[0], c.shape
+    out, s = np.zeros(q), np.empty(p)
+    for n in range(q):
+        for r in range(g):
+            for i in range(p):
+                s[i] = c[r, i]
+                for j in range(p):
+                    s[i] -= h[r, i, j] * value[n, j]
+            for i in range(p):
+                for j in range(p):
+                    out[n] += s[i] * grid[n, i] * k[n, r, i, j] * s[j]
+    return out
 
 
 def huber_weights(d: Design, first: _Index, m: Moments, w: Working, value: FloatArray) -> FloatArray:

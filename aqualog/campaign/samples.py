@@ -139,6 +139,8 @@ def load_results(configured: Configured, store: Store, jobs: Sequence[Job] | Non
     """What the store has of a campaign; runs without results are among the runs, and say why."""
     jobs = plan_jobs(configured, Contents(store.read_json("contents.json"))) if jobs is None else jobs
     done, failed = store.keys()
+    store.look_at(done & {j.key for j in jobs})
+    store.expect(j.key for j in sorted(jobs, key=lambda j: j.runs) if j.key in done)
     of_run = {index: job for job in jobs for index in job.runs}
     runs = []
     for index, run in enumerate(configured.campaign.runs):

@@ -1,4 +1,4 @@
-"""The folder in which a campaign's results are kept: one file per log, and tables that open by themselves.
+"""Where a campaign's results are kept, a folder or a URL: a file per log, and tables that open by themselves.
 
 STORE/samples/KEY.parquet   samples of one log; what was found stands as JSON under "aqualog" in the file's metadata
 STORE/failed/KEY.json       why a log gave nothing; tried again when the log or its configuration changes
@@ -15,9 +15,7 @@ from __future__ import annotations
 import errno
 import io
 import json
-import os
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -25,8 +23,8 @@ from typing import Any
 import polars as pl
 
 from aqualog.campaign.measure import Measurement
+from aqualog.campaign.place import Address, Place, is_orphan, place_of
 from aqualog.errors import AqualogError, ConfigError, LogError
-from aqualog.io.whole import only_here, write_text, write_whole
 from aqualog.notation import WHEELS
 
 __all__ = ["MARK", "Store"]
@@ -38,7 +36,6 @@ _LOCK = "lock"
 _FOLDERS = ("samples", "failed", "parts")
 _CONTENTS = "contents.json"
 _FILES = ("runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK, _LOCK)
-_ORPHAN = re.compile(r"\..{1,40}-\w{8}\.(parquet|json)\.tmp", re.DOTALL)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 # what readers of the store rely on
@@ -54,19 +51,43 @@ _PARTS: Mapping[str, type] = {
 
 
 class Store:
-    """A store folder.
+    """A store.
 
     Parameters
     ----------
-    folder : Path
-        Made by `held` if it is not there.
+    address : Path or str
+        Its folder, made by `held` if it is not there; or a URL of fsspec.
     part : str
         Name of the shard that works here beside others; it makes no tables.
+
+    Raises
+    ------
+    AqualogError
+        If a URL is none, lacks its package, or cannot be reached.
     """
 
-    def __init__(self, folder: Path, part: str = "") -> None:
-        self.folder = folder
+    def __init__(self, address: Address, part: str = "") -> None:
+        self._place: Place = place_of(address)
         self.part = part
+
+    @property
+    def address(self) -> Address:
+        """From which another process makes the same store."""
+        return self._place.address
+
+    @property
+    def name(self) -> str:
+        """The address as users are told."""
+        return self._place.name
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether other processes see it."""
+        return self._place.is_shared
+
+    def at(self, name: str) -> str:
+        """A file of the store as users are told."""
+        return self._place.at(name)
 
     def check(self) -> None:
         """Refuse a folder that is none of a store; one that is not there will do.
@@ -74,41 +95,31 @@ class Store:
         Raises
         ------
         ConfigError
+        AqualogError
+            If a URL cannot be reached.
         """
-        if not self.folder.exists():
-            if self.folder.is_symlink():
-                raise ConfigError("is a link to nothing", where=str(self.folder), expected="a folder for the results")
-            return
-        if not self.folder.is_dir():
-            raise ConfigError("is a file", where=str(self.folder), expected="a folder for the results")
-        self._check_parts()
-        if not (self.folder / MARK).exists():
-            if any(p.name != _LOCK and not _is_orphan(p) for p in self.folder.iterdir()):
-                raise ConfigError(
-                    "holds other files", where=str(self.folder), expected="an empty folder, or one of `aqualog batch`"
-                )
-            return
+        with self._reached():
+            if not self._place.check(_FOLDERS, _FILES):
+                return
+            if not self._place.has(MARK):
+                if any(n != _LOCK and not is_orphan(n) for n in self._place.names()):
+                    raise ConfigError(
+                        "holds other files", where=self.name, expected="an empty folder, or one of `aqualog batch`"
+                    )
+                return
         mark = self.read_json(MARK)
         version = mark.get("schema_version") if isinstance(mark, dict) else None
         if version != _SCHEMA:
             raise ConfigError(
-                f"is a store of schema_version {version}", where=str(self.folder / MARK),
+                f"is a store of schema_version {version}", where=self.at(MARK),
                 expected=f"schema_version {_SCHEMA}", hint="another folder for this version's results",
             )  # fmt: skip
-
-    def _check_parts(self) -> None:
-        for name in _FOLDERS:
-            path = self.folder / name
-            if os.path.lexists(path) and not path.is_dir():
-                raise ConfigError("is no folder", where=str(path), expected="the store's folder", hint="remove it")
-        for name in _FILES:
-            path = self.folder / name
-            if path.is_dir():
-                raise ConfigError("is a folder", where=str(path), expected="the store's file", hint="remove it")
 
     @contextmanager
     def held(self, *, must: bool) -> Iterator[bool]:
         """Make the folder ready and keep other batches out; within, whether that could be done.
+
+        Behind a URL there are no locks: two batches would do the same work twice, to the same result.
 
         Parameters
         ----------
@@ -123,16 +134,16 @@ class Store:
         with ExitStack() as stack:
             is_held = False
             try:
-                self.folder.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(only_here(self.folder / _LOCK, together=bool(self.part)))
+                self._place.make(())
+                stack.enter_context(self._place.held(_LOCK, together=bool(self.part)))
                 self._make()
                 if self.part:
-                    stack.enter_context(only_here(self.folder / "parts" / f"{self.part}.lock"))
+                    stack.enter_context(self._place.held(f"parts/{self.part}.lock"))
                 is_held = True
             except BlockingIOError as error:
                 if must:
                     raise AqualogError(
-                        f"is in use by another batch (process {error.strerror})", where=str(self.folder),
+                        f"is in use by another batch (process {error.strerror})", where=self.name,
                         hint="wait until it is done, or --store DIR",
                     ) from error  # fmt: skip
             except OSError as error:
@@ -141,31 +152,31 @@ class Store:
             yield is_held
 
     def _make(self) -> None:
-        if not (self.folder / MARK).exists():
-            write_text(self.folder / MARK, json.dumps({"schema_version": _SCHEMA}) + "\n")
-        for name in _FOLDERS:
-            (self.folder / name).mkdir(exist_ok=True)
+        if not self._place.has(MARK):
+            self._place.write(MARK, (json.dumps({"schema_version": _SCHEMA}) + "\n").encode())
+        self._place.make(_FOLDERS)
         if not self.part:  # another shard's file may be in the making
-            self._sweep()
+            self._place.sweep(("", "samples", "failed"))
 
     @property
     def exists(self) -> bool:
         """Whether this folder is a store."""
-        return (self.folder / MARK).is_file()
+        return self._place.has(MARK)
 
-    def samples_path(self, key: str) -> Path:
-        """File of a log's samples."""
-        return self.folder / "samples" / f"{key}.parquet"
+    def size_of(self, key: str) -> int:
+        """Size of a log's file, 0 without one. [byte]"""
+        name = _samples(key)
+        return self._place.copy(name).stat().st_size if self._place.has(name) else 0
 
     def state_of(self, key: str) -> str:
         """`done`, `failed`, or empty where nothing is known."""
-        if self.samples_path(key).is_file():
+        if self._place.has(_samples(key)):
             return "done"
-        return "failed" if self._failure_path(key).is_file() else ""
+        return "failed" if self._place.has(_failure(key)) else ""
 
     def keys(self) -> tuple[set[str], set[str]]:
         """Keys of all logs that are done, and of those that failed; one look at each folder."""
-        return _stems(self.folder / "samples", ".parquet"), _stems(self.folder / "failed", ".json")
+        return _stems(self._place.names("samples"), ".parquet"), _stems(self._place.names("failed"), ".json")
 
     def put(self, key: str, measurement: Measurement) -> None:
         """Keep the result of a log, whole.
@@ -177,25 +188,40 @@ class Store:
         """
         metadata = {_METADATA_KEY: json.dumps(measurement.about, ensure_ascii=True, separators=(",", ":"))}
         with self._told():
-            _write_frame(self.samples_path(key), measurement.samples, metadata=metadata, statistics=False)
-            self._failure_path(key).unlink(missing_ok=True)
+            self._write_frame(_samples(key), measurement.samples, metadata=metadata, statistics=False)
+            self._place.remove(_failure(key))
 
     def put_failure(self, key: str, reason: str) -> None:
         """Keep why a log gave nothing."""
         with self._told():
-            write_text(self._failure_path(key), json.dumps({"reason": reason}) + "\n")
+            self._place.write(_failure(key), (json.dumps({"reason": reason}) + "\n").encode())
 
     def failure(self, key: str) -> str:
         """Why a log gave nothing."""
         try:
-            return str(json.loads(self._failure_path(key).read_text(encoding="utf-8"))["reason"])
+            return str(json.loads(self._place.read(_failure(key)))["reason"])
         except (OSError, ValueError, KeyError, TypeError):
             return "failed, and the reason cannot be read"
 
     def drop(self, key: str) -> None:
         """Remove a log's file, a damaged one."""
         with self._told():
-            self.samples_path(key).unlink(missing_ok=True)
+            self._place.remove(_samples(key))
+
+    def look_at(self, keys: Collection[str]) -> None:
+        """What was found in these logs is asked for next: behind a URL many are read together.
+
+        Raises
+        ------
+        AqualogError
+            If the store cannot be reached.
+        """
+        with self._reached():
+            self._place.look_at([_samples(k) for k in sorted(keys)])
+
+    def expect(self, keys: Iterable[str]) -> None:
+        """Samples of these logs are asked for, probably in this order; what was read before is read anew."""
+        self._place.expect([_samples(k) for k in keys])
 
     def is_sound(self, key: str) -> bool:
         """Whether a log's file can be read as far as its metadata and columns tell."""
@@ -212,15 +238,22 @@ class Store:
         ------
         LogError
             If its file is damaged.
+        AqualogError
+            If the store cannot be reached.
         """
-        path = self.samples_path(key)
+        name = _samples(key)
+        with self._reached():
+            try:
+                source = self._place.footer(name)
+            except FileNotFoundError as error:
+                raise self._damaged(name) from error
         try:
-            found: Mapping[str, Any] = json.loads(pl.read_parquet_metadata(path)[_METADATA_KEY])
-            is_whole = _is_about(found) and pl.read_parquet_schema(path).keys() >= _COLUMNS
+            found: Mapping[str, Any] = json.loads(pl.read_parquet_metadata(source)[_METADATA_KEY])
+            is_whole = _is_about(found) and pl.read_parquet_schema(source).keys() >= _COLUMNS
         except (OSError, ValueError, KeyError, *_UNREADABLE) as error:
-            raise _damaged(path) from error
+            raise self._damaged(name) from error
         if not is_whole:
-            raise _damaged(path)
+            raise self._damaged(name)
         return found
 
     def samples(self, key: str) -> pl.DataFrame:
@@ -231,23 +264,23 @@ class Store:
         LogError
             If its file is damaged or cannot be read.
         """
-        path = self.samples_path(key)
+        name = _samples(key)
         try:
-            frame = pl.read_parquet(path, hive_partitioning=False)
+            frame = pl.read_parquet(self._place.copy(name), hive_partitioning=False)
         except OSError as error:
-            raise LogError(f"cannot be read ({error.strerror or error})", where=str(path)) from error
+            raise LogError(f"cannot be read ({error.strerror or error})", where=self.at(name)) from error
         except _UNREADABLE as error:
             with suppress(OSError):  # a store that is only read
-                path.unlink()
-            raise _damaged(path) from error
+                self._place.remove(name)
+            raise self._damaged(name) from error
         if not set(frame.columns) >= _COLUMNS:
-            raise _damaged(path)
+            raise self._damaged(name)
         return frame
 
     def contents(self) -> dict[str, Any]:
         """Hashes that batches and shards have kept."""
-        names = [_CONTENTS, *(f"parts/{p.name}" for p in sorted((self.folder / "parts").glob("*.json")))]
-        known = [self.read_json(n) for n in names]
+        parts = sorted(n for n in self._place.names("parts") if n.endswith(".json") and n[0] != ".")
+        known = [self.read_json(n) for n in (_CONTENTS, *(f"parts/{p}" for p in parts))]
         return {path: entry for d in known if isinstance(d, dict) for path, entry in d.items()}
 
     def keep_contents(self, known: Mapping[str, Any]) -> None:
@@ -255,25 +288,42 @@ class Store:
         self.write_json(f"parts/{self.part}.json" if self.part else _CONTENTS, known)
 
     def read_json(self, name: str) -> Any:
-        """A JSON file of the store; None where it is not there or damaged."""
-        try:
-            return json.loads((self.folder / name).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
+        """A JSON file of the store; None where it is not there or damaged.
+
+        Raises
+        ------
+        AqualogError
+            If a store behind a URL cannot be reached.
+        """
+        with self._reached():
+            try:
+                return json.loads(self._place.read(name))
+            except (FileNotFoundError, ValueError):
+                return None
+            except OSError:
+                if isinstance(self.address, Path):
+                    return None
+                raise
 
     def write_json(self, name: str, document: Any) -> None:
         """A JSON file of the store, whole."""
         with self._told():
-            write_text(self.folder / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
+            self._place.write(name, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
 
     def write_table(self, name: str, frame: pl.DataFrame) -> None:
         """A table of the store, whole."""
         with self._told():
-            _write_frame(self.folder / name, frame)
+            self._write_frame(name, frame)
 
     def holds(self, path: Path) -> bool:
         """Whether a path lies in this store."""
-        return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(self.folder))
+        return self._place.holds(path)
+
+    def _write_frame(self, name: str, frame: pl.DataFrame, **options: Any) -> None:
+        # into memory first: then a disk that is full is an OSError with its number
+        buffer = io.BytesIO()
+        frame.write_parquet(buffer, compression="zstd", **options)
+        self._place.write(name, buffer.getbuffer())
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -283,42 +333,43 @@ class Store:
         except OSError as error:
             raise self._unwritable(error) from error
 
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        """A store that cannot be asked says nothing of its files; a folder's faults are told as they are."""
+        try:
+            yield
+        except OSError as error:
+            if isinstance(self.address, Path) or isinstance(error, FileNotFoundError):
+                raise
+            raise AqualogError(
+                f"cannot be read ({error.strerror or error})", where=str(error.filename or self.name),
+                hint="the network, and the credentials in the environment; the same command goes on",
+            ) from error  # fmt: skip
+
     def _unwritable(self, error: OSError) -> AqualogError:
         if error.errno in _NO_ROOM:
             return AqualogError(
-                f"{error.strerror}".lower(), where=str(self.folder), expected="room for the results",
+                f"{error.strerror}".lower(), where=self.name, expected="room for the results",
                 hint="make room, or --store DIR; the same command goes on with the rest",
             )  # fmt: skip
-        file = error.filename2 or error.filename or self.folder
+        file = error.filename2 or error.filename or self.name
         return AqualogError(
             f"cannot be written ({error.strerror or error})", where=str(file), hint="its permissions, or --store DIR"
         )
 
-    def _failure_path(self, key: str) -> Path:
-        return self.folder / "failed" / f"{key}.json"
-
-    def _sweep(self) -> None:
-        """Remove what a killed process has left half-written."""
-        for folder in (self.folder, self.folder / "samples", self.folder / "failed"):
-            for orphan in folder.glob(".*.tmp"):
-                if _is_orphan(orphan):
-                    orphan.unlink(missing_ok=True)
+    def _damaged(self, name: str) -> LogError:
+        return LogError(
+            "is damaged", where=self.at(name), expected="a file that `aqualog batch` has written",
+            hint="the same command once more, which makes it again",
+        )  # fmt: skip
 
 
-def _is_orphan(path: Path) -> bool:
-    # the names that `write_whole` gives
-    return _ORPHAN.fullmatch(path.name) is not None
+def _samples(key: str) -> str:
+    return f"samples/{key}.parquet"
 
 
-def _write_frame(path: Path, frame: pl.DataFrame, **options: Any) -> None:
-    # into memory first: then a disk that is full is an OSError with its number
-    buffer = io.BytesIO()
-    frame.write_parquet(buffer, compression="zstd", **options)
-    write_whole(path, lambda temporary: _put(temporary, buffer))
-
-
-def _put(path: Path, buffer: io.BytesIO) -> None:
-    path.write_bytes(buffer.getbuffer())
+def _failure(key: str) -> str:
+    return f"failed/{key}.json"
 
 
 def _is_about(found: Any) -> bool:
@@ -329,16 +380,5 @@ def _is_about(found: Any) -> bool:
     return all(isinstance(e, dict) and "detector" in e and isinstance(e.get("evidence"), dict) for e in found["events"])
 
 
-def _damaged(path: Path) -> LogError:
-    return LogError(
-        "is damaged", where=str(path), expected="a file that `aqualog batch` has written",
-        hint="the same command once more, which makes it again",
-    )  # fmt: skip
-
-
-def _stems(folder: Path, suffix: str) -> set[str]:
-    try:
-        with os.scandir(folder) as entries:
-            return {e.name.removesuffix(suffix) for e in entries if e.name.endswith(suffix) and e.name[0] != "."}
-    except FileNotFoundError:
-        return set()
+def _stems(names: Iterable[str], suffix: str) -> set[str]:
+    return {n.removesuffix(suffix) for n in names if n.endswith(suffix) and n[0] != "."}

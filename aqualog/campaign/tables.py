@@ -34,6 +34,7 @@ _EVENT = {
 def write_tables(configured: Configured, store: Store, jobs: Sequence[Job]) -> None:
     """Write runs.parquet, events.parquet and manifest.json, a row per run of the campaign."""
     done, failed = store.keys()
+    store.look_at(done & {j.key for j in jobs})
     of_run = {index: job for job in jobs for index in job.runs}
     runs, events, logs = [], [], []
     for index, run in enumerate(configured.campaign.runs):

@@ -119,7 +119,7 @@ def tried(
             report=report,
         )  # fmt: skip
         ended = time.perf_counter()
-        found = tuple(_tried(spent[k], of, c, _size(store.samples_path(k))) for k, c in costs.items())
+        found = tuple(_tried(spent[k], of, c, store.size_of(k)) for k, c in costs.items())
     real = [(of[spent[k]][0], c) for k, c in costs.items() if isinstance(c, Cost)]
     first, last = marks[:2] or (ended, ended)
     return Trial(
@@ -186,7 +186,3 @@ def peak_memory() -> int:
         return 0
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most if sys.platform == "darwin" else 1024 * most
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.is_file() else 0

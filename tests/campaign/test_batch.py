@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -169,7 +170,7 @@ def test_a_damaged_result_is_told(own):
     store = Store(own.parent / "s")
     run_batch(configure(own), store)
     key = sorted(store.keys()[0])[0]
-    store.samples_path(key).write_bytes(b"PAR1 nonsense")
+    Path(store.at(f"samples/{key}.parquet")).write_bytes(b"PAR1 nonsense")
     with pytest.raises(LogError, match="damaged"):
         store.about(key)
 
@@ -212,14 +213,14 @@ def test_nothing_usable(own):
 
 
 def test_an_unforeseen_fault_of_one_log_leaves_the_others(own, monkeypatch):
-    real = batch.load_signals
+    real = batch.load_drive
 
     def breaks(logs, **kw):
         if logs[0].name == "v090_0.parquet":
             raise ZeroDivisionError("as asammdf does")
         return real(logs, **kw)
 
-    monkeypatch.setattr(batch, "load_signals", breaks)
+    monkeypatch.setattr(batch, "load_drive", breaks)
     outcome = run_batch(configure(own), Store(own.parent / "s"))
     assert outcome.made == 2
     assert "ZeroDivisionError" in next(iter(outcome.failed.values()))

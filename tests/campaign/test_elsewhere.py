@@ -1,16 +1,14 @@
 """A batch in parts, on a cluster, and with limits: the store is that of one undisturbed batch."""
 
 import json
-import os
 import signal
-import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, suppress
 
 import polars as pl
 import pytest
+from campaign.dask_here import cluster, free_port, with_children
 from campaign.made import make_campaign
 from typer.testing import CliRunner
 
@@ -85,54 +83,13 @@ def test_the_same_shard_twice_and_a_batch_beside_a_shard_are_refused(whole, tmp_
     assert plain.exit_code != 0
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
-
-
-@contextmanager
-def dask(*args, **kw):
-    """A process of dask's command line, ended at the end."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "distributed.cli." + args[0], *map(str, args[1:])],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, **kw,
-    ) as process:  # fmt: skip
-        try:
-            yield process
-        finally:
-            with_children(process, signal.SIGTERM)
-            try:
-                process.wait(10)
-            except subprocess.TimeoutExpired:
-                with_children(process, signal.SIGKILL)
-
-
-def with_children(process, number):
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, number)
-
-
-@contextmanager
-def cluster(tmp_path):
-    """A scheduler and two workers in processes of their own: address, workers."""
-    port = free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    worker = ("dask_worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", tmp_path / "dask")
-    with (
-        dask("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"),
-        dask(*worker) as a, dask(*worker) as b,
-    ):  # fmt: skip
-        yield address, (a, b)
-
-
 def test_a_worker_that_is_killed_half_way_leaves_no_trace(tmp_path):
     campaign = make_campaign(tmp_path, speeds=(70, 80, 90, 100), repeats=12)
     assert run("batch", campaign, "-o", tmp_path / "plain").exit_code == 0
     store = tmp_path / "s"
     command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "-o", str(store), "--json", "--progress", "off"]
     with (
-        cluster(tmp_path) as (address, (first, _)),
+        cluster(tmp_path) as (address, (_, first, _)),
         subprocess.Popen([*command, "--cluster", address], stdout=subprocess.PIPE, text=True) as process,
     ):
         for _ in range(6000):

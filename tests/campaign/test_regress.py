@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from slope_coverage import World, made, study
 
+from aqualog.campaign import moments
 from aqualog.campaign.regress import Design, estimate
 
 
@@ -117,3 +118,26 @@ def test_drawing_each_run_once_is_the_fit_itself():
     d = made(World(runs=6), np.random.default_rng(12))
     found = estimate(d)
     assert found.parts.again(np.ones((1, 6)))[0] == pytest.approx(found.value[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
+    """-2 log of the restricted likelihood with V = sigma^2 I + X T X' written out, run by run."""
+    rng = np.random.default_rng(p)
+    run = np.repeat(np.arange(4), [5, 9, 3, 7])
+    columns, y, variance = (
+        rng.normal(size=(p, run.size)) * 10.0 ** -np.arange(p)[:, None],
+        rng.normal(size=run.size),
+        0.3,
+    )
+    grid = np.concatenate([np.zeros((1, p)), 10.0 ** rng.uniform(-2, 2, (6, p))])
+    d = Design(columns, y, run, np.arange(run.size), (True,) * p, (False,) * p)
+    found = moments._unlikelihood(moments.moments_of(d, moments.run_starts(run), np.ones_like(y)), variance, grid)
+    dense = []
+    for t in grid:
+        V = np.where(run[:, None] == run, columns.T @ (t[:, None] * columns), 0.0) + variance * np.eye(run.size)
+        W = np.linalg.inv(V)
+        A = columns @ W @ columns.T
+        e = y - columns.T @ np.linalg.solve(A, columns @ W @ y)
+        dense.append(np.linalg.slogdet(V)[1] + np.linalg.slogdet(A)[1] + e @ W @ e)
+    assert np.diff(found) == pytest.approx(np.diff(dense), rel=1e-9, abs=1e-9)

@@ -15,8 +15,7 @@ import pytest
 from campaign.made import make_campaign
 from typer.testing import CliRunner
 
-from aqualog.campaign import batch
-from aqualog.campaign import store as store_module
+from aqualog.campaign import batch, place_local
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.key import _BEHIND, Contents, code_stamp
 from aqualog.campaign.samples import load_results
@@ -71,14 +70,14 @@ def failures(folder):
 
 def spoil(monkeypatch, name, act):
     """Let `act(path)` happen before a log of that name is read."""
-    real = batch.load_signals
+    real = batch.load_drive
 
     def reads(logs, **options):
         if logs[0].name == name:
             act(logs[0])
         return real(logs, **options)
 
-    monkeypatch.setattr(batch, "load_signals", reads)
+    monkeypatch.setattr(batch, "load_drive", reads)
 
 
 # --- what is kept, and for which content ------------------------------------------------------------------------------
@@ -205,8 +204,8 @@ def test_no_space_left(bare, monkeypatch):
             raise OSError(28, "No space left on device")
         real(path, write)
 
-    real = store_module.write_whole
-    monkeypatch.setattr(store_module, "write_whole", full)
+    real = place_local.write_whole
+    monkeypatch.setattr(place_local, "write_whole", full)
     with pytest.raises(AqualogError, match=r"campaign\.store: no space left on device; expected room") as caught:
         batched(bare)
     assert caught.value.exit_code == 1
@@ -400,6 +399,13 @@ def test_one_batch_at_a_time(own):
     assert not half.exists()
 
 
+def children_of(number):
+    try:
+        return Path(f"/proc/{number}/task/{number}/children").read_text().split()
+    except OSError:  # it has ended meanwhile
+        return []
+
+
 @pytest.mark.parametrize("delay_s", [0.0, 0.15, 0.4])
 def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
     campaign = make_campaign(tmp_path, speeds=(70, 80), repeats=6)
@@ -407,12 +413,11 @@ def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True
     ) as process:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        if not children.exists():
+        if not Path(f"/proc/{process.pid}/task/{process.pid}/children").exists():
             process.kill()
             pytest.skip("no /proc")
         for _ in range(6000):  # the tracker of multiprocessing is one child, the first worker the second
-            if len(children.read_text().split()) >= 2:
+            if len([c for own in children_of(process.pid) for c in children_of(own)]) >= 2:
                 break
             time.sleep(0.005)
         time.sleep(delay_s)

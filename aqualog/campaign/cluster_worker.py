@@ -1,0 +1,96 @@
+"""What a worker of a cluster must have in common with the machine that asks it: the code, the logs and the store."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from aqualog import __version__
+from aqualog.campaign.key import code_stamp
+from aqualog.errors import ConfigError
+from aqualog.io.whole import write_text
+
+__all__ = ["Asked", "Stamp", "asked_of", "own_stamp", "unlike"]
+
+Stamp = tuple[str, str]
+"""Version and hash of the sources behind a result."""
+
+
+class Asked(NamedTuple):
+    """What is asked of a worker: to run this code, and to see these files with their sizes [byte]."""
+
+    stamp: Stamp
+    files: tuple[tuple[Path, int], ...]
+
+
+def own_stamp() -> Stamp:
+    """Stamp of this process."""
+    return __version__, code_stamp()
+
+
+@contextmanager
+def asked_of(tasks: Mapping[Any, tuple[Any, ...]]) -> Iterator[Asked]:
+    """What is asked before work on these tasks: a few of their files, and marks in their folders while it lasts.
+
+    A folder of the same name may lie on every machine; only one that is shared has the mark.
+    """
+    some = list(tasks.values())
+    some = [some[i] for i in sorted({0, len(some) // 2, len(some) - 1})] if some else []
+    paths = list(dict.fromkeys(p for task in some for p in _paths(task)))
+    marks = [p / f".seen-{secrets.token_hex(4)}.json.tmp" for p in paths if p.is_dir()]
+    try:
+        for mark in marks:
+            with suppress(OSError):  # a source that is a folder and read-only; what cannot be written says so itself
+                write_text(mark, "seen\n")
+        files = [p for p in (*paths, *marks) if p.is_file()]
+        yield Asked(own_stamp(), tuple((p, p.stat().st_size) for p in files))
+    finally:
+        for mark in marks:
+            with suppress(OSError):
+                mark.unlink(missing_ok=True)
+
+
+def _paths(values: Iterable[Any]) -> Iterator[Path]:
+    for value in values:
+        if isinstance(value, Path):
+            yield value
+        elif isinstance(value, tuple):
+            yield from (v for v in value if isinstance(v, Path))
+
+
+_fit: set[Asked] = set()  # what this process has been found to have
+
+
+def unlike(asked: Asked) -> ConfigError | None:
+    """On a worker: what it has not, if anything; asked once a process, since workers may join at any time."""
+    if asked in _fit:
+        return None
+    own = own_stamp()
+    if own != asked.stamp:
+        return ConfigError(
+            f"runs another aqualog ({own[0]}, there {asked.stamp[0]})",
+            expected="the same code everywhere, or results would differ",
+        )
+    missing = _missing(asked.files)
+    if missing:
+        return ConfigError(
+            f"does not see {missing}", expected="logs and store under the same paths on every machine",
+            hint="a disk that all share; for results also --store with a URL",
+        )  # fmt: skip
+    _fit.add(asked)
+    return None
+
+
+def _missing(files: Sequence[tuple[Path, int]]) -> str:
+    for path, size in files:
+        try:
+            there = path.stat().st_size
+        except OSError:
+            # a mark stands for its folder
+            return str(path.parent if path.name.startswith(".seen-") else path)
+        if there != size:
+            return f"{path} as it is here ({there} byte, not {size})"
+    return ""

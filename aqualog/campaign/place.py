@@ -1,0 +1,138 @@
+"""Where a store lies: the few operations that it needs, on a folder or behind a URL of fsspec."""
+
+from __future__ import annotations
+
+import io
+import re
+import secrets
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Protocol
+
+from aqualog.errors import ConfigError
+
+__all__ = ["Address", "Place", "address_of", "is_orphan", "place_of", "temporary_name"]
+
+Address = Path | str
+"""A folder, or the URL of something that fsspec knows."""
+
+_URL = re.compile(r"([a-z][a-z0-9+.\-]+)://(.*)", re.IGNORECASE | re.DOTALL)
+_CHAIN = re.compile(r"[a-z][a-z0-9+.\-]+(://.*)?::.*://", re.IGNORECASE | re.DOTALL)
+_ORPHAN = re.compile(r"\..{1,40}-\w{8}\.(parquet|json)\.tmp", re.DOTALL)
+
+
+class Place(Protocol):
+    """Files by their names below the store, `runs.parquet`, `samples/KEY.parquet`.
+
+    Every operation that fails raises an OSError with number, reason and file.
+    """
+
+    @property
+    def address(self) -> Address:
+        """From which another process makes the same place."""
+
+    @property
+    def name(self) -> str:
+        """As users are told, without what is secret."""
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether other processes see it."""
+
+    def at(self, name: str) -> str:
+        """A file as users are told."""
+
+    def check(self, folders: Iterable[str], files: Iterable[str]) -> bool:
+        """Whether it is there; a ConfigError if it, or one of these, is of the wrong kind."""
+
+    def make(self, folders: Iterable[str]) -> None:
+        """Make it, and folders in it, as far as they are not there."""
+
+    def held(self, lock: str, *, together: bool = False) -> AbstractContextManager[None]:
+        """Keep others out by a lock file, as `aqualog.io.whole.only_here`, where there are locks."""
+
+    def names(self, folder: str = "") -> set[str]:
+        """Names of what is in a folder; none where there is no such folder."""
+
+    def has(self, name: str) -> bool:
+        """Whether there is such a file."""
+
+    def read(self, name: str) -> bytes:
+        """A file's content."""
+
+    def write(self, name: str, data: bytes | memoryview) -> None:
+        """A file, there whole or not at all."""
+
+    def remove(self, name: str) -> None:
+        """Remove a file, which need not be there."""
+
+    def sweep(self, folders: Iterable[str]) -> None:
+        """Remove what killed processes have left half-written."""
+
+    def copy(self, name: str) -> Path:
+        """A file to read here, itself or a copy."""
+
+    def footer(self, name: str) -> Path | io.BytesIO:
+        """Something with a Parquet file's metadata and schema, and maybe its data."""
+
+    def look_at(self, names: Sequence[str]) -> None:
+        """The footers of these are asked for next."""
+
+    def expect(self, names: Sequence[str]) -> None:
+        """Copies of these are asked for, probably in this order."""
+
+    def holds(self, path: Path) -> bool:
+        """Whether a path of this machine lies in it."""
+
+
+def address_of(text: Address) -> Address:
+    """What was typed as the place of a store; `file://` is a folder.
+
+    Raises
+    ------
+    ConfigError
+        If it is a chain of file systems.
+    """
+    if isinstance(text, Path):
+        return text
+    if _CHAIN.match(text):
+        raise ConfigError(
+            "is a chain of file systems", where=text.split("::")[0], expected="one, as s3://bucket/store",
+            hint="without the cache before it, which would hide what others write",
+        )  # fmt: skip
+    match = _URL.fullmatch(text)
+    if match is None:
+        return Path(text)
+    return Path(match[2]) if match[1].lower() in ("file", "local") else match[0]
+
+
+def place_of(address: Address) -> Place:
+    """The place behind an address.
+
+    Raises
+    ------
+    ConfigError
+        If a package for it is missing, or fsspec does not know it.
+    AqualogError
+        If it cannot be reached.
+    """
+    address = address_of(address)
+    if isinstance(address, Path):
+        from aqualog.campaign.place_local import Folder
+
+        return Folder(address)
+    from aqualog.campaign.place_remote import Remote
+
+    return Remote(address)
+
+
+def temporary_name(name: str) -> str:
+    """A name beside a file's own, such as `is_orphan` knows again."""
+    path = Path(name)
+    return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}.tmp").as_posix()
+
+
+def is_orphan(name: str) -> bool:
+    """Whether a file has such a name, as `aqualog.io.whole.write_whole` gives it too."""
+    return _ORPHAN.fullmatch(name) is not None
