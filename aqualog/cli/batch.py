@@ -25,12 +25,12 @@ __all__ = ["batch"]
 def batch(
     inputs: Inputs,
     out: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "-o",
             "--out",
             "--store",
-            help="Folder for the results; default beside the campaign file: NAME.store.",
+            help="Folder or URL (s3://...) for the results; default beside the campaign file: NAME.store.",
             metavar="DIR",
         ),
     ] = None,
@@ -78,7 +78,7 @@ def batch(
       aqualog batch campaign.toml -o results --jobs 8 --progress plain
       aqualog batch logs/*.mf4 --vehicle car.toml -o results --limit-s 60 --limit-mb 2000
       aqualog batch campaign.toml --shard 3/8
-      aqualog batch campaign.toml --cluster tcp://scheduler:8786
+      aqualog batch campaign.toml --cluster tcp://scheduler:8786 -o s3://bucket/store
       duckdb -c "select tyre, avg(events_joint_criteria) from 'campaign.store/runs.parquet' group by tyre"
     """  # fmt: skip
     from aqualog.cli.console import Console, guarded
@@ -96,7 +96,7 @@ def batch(
 
 def _batch(
     inputs: list[str],
-    out: Path | None,
+    out: str | None,
     vehicle: Path | None,
     map_file: Path | None,
     dbc: list[Path],
@@ -115,21 +115,21 @@ def _batch(
 
     began = time.monotonic()
     configured = opened(inputs, vehicle=vehicle, map_file=map_file, dbc=dbc, thresholds=thresholds)
-    folder = store_of(configured, out)
+    place = store_of(configured, out)
     if placed.shard is not None:
         configured = replace(configured, campaign=part_of(configured.campaign, placed.shard))
         if not configured.campaign.runs:  # a matrix may have more jobs than there are logs
             console.note(f"shard {placed.shard.index} of {placed.shard.count} has no log")
             return 0
     data, outcome = results(
-        configured, folder, console=console, jobs=jobs, force=force, shard=placed.shard, cluster=placed.cluster,
+        configured, place, console=console, jobs=jobs, force=force, shard=placed.shard, cluster=placed.cluster,
         limits=placed.limits,
     )  # fmt: skip
     if as_json:
-        sys.stdout.write(json.dumps(_document(data, outcome, folder), indent=1, allow_nan=False) + "\n")
+        sys.stdout.write(json.dumps(_document(data, outcome), indent=1, allow_nan=False) + "\n")
     else:
         sys.stdout.write(_text(data, outcome))
-    console.note(f"results are in {folder}, {time.monotonic() - began:.0f} s")
+    console.note(f"results are in {data.store.name}, {time.monotonic() - began:.0f} s")
     if placed.shard is not None:
         console.note("tables are made by the same command without --shard, when all parts are done")
     return exit_code(outcome, data)
@@ -161,14 +161,14 @@ def _placed(
     return Placed(limits, shard_of(shard) if shard is not None else None, cluster)
 
 
-def _document(data: CampaignData, outcome: BatchOutcome, folder: Path) -> dict[str, object]:
+def _document(data: CampaignData, outcome: BatchOutcome) -> dict[str, object]:
     from aqualog import __version__
 
     return {
         "schema_version": 1,
         "tool_version": __version__,
         "campaign": data.name,
-        "store": str(folder),
+        "store": data.store.name,
         "runs": len(data.runs),
         "made": outcome.made,
         "kept": outcome.kept,

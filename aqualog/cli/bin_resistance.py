@@ -83,7 +83,7 @@ def _bin_resistance(
     by: str,
     width: float,
     road: str,
-    store: Path | None,
+    store: str | None,
     vehicle: Path | None,
     map_file: Path | None,
     dbc: list[Path],

@@ -103,7 +103,7 @@ def _bin_slipslope(
     by: str,
     width: float,
     road: str,
-    store: Path | None,
+    store: str | None,
     vehicle: Path | None,
     map_file: Path | None,
     dbc: list[Path],

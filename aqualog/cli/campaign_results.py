@@ -17,8 +17,10 @@ from aqualog.errors import ConfigError, ExitCode
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome, Configured
+    from aqualog.campaign.place import Address
     from aqualog.campaign.samples import CampaignData
     from aqualog.campaign.shard import Shard
+    from aqualog.campaign.store import Store
     from aqualog.cli.console import Steps
     from aqualog.workers import Limits, WorkOn
 
@@ -56,8 +58,8 @@ def opened(
     )  # fmt: skip
 
 
-def store_of(configured: Configured, given: Path | None) -> Path:
-    """Folder of the results: the one given, else beside the campaign file.
+def store_of(configured: Configured, given: Address | None) -> Address:
+    """Folder or URL of the results: the one given, else a folder beside the campaign file.
 
     Raises
     ------
@@ -65,21 +67,23 @@ def store_of(configured: Configured, given: Path | None) -> Path:
         For logs without a campaign file, which have no place of their own.
     """
     if given is not None:
-        return given
+        from aqualog.campaign.place import address_of
+
+        return address_of(given)
     if configured.campaign.path.suffix.lower() != ".toml":
         raise ConfigError("logs without a campaign file have no place for results", expected="--store DIR")
     return configured.campaign.path.with_suffix(".store")
 
 
 def check_targets(
-    configured: Configured, targets: Sequence[Path], *, force: bool, store: Path | None = None
+    configured: Configured, targets: Sequence[Path], *, force: bool, store: Address | None = None
 ) -> None:  # fmt: skip
     """Refuse results that are in the way of something, that the campaign itself reads, or that lie in a store.
 
     Parameters
     ----------
-    store : Path, optional
-        Folder of the results as it was typed, for one that is not there yet.
+    store : Path or str, optional
+        Folder or URL of the results as it was typed, for one that is not there yet.
 
     Raises
     ------
@@ -87,17 +91,17 @@ def check_targets(
     """
     from aqualog.config.configured import files_of
 
-    places = [store] if store is not None else []
+    places = [store_of(configured, store)] if store is not None else []
     if configured.campaign.path.suffix.lower() == ".toml":
         places.append(store_of(configured, None))
     for target in targets:
-        _refuse_in_store(target, places)
+        _refuse_in_store(target, [p for p in places if isinstance(p, Path)])
     refuse_existing(targets, force=force, sources=files_of(configured))
 
 
 def results(
     configured: Configured,
-    store: Path | None,
+    store: Address | None,
     *,
     console: Console,
     jobs: int | None = None,
@@ -128,7 +132,7 @@ def results(
         from aqualog.campaign.store import Store
 
         place = Store(store_of(configured, store), shard.name if shard is not None else "")
-        _check_apart(configured, place.folder)
+        _check_apart(configured, place)
         told: list[str] = []
 
         def tell(name: str, reason: str) -> None:
@@ -148,7 +152,7 @@ def results(
         steps("loading the results")
         data = load_results(configured, place)
     if len(told) > _TOLD_AT_ONCE:
-        sys.stderr.write(f"error: and {len(told) - _TOLD_AT_ONCE} more; all are in {place.folder / 'manifest.json'}\n")
+        sys.stderr.write(f"error: and {len(told) - _TOLD_AT_ONCE} more; all are in {place.at('manifest.json')}\n")
     return data, outcome
 
 
@@ -171,13 +175,11 @@ def exit_code(outcome: BatchOutcome, data: CampaignData) -> int:
     return int(ExitCode.PARTIAL) if outcome.failed or is_lossy else int(ExitCode.DONE)
 
 
-def _check_apart(configured: Configured, folder: Path) -> None:
-    from aqualog.campaign.store import Store
+def _check_apart(configured: Configured, place: Store) -> None:
     from aqualog.config.configured import files_of
 
-    place = Store(folder)
     if any(place.holds(p) for p in files_of(configured)):
-        raise ConfigError("holds a source of this campaign", where=str(folder), expected="a folder of its own")
+        raise ConfigError("holds a source of this campaign", where=place.name, expected="a folder of its own")
 
 
 def _refuse_in_store(target: Path, places: Sequence[Path]) -> None:

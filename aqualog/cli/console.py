@@ -12,6 +12,7 @@ from typing import Any, TextIO, cast
 
 import typer
 
+from aqualog.cli.apart import apart
 from aqualog.errors import AqualogError, ConfigError, ExitCode
 
 __all__ = ["Console", "clean", "guarded", "told_if_interrupted"]
@@ -112,13 +113,16 @@ def told_if_interrupted(text: str) -> Iterator[None]:
 
 @contextmanager
 def guarded(*, debug: bool) -> Iterator[None]:
-    """One line and the contract's exit code for every error and interrupt; a traceback only with `--debug`."""
+    """One line and the contract's exit code for every error and interrupt; a traceback only with `--debug`.
+
+    Of the installed command all that is within is done `apart`.
+    """
     data = _StandardOutput(sys.stdout)
     try:
-        with redirect_stdout(cast("TextIO", data)):
+        with apart(debug=debug), redirect_stdout(cast("TextIO", data)):
             yield
-        # what stdout cannot take must come to light here, not when the interpreter ends
-        data.flush()
+            # what stdout cannot take must come to light here, not when the interpreter ends
+            data.flush()
     except AqualogError as error:
         if debug:
             traceback.print_exc()
@@ -144,12 +148,27 @@ def guarded(*, debug: bool) -> Iterator[None]:
         raise typer.Exit(int(ExitCode.INTERRUPTED)) from None
     except (typer.Exit, typer.Abort):
         raise
+    except MemoryError as error:
+        if debug:
+            traceback.print_exc()
+        sys.stderr.write(f"error: {_memory_told()}\n")
+        raise typer.Exit(int(ExitCode.FAILED)) from error
     except Exception as error:
         if debug:
             traceback.print_exc()
         kind = type(error).__name__
         sys.stderr.write(f"error: aqualog failed ({kind}: {clean(str(error))[:300]}). Try: --debug, and report it\n")
         raise typer.Exit(int(ExitCode.FAILED)) from error
+
+
+def _memory_told() -> str:
+    from aqualog.io.in_hand import memory_bound
+    from aqualog.io.limits import VARIABLES
+
+    most = memory_bound()
+    if not most:
+        return "not enough memory"
+    return f"more memory is needed than the {most // 1_000_000} MB allowed. Try: a higher {VARIABLES['memory']}"
 
 
 class _StandardOutput:

@@ -208,7 +208,9 @@ def _detect(
             steps("detecting")
             # what an earlier look at this very drive has left is not what it is compared with
             key = drive_key(drive) if history_file else ""
-            result, told = _whole(drive, vehicle, model, settings, memory, key, console)
+            result, told = _whole(
+                drive, vehicle, model, settings, memory, key, console, samples=out is not None or write is not None
+            )
         result = replace(result, notes=(*told, *result.notes))
         loaded = result.signals
         terms = _model_document(model)
@@ -239,9 +241,17 @@ def _detect(
 
 
 def _whole(
-    loaded: LoadedSignals, vehicle: Car, model: Model | None, settings: Any, memory: Memory, key: str, console: Console
+    loaded: LoadedSignals,
+    vehicle: Car,
+    model: Model | None,
+    settings: Any,
+    memory: Memory,
+    key: str,
+    console: Console,
+    *,
+    samples: bool,
 ) -> tuple[DriveResult, tuple[str, ...]]:
-    """Detection in one go: the result, and what the model said."""
+    """Detection in one go: the result, sample by sample if that is written anywhere, and what the model said."""
     from contextlib import nullcontext
     from dataclasses import replace
 
@@ -258,7 +268,7 @@ def _whole(
     # what takes long of a short drive is the compiler; of a long one it is the drive
     with console.told_if_slow("the detectors") if loaded.frame.height < 200_000 else nullcontext():
         known = replace(memory, history=memory.history.without(key))
-        return detect_drive(loaded, vehicle, settings=settings, memory=known), told
+        return detect_drive(loaded, vehicle, settings=settings, memory=known, samples=samples), told
 
 
 def _memory(history_file: Path | None, configuration: str, reference: str, out: Path | None) -> Memory:

@@ -11,6 +11,7 @@ from aqualog.cli.files import write_whole
 from aqualog.detect.long import detect_long
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import Settings
+from aqualog.io.in_hand import unfinished
 from aqualog.types import DriveResult
 from aqualog.vehicle import Vehicle
 
@@ -37,7 +38,8 @@ def detect_in_windows(
         with loaded.opened:
             return _run(loaded, vehicle, settings, memory, None, report)
     out.mkdir(parents=True, exist_ok=True)
-    with loaded.opened, tempfile.TemporaryDirectory(prefix=".windows-", dir=out, ignore_cleanup_errors=True) as folder:
+    scratch = tempfile.TemporaryDirectory(prefix=".windows-", dir=out, ignore_cleanup_errors=True)
+    with loaded.opened, scratch as folder, unfinished(Path(folder)):
         table = _Table(Path(folder))
         result = _run(loaded, vehicle, settings, memory, table.add, report)
         report("writing the table")

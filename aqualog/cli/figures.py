@@ -96,7 +96,7 @@ def _figures(
     out: Path,
     *,
     campaign: Path | None,
-    store: Path | None,
+    store: str | None,
     formats: Sequence[str],
     jobs: int | None,
     as_json: bool,
@@ -166,7 +166,7 @@ def _opened(campaign: Path) -> Configured:
     return opened([str(campaign)])
 
 
-def _evidence(configured: Configured, store: Path | None, jobs: int | None, console: Console) -> tuple[Evidence, int]:
+def _evidence(configured: Configured, store: str | None, jobs: int | None, console: Console) -> tuple[Evidence, int]:
     """The campaign's results, brought up to date, and the exit code that its logs give."""
     from aqualog.cli.campaign_results import exit_code, results
     from aqualog.figures.evidence import Evidence

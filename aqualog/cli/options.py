@@ -57,9 +57,10 @@ Inputs = Annotated[
     ),
 ]
 StoreOption = Annotated[
-    Path | None,
+    str | None,
     typer.Option(
-        "--store", help="Folder for the results of each log; default beside the campaign file: NAME.store.",
+        "--store", help="Folder or URL (s3://...) for the results of each log; default beside the campaign file: "
+        "NAME.store.",
         metavar="DIR",
     ),
 ]  # fmt: skip

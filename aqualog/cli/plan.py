@@ -27,7 +27,9 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
+    from aqualog.campaign.place import Address
     from aqualog.campaign.plan import Estimate, Plan, Work
+    from aqualog.campaign.store import Store
     from aqualog.campaign.trial import Trial
     from aqualog.cli.console import Console
 
@@ -85,7 +87,7 @@ def plan(
 
 def _plan(
     inputs: list[str],
-    out: Path | None,
+    out: str | None,
     jobs: int | None,
     count: int | None,
     within: str | None,
@@ -137,10 +139,10 @@ def _plan(
     if found is None:
         if work.new or not work.kept:
             raise FitError("no log can be measured", where=inputs[0], expected="logs that are there")
-        sys.stdout.write(_nothing(work, place.folder) if not as_json else json.dumps(_left(work), indent=1) + "\n")
+        sys.stdout.write(_nothing(work, place) if not as_json else json.dumps(_left(work), indent=1) + "\n")
         return int(ExitCode.PARTIAL if work.missing else ExitCode.DONE)
     parts = shards_within(configured, work, found, seconds) if seconds is not None else None
-    document = _document(work, trial, found, processes, place.folder, seconds, parts)
+    document = _document(work, trial, found, processes, place, seconds, parts)
     if as_json:
         sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
     else:
@@ -170,15 +172,12 @@ def _left(work: Work) -> dict[str, Any]:
 
 
 def _document(
-    work: Work, trial: Trial, found: Plan, processes: int, store: Path, within_s: float | None,
+    work: Work, trial: Trial, found: Plan, processes: int, store: Store, within_s: float | None,
     parts: tuple[int, float] | None,
 ) -> dict[str, Any]:  # fmt: skip
-    import shutil
-
     from aqualog.campaign.trial import peak_memory
 
     worker = found.worker
-    folder = next(p for p in (store, *store.absolute().parents) if p.is_dir())
     # one process beside the workers leads; without workers it is the one that works
     all_bytes = processes * trial.peak_bytes + (peak_memory() if processes > 1 else 0)
     return {
@@ -198,9 +197,9 @@ def _document(
         },
         "memory": {"process_bytes": trial.peak_bytes, "all_bytes": all_bytes, "there_bytes": _memory()},
         "store": {
-            "folder": str(store),
+            "folder": store.name,
             "bytes": _three(found.store_bytes, digits=0),
-            "free_bytes": shutil.disk_usage(folder).free,
+            "free_bytes": _free(store.address),
         },
         "within": None if within_s is None else {
             "seconds": within_s, "shards": parts[0] if parts else None,
@@ -231,8 +230,17 @@ def _memory() -> int | None:
         return None
 
 
-def _nothing(work: Work, store: Path) -> str:
-    return f"nothing to measure: {work.kept} logs are in {store}, {work.failed} failed before\n"
+def _free(store: Address) -> int | None:
+    """Room on the disk of a folder, which need not be there yet; None behind a URL. [byte]"""
+    import shutil
+
+    if isinstance(store, str):
+        return None
+    return shutil.disk_usage(next(p for p in (store, *store.absolute().parents) if p.is_dir())).free
+
+
+def _nothing(work: Work, store: Store) -> str:
+    return f"nothing to measure: {work.kept} logs are in {store.name}, {work.failed} failed before\n"
 
 
 def _text(
@@ -253,6 +261,7 @@ def _text(
     at_a_time = f", {found.together} at a time" if found.together < processes else ""
     there = f"of {_room(memory['there_bytes'])}" if memory["there_bytes"] else ""
     room = found.store_bytes
+    free = "" if store["free_bytes"] is None else f"; {_room(store['free_bytes'])} free"
     rows = [
         (f"wall time, {processes} process{'es' if processes > 1 else ''}{at_a_time}", *times(found.wall_s)),
         ("  start of each process", f"{worker.start_s:.1f} s", ""),
@@ -261,7 +270,7 @@ def _text(
         ("computing time", *times(found.cpu_s)),
         ("memory of a process", _room(memory["process_bytes"]), ""),
         ("memory of all, at most", _room(memory["all_bytes"]), there),
-        ("store", _room(room.value), f"{_room(room.low)} to {_room(room.high)}; {_room(store['free_bytes'])} free"),
+        ("store", _room(room.value), f"{_room(room.low)} to {_room(room.high)}{free}"),
     ]
     sample = f"sample: {len(trial.tried)} logs, {trial.processes} at a time"
     text = f"{head}\n{sample}\n\n{table(('', 'expected', '90 %'), rows)}\n"

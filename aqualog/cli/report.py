@@ -65,7 +65,7 @@ def _report(
     out: Path | None,
     by: str,
     width: float,
-    store: Path | None,
+    store: str | None,
     jobs: int | None,
     *,
     robust: bool,

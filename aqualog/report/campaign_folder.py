@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from aqualog.campaign.samples import CampaignData
@@ -23,6 +25,7 @@ __all__ = ["MARK", "check_folder", "page_names", "targets_of", "write_report"]
 MARK = "aqualog_report.json"
 _OWN = re.compile(r"runs/[a-z0-9-]{1,120}\.html|data/[a-z_]{1,60}\.csv|plotly\.min\.js|index\.html")
 _TABLES = ("runs.csv", "slip_slope.csv", "resistance.csv", "full_aquaplaning.csv")
+_WRITERS, _WAITING = 8, 64  # threads, and pages that wait for them
 Report = Callable[[int, int], None]
 
 
@@ -71,11 +74,17 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
     own = sorted({*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js", "index.html"})
     _mark(folder, sorted({*own, *earlier}))
     facts: list[RunFacts | None] = []
-    for i, info in enumerate(data.runs):
-        samples = data.samples(info) if info.is_done else None
-        facts.append(facts_of(info, samples) if samples is not None else None)
-        write_text(folder / pages[i], _clean(render_run_page(data, info, samples, facts[i], back="../index.html")))
-        report(i + 1, len(pages))
+    # most of a small file's time is the wait until the disk has it
+    with ThreadPoolExecutor(_WRITERS) as writers:
+        writing: deque[Future[None]] = deque()
+        for i, info in enumerate(data.runs):
+            samples = data.samples(info) if info.is_done else None
+            facts.append(facts_of(info, samples) if samples is not None else None)
+            text = _clean(render_run_page(data, info, samples, facts[i], back="../index.html"))
+            writing.append(writers.submit(write_text, folder / pages[i], text))
+            while len(writing) > (_WAITING if i + 1 < len(pages) else 0):
+                writing.popleft().result()
+            report(i + 1, len(pages))
     for name, text in tables_of(data, findings, facts, pages).items():
         write_text(folder / "data" / name, _clean(text))
     write_text(folder / "plotly.min.js", plotly_js())

@@ -41,6 +41,7 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
             "dropped_samples": quality.dropped_samples,
             "time_jumps": quality.time_jumps,
             "truncated": quality.truncated,
+            "frozen_samples": quality.frozen_samples,
             **{n: getattr(quality.faults, n) for n in type(quality.faults).__slots__},
             "notes": [*quality.notes, *result.notes],
         },
@@ -77,6 +78,7 @@ def _signal(signals: Signals, name: str) -> dict[str, Any]:
         "not_finite": origin.not_finite,
         "out_of_range": origin.out_of_range,
         "invalid_code": origin.invalid_code,
+        "frozen": origin.frozen,
     }
 
 

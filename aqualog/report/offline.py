@@ -7,23 +7,29 @@ import hashlib
 import json
 from collections.abc import Iterable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-__all__ = ["TEMPLATES", "content_policy", "environment", "json_island", "plotly_js"]
+from aqualog.report.wording import readable
+
+__all__ = [
+    "PLOTLY_HERE", "TEMPLATES", "content_policy", "environment", "json_island", "plotly_js", "with_plotly",
+]  # fmt: skip
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 
 @cache
 def environment(*folders: Path) -> Environment:
-    """Templates of folders, compiled once; everything that is put into one is escaped unless it is Markup."""
+    """Templates of folders, compiled once; what is put into one is escaped and made readable unless it is Markup."""
     return Environment(
         loader=FileSystemLoader(folders),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -31,12 +37,40 @@ def environment(*folders: Path) -> Environment:
     )
 
 
+def _shown(value: Any) -> Any:
+    return readable(value) if type(value) is str else value
+
+
+@cache
 def plotly_js() -> str:
     """The whole of plotly.js, as a browser reads it."""
-    from plotly.offline import get_plotlyjs
+    # found without an import of plotly, which takes longer than all else of a page
+    found = find_spec("plotly")
+    if found is None or found.origin is None:
+        raise ModuleNotFoundError("No module named 'plotly'", name="plotly")
+    # CR LF becomes LF, as a browser reads it: the hash in the policy is of that
+    return (Path(found.origin).parent / "package_data" / "plotly.min.js").read_text(encoding="utf-8")
 
-    # a browser reads CR LF as LF, and the hash in the policy is of what the browser reads
-    return str(get_plotlyjs()).replace("\r\n", "\n").replace("\r", "\n")
+
+@cache
+def _plotly_digest() -> str:
+    """Hash of plotly.js for a policy."""
+    return _digest(plotly_js())
+
+
+# Stands for plotly.js while a template is filled, so that megabytes need not go through it; nothing that is escaped can
+# hold it.
+PLOTLY_HERE = "/*<plotly.js>*/"
+
+
+def with_plotly(page: str) -> str:
+    """A page with plotly.js in the place of its stand-in, if it has one."""
+    before, found, after = page.partition(PLOTLY_HERE)
+    return f"{before}{plotly_js()}{after}" if found else page
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def content_policy(scripts: Iterable[str], *, loads: bool = False) -> str:
@@ -45,13 +79,13 @@ def content_policy(scripts: Iterable[str], *, loads: bool = False) -> str:
     Parameters
     ----------
     scripts : iterable of str
-        Texts of the scripts in the page.
+        Texts of the scripts in the page; `PLOTLY_HERE` for plotly.js.
     loads : bool
         Whether these scripts may load further ones themselves, as pages that share one plotly.js do. A page on a disk
         has no origin: `'self'` names nothing there in some browsers and the whole disk in others. So trust goes by who
         asks: a script element that stands in the document stays forbidden.
     """
-    digests = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
+    digests = [_plotly_digest() if s == PLOTLY_HERE else _digest(s) for s in scripts]
     allowed = " ".join([*(f"'sha256-{d}'" for d in digests), *(["'strict-dynamic'"] if loads else [])])
     # plotly sets style attributes and style elements; data: and blob: are for its "save as picture"
     return (

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from aqualog import __version__
 from aqualog.report import tables
+from aqualog.report.event_columns import event_columns
 from aqualog.report.figures.accelerations import accelerations
 from aqualog.report.figures.lanes import lanes
 from aqualog.report.figures.resistance import resistance
@@ -20,13 +21,18 @@ from aqualog.report.figures.stack import groups, stack
 from aqualog.report.figures.statistics import statistics
 from aqualog.report.figures.tie_rods import tie_rods
 from aqualog.report.figures.water import water
-from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island, plotly_js
+from aqualog.report.offline import PLOTLY_HERE, TEMPLATES, content_policy, environment, json_island, with_plotly
 from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.verdict import by_importance, verdict
 from aqualog.types import DriveResult
 
 __all__ = ["render_page", "write_page"]
+
+MOST_ROWS = (
+    500  # of events in the page's text; a browser lays a longer table out slowly, so the script fills it by pages
+)
+FIRST_EVENTS = 200  # in the text of a page with more, for a reader without scripts
 
 _FIGURES = (speeds, lanes, speed_differences, accelerations, statistics, slip_slope, resistance, tie_rods, water)
 
@@ -56,15 +62,17 @@ def render_page(result: DriveResult, *, title: str) -> str:
     ranked = by_importance(result.events)
     plan = make_plan(ranked, result.signals.frame.height, result.signals.dt)
     rows = [row for figure in _FIGURES for row in figure(result)]
-    scripts = {"plotly": plotly_js(), "page": _text("page.js")}
-    return environment(TEMPLATES).get_template("page.html.j2").render(
+    events = tables.event_rows(result)
+    is_short = len(events) <= MOST_ROWS
+    scripts = {"plotly": PLOTLY_HERE, "page": _text("page.js")}
+    page = environment(TEMPLATES).get_template("page.html.j2").render(
         title=title,
         version=__version__,
         policy=content_policy(scripts.values()),
         # Markup only for the package's own files, plotly.js and what _data has escaped
         css=Markup(_text("page.css")),
         scripts={name: Markup(text) for name, text in scripts.items()},
-        data=_data(result, rows, plan),
+        data=_data(result, rows, plan, events),
         has_plots=bool(rows) and plan.n > 0,
         toggles=_toggles(rows),
         note=_picture_note(result) or _reduction_note(plan, len(result.events)),
@@ -72,24 +80,29 @@ def render_page(result: DriveResult, *, title: str) -> str:
         verdict=verdict(result),
         facts=tables.head_facts(result),
         problems=tables.problems(result),
-        events=tables.event_rows(result),
+        events=events if is_short else events[:FIRST_EVENTS],
+        events_left_out=0 if is_short else len(events) - FIRST_EVENTS,
         detectors=tables.detector_rows(result),
         slopes=tables.slope_rows(result),
         signals=tables.signal_rows(result),
         fault_columns=tables.fault_columns(),
         faults=tables.fault_rows(result),
     )  # fmt: skip
+    return with_plotly(page)
 
 
 def _text(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
-def _data(result: DriveResult, rows: list[Row], plan: Plan) -> Markup:
+def _data(result: DriveResult, rows: list[Row], plan: Plan, events: list[dict[str, Any]]) -> Markup:
     """Everything that the script draws, as JSON that no HTML parser can leave."""
-    document: dict[str, Any] = {"events": [[round(e.start_s, 6), round(e.end_s, 6)] for e in result.events]}
+    spans = [[round(e.start_s, 6), round(e.end_s, 6), int(e.severity == "full")] for e in result.events]
+    document: dict[str, Any] = {"events": spans}
+    if len(events) > MOST_ROWS:
+        document["table"] = event_columns(events)
     if rows and plan.n:
-        document |= stack(rows, result.events, plan, result.signals.dt)
+        document |= stack(rows, plan, result.signals.dt)
     return json_island(document)
 
 

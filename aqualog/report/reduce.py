@@ -119,6 +119,8 @@ def reduce_indices(values: FloatArray, points: int = POINTS) -> NDArray[np.int64
     finite = np.isfinite(values)
     if values.size <= points:
         return np.arange(values.size)
+    if finite.all():
+        return _extremes(values, points)
     stretches, gaps = _stretches(finite, at_most=points // 8)
     total = max(1, int(finite.sum()))
     parts = [gaps]
@@ -126,7 +128,7 @@ def reduce_indices(values: FloatArray, points: int = POINTS) -> NDArray[np.int64
         inside = begin + np.flatnonzero(finite[begin:end])
         share = max(4, 2 * round(0.5 * points * inside.size / total))
         parts.append(inside[_extremes(values[inside], share)])
-    return np.unique(np.concatenate(parts)).astype(np.int64)
+    return _distinct(np.concatenate(parts).astype(np.int64))
 
 
 def _stretches(finite: BoolArray, *, at_most: int) -> tuple[Spans, NDArray[np.int64]]:
@@ -147,4 +149,10 @@ def _extremes(values: FloatArray, points: int) -> NDArray[np.int64]:
         return np.arange(values.size)
     # both ends too: the line must reach to its gap
     found = MinMaxDownsampler().downsample(np.ascontiguousarray(values), n_out=points)
-    return np.unique(np.concatenate([[0], found.astype(np.int64), [values.size - 1]]))
+    return _distinct(np.concatenate([[0], found.astype(np.int64), [values.size - 1]]))
+
+
+def _distinct(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+    """In order, each once; `np.unique` takes ten times as long for as few as these."""
+    ordered = np.sort(indices)
+    return ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])] if ordered.size else ordered

@@ -183,6 +183,7 @@ def _bad(origin: Origin) -> str:
         "not finite": origin.not_finite,
         "out of range": origin.out_of_range,
         "marked invalid": origin.invalid_code,
+        "frozen": origin.frozen,
     }
     return ", ".join(f"{n} {what}" for what, n in counts.items() if n)
 

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from aqualog.types import Event
 
 __all__ = [
-    "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "speed_kmh",
+    "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "readable",
+    "speed_kmh",
 ]  # fmt: skip
 
 _KMH = 3.6
+LONGEST_WORD = 200  # characters without a space that a page shows
+LONGEST_TEXT = 4000  # characters in one place of a page
+# what a terminal or a browser obeys rather than shows: controls, and marks that turn the direction of writing
+_OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+_LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 _DETECTORS = {
     "spin_down": ("Spin-down", "speed a wheel lost faster than a healthy one can"),
     "minor_spin_down": ("Minor spin-down", "variance of wheel acceleration, watched axle minus the other one"),
@@ -43,7 +50,7 @@ _CRITERIA = {1: "spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip slope"
 
 def detector_name(detector: str) -> str:
     """`minor_spin_down` -> `Minor spin-down`."""
-    return _DETECTORS[detector][0] if detector in _DETECTORS else detector.replace("_", " ")
+    return _DETECTORS[detector][0] if detector in _DETECTORS else readable(detector, LONGEST_WORD).replace("_", " ")
 
 
 def caption(detector: str) -> str:
@@ -58,7 +65,7 @@ def place(wheel: str | None, side: str | None) -> str:
 
 def pretty_unit(unit: str) -> str:
     """Unit with real exponents."""
-    return _UNITS.get(unit, unit)
+    return _UNITS.get(unit) or readable(unit, LONGEST_WORD)
 
 
 def number(x: float, decimals: int | None = None) -> str:
@@ -96,10 +103,12 @@ def evidence_parts(evidence: Mapping[str, Any]) -> list[str]:
 
 
 def _part(stem: str, values: Mapping[str, Any]) -> str:
-    label, factor, unit, decimals = _EVIDENCE.get(stem, (stem.replace("_", " "), 1.0, "", None))
+    label, factor, unit, decimals = _EVIDENCE.get(stem, (readable(stem, LONGEST_WORD).replace("_", " "), 1.0, "", None))
     single = values.get("", 0.0)
     if not isinstance(single, float | int) or isinstance(single, bool):
-        return (label if single else "") if isinstance(single, bool) else f"{label} {single}"
+        return (
+            (label if single else "") if isinstance(single, bool) else f"{label} {readable(str(single), LONGEST_WORD)}"
+        )
     numbers = {
         k: number(factor * v, decimals) for k, v in values.items() if isinstance(v, float | int) and math.isfinite(v)
     }
@@ -111,10 +120,23 @@ def _part(stem: str, values: Mapping[str, Any]) -> str:
     return f"{label} {words[found[0]]}{numbers[found[0]]} {unit}".rstrip() if found else ""
 
 
+def readable(text: str, most: int = LONGEST_TEXT) -> str:
+    """Text as a page can show it: shortened with a mark that says how long it was, without control characters."""
+    if len(text) > most:
+        text = f"{text[: most - 40]}… ({len(text)} characters)"
+    if len(text) > LONGEST_WORD:
+        text = _LONG_WORD.sub(_shortened, text)
+    return text if text.isprintable() else _OBEYED.sub("\ufffd", text)
+
+
+def _shortened(word: re.Match[str]) -> str:
+    return f"{word[0][: LONGEST_WORD - 20]}… ({len(word[0])} characters)"
+
+
 def plot_text(text: str, most: int = 80) -> str:
     """Text for plotly, which reads `<b>`, entities and `%{...}` as markup: those characters become look-alikes.
 
     Longer text than `most` characters is cut: plotly does not wrap.
     """
-    text = text if len(text) <= most else f"{text[: most - 1]}…"
+    text = readable(text if len(text) <= most else f"{text[: most - 1]}…")
     return text.replace("&", "＆").replace("<", "‹").replace(">", "›").replace("%{", "％{").replace("$", "＄")

@@ -1,12 +1,15 @@
 """The page in headless Chromium without a network: it draws, zooms, resets, and nothing in a name runs."""
 
+import re
 import time
+from dataclasses import replace
 
 import fake_result as fake
 import pytest
 from headless import PATIENCE, click, requests, severe, wait_for
 
 from aqualog.report.page import write_page
+from aqualog.report.theme import EVENT_SHADE, FULL_SHADE
 
 pytestmark = pytest.mark.browser
 
@@ -40,6 +43,30 @@ def points(browser, row, name):
     return browser.execute_script(script, row, name)
 
 
+def lanes(browser):
+    return browser.execute_script(
+        "return document.getElementById('plots')._fullData.filter(t => t.meta === 'bars').map(t => t.name)"
+    )
+
+
+def bars(browser, name):
+    """Begin and end of the bars that a lane draws."""
+    script = """
+      const t = document.getElementById('plots')._fullData.find(t => t.meta === 'bars' && t.name === arguments[0]);
+      return Array.from(t.x);"""
+    x = browser.execute_script(script, name)
+    return [[x[i], x[i + 2]] for i in range(0, len(x), 6)]
+
+
+def shade(browser, colour):
+    """Begin and end of what a colour shades."""
+    script = (
+        "return (document.getElementById('plots').layout.shapes.find(s => s.fillcolor === arguments[0]) || {}).path"
+    )
+    path = browser.execute_script(script, colour) or ""
+    return [[float(a), float(b)] for a, b in re.findall(r"M([\d.-]+),0V1H([\d.-]+)V0Z", path)]
+
+
 def visible_groups(browser):
     script = """return document.getElementById('plots')._fullData
       .filter(t => t.visible === true && t.legendgroup).map(t => t.legendgroup)"""
@@ -55,7 +82,8 @@ def test_plots_are_drawn_without_errors_or_requests(show, short):
     browser = show(short)
     drawn = "return document.querySelectorAll('#plots .scatterlayer .trace path.js-line').length"
     assert browser.execute_script(drawn) >= 20
-    assert browser.execute_script("return document.querySelectorAll('#plots .barlayer .point path').length") >= 15
+    assert bars(browser, "Spin-down RL") == [[28.0, 28.01]]
+    assert sum(len(bars(browser, t)) for t in lanes(browser)) >= 15
     assert x_range(browser) == [0, 30]
     assert requests(browser) == []
     assert severe(browser) == []
@@ -190,6 +218,71 @@ def test_hour_shows_the_spike_and_every_sample_of_an_event(show):
     t, _ = points(browser, "y4", "FL")
     inside = [a for a in t if begin <= a <= end]
     assert len(inside) == pytest.approx((end - begin) * 100, abs=2)
+    assert severe(browser) == []
+
+
+EVERY = 0.3  # [s]
+MANY = 900
+
+
+@pytest.fixture(scope="module")
+def eventful():
+    """More events than a table in the page's text holds, one by one."""
+    drive = fake.make_result(300.0)
+    starts = (round(EVERY * k, 6) for k in range(MANY))
+    events = [
+        replace(drive.events[k % len(drive.events)], start_s=t, end_s=round(t + 0.1, 6)) for k, t in enumerate(starts)
+    ]
+    return replace(drive, events=tuple(events))
+
+
+def event_starts(browser):
+    texts = "return Array.from(document.querySelectorAll('#events tbody td:nth-child(3)')).map(c => c.textContent)"
+    return [float(t.replace("−", "-")) for t in browser.execute_script(texts)]
+
+
+def check_shades(browser, result):
+    """Few shapes for all events, and exact where the view is."""
+    assert len(browser.execute_script("return document.getElementById('plots').layout.shapes")) < 30
+    begin, end = x_range(browser)
+    inside = {(e.start_s, e.end_s) for e in result.events if e.end_s >= begin and e.start_s <= end}
+    assert len(inside) >= 2
+    assert inside <= {(a, b) for c in (EVENT_SHADE, FULL_SHADE) for a, b in shade(browser, c)}
+
+
+def test_thousands_of_events_by_pages_searched_sorted_and_stepped_through(show, eventful):
+    browser = show(eventful)
+    assert len(shade(browser, EVENT_SHADE)) > 10
+    assert len(shade(browser, FULL_SHADE)) > 10
+    starts = [round(e.start_s, 2) for e in eventful.events]
+    count = "return document.getElementById('event-count').textContent"
+    assert browser.execute_script(count) == "1–200 of 900"
+    assert event_starts(browser) == starts[:200]
+    click(browser, "#event-on")
+    assert event_starts(browser) == starts[200:400]
+    click(browser, "#events th:nth-child(3)")
+    click(browser, "#events th:nth-child(3)")
+    assert event_starts(browser) == starts[:-201:-1]
+    click(browser, "#previous")  # the last one of the order
+    wait_for(lambda: x_range(browser) != [0, 300])
+    check_shades(browser, eventful)
+    assert browser.execute_script(count) == "801–900 of 900"
+    chosen = browser.execute_script("return document.querySelector('#events tr[aria-selected=true]').dataset.event")
+    assert chosen == "0"
+    search = (
+        "const s = document.getElementById('event-search'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))"
+    )
+    wanted = [e for e in eventful.events if e.detector == "spin_up" and e.wheel == "rr"]
+    browser.execute_script(search, "spin-up rr")
+    assert browser.execute_script(count) == f"1–{len(wanted)} of {len(wanted)} found among 900"
+    assert event_starts(browser) == [round(e.start_s, 2) for e in reversed(wanted)]
+    browser.execute_script(search, "no such thing")
+    assert browser.execute_script(count) == "no event"
+    browser.execute_script(search, "")
+    browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    assert len(event_starts(browser)) == MANY
+    browser.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert len(event_starts(browser)) == 200
     assert severe(browser) == []
 
 

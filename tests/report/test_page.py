@@ -15,8 +15,9 @@ import polars as pl
 import pytest
 
 import aqualog.report
-from aqualog.report.page import render_page, write_page
+from aqualog.report.page import FIRST_EVENTS, MOST_ROWS, render_page, write_page
 from aqualog.report.reduce import POINTS
+from aqualog.report.tables import event_rows
 from aqualog.types import Quality, Unavailable
 
 TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
@@ -194,9 +195,8 @@ def test_figure_is_valid_and_complete(page):
     assert units == ["km/h", "km/h", "m/s²", "m/s", "(m/s²)²", "m/s", "m/s", "–", "m/s²", "mm"]
     colours = {}
     for trace in figure.data:
-        colour = trace.line.color if trace.type == "scatter" else trace.marker.color
         if trace.legendgroup:
-            colours.setdefault(trace.legendgroup, set()).add(colour)
+            colours.setdefault(trace.legendgroup, set()).add(trace.line.color)
     assert all(len(colours[w]) == 1 for w in ("fl", "fr", "rl", "rr"))
 
 
@@ -237,10 +237,34 @@ def test_short_drive_holds_every_sample_and_its_gaps(page, short):
 
 
 def test_a_bit_of_one_sample_has_its_bar(page):
-    lane = next(t for t in data_of(page)["figure"]["data"] if t["type"] == "bar" and t["name"] == "Spin-down RL")
-    assert lane["base"] == [28.0]
-    assert lane["x"] == [0.01]
-    assert lane["customdata"] == ["28.00 – 28.01 s (0.01 s)"]
+    data = data_of(page)
+    names = [t["name"] for t in data["figure"]["data"] if t.get("meta") == "bars"]
+    lane = data["lanes"][names.index("Spin-down RL")]
+    assert np.frombuffer(base64.b64decode(lane["spans"]), dtype="<u4").tolist() == [2800, 2801]
+
+
+def test_two_thousand_events_go_into_columns_and_stay_small(short):
+    events = tuple(sorted((replace(e, start_s=e.start_s + 1e-3 * k) for k in range(140) for e in short.events),
+                          key=lambda e: e.start_s))  # fmt: skip
+    assert len(events) > 2000
+    many, few = replace(short, events=events), replace(short, events=events[:MOST_ROWS])
+    text = render_page(many, title="t")
+    rows = [a["data-event"] for t, a in Reader(text).elements if "data-event" in a]
+    assert rows == [str(i) for i in range(FIRST_EVENTS)]
+    assert f"The first {FIRST_EVENTS} events; the other {len(events) - FIRST_EVENTS} need JavaScript" in text
+    table = data_of(text)["table"]
+    assert {len(table[c]) for c in ("detector", "place", "severity", "peak", "ratio", "speed", "evidence")} == {
+        len(events)
+    }
+    row = event_rows(many)[777]
+    assert [table["detectors"][table["detector"][777]], table["peak"][777], table["evidence"][777]] == [
+        row["detector"], row["peak"].text, row["evidence"],
+    ]  # fmt: skip
+    short_text = render_page(few, title="t")
+    assert "table" not in data_of(short_text)
+    assert short_text.count("data-event=") == MOST_ROWS
+    assert "events.json" not in short_text
+    assert len(text) - len(render_page(short, title="t")) < 300 * len(events)
 
 
 def test_an_hour_is_reduced_said_so_and_small(hour):

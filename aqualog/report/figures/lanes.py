@@ -13,7 +13,7 @@ from aqualog.types import DriveResult, Track
 
 __all__ = ["lanes"]
 
-MOST_BARS = 1500  # per lane; beyond, bars that nearly touch are joined
+MOST_BARS = 20_000  # per lane; beyond, bars that nearly touch are joined
 
 
 def lanes(result: DriveResult) -> list[Row]:

@@ -11,11 +11,11 @@ __all__ = ["resistance"]
 
 def resistance(result: DriveResult) -> list[Row]:
     """Nominal minus measured acceleration, Eq. (2.9) of the thesis."""
-    values = feature(result.features, "delta_a_x", "m/s^2", "m/s^2")
+    values = feature(result.features, "delta_a_x")
     if values is None:
         return []
     lines = [Line("delta_a_x", VEHICLE, detector_colour("resistance", None), values)]
-    offset = feature(result.features, "delta_a_x_offset", "m/s^2", "m/s^2")
+    offset = feature(result.features, "delta_a_x_offset")
     caption = "nominal minus measured acceleration; water lifts it"
     if offset is not None:
         lines.append(Line("dry offset", VEHICLE, MUTED, offset, width=0.9))

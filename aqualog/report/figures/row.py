@@ -12,7 +12,6 @@ from aqualog.notation import WHEELS
 from aqualog.report.reduce import Spans
 from aqualog.report.theme import wheel_colour
 from aqualog.types import DriveResult, FloatArray
-from aqualog.units import convert
 
 if TYPE_CHECKING:
     import polars as pl
@@ -24,13 +23,17 @@ VEHICLE = "vehicle"  # group of everything that belongs to no wheel
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One signal over time. Lines of one `group` are shown and hidden together."""
+    """One signal over time. Lines of one `group` are shown and hidden together.
+
+    `units` are the values' and the axis's: only what is drawn of a long drive is converted.
+    """
 
     label: str
     group: str
     colour: str
     values: FloatArray
     width: float = 1.3
+    units: tuple[str, str] = ("-", "-")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +67,18 @@ class Row:
     decimals: int = 2
 
 
-def feature(frame: pl.DataFrame, name: str, source: str, target: str) -> FloatArray | None:
-    """A column in the unit of the axis; None where it is absent or has no value at all."""
+def feature(frame: pl.DataFrame, name: str) -> FloatArray | None:
+    """A column as floats; None where it is absent or has no value at all."""
     import polars as pl
 
     if name not in frame.columns:
         return None
-    values = frame[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
-    return convert(values, source, target) if np.isfinite(values).any() else None
+    column = frame[name].cast(pl.Float64)
+    values: FloatArray = (column.fill_null(np.nan) if column.null_count() else column).to_numpy()
+    return values if np.isfinite(values).any() else None
 
 
-def wheel_lines(result: DriveResult, stem: str, source: str, target: str) -> tuple[Line, ...]:
-    """The lines of the wheels that have this feature."""
-    columns: Sequence[tuple[str, FloatArray | None]] = [
-        (w, feature(result.features, f"{stem}_{w}", source, target)) for w in WHEELS
-    ]
-    return tuple(Line(w.upper(), w, wheel_colour(w), values) for w, values in columns if values is not None)
+def wheel_lines(result: DriveResult, stem: str, units: tuple[str, str] = ("-", "-")) -> tuple[Line, ...]:
+    """The lines of the wheels that have this feature; `units` are the feature's and the axis's."""
+    columns: Sequence[tuple[str, FloatArray | None]] = [(w, feature(result.features, f"{stem}_{w}")) for w in WHEELS]
+    return tuple(Line(w.upper(), w, wheel_colour(w), v, units=units) for w, v in columns if v is not None)

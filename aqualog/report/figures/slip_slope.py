@@ -16,8 +16,8 @@ def slip_slope(result: DriveResult) -> list[Row]:
     lines = []
     wheels = {t.side: t.wheel for t in result.tracks if t.detector == "slip_slope_drop"}
     for side, pair in SIDES.items():
-        slope = feature(result.features, f"slip_slope_{side}", "-", "-")
-        dry = feature(result.features, f"slip_slope_ref_{side}", "-", "-")
+        slope = feature(result.features, f"slip_slope_{side}")
+        dry = feature(result.features, f"slip_slope_ref_{side}")
         if slope is None:
             continue
         wheel = wheels.get(side)

@@ -12,11 +12,12 @@ __all__ = ["speeds"]
 
 def speeds(result: DriveResult) -> list[Row]:
     """Speed of the vehicle and of the four wheels on its centre line."""
-    reference = feature(result.signals.frame, "v_x", "m/s", "km/h")
-    estimate = feature(result.features, "v_x_hat", "m/s", "km/h")
-    below = () if reference is None else (Line("v_x reference", VEHICLE, MUTED, reference, 1.0),)
-    above = () if estimate is None else (Line("v_x", VEHICLE, INK, estimate, 1.8),)
-    lines = (*below, *wheel_lines(result, "v_w", "m/s", "km/h"), *above)
+    units = ("m/s", "km/h")
+    reference = feature(result.signals.frame, "v_x")
+    estimate = feature(result.features, "v_x_hat")
+    below = () if reference is None else (Line("v_x reference", VEHICLE, MUTED, reference, 1.0, units),)
+    above = () if estimate is None else (Line("v_x", VEHICLE, INK, estimate, 1.8, units),)
+    lines = (*below, *wheel_lines(result, "v_w", units), *above)
     if not lines:
         return []
     caption = "wheels on the vehicle's centre line; a wheel that leaves the black line slips"

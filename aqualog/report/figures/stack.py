@@ -1,7 +1,7 @@
-"""Rows into one plotly figure with one time axis, and the samples apart from it.
+"""Rows into one plotly figure with one time axis, and apart from it the samples, the bars and the shades.
 
-The page's script fills the traces from the samples, as many as the view needs: a figure with every sample of every
-trace would be slow to zoom.
+The page's script fills the figure from them, as many as the view can show: a figure with every sample of every trace,
+or with an element for each of thousands of bars and events, would be slow to open and to zoom.
 """
 
 from __future__ import annotations
@@ -15,53 +15,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.report.figures.row import VEHICLE, Lane, Line, Row
-from aqualog.report.reduce import Plan, Spans, merge_spans, reduce_indices
+from aqualog.report.reduce import Plan, Spans, reduce_indices
 from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, GRID, INK, MUTED, THRESHOLD, WATER_SHADE
 from aqualog.report.wording import plot_text
-from aqualog.types import Event
+from aqualog.units import convert
 
 __all__ = ["groups", "stack"]
 
 ABOVE = 30  # [px] room above a row for its title
 TOP, BOTTOM = 58, 44  # [px] above the first row stand its title, the upper time axis and the buttons
-MOST_SHADES = 150
 
 
-def stack(rows: Sequence[Row], events: Sequence[Event], plan: Plan, dt: float) -> dict[str, Any]:
+def stack(rows: Sequence[Row], plan: Plan, dt: float) -> dict[str, Any]:
     """Figure, samples and what the script must know of the rows.
 
     Returns
     -------
     dict
-        `figure` (data, layout), `lines` (samples of the first traces of the figure, in their order), `rows` (y axis,
-        what it must show), `dt`, `n`, `windows`.
+        `figure` (data, layout), `lines` (samples of the first traces of the figure, in their order), `lanes` (bars of
+        the next ones), `rows` (y axis, what it must show), `shades` (of the events, by severity), `dt`, `n`, `windows`.
     """
     data: list[dict[str, Any]] = []
     lines: list[dict[str, Any]] = []
     for k, row in enumerate(rows):
         for line in row.lines:
             data.append(_line_trace(line, row, _axis(k)))
-            lines.append({"row": k, **_samples(line.values, plan)})
-    for k, row in enumerate(rows):
-        data += [_lane_trace(lane, len(row.lanes) - i, _axis(k), dt) for i, lane in enumerate(row.lanes)]
-        if row.lanes:
-            data.append(_lane_hover(_axis(k)))
+            lines.append({"row": k, **_samples(line, plan)})
+    lanes = [(lane, len(row.lanes) - i, k) for k, row in enumerate(rows) for i, lane in enumerate(row.lanes)]
+    data += [_lane_trace(lane, _axis(k)) for lane, _, k in lanes]
+    data += [_lane_hover(_axis(k)) for k, row in enumerate(rows) if row.lanes]
     data.append(_anchor_of_upper_axis())
     return {
         "dt": dt,
         "n": plan.n,
         "windows": plan.windows.tolist(),
         "lines": lines,
+        "lanes": [{"level": level, "spans": _indices(lane.spans)} for lane, level, _ in lanes],
+        "shades": {"partial": EVENT_SHADE, "full": FULL_SHADE},
         "rows": [
             {
                 "axis": _layout_axis(k),
                 "include": [*r.include, *r.thresholds],
                 "least_span": r.least_span,
                 "has_lines": bool(r.lines),
+                "strips": None if r.shades is None else {"colour": WATER_SHADE, "spans": _indices(r.shades)},
             }
             for k, r in enumerate(rows)
         ],
-        "figure": {"data": data, "layout": _layout(rows, events, plan, dt)},
+        "figure": {"data": data, "layout": _layout(rows, plan, dt)},
     }
 
 
@@ -90,23 +91,22 @@ def _line_trace(line: Line, row: Row, axis: str) -> dict[str, Any]:
     }
 
 
-def _lane_trace(lane: Lane, level: int, axis: str, dt: float) -> dict[str, Any]:
-    begins, ends = lane.spans[:, 0] * dt, lane.spans[:, 1] * dt
-    spans = [f"{a:.2f} – {b:.2f} s ({b - a:.2f} s)" for a, b in zip(begins, ends, strict=True)]
+def _lane_trace(lane: Lane, axis: str) -> dict[str, Any]:
+    """All bars of a lane as one outline: an element for each bar would make thousands of them slow."""
     return {
-        "type": "bar",
-        "orientation": "h",
+        "type": "scatter",
+        "mode": "lines",
+        "meta": "bars",
         "name": plot_text(lane.label),
         "legendgroup": lane.group,
         "xaxis": "x",
         "yaxis": axis,
-        "base": _numbers(begins),
-        "x": _numbers(ends - begins),
-        "y": [level] * len(spans),
-        "width": 0.62,
+        "x": [],
+        "y": [],
+        "fill": "toself",
+        "fillcolor": lane.colour,
         # the outline keeps a bar of one sample visible however far the view is zoomed out
-        "marker": {"color": lane.colour, "line": {"color": lane.colour, "width": 1.2}},
-        "customdata": spans,
+        "line": {"color": lane.colour, "width": 1.2, "simplify": False},
         "hoverinfo": "skip",
     }
 
@@ -137,28 +137,33 @@ def _anchor_of_upper_axis() -> dict[str, Any]:
     return {"type": "scatter", "x": [None], "y": [None], "xaxis": "x2", "yaxis": "y", "hoverinfo": "skip"}
 
 
-def _numbers(values: NDArray[np.floating[Any]]) -> list[float]:
-    return [float(f"{v:.9g}") for v in values]
-
-
 # --- samples ---------------------------------------------------------------------------------------------------
 
 
-def _samples(values: NDArray[np.float64], plan: Plan) -> dict[str, str]:
+def _samples(line: Line, plan: Plan) -> dict[str, str]:
     """`full`: every value inside the windows; `index`, `value`: minima and maxima elsewhere. Base64, little-endian."""
-    inside = np.zeros(plan.n, dtype=bool)
-    for begin, end in plan.windows:
-        inside[begin:end] = True
-    with np.errstate(over="ignore"):
-        short = values.astype("<f4")
-    short[~np.isfinite(short)] = np.nan
+    values = line.values
     index = np.empty(0, dtype=np.int64) if plan.is_complete else reduce_indices(values)
-    index = index[~inside[index]]
+    for begin, end in plan.windows:
+        index = np.delete(index, slice(*np.searchsorted(index, (begin, end))))
+    inside = np.concatenate([values[:0], *(values[begin:end] for begin, end in plan.windows)])
     return {
-        "full": _base64(short[inside]),
+        "full": _base64(_short(inside, line.units)),
         "index": _base64(index.astype("<u4")),
-        "value": _base64(short[index]),
+        "value": _base64(_short(values[index], line.units)),
     }
+
+
+def _short(values: NDArray[np.float64], units: tuple[str, str]) -> NDArray[np.float32]:
+    with np.errstate(over="ignore"):
+        short = convert(values, *units).astype("<f4")
+    short[~np.isfinite(short)] = np.nan
+    return short
+
+
+def _indices(spans: Spans) -> str:
+    """First index and the one after the last of each span, one after the other."""
+    return _base64(spans.astype("<u4"))
 
 
 def _base64(array: NDArray[Any]) -> str:
@@ -168,7 +173,7 @@ def _base64(array: NDArray[Any]) -> str:
 # --- layout ----------------------------------------------------------------------------------------------------
 
 
-def _layout(rows: Sequence[Row], events: Sequence[Event], plan: Plan, dt: float) -> dict[str, Any]:
+def _layout(rows: Sequence[Row], plan: Plan, dt: float) -> dict[str, Any]:
     total = TOP + BOTTOM + sum(r.height + ABOVE for r in rows)
     domains = list(_domains(rows))
     duration = max(plan.n, 1) * dt
@@ -196,7 +201,7 @@ def _layout(rows: Sequence[Row], events: Sequence[Event], plan: Plan, dt: float)
             "showgrid": False,
             "showspikes": False,
         },
-        "shapes": [*_event_shapes(events), *_row_shapes(rows, dt)],
+        "shapes": list(_threshold_lines(rows)),
         "annotations": [*_titles(rows, domains), *_threshold_labels(rows)],
     }
     for k, (row, domain) in enumerate(zip(rows, domains, strict=True)):
@@ -308,43 +313,8 @@ def _threshold_labels(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             }
 
 
-def _event_shapes(events: Sequence[Event]) -> Iterator[dict[str, Any]]:
-    for severity, colour in (("partial", EVENT_SHADE), ("full", FULL_SHADE)):
-        spans = [(e.start_s, e.end_s) for e in events if (e.severity == "full") == (severity == "full")]
-        for begin, end in _few(spans):
-            yield _rectangle(begin, end, "paper", colour)
-
-
-def _few(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Union of spans [s], at most MOST_SHADES of them."""
-    whole: Spans = np.round(np.array(spans, dtype=np.float64).reshape(-1, 2) * 1e6).astype(np.int64)
-    merged, gap = merge_spans(whole), 1000
-    while len(merged) > MOST_SHADES:
-        merged, gap = merge_spans(merged, gap), 2 * gap
-    return [(a / 1e6, b / 1e6) for a, b in merged.tolist()]
-
-
-def _rectangle(begin: float, end: float, yref: str, colour: str) -> dict[str, Any]:
-    return {
-        "type": "rect",
-        "xref": "x",
-        "x0": begin,
-        "x1": end,
-        "yref": yref,
-        "y0": 0,
-        "y1": 1,
-        "fillcolor": colour,
-        "line": {"width": 0},
-        "layer": "below",
-    }
-
-
-def _row_shapes(rows: Sequence[Row], dt: float) -> Iterator[dict[str, Any]]:
+def _threshold_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
     for k, row in enumerate(rows):
-        for begin, end in [] if row.shades is None else row.shades.tolist():
-            # a strip along the bottom, which the colours of the events do not mix with
-            strip = _rectangle(round(begin * dt, 6), round(end * dt, 6), f"{_axis(k)} domain", WATER_SHADE)
-            yield {**strip, "y1": 0.05}
         for value in row.thresholds:
             yield {
                 "type": "line",

@@ -13,8 +13,8 @@ def tie_rods(result: DriveResult) -> list[Row]:
     """Measured and modelled forces of both rods (thesis section 2.4)."""
     lines = []
     for wheel in ("fl", "fr"):
-        measured = feature(result.features, f"tie_rod_meas_{wheel}", "N", "N")
-        model = feature(result.features, f"tie_rod_hat_{wheel}", "N", "N")
+        measured = feature(result.features, f"tie_rod_meas_{wheel}")
+        model = feature(result.features, f"tie_rod_hat_{wheel}")
         if measured is not None and model is not None:
             lines += [
                 Line(wheel.upper(), wheel, wheel_colour(wheel), measured),
@@ -23,8 +23,8 @@ def tie_rods(result: DriveResult) -> list[Row]:
     if lines:
         caption = "measured; dry model in grey"
         return [Row("Tie-rod forces", caption, "N", tuple(lines), include=(-200.0, 200.0), decimals=0)]
-    measured = feature(result.features, "steering_meas", "N*m", "N*m")
-    model = feature(result.features, "steering_hat", "N*m", "N*m")
+    measured = feature(result.features, "steering_meas")
+    model = feature(result.features, "steering_hat")
     if measured is None or model is None:
         return []
     pair = (Line("measured", VEHICLE, "#7F6BB3", measured), Line("model", VEHICLE, MUTED, model, width=0.9))

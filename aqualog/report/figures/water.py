@@ -16,7 +16,7 @@ _TRACKS = {
     "water_depth_left": ("left track", WHEEL_COLOURS["fl"]),
     "water_depth_right": ("right track", WHEEL_COLOURS["fr"]),
 }
-MOST_SHADES = 150
+MOST_SHADES = 20_000
 
 
 def watered(result: DriveResult) -> Spans | None:
@@ -29,8 +29,10 @@ def watered(result: DriveResult) -> Spans | None:
 def water(result: DriveResult) -> list[Row]:
     """Water depths."""
     frame = result.signals.frame
-    columns = [(label, colour, feature(frame, s, "m", "mm")) for s, (label, colour) in _TRACKS.items()]
-    lines = tuple(Line(label, VEHICLE, colour or MUTED, v) for label, colour, v in columns if v is not None)
+    columns = [(label, colour, feature(frame, s)) for s, (label, colour) in _TRACKS.items()]
+    lines = tuple(
+        Line(label, VEHICLE, colour or MUTED, v, units=("m", "mm")) for label, colour, v in columns if v is not None
+    )
     if not lines:
         return []
     return [Row("Water depth", "as logged", "mm", lines, include=(0.0,), height=100)]

@@ -3,6 +3,7 @@
   const data = JSON.parse(document.getElementById("drive-data").textContent);
   const plot = document.getElementById("plots");
   const POINTS = 3000; // per line in view: about two per pixel
+  const collator = new Intl.Collator("en");
 
   // --- samples ------------------------------------------------------------------------------------------------
 
@@ -60,26 +61,99 @@
     return [x, y];
   }
 
-  // --- lanes --------------------------------------------------------------------------------------------------
+  // --- spans: bars of the lanes, strips, shades ---------------------------------------------------------------------
 
   const traces = data.figure ? data.figure.data : [];
-  const lanes = traces.filter(function (trace) { return trace.type === "bar"; });
+  const firstLane = (data.lines || []).length;
   const laneHover = traces.findIndex(function (trace) { return trace.meta === "lanes"; });
+  const HALF_BAR = 0.31; // of the distance of two lanes
+
+  // Begins and ends [s], in order of time.
+  function spansOf(base64) {
+    const index = new Uint32Array(bytes(base64)), begin = new Float64Array(index.length / 2), end = begin.slice();
+    for (let i = 0; i < begin.length; i++) { begin[i] = index[2 * i] * data.dt; end[i] = index[2 * i + 1] * data.dt; }
+    return { begin: begin, end: end };
+  }
+
+  function seconds(x) { return x.toFixed(2); }
+
+  const lanes = (data.lanes || []).map(function (lane, i) {
+    const trace = traces[firstLane + i];
+    return Object.assign(spansOf(lane.spans), { level: lane.level, name: trace.name, group: trace.legendgroup });
+  });
+  const strips = (data.rows || []).map(function (row) { return row.strips && spansOf(row.strips.spans); });
+
+  // Union of events of one severity.
+  function shaded(isFull) {
+    const begin = [], end = [];
+    for (const [a, b, full] of data.events.slice().sort(function (p, q) { return p[0] - q[0]; })) {
+      const last = end.length - 1;
+      if (Boolean(full) !== isFull) continue;
+      if (last >= 0 && a <= end[last]) end[last] = Math.max(end[last], b);
+      else { begin.push(a); end.push(b); }
+    }
+    return { begin: begin, end: end };
+  }
+  const shades = { partial: shaded(false), full: shaded(true) };
+
+  // Spans in a range, as [begin, end]; those that are closer than can be seen are one, and none is shorter than `least`.
+  function inside(spans, from, to, unseen, least = 0) {
+    const out = [];
+    for (let i = firstAtOrAfter(spans.end, from); i < spans.begin.length && spans.begin[i] <= to; i++) {
+      const last = out[out.length - 1], end = Math.max(spans.end[i], spans.begin[i] + least);
+      if (last && spans.begin[i] - last[1] < unseen) last[1] = Math.max(last[1], end);
+      else out.push([spans.begin[i], end]);
+    }
+    return out;
+  }
+
+  function outlines(spans, level) {
+    const x = [], y = [], low = level - HALF_BAR, high = level + HALF_BAR;
+    for (const [a, b] of spans) {
+      x.push(a, a, b, b, a, null);
+      y.push(low, high, high, low, low, null);
+    }
+    return [x, y];
+  }
+
+  // One shape for all: thousands of rectangles would be slow.
+  function rectangles(spans, yref, top, colour) {
+    const path = spans.map(function ([a, b]) {
+      return `M${a.toFixed(6)},0V${top}H${b.toFixed(6)}V0Z`;
+    }).join("");
+    return path ? [{
+      type: "path", path: path, xref: "x", yref: yref, fillcolor: colour, line: { width: 0 }, layer: "below",
+    }] : [];
+  }
+
+  function shadesAndStrips(from, to, unseen) {
+    const found = ["partial", "full"].flatMap(function (severity) {
+      return rectangles(inside(shades[severity], from, to, unseen, 2 * unseen), "paper", 1, data.shades[severity]);
+    });
+    data.rows.forEach(function (row, k) {
+      // a strip along the bottom, which the colours of the events do not mix with
+      const yref = row.axis.replace("axis", "") + " domain";
+      if (strips[k]) found.push(...rectangles(inside(strips[k], from, to, unseen), yref, 0.05, row.strips.colour));
+    });
+    return found;
+  }
 
   // What is on in each of some hundred slices of the view; a slice takes in everything that touches it.
   function slices(range) {
     const count = 400, width = (range[1] - range[0]) / count;
-    const shown = lanes.filter(function (lane) { return !hidden.has(lane.legendgroup); });
-    const next = shown.map(function () { return 0; });
+    const shown = lanes.filter(function (lane) { return !hidden.has(lane.group); });
+    const next = shown.map(function (lane) { return firstAtOrAfter(lane.end, range[0]); });
     const x = [], y = [], text = [];
     for (let s = 0; s < count; s++) {
       const from = range[0] + s * width, to = from + width, on = [];
       shown.forEach(function (lane, i) {
-        while (next[i] < lane.x.length && lane.base[next[i]] + lane.x[next[i]] <= from) next[i]++;
-        let last = next[i];
-        while (last < lane.x.length && lane.base[last] < to) last++;
-        const found = last - next[i];
-        if (found > 0) on.push(lane.name + ": " + (found > 1 ? found + " detections" : lane.customdata[next[i]]));
+        while (next[i] < lane.end.length && lane.end[next[i]] <= from) next[i]++;
+        const first = next[i], found = firstAtOrAfter(lane.begin, to) - first;
+        if (found > 1) on.push(lane.name + ": " + found + " detections");
+        else if (found === 1) {
+          const a = lane.begin[first], b = lane.end[first];
+          on.push(`${lane.name}: ${seconds(a)} – ${seconds(b)} s (${seconds(b - a)} s)`);
+        }
       });
       x.push(from + 0.5 * width);
       y.push(1);
@@ -92,7 +166,6 @@
 
   const whole = [0, Math.max(data.n || 0, 1) * (data.dt || 1)];
   const lines = (data.lines || []).map(unpack);
-  const lineIndices = lines.map(function (_, i) { return i; });
   const hidden = new Set();
   const held = {}; // y axes that the user has scaled, until "show all"
   let view = whole.slice();
@@ -129,33 +202,43 @@
     }];
   }
 
-  function draw(range) {
-    view = range;
-    const width = range[1] - range[0];
-    const xs = [], ys = [];
-    for (const line of lines) {
-      // half a view more on both sides, so that panning does not pull in blank paper
-      const a = Math.max(0, firstAtOrAfter(line.t, range[0] - 0.5 * width) - 1);
-      const b = Math.min(line.t.length, firstAtOrAfter(line.t, range[1] + 0.5 * width) + 1);
-      const xy = picked(line, a, b);
-      xs.push(xy[0]);
-      ys.push(xy[1]);
-    }
-    const layout = { "xaxis.range": range.slice(), "xaxis2.range": range.slice(), shapes: shapes.concat(selectionShape()) };
+  // What a view shows: samples and bars of each trace by its index, and what changes of the layout.
+  function contents(range) {
+    const width = range[1] - range[0], change = new Map(), layout = { shapes: shapes.slice() };
+    // half a view more on both sides, so that panning does not pull in blank paper
+    const from = range[0] - 0.5 * width, to = range[1] + 0.5 * width, unseen = width / POINTS;
+    lines.forEach(function (line, i) {
+      const a = Math.max(0, firstAtOrAfter(line.t, from) - 1);
+      const b = Math.min(line.t.length, firstAtOrAfter(line.t, to) + 1);
+      const [x, y] = picked(line, a, b);
+      change.set(i, { x: x, y: y });
+    });
+    lanes.forEach(function (lane, i) {
+      const [x, y] = outlines(inside(lane, from, to, unseen), lane.level);
+      change.set(firstLane + i, { x: x, y: y });
+    });
+    if (laneHover >= 0) change.set(laneHover, slices(range));
+    layout.shapes.unshift(...shadesAndStrips(from, to, unseen));
+    layout.shapes.push(...selectionShape());
+    for (const axis of ["xaxis", "xaxis2"]) layout[axis + ".range"] = range.slice();
     data.rows.forEach(function (row, k) {
       if (row.has_lines && !held[row.axis]) layout[row.axis + ".range"] = valueRange(k, range);
     });
+    return [change, layout];
+  }
+
+  function tellView() {
     document.getElementById("view").textContent =
-      range[0].toFixed(2) + " – " + range[1].toFixed(2) + " s (" + width.toFixed(2) + " s)";
-    const change = { x: xs, y: ys }, indices = lineIndices.slice();
-    if (laneHover >= 0) {
-      const hover = slices(range);
-      change.customdata = lines.map(function () { return null; }).concat([hover.customdata]);
-      xs.push(hover.x);
-      ys.push(hover.y);
-      indices.push(laneHover);
-    }
-    return Plotly.update(plot, change, layout, indices);
+      view[0].toFixed(2) + " – " + view[1].toFixed(2) + " s (" + (view[1] - view[0]).toFixed(2) + " s)";
+  }
+
+  function draw(range) {
+    view = range;
+    tellView();
+    const [change, layout] = contents(range), all = Array.from(change.values());
+    const update = { visible: Array.from(change.keys(), function (i) { return !isHidden(i); }) };
+    for (const key of ["x", "y", "customdata"]) update[key] = all.map(function (c) { return c[key] || null; });
+    return Plotly.update(plot, update, layout, Array.from(change.keys()));
   }
 
   function showAll() {
@@ -179,11 +262,16 @@
 
   // --- events -------------------------------------------------------------------------------------------------
 
-  const rows = Array.from(document.querySelectorAll("#events tbody tr"));
+  const eventTable = document.getElementById("events");
+  const eventBody = eventTable ? eventTable.tBodies[0] : null;
+  const PAGE = 200; // rows of a long table of events at a time
+  // A long table is filled by its pages; `order` has the events that the search leaves, as they are sorted.
+  const long = data.table ? { order: data.events.map(function (_, i) { return i; }), first: 0, words: null } : null;
 
   function mark(index) {
     selected = index;
-    for (const row of rows) row.setAttribute("aria-selected", String(Number(row.dataset.event) === index));
+    if (!eventBody) return;
+    for (const row of eventBody.rows) row.setAttribute("aria-selected", String(Number(row.dataset.event) === index));
   }
 
   function zoomTo(index, scroll) {
@@ -199,35 +287,125 @@
   }
 
   function step(by) {
-    const order = Array.from(document.querySelectorAll("#events tbody tr")).map(function (r) { return Number(r.dataset.event); });
+    const order = long ? long.order : Array.from(eventBody.rows, function (r) { return Number(r.dataset.event); });
+    if (!order.length) return;
     const at = order.indexOf(selected);
     const next = at < 0 ? (by > 0 ? 0 : order.length - 1) : (at + by + order.length) % order.length;
+    if (long && (next < long.first || next >= long.first + PAGE)) fillEvents(next - next % PAGE);
     zoomTo(order[next], false);
   }
 
-  for (const row of rows) {
-    row.addEventListener("click", function () { zoomTo(Number(row.dataset.event), true); });
-    row.addEventListener("keydown", function (e) {
+  if (eventBody) {
+    eventBody.addEventListener("click", function (e) {
+      const row = e.target.closest("tr");
+      if (row) zoomTo(Number(row.dataset.event), true);
+    });
+    eventBody.addEventListener("keydown", function (e) {
+      const row = e.target.closest("tr");
       if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(Number(row.dataset.event), true); }
       const other = e.key === "ArrowDown" ? row.nextElementSibling : e.key === "ArrowUp" ? row.previousElementSibling : null;
       if (other) { e.preventDefault(); other.focus(); }
     });
   }
 
+  // --- a long table of events ---------------------------------------------------------------------------------
+
+  function make(tag, properties, ...children) {
+    const element = Object.assign(document.createElement(tag), properties);
+    element.append(...children);
+    return element;
+  }
+
+  function minus(text) { return text.replace("-", "−"); }
+
+  // Text of a cell and what it is sorted by, as the page has them in a short table.
+  const columns = [
+    function (i) { return [data.table.detectors[data.table.detector[i]]]; },
+    function (i) { return [data.table.places[data.table.place[i]][0]]; },
+    function (i) { return [minus(seconds(data.events[i][0])), data.events[i][0]]; },
+    function (i) { return [minus(seconds(data.events[i][1])), data.events[i][1]]; },
+    function (i) { const d = data.events[i][1] - data.events[i][0]; return [minus(seconds(d)), d]; },
+    function (i) { return [data.table.severities[data.table.severity[i]]]; },
+    function (i) { return [data.table.peak[i], data.table.ratio[i]]; },
+    function (i) { return [data.table.speed[i] < 0 ? "–" : data.table.speed[i].toFixed(0), data.table.speed[i]]; },
+    function (i) { return [data.table.evidence[i]]; },
+  ];
+
+  function eventRow(i) {
+    const line = make("tr", { tabIndex: 0 });
+    line.dataset.event = i;
+    line.setAttribute("aria-selected", String(i === selected));
+    columns.forEach(function (column, c) {
+      const text = column(i)[0], colour = c === 1 ? data.table.places[data.table.place[i]][1] : "";
+      const isNumber = eventTable.tHead.rows[0].cells[c].classList.contains("num");
+      const cell = make("td", { className: isNumber ? "num" : c === 8 ? "wide" : "" });
+      if (colour) cell.append(make("i", { className: "dot" }));
+      if (colour) cell.firstChild.style.background = colour;
+      cell.append(c === 5 ? make("span", { className: "tag " + (text === "full" ? "full" : "partial"), textContent: text }) : text);
+      line.append(cell);
+    });
+    return line;
+  }
+
+  function fillEvents(first, most) {
+    const count = long.order.length, part = long.order.slice(first, first + (most || PAGE));
+    long.first = first;
+    eventBody.replaceChildren(...part.map(eventRow));
+    eventTable.parentNode.scrollTop = 0;
+    document.getElementById("event-count").textContent = count
+      ? `${first + 1}–${first + part.length} of ${count}` + (count < data.events.length ? ` found among ${data.events.length}` : "")
+      : "no event";
+    document.getElementById("event-back").disabled = first === 0;
+    document.getElementById("event-on").disabled = first + part.length >= count;
+  }
+
+  function orderEvents() {
+    const words = document.getElementById("event-search").value.trim().toLowerCase().split(/\s+/);
+    long.words = long.words || data.events.map(function (_, i) {
+      return columns.map(function (column) { return column(i)[0]; }).join(" ").toLowerCase();
+    });
+    const found = data.events.map(function (_, i) { return i; }).filter(function (i) {
+      return words.every(function (word) { return long.words[i].includes(word); });
+    });
+    const heads = Array.from(eventTable.tHead.rows[0].cells);
+    const column = heads.findIndex(function (head) { return head.hasAttribute("aria-sort"); });
+    if (column >= 0) {
+      const sign = heads[column].getAttribute("aria-sort") === "ascending" ? 1 : -1;
+      const keys = data.events.map(function (_, i) { const c = columns[column](i); return c.length > 1 ? c[1] : c[0]; });
+      const compare = heads[column].classList.contains("num")
+        ? function (p, q) { return keys[p] - keys[q]; } : function (p, q) { return collator.compare(keys[p], keys[q]); };
+      found.sort(function (p, q) { return sign * compare(p, q); });
+    }
+    long.order = found;
+    fillEvents(0);
+  }
+
+  if (long) {
+    document.getElementById("event-search").addEventListener("input", orderEvents);
+    document.getElementById("event-back").addEventListener("click", function () { fillEvents(long.first - PAGE); });
+    document.getElementById("event-on").addEventListener("click", function () { fillEvents(long.first + PAGE); });
+    document.getElementById("event-controls").hidden = false;
+    fillEvents(0);
+    let first = 0;
+    window.addEventListener("beforeprint", function () { first = long.first; fillEvents(0, Infinity); });
+    window.addEventListener("afterprint", function () { fillEvents(first); });
+  }
+
   // --- sorting ------------------------------------------------------------------------------------------------
 
   function sortBy(table, head, column) {
     const down = head.getAttribute("aria-sort") === "ascending";
+    for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    if (long && table === eventTable) { orderEvents(); return; }
     const body = table.tBodies[0];
     const key = function (row) { return row.cells[column].dataset.key; };
     const isNumber = head.classList.contains("num");
     const sorted = Array.from(body.rows).sort(function (p, q) {
-      const order = isNumber ? Number(key(p)) - Number(key(q)) : key(p).localeCompare(key(q), "en");
+      const order = isNumber ? Number(key(p)) - Number(key(q)) : collator.compare(key(p), key(q));
       return down ? -order : order;
     });
-    for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
-    head.setAttribute("aria-sort", down ? "descending" : "ascending");
-    body.append.apply(body, sorted);
+    body.append(...sorted);
   }
 
   for (const table of document.querySelectorAll("table.sortable")) {
@@ -240,7 +418,7 @@
     });
   }
 
-  if (!plot) return;
+  if (!plot) { document.body.dataset.ready = "true"; return; }
 
   // --- colours ------------------------------------------------------------------------------------------------
 
@@ -268,12 +446,21 @@
     shapes = figure.layout.shapes;
     if (width) figure.layout.width = width;
     figure.data.forEach(function (trace) { trace.visible = !hidden.has(trace.legendgroup); });
+    tellView();
+    const [change, layout] = contents(view);
+    change.forEach(function (values, i) { Object.assign(figure.data[i], values); });
+    for (const axis of Object.keys(held)) layout[axis + ".range"] = plot.layout[axis].range.slice();
+    for (const [key, value] of Object.entries(layout)) {
+      const [axis, range] = key.split(".");
+      if (range) figure.layout[axis].range = value;
+      else figure.layout[axis] = value;
+    }
     const config = {
       displaylogo: false, responsive: true, doubleClick: false, showTips: false, plotlyServerURL: "",
       showSendToCloud: false, showEditInChartStudio: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
-    return Plotly.react(plot, figure.data, figure.layout, config).then(function () { return draw(view); });
+    return Plotly.react(plot, figure.data, figure.layout, config);
   }
 
   for (const button of document.querySelectorAll(".toggle")) {
@@ -281,9 +468,7 @@
       const group = button.dataset.group, show = hidden.has(group);
       if (show) hidden.delete(group); else hidden.add(group);
       button.setAttribute("aria-pressed", String(show));
-      const indices = [];
-      data.figure.data.forEach(function (trace, i) { if (trace.legendgroup === group) indices.push(i); });
-      Plotly.restyle(plot, { visible: show }, indices).then(function () { draw(view); });
+      draw(view);
     });
   }
   document.getElementById("show-all").addEventListener("click", showAll);
@@ -295,7 +480,7 @@
   build().then(function () {
     plot.on("plotly_relayout", onRelayout);
     plot.on("plotly_doubleclick", showAll);
-    plot.dataset.ready = "true";
+    plot.dataset.ready = document.body.dataset.ready = "true";
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { build(); });
   window.addEventListener("beforeprint", function () { build(PRINT_WIDTH); });

@@ -1,0 +1,273 @@
+"""A command in a process of its own, watched by the one that was called.
+
+Logs are read by native libraries. One that crashes, never comes back, or takes memory without end ends the process
+that works, not the one that watches: it says which log it was and starts the work again, which then finds that this
+log cannot be read and goes on as it does with any such log. The process is forked when a command begins to work, before
+anything heavy is imported, so that `--help` costs nothing and a command a few milliseconds.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
+
+if TYPE_CHECKING:
+    from aqualog.cli.board import Board
+    from aqualog.io.in_hand import InHand
+    from aqualog.io.limits import ReadLimits
+
+__all__ = ["apart", "ask"]
+
+_TICK_S = 0.25
+_GRACE_S = 1.2  # after an interrupt, for a reader to come back to Python
+_MOST_REFUSED = 20  # each costs another beginning
+_SWITCH = "AQUALOG_LIMITS"
+_FAILED, _INTERRUPTED = 1, 130
+_TWICE_S = 0.5  # signals within are one request: a shell and a terminal may both send one
+_DEAD_S = 5.0  # a process that a dead disk holds cannot be killed, and is not waited for
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
+
+_asked = False
+
+
+def ask() -> None:
+    """Let the command that this process was started for work apart."""
+    global _asked
+    _asked = True
+
+
+@contextmanager
+def apart(*, debug: bool) -> Iterator[None]:
+    """Work within the block in a process of its own; the process that was called never leaves it.
+
+    Without `ask`, where the system has no means, or with AQUALOG_LIMITS=off, the work is done here.
+
+    Raises
+    ------
+    ConfigError
+        If a limit is no number.
+    """
+    global _asked
+    asked, _asked = _asked, False
+    if not asked or os.environ.get(_SWITCH, "").strip().lower() == "off" or not _is_possible():
+        yield
+        return
+    from aqualog.io.limits import limits_from
+
+    board = _worker(limits_from(os.environ), debug=debug)
+    try:
+        yield
+    finally:
+        board.finish()
+
+
+def _is_possible() -> bool:
+    from threading import active_count
+
+    return all(hasattr(os, n) for n in ("fork", "wait4")) and hasattr(signal, "sigtimedwait") and active_count() == 1
+
+
+class _End(NamedTuple):
+    """How a worker has ended: exit code, or minus the signal; what it had in hand; seconds if it was too slow."""
+
+    code: int
+    held: InHand
+    seconds: float = 0.0
+    is_interrupted: bool = False
+
+
+def _worker(limits: ReadLimits, *, debug: bool) -> Board:
+    """Returns in the worker only."""
+    from aqualog.cli.board import Board
+
+    board = Board()
+    scratch = _Scratch()
+    refused: dict[str, str] = {}
+    waited = {getattr(signal, n) for n in _ENDING}
+    waited = {s for s in waited if signal.getsignal(s) is not signal.SIG_IGN} | {signal.SIGCHLD}
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    while True:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        board.clear()
+        scratch.make()
+        me = os.getpid()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+        worker = os.fork()
+        if worker == 0:
+            _begin(me, limits, board, refused, debug=debug)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            return board
+        end = _watch(worker, board, waited)
+        scratch.remove()
+        _clear_away(end.held)
+        if end.is_interrupted:
+            has_told = end.code == _INTERRUPTED or board.is_finished
+            _leave(_INTERRUPTED, "" if has_told else "interrupted")
+        if board.is_finished or not end.held.log:
+            _leave(*_last_word(end, is_finished=board.is_finished))
+        why = _why(end, limits)
+        path = os.path.abspath(end.held.log)  # noqa: PTH100 - links are not followed
+        if path in refused or len(refused) == _MOST_REFUSED:
+            _leave(_FAILED, f"error: {end.held.log}: {why}, as {len(refused)} logs before; no more are tried")
+        refused[path] = why
+
+
+def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str], *, debug: bool) -> None:
+    """Set the worker up."""
+    import resource
+
+    from aqualog.io.in_hand import bound_memory, watched_by
+
+    _die_with(parent)
+    _, hard = resource.getrlimit(resource.RLIMIT_CORE)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, hard))  # as large as the memory, and with the log in it
+    if most := limits.memory_here():
+        bound_memory(most)
+    if debug:
+        import faulthandler
+
+        faulthandler.enable()
+    else:
+        os.environ["RUST_BACKTRACE"] = "0"  # a hundred lines of it would hide the one that says which log it was
+    watched_by(board.tell, limits, refused)
+
+
+def _die_with(parent: int) -> None:
+    """End when the parent does, even when it is killed and this process hangs in a library."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        os._exit(_FAILED)
+
+
+def _watch(worker: int, board: Board, waited: set[signal.Signals]) -> _End:
+    """Wait for the worker, pass signals on, end one that hangs."""
+    interrupts, asked = 0, -math.inf
+    step, spent, too_long = -1, 0.0, 0.0
+    killed = math.inf
+    then = time.monotonic()
+    while True:
+        told = signal.sigtimedwait(waited, _TICK_S)
+        now = time.monotonic()
+        # a tick that lasted long was a machine asleep, or a job that was stopped
+        tick, then = min(now - then, 4.0 * _TICK_S), now
+        done, status, _ = os.wait4(worker, os.WNOHANG)
+        held = board.read()
+        if done or now - killed > _DEAD_S:
+            code = os.waitstatus_to_exitcode(status) if done else -signal.SIGKILL
+            is_whole = board.is_finished and code >= 0
+            return _End(code, held, too_long, code == _INTERRUPTED or bool(interrupts and not is_whole))
+        if told is not None and told.si_signo != signal.SIGCHLD:
+            if now - asked > _TWICE_S:
+                interrupts, asked = interrupts + 1, now
+            if told.si_code <= 0:  # sent by a process; a terminal's reaches the worker by itself
+                os.kill(worker, told.si_signo)
+        spent = spent + tick if held.step == step else 0.0
+        step = held.step
+        if held.log and 0.0 < held.seconds < spent:
+            too_long = held.seconds
+        # a batch finishes the logs that it has in work; a library that does not come back is not waited for
+        is_deaf = interrupts > 0 and now - asked > _GRACE_S and (bool(held.log) or interrupts > 1)
+        if (is_deaf or too_long) and killed == math.inf and not board.is_finished:
+            killed = now
+            os.kill(worker, signal.SIGKILL)
+
+
+def _why(end: _End, limits: ReadLimits) -> str:
+    """Why a log cannot be read, in one line."""
+    size = end.held.size
+    if end.seconds:
+        return f"reading it took longer than {end.seconds:g} s. Try: a higher AQUALOG_LIMIT_S"
+    if end.code == -signal.SIGXCPU:
+        most = limits.cpu_for(size)
+        return f"reading it took more than {most:g} s of processor time. Try: a higher AQUALOG_LIMIT_CPU_S"
+    if end.code == -signal.SIGXFSZ:
+        most = limits.file_for(size) // 1_000_000
+        return f"reading it writes a file of more than {most} MB. Try: a higher AQUALOG_LIMIT_FILE_MB"
+    return f"reading it ended the process ({_how(end.code, limits)})"
+
+
+def _how(code: int, limits: ReadLimits) -> str:
+    if code >= 0:
+        return f"exit code {code}: a reading library gave up"
+    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    if code == -signal.SIGKILL:
+        return f"{name}: by the system, when memory is short, or by hand"
+    if code == -signal.SIGABRT and (most := limits.memory_here()):
+        return f"{name}: more memory than the {most // 1_000_000} MB of AQUALOG_LIMIT_MB, or a fault of a library"
+    return f"{name}: a fault of a library that reads it"
+
+
+def _last_word(end: _End, *, is_finished: bool) -> tuple[int, str]:
+    """Exit code, and what is to be said of a worker that no log has ended."""
+    if is_finished and end.code >= 0:
+        return end.code, ""
+    how = f"exit code {end.code}" if end.code >= 0 else signal.Signals(-end.code).name
+    when = "after its work" if is_finished else "while it read no log"
+    return _FAILED, f"error: aqualog's process ended by itself, {when} ({how}). Try: --debug, and report it"
+
+
+def _leave(code: int, text: str) -> NoReturn:
+    """End here: what the interpreter does at its end, the worker has done."""
+    if text:
+        with suppress(OSError, ValueError):
+            if sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
+                sys.stderr.write("\r\x1b[K")  # a line of progress that stayed
+            sys.stderr.write("".join(c if c.isprintable() else "\ufffd" for c in text) + "\n")
+            sys.stderr.flush()
+    os._exit(code)
+
+
+def _clear_away(held: InHand) -> None:
+    """Remove what the worker has not finished."""
+    import shutil
+
+    for name in held.temporary:
+        path = Path(name)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+class _Scratch:
+    """A folder for temporary files of the worker and its libraries, so that none outlives it."""
+
+    def __init__(self) -> None:
+        self._base = os.environ.get("TMPDIR") or "/tmp"
+        self._folder: Path | None = None
+
+    def make(self) -> None:
+        """Make it, if that can be done, and let TMPDIR name it."""
+        folder = Path(self._base).absolute() / f"aqualog-{os.getpid()}-{os.urandom(4).hex()}"
+        with suppress(OSError):
+            folder.mkdir(mode=0o700)
+            self._folder = folder
+            os.environ["TMPDIR"] = str(folder)
+            import tempfile
+
+            tempfile.tempdir = None  # it may remember the one before
+
+    def remove(self) -> None:
+        """Remove it with what is in it."""
+        if self._folder is None:
+            return
+        try:
+            self._folder.rmdir()
+        except OSError:
+            import shutil
+
+            shutil.rmtree(self._folder, ignore_errors=True)

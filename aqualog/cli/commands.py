@@ -1,0 +1,91 @@
+"""The commands by name. A module is imported when its command is asked for, not to list it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+__all__ = ["COMMANDS", "Command", "Commands"]
+
+
+class Command(NamedTuple):
+    """A command: the first paragraph of its help, and where it is.
+
+    `module` of `aqualog.cli` and `function` in it, or a `typer.Typer` with commands of its own; empty: both are named
+    as the command is. `runs_bare`: without arguments it does something else than to show its help.
+    """
+
+    line: str
+    module: str = ""
+    function: str = ""
+    runs_bare: bool = False
+
+    def load(self, name: str) -> Any:
+        """The function or the `typer.Typer` of the command of that name."""
+        own = name.replace("-", "_")
+        return getattr(import_module(f"aqualog.cli.{self.module or own}"), self.function or own)
+
+
+COMMANDS = {
+    "detect": Command("Detect aquaplaning in one drive."),
+    "inspect": Command(
+        "List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix."
+    ),
+    "doctor": Command("Tell what is wrong with a log, what was lost of it, and what to do."),
+    "convert": Command("Write the aligned signals of one drive as one log, in SI units and with canonical names."),
+    "align": Command(
+        "Find the clock offset (and drift) between sources from a quantity that both carry.", module="clock"
+    ),
+    "slip-slope": Command(
+        "Tell the slip slope C_s/F_z of each driven wheel, how sure it is, and whether it stayed the same."
+    ),
+    "batch": Command("Run every log of a campaign through the detectors and keep the results."),
+    "plan": Command("Tell what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),
+    "bin-slipslope": Command("Slip slope over speed for each configuration, and the speed of full aquaplaning."),
+    "bin-resistance": Command("Mean resistance measure over speed for each configuration."),
+    "report": Command(
+        "Make the page of a campaign: quality, test matrix, slip slope and resistance over speed, detections, all runs."
+    ),
+    "calibrate": Command(
+        "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be told."
+    ),
+    "diagnose": Command(
+        "Say what the simulation gets wrong on measured drives: the cause, its size, how sure, and what it gains."
+    ),
+    "evaluate": Command(
+        "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."
+    ),
+    "simulate": Command("Simulate one drive of a scenario file, or the drives of a measuring campaign."),
+    "figures": Command("Make figures of the thesis again, from runs, with what they say about its claims."),
+    "reproduce": Command("Reproduce the thesis: simulate its campaign, run everything, and judge each of its claims."),
+    "cache": Command("Show or empty the folder in which aligned signals are kept.", runs_bare=True),
+    "campaign": Command("Campaign files: many drives in known configurations.", function="campaign_app"),
+}
+
+
+class Commands(TyperGroup):
+    """The group of all commands: each is its line of help until it is asked for."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = {n: TyperCommand(n, help=c.line) for n, c in COMMANDS.items()} | dict(self.commands)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the arguments begin with."""
+        name = args[0]
+        if name in COMMANDS:
+            self.commands[name] = _made(name, COMMANDS[name])
+        return super().resolve_command(ctx, args)
+
+
+def _made(name: str, command: Command) -> Any:
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    target = command.load(name)
+    if isinstance(target, typer.Typer):
+        app.add_typer(target, name=name)
+        return typer.main.get_group(app).commands[name]
+    app.command(name, no_args_is_help=not command.runs_bare)(target)
+    return typer.main.get_command(app)

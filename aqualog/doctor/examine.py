@@ -1,0 +1,111 @@
+"""Examine the files of one drive: each by itself, then the drive as `detect` would see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from aqualog.align.load import load_signals, read_options
+from aqualog.align.mapping import SignalMap
+from aqualog.align.overview import find_mounting, overview
+from aqualog.detect.stream import detect_drive
+from aqualog.doctor.channels import channel_findings
+from aqualog.doctor.records import Examination, FileState, Finding
+from aqualog.errors import AqualogError
+from aqualog.io.base import ReadOptions
+from aqualog.io.open_log import open_log
+from aqualog.types import FileFaults
+from aqualog.vehicle import Vehicle
+
+__all__ = ["examine"]
+
+_DETECTORS = ("spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
+              "joint_cusum")  # fmt: skip
+
+
+def examine(
+    paths: Sequence[Path],
+    *,
+    vehicle: Vehicle,
+    signal_map: SignalMap,
+    dbc: Sequence[Path] = (),
+    report: Callable[[str], None] = lambda _: None,
+) -> Examination:
+    """Look at everything that the files of one drive hold.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of one drive.
+    vehicle : Vehicle
+    signal_map : SignalMap
+    dbc : sequence of Path
+        Databases for raw CAN frames.
+    report : callable
+        Told what is being done.
+
+    A file that cannot be read is a finding and no error, as is a drive without signals.
+    """
+    files, findings = [], []
+    for path in paths:
+        report(f"reading {path.name}")
+        state, own = _file(path, read_options(signal_map, dbc))
+        files.append(state)
+        findings += own
+    if any(f.level == "unreadable" for f in findings):
+        return Examination(tuple(files), tuple(findings))
+    report("looking at the drive")
+    try:
+        signals = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
+        result = detect_drive(signals, vehicle)
+    except AqualogError as error:
+        whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
+        return Examination(tuple(files), (*findings, whole), (), tuple((d, ()) for d in _DETECTORS))
+    findings += _of_signals(findings, [*signals.quality.notes, *result.notes])
+    missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
+    lacking = {u.detector for u in result.unavailable}
+    return Examination(tuple(files), tuple(findings), tuple(d for d in _DETECTORS if d not in lacking), missing)
+
+
+def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding]]:
+    """State of one file, and what is wrong with it."""
+    size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
+    try:
+        with open_log(path, options) as reader:
+            channels = reader.read(reader.channels())
+            kind, faults = reader.format, reader.faults
+    except AqualogError as error:
+        # the line names the file itself
+        what = error.what + (f"; expected {error.expected}" if error.expected else "")
+        return FileState(path.name, "", size), [Finding("unreadable", "unreadable", path.name, "", what, error.hint)]
+    origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
+    end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
+    found = [overview(c, origin_ns=origin) for c in channels]
+    samples = sum(c.values.size for c in channels)
+    state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
+    findings = [*_of_file(path.name, faults), *channel_findings(found, channels)]
+    findings += [Finding("doubt", "mounting", path.name, "", text) for text in find_mounting(found)]
+    if not channels:
+        findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
+    return state, findings
+
+
+def _of_file(name: str, faults: FileFaults) -> Iterator[Finding]:
+    if faults.truncated:
+        advice = "record again if the end matters; a logger that loses power needs a buffered supply"
+        yield Finding("lost", "truncated", name, "", "is cut off: its end is missing", advice)
+    if faults.lost_samples:
+        what = f"{faults.lost_samples} samples could not be read"
+        yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",
+                      faults.lost_samples)  # fmt: skip
+    is_lossy = faults.truncated or faults.lost_samples > 0
+    for note in faults.notes:
+        yield Finding("lost" if is_lossy else "doubt", "note", name, "", note.removeprefix(f"{name}: "))
+
+
+def _of_signals(before: Sequence[Finding], notes: Sequence[str]) -> Iterator[Finding]:
+    """What is told of a drive beyond what its files told."""
+    told = {f.what for f in before}
+    for note in dict.fromkeys(notes):
+        if not any(what in note for what in told) and "time stamps:" not in note:
+            yield Finding("lost" if "left out" in note else "doubt", "signal", "", "", note)

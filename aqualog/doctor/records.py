@@ -1,0 +1,59 @@
+"""What an examination finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Examination", "FileState", "Finding", "Level"]
+
+Level = Literal["unreadable", "lost", "mended", "doubt"]
+"""`unreadable`: nothing could be read; `lost`: samples are gone or not used; `mended`: a fault of the time stamps was
+undone; `doubt`: nothing is lost, but somebody should look."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong. `count` of `of` samples (0, 0: does not apply); `channel` empty for the whole file."""
+
+    level: Level
+    kind: str
+    file: str
+    channel: str
+    what: str
+    advice: str = ""
+    count: int = 0
+    of: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """One file: its format (empty if unreadable), size [bytes], channels and samples read, and over which time [s]."""
+
+    file: str
+    format: str
+    size: int
+    channels: int = 0
+    samples: int = 0
+    start_s: float | None = None
+    end_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """Everything that was found in the files of one drive; `missing` are signals that a detector lacks, by detector."""
+
+    files: tuple[FileState, ...]
+    findings: tuple[Finding, ...]
+    ready: tuple[str, ...] = ()
+    missing: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    @property
+    def is_unreadable(self) -> bool:
+        """Whether nothing of the drive could be read."""
+        return all(not f.format for f in self.files)
+
+    @property
+    def has_loss(self) -> bool:
+        """Whether data was lost."""
+        return any(f.level in ("lost", "unreadable") for f in self.findings)

@@ -1,0 +1,320 @@
+"""A log that crashes its reader, hangs, or takes without end costs that log, and nobody else."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from aqualog.cli.board import Board
+from aqualog.errors import AqualogError, ConfigError, LogError
+from aqualog.io import in_hand
+from aqualog.io.in_hand import InHand, reading, unfinished, watched_by
+from aqualog.io.limits import ReadLimits, _group_limits, limits_from, machine_memory
+from aqualog.workers import Crashed, Limits, work_on
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "sigtimedwait"), reason="commands work in one process here")
+
+HOSTILE = """
+import collections, ctypes, itertools, os, sys, tempfile, time
+from pathlib import Path
+import aqualog.io.open_log as opening
+from aqualog.io.in_hand import unfinished
+csv = opening._READERS["csv"]
+
+def write(path):
+    with tempfile.NamedTemporaryFile() as file:
+        while True:
+            file.write(bytes(1_000_000))
+
+def crash(path):
+    tempfile.mkstemp()
+    path.with_suffix(".tmp").touch()
+    with unfinished(path.with_suffix(".tmp")):
+        ctypes.string_at(0)
+
+def consume(path):
+    collections.deque(itertools.repeat(0), maxlen=0)  # in C, with the interpreter's lock held, deaf to signals
+
+ACTS = {
+    "crash": crash, "leave": lambda p: os._exit(0), "hang": consume, "sleep": lambda p: time.sleep(60), "spin": consume,
+    "memory": lambda p: [bytearray(50_000_000) for _ in range(10**6)], "write": write,
+}
+
+def bad(path, options):
+    act = ACTS.get(path.stem)
+    if act:
+        sys.stderr.write(f"READY {os.getpid()}\\n")
+        sys.stderr.flush()
+        act(path)
+    return csv(path, options)
+
+opening._READERS["csv"] = bad
+"""
+LOOK = """
+import json
+from typing import Annotated
+import typer
+from aqualog.cli import main
+from aqualog.errors import AqualogError
+from aqualog.io.open_log import open_log
+
+app = typer.Typer()
+
+@app.command()
+def look(logs: list[str]):
+    from aqualog.cli.console import guarded
+    done, failed = [], []
+    with guarded(debug=False):
+        for name in logs:
+            try:
+                with open_log(Path(name)) as log:
+                    done.append(log.format)
+            except AqualogError as error:
+                failed.append(error.line())
+        sys.stderr.writelines(f"error: {line}\\n" for line in failed)
+        sys.stdout.write(json.dumps(done))
+    raise typer.Exit(3 if len(done) < len(logs) else 0)
+
+main.app = app
+main.run()
+"""
+REAL = "from aqualog.cli.main import run\nrun()\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("good", "good2", "crash", "leave", "hang", "sleep", "spin", "memory", "write"):
+        (tmp_path / f"{name}.csv").write_text("t [s],v_x [m/s]\n0,1\n1,2\n")
+    (tmp_path / "tmp").mkdir()
+    return tmp_path
+
+
+def started(folder, *arguments, code=LOOK, **limits):
+    env = {**os.environ, "TMPDIR": str(folder / "tmp"), **{f"AQUALOG_LIMIT_{k}": str(v) for k, v in limits.items()}}
+    return subprocess.Popen(
+        [sys.executable, "-c", HOSTILE + code, *arguments], cwd=folder, text=True, env=env, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def ended(process, within=30.0):
+    out, err = process.communicate(timeout=within)
+    return process.returncode, out, [line for line in err.splitlines() if not line.startswith("READY")]
+
+
+LINES = {
+    "crash": "reading it ended the process (SIGSEGV: a fault of a library that reads it)",
+    "leave": "reading it ended the process (exit code 0: a reading library gave up)",
+    "hang": "reading it took longer than 3 s. Try: a higher AQUALOG_LIMIT_S",
+    "spin": "reading it took more than 0.1 s of processor time. Try: a higher AQUALOG_LIMIT_CPU_S",
+    "memory": "reading it takes more memory than the 500 MB that it may have. "
+    "Try: a higher AQUALOG_LIMIT_MB (--limit-mb of a batch)",
+    "write": "reading it writes a file of more than 5 MB. Try: a higher AQUALOG_LIMIT_FILE_MB",
+}
+LIMIT = {"hang": {"S": 3}, "spin": {"CPU_S": 0.1}, "memory": {"MB": 500}, "write": {"FILE_MB": 5}}
+
+
+@pytest.mark.parametrize(
+    "kind", ["crash", "hang", "write", *(pytest.param(k, marks=pytest.mark.long) for k in ("memory", "spin"))]
+)
+def test_one_bad_log_is_one_line_and_the_others_are_read(folder, kind):
+    code, out, lines = ended(started(folder, "good.csv", f"{kind}.csv", "good2.csv", **LIMIT.get(kind, {})))
+    assert lines == [f"error: {kind}.csv: {LINES[kind]}"]
+    assert json.loads(out) == ["csv", "csv"]
+    assert code == 3
+    assert not list((folder / "tmp").iterdir())
+    assert not list(folder.glob("*.tmp"))
+
+
+def test_several_bad_logs_and_no_core(folder):
+    code, out, lines = ended(started(folder, "crash.csv", "good.csv", "leave.csv"))
+    assert [line.split(":")[1] for line in lines] == [" crash.csv", " leave.csv"]
+    assert (code, json.loads(out)) == (3, ["csv"])
+    assert not list(folder.glob("core*"))
+
+
+def test_a_command_on_one_log_that_crashes_it_fails(folder):
+    code, out, lines = ended(started(folder, "inspect", "crash.csv", "--json", code=REAL))
+    assert (code, out, lines) == (1, "", [f"error: crash.csv: {LINES['crash']}"])
+
+
+@pytest.mark.long
+def test_a_command_on_many_logs_one_of_which_crashes_it_goes_on(folder):
+    (folder / "logs").mkdir()
+    for name in ("good", "crash"):
+        shutil.copy(folder / f"{name}.csv", folder / "logs")
+    code, out, lines = ended(started(folder, "campaign", "init", "logs", "--json", code=REAL))
+    document = json.loads(out)
+    assert document["left_out"] == {"crash.csv": LINES["crash"]}
+    assert len(document["drives"]) == 2  # the broken one stays as a run that fails
+    assert (code, lines) == (3, [])
+
+
+def gone(number):
+    for _ in range(100):
+        try:
+            state = Path(f"/proc/{number}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        if state == "Z":  # a process whose parent was killed waits for init
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.parametrize(
+    ("kind", "to_all"),
+    [("sleep", False), ("sleep", True), ("hang", False), pytest.param("hang", True, marks=pytest.mark.long)],
+)
+def test_an_interrupt_ends_both_at_once(folder, kind, to_all):
+    """Also while a library does not come back; the group gets it as from a terminal, once more than needed."""
+    process = started(folder, f"{kind}.csv", "crash.csv")
+    worker = int(process.stderr.readline().split()[1])
+    began = time.monotonic()
+    (os.killpg if to_all else os.kill)(process.pid, signal.SIGINT)
+    code, out, lines = ended(process)
+    assert time.monotonic() - began < 4.0  # 2 s, and what a busy machine adds
+    assert (code, out, lines) == (130, "", ["interrupted"])
+    assert gone(worker)
+    assert not list((folder / "tmp").iterdir())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only there a process is told of its parent's end")
+def test_a_command_that_is_killed_leaves_no_worker(folder):
+    process = started(folder, "hang.csv")
+    worker = int(process.stderr.readline().split()[1])
+    assert worker != process.pid
+    process.kill()
+    process.communicate(timeout=20)
+    assert gone(worker)
+
+
+def test_switched_off_a_command_works_in_the_process_that_was_called(folder, monkeypatch):
+    monkeypatch.setenv("AQUALOG_LIMITS", "off")
+    process = started(folder, "crash.csv")
+    assert int(process.stderr.readline().split()[1]) == process.pid
+    assert ended(process)[0] == -signal.SIGSEGV
+
+
+# --- in a batch -------------------------------------------------------------------------------------------------------
+
+
+def read_badly(path, kind):
+    acts = {"hang": lambda: time.sleep(60), "write": write_on}
+    try:
+        with reading(Path(path)):
+            acts.get(kind, int)()
+    except AqualogError as error:
+        return error.line()
+    return kind
+
+
+def write_on(path="endless"):
+    with open(path, "wb") as file:  # noqa: PTH123
+        while True:
+            file.write(bytes(1_000_000))
+
+
+def test_workers_of_a_batch_have_the_same_limits(tmp_path, monkeypatch):
+    """`--limit-s` is not given: a step of reading has its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("AQUALOG_LIMIT_S", "3")
+    monkeypatch.setenv("AQUALOG_LIMIT_FILE_MB", "5")
+    found = {}
+    work_on({k: ("a", k) for k in ("hang", "write", "y")}, read_badly, jobs=1, record=found.__setitem__)
+    assert found["y"] == "y"
+    assert isinstance(found["hang"], Crashed)
+    assert found["hang"].seconds >= 3.0
+    assert found["write"] == f"a: {LINES['write']}"
+
+
+def test_the_limit_of_an_item_stands_in_for_that_of_reading(tmp_path, monkeypatch):
+    monkeypatch.setenv("AQUALOG_LIMIT_S", "0.1")
+    found = {}
+    work_on({"a": (str(tmp_path),)}, slow_read, jobs=1, record=found.__setitem__, limits=Limits(seconds=30.0))
+    assert found == {"a": "read"}
+
+
+def slow_read(path):
+    with reading(Path(path)):
+        time.sleep(0.5)
+    return "read"
+
+
+# --- the parts --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What a watcher of this process is told; nobody watches afterwards."""
+    monkeypatch.setattr(in_hand, "_watch", None)
+    monkeypatch.setattr(in_hand, "_held", InHand())
+    return []
+
+
+def test_what_is_in_hand_is_told(told, tmp_path):
+    log = tmp_path / "a.csv"
+    log.write_bytes(bytes(2_000_000))
+    with reading(log), unfinished(log):
+        pass
+    watched_by(told.append, ReadLimits(), {str(tmp_path / "b.csv"): "crashed"})
+    with unfinished(tmp_path / "x"), reading(log):
+        pass
+    with pytest.raises(LogError, match=r"b\.csv: crashed"), reading(tmp_path / "b.csv"):
+        pass
+    held = list(told)
+    told.clear()
+    with pytest.raises(AqualogError, match=r"a\.csv: its reader failed \(IndexError: x\)"), reading(log):
+        raise IndexError("x")
+    assert told[-1].log == ""
+    temporary = (str(tmp_path / "x"),)
+    assert held == [
+        InHand(temporary=temporary), InHand(str(log), 310.0, 2_000_000, 1, temporary),
+        InHand(step=2, temporary=temporary), InHand(step=2),
+    ]  # fmt: skip
+
+
+def test_the_board_tells_what_was_written_last_and_believes_no_nonsense():
+    board = Board()
+    assert board.read() == InHand()
+    held = InHand("/a b/ü\udcff.csv", 12.5, 3, 7, ("/tmp/x",))
+    board.tell(held)
+    assert board.read() == held
+    board._page[1:5] = b"\xff" * 4
+    assert board.read() == held
+    board.tell(held._replace(temporary=("x" * 5000,) * 20))
+    assert board.read() == held._replace(temporary=())
+    assert not board.is_finished
+    board.finish()
+    board.tell(held)
+    assert board.is_finished
+
+
+def test_limits_are_named_by_variables():
+    limits = limits_from({"AQUALOG_LIMIT_S": "5", "AQUALOG_LIMIT_MB": "0", "AQUALOG_LIMIT_FILE_MB": "1.5"})
+    assert limits == ReadLimits(wall_s=5.0, memory=0, file=1_500_000)
+    assert (limits.wall_for(10**9), limits.memory_here(), limits.file_for(10**9)) == (5.0, 0, 1_500_000)
+    # 100 h of MF4, 4.6 GB, are read in 4 min and 0.7 GB
+    assert ReadLimits().wall_for(4_600_000_000) > 3600.0
+    assert ReadLimits().memory_here() >= min(2_000_000_000, machine_memory())
+    for text in ("x", "-1", "nan", "inf"):
+        with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_CPU_S: is .* expected a number of seconds"):
+            limits_from({"AQUALOG_LIMIT_CPU_S": text})
+
+
+def test_memory_of_a_control_group(tmp_path):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "memory" / "c").mkdir(parents=True)
+    (tmp_path / "a" / "memory.max").write_text("5000\n")
+    (tmp_path / "a" / "b" / "memory.max").write_text("max\n")
+    (tmp_path / "memory" / "c" / "memory.limit_in_bytes").write_text("7000\n")
+    groups = tmp_path / "groups"
+    groups.write_text("3:cpu,memory:/c\n1:name=x:/\n0::/a/b\nnonsense\n")
+    assert sorted(_group_limits(groups, tmp_path)) == [5000, 7000]
+    assert _group_limits(tmp_path / "none", tmp_path) == []

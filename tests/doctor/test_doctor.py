@@ -1,0 +1,138 @@
+"""What `aqualog doctor` finds in sound and in damaged logs."""
+
+import json
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from aqualog.align.mapping import SignalMap
+from aqualog.cli.main import app
+from aqualog.config.vehicle import load_vehicle
+from aqualog.doctor.channels import frozen_longest
+from aqualog.doctor.examine import examine
+from aqualog.types import Channel, ChannelInfo
+
+SAMPLES = ROOT / "sample_logs"
+CAR = load_vehicle(SAMPLES / "vehicle.toml")
+
+
+def table(rows, header="t [s],omega_fl [rad/s],omega_fr [rad/s],v_x [m/s]"):
+    return "\n".join([header, *(",".join(f"{c:.6g}" for c in r) for r in rows)]) + "\n"
+
+
+def drive(n=3000):
+    rng = np.random.default_rng(1)
+    t = np.arange(n) * 0.01
+    v = 20.0 + np.sin(t) + rng.normal(0, 0.01, n)
+    return np.column_stack([t, v / 0.31, v / 0.31, v])
+
+
+def kinds(tmp_path, text):
+    path = tmp_path / "x.csv"
+    path.write_text(text)
+    found = examine([path], vehicle=CAR, signal_map=SignalMap())
+    return {(f.level, f.kind): f for f in found.findings}, found
+
+
+def test_sound_log():
+    found = examine([SAMPLES / "lane_drive.parquet"], vehicle=CAR, signal_map=SignalMap())
+    assert not found.has_loss
+    assert not [f for f in found.findings if f.kind in ("frozen", "code", "signal")]
+    assert set(found.ready) >= {"spin_down", "minor_spin_down", "resistance", "joint_cusum"}
+    assert dict(found.missing)["tie_rod"]
+
+
+def reset(x):
+    x[1500:, 0] -= 14.0
+    return x
+
+
+def wrapped(x):
+    x[:, 0] += 2**32 * 1e-6 - 12.0
+    x[1200:, 0] -= 2**32 * 1e-6
+    return x
+
+
+def doubled(x):
+    x[100:200, 0] = x[100, 0]
+    return x
+
+
+def swapped(x):
+    x[[700, 701]] = x[[701, 700]]
+    return x
+
+
+def pause(x):
+    x[2000:, 0] += 30.0
+    return x
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (reset, ("mended", "resets")),
+        (wrapped, ("mended", "wraps")),
+        (doubled, ("lost", "duplicates")),
+        (swapped, ("mended", "back_steps")),
+        (pause, ("doubt", "pauses")),
+    ],
+)
+def test_time_faults(change, expected, tmp_path):
+    found, _ = kinds(tmp_path, table(change(drive())))
+    assert expected in found
+    assert found[expected].what
+
+
+def test_values(tmp_path):
+    x = drive()
+    x[500:1900, 1] = x[500, 1]
+    x[10:20, 3] = np.nan
+    found, _ = kinds(tmp_path, table(x))
+    frozen = found["doubt", "frozen"]
+    assert (frozen.channel, frozen.file) == ("omega_fl", "x.csv")
+    assert "for 14 s (from 5 s)" in frozen.what
+    assert found["doubt", "not_finite"].count == 10
+
+
+def channel(values, step_s=0.1):
+    t_ns = np.arange(len(values), dtype=np.int64) * int(step_s * 1e9)
+    return Channel(ChannelInfo("x", "x", "", len(values), "x"), t_ns, np.asarray(values, dtype=float), False)
+
+
+def test_a_coarse_signal_and_a_car_at_rest_are_not_frozen():
+    noise = np.random.default_rng(0).normal(size=3000)
+    coarse = np.repeat(np.arange(10.0), 300)
+    at_rest = np.where(np.arange(3000) < 1000, 0.0, noise)
+    stuck = np.where((np.arange(3000) >= 1000) & (np.arange(3000) < 2000), 1.5, noise)
+    slow = np.where((np.arange(3000) // 20) % 2 == 0, 3.0 + np.arange(3000) // 40, noise)  # stops of 2 s all the time
+    slow[1000:1150] = 7.5
+    assert frozen_longest(channel(slow))[0] == 0.0
+    assert frozen_longest(channel(coarse))[0] == 0.0
+    assert frozen_longest(channel(at_rest))[0] == 0.0
+    assert frozen_longest(channel(stuck)) == pytest.approx((99.9, 100.0, 1.5))
+    assert frozen_longest(channel([]))[0] == 0.0
+    assert frozen_longest(channel([1.0]))[0] == 0.0
+
+
+@pytest.mark.parametrize(("keep", "code"), [(1.0, 0), (0.5, 3), (0.0, 1)], ids=["sound", "cut in half", "empty"])
+def test_exit_code_and_document(keep, code, tmp_path, capsys):
+    data = (SAMPLES / "lane_drive.csv").read_bytes()
+    path = tmp_path / "drive.csv"
+    path.write_bytes(data[: int(keep * len(data)) - (7 if 0 < keep < 1 else 0)])
+    with pytest.raises(SystemExit) as leave:
+        app(["doctor", str(path), "--signals", str(SAMPLES / "map_csv.toml"), "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert leave.value.code == code
+    assert document["healthy"] is (code == 0)
+    assert {f["level"] for f in document["findings"]} >= ({"unreadable"} if code == 1 else {"lost"} if code else set())
+
+
+def test_unknown_names_say_what_to_try(tmp_path, capsys):
+    path = tmp_path / "x.csv"
+    path.write_text(table(drive(), header="t [s],a,b,c"))
+    with pytest.raises(SystemExit) as leave:
+        app(["doctor", str(path)])
+    assert leave.value.code == 4
+    assert "--write-map" in capsys.readouterr().out
