@@ -1,0 +1,1 @@
+"""What aqualog is built on: versions and licences."""
