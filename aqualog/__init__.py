@@ -5,4 +5,4 @@ Nothing heavy is imported here: `import aqualog` must stay cheap.
 
 __all__ = ["__version__"]
 
-__version__ = "0.9.0"
+__version__ = "0.10.0"

@@ -11,6 +11,7 @@ from types import FunctionType
 from typing import Any
 
 from numba import config, njit
+from numba.core.runtime import rtsys
 
 from aqualog.places import user_cache
 
@@ -37,6 +38,7 @@ def compiled(function: Callable[..., Any]) -> Any:
         return njit(function, error_model="numpy", nogil=True)
     finally:
         config.CACHE_DIR = own
+    _load_lightly(dispatcher)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
         index._source_stamp = (index._source_stamp, _stamp(Path(function.__code__.co_filename).parent))
@@ -63,6 +65,24 @@ def inlined(function: Callable[..., Any]) -> Any:
         )  # the last ones have them
         _inlined[function] = njit(FunctionType(code, scope, function.__name__, defaults), error_model="numpy")
     return _inlined[function]
+
+
+def _load_lightly(dispatcher: Any) -> None:
+    """Let kept machine code be loaded without what only compiling needs.
+
+    numba fills its tables of implementations before it looks for kept code: a hundred modules, with SciPy where that
+    is installed, 0.3 s in each process. A function that must be compiled after all has them filled by the compiler.
+    """
+    kept: Any = getattr(dispatcher, "_cache", None)
+    if not hasattr(kept, "_load_overload") or not hasattr(kept, "_guard_against_spurious_io_errors"):
+        return  # numba's own attributes: without them, its own way holds
+
+    def load(signature: Any, target: Any) -> Any:
+        rtsys.initialize(target)  # what allocates arrays in compiled code
+        with kept._guard_against_spurious_io_errors():
+            return kept._load_overload(signature, target)
+
+    kept.load_overload = load
 
 
 @cache

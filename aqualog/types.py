@@ -91,14 +91,15 @@ class Origin:
     invalid_code: int = 0
     missing_fraction: float = 0.0
     faults: TimeFaults = field(default_factory=TimeFaults)
+    frozen: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
     """What was lost on the way from the files to the grid.
 
-    `dropped_samples` are all samples that were not used; `lost_in_files` those among them that a reader could not get
-    out of a damaged file.
+    `dropped_samples` are all samples that were not used; among them `lost_in_files` those that a reader could not get
+    out of a damaged file, `frozen_samples` those with which a sensor repeated itself.
     """
 
     dropped_samples: int = 0
@@ -107,6 +108,7 @@ class Quality:
     lost_in_files: int = 0
     faults: TimeFaults = field(default_factory=TimeFaults)
     notes: tuple[str, ...] = ()
+    frozen_samples: int = 0
 
 
 @dataclass(frozen=True, slots=True)

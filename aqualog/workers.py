@@ -14,6 +14,9 @@ from contextlib import contextmanager
 from threading import Thread, current_thread, main_thread
 from typing import Any, NamedTuple, TypeVar
 
+from aqualog.io.in_hand import InHand, bound_memory, watched_by
+from aqualog.io.limits import ReadLimits, limits_from
+
 __all__ = ["NO_LIMITS", "Crashed", "Limits", "WorkOn", "most_processes", "work_on"]
 
 _PER_CORE = 4  # more processes than this many a core only take memory
@@ -61,7 +64,8 @@ def work_on(
         Called here with name and result as each is done; the result is `Crashed` if the process ended. An item that
         was merely in work beside one that crashed is done again, alone.
     limits : Limits
-        An item that takes longer ends its process; one that wants more memory gets a MemoryError.
+        An item that takes longer ends its process; one that wants more memory gets a MemoryError. Without `seconds`,
+        reading a log has the time that `aqualog.io.limits` gives it.
 
     An interrupt lets the items in work finish and records them before it is raised.
     """
@@ -99,7 +103,8 @@ def _round(
     todo = iter(list(left.items()))
     pending: dict[Future[Any], Name] = {}
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, spawn, initializer=_quiet_worker, initargs=(limits.memory_mb,)) as pool:
+    begin = (limits, limits_from(os.environ))
+    with ProcessPoolExecutor(jobs, spawn, initializer=_quiet_worker, initargs=begin) as pool:
         try:
             # few in the queue: when a pool breaks, only those that it held are in doubt
             for name, task in todo:
@@ -173,26 +178,33 @@ def _within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
             faulthandler.cancel_dump_traceback_later()
 
 
-def _quiet_worker(memory_mb: int | None = None) -> None:
+def _quiet_worker(limits: Limits, read_limits: ReadLimits) -> None:
     """An interrupt is the parent's business; a worker finishes what it has in hand, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # one a process: these are as many as the cores
-    if memory_mb is not None:
-        _bound_memory(memory_mb)
+    if limits.memory_mb is not None:
+        bound_memory(limits.memory_mb * 1_000_000)
+    if limits.seconds is not None:  # the item has a watchdog, and there is one only
+        watched_by(lambda _: None, read_limits._replace(wall_s=0.0, cpu_s=0.0))
+    else:
+        watched_by(_Alarm().set, read_limits)
     Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _bound_memory(megabytes: int) -> None:
-    """Private memory of this process; what is only mapped (files, code) is not counted."""
-    try:
-        import resource
-    except ImportError:  # no such limit on this system
-        return
-    most = megabytes * 1_000_000
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (most if hard < 0 else min(most, hard), hard))
+class _Alarm:
+    """Ends this process if a step of reading takes too long."""
+
+    def __init__(self) -> None:
+        self._nowhere = open(os.devnull, "w")  # noqa: PTH123, SIM115 - as long as the process
+
+    def set(self, held: InHand) -> None:
+        """Begin to wait, or stop."""
+        if held.log and held.seconds:
+            faulthandler.dump_traceback_later(held.seconds, exit=True, file=self._nowhere)
+        else:
+            faulthandler.cancel_dump_traceback_later()
 
 
 def _end_with_parent() -> None:

@@ -12,8 +12,8 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "places", "compiled", "workers", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "align", "features", "calibrate",
-    "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "report", "figures", "reproduce", "config", "cli",
+    "errors", "places", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "workers", "align", "features", "calibrate",
+    "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "figures", "reproduce", "config", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
@@ -74,6 +74,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "diagnose",
                 "cache",
                 "plan",
+                "doctor",
             )
         ),
     ],

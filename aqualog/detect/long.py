@@ -18,7 +18,7 @@ from aqualog.notation import SYMBOLS
 from aqualog.types import DriveResult, Event, FileFaults, FloatArray, Signals, Track
 from aqualog.vehicle import Vehicle
 
-__all__ = ["ROWS", "detect_long"]
+__all__ = ["ROWS", "detect_long", "present_in"]
 
 ROWS = 20_000  # of a window: 3 min at 100 Hz, some hundred arrays of 160 kB, which a cache holds
 
@@ -32,6 +32,7 @@ def detect_long(
     faults: Sequence[FileFaults] = (),
     rows: int = ROWS,
     keep: Callable[[DriveResult], None] | None = None,
+    present: Sequence[str] | None = None,
     pictured: bool = False,
     tell: Callable[[float], None] = lambda _: None,
 ) -> DriveResult:
@@ -48,6 +49,8 @@ def detect_long(
         Of a window.
     keep : callable, optional
         Given each window with its signals, features and tracks, in order.
+    present : sequence of str, optional
+        What `present_in` has found.
     pictured : bool
         With least and greatest values of stretches of the drive, for a page.
     tell : callable
@@ -58,7 +61,7 @@ def detect_long(
     DriveResult
         Events as `detect_drive` finds them; signals, features and tracks are a picture of the drive, or empty.
     """
-    present = _present(drive, rows)
+    present = present_in(drive, rows) if present is None else present
     dt_ns = drive.grid.dt_ns
     stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
     plausibility = Plausibility(present, vehicle, stream.dt)
@@ -103,8 +106,8 @@ def detect_long(
     )
 
 
-def _present(drive: LongDrive, rows: int) -> list[str]:
-    """Symbols that have a value somewhere; mostly the first window tells."""
+def present_in(drive: LongDrive, rows: int = ROWS) -> list[str]:
+    """Symbols that have a value somewhere; mostly the first window of so many rows tells."""
     seen: set[str] = set()
     for signals, _ in drive.windows(rows):
         seen |= {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,8 @@ from aqualog.types import DriveResult, Event, FloatArray, Signals, Track, Unavai
 from aqualog.vehicle import Vehicle
 
 __all__ = ["DriveStream", "Piece", "Settings", "detect_drive", "in_order"]
+
+PIECE = 20_000  # samples that go through at once: some hundred arrays of 160 kB, which a cache holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +185,44 @@ def in_order(events: Iterable[Event]) -> tuple[Event, ...]:
     return tuple(sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")))
 
 
+class _Gathered:
+    """Features and tracks of the pieces of a drive, in arrays of the whole; or tracks by name alone."""
+
+    def __init__(self, rows: int, *, samples: bool) -> None:
+        self._rows = rows
+        self._samples = samples
+        self._at = 0
+        self.features: dict[str, FloatArray] = {}
+        self.tracks: tuple[Track, ...] = ()
+
+    def add(self, piece: Piece, n: int) -> None:
+        """Take the next piece, of n samples."""
+        if self._samples and n == self._rows:
+            self.features, self.tracks = dict(piece.features), piece.tracks
+            return
+        if self._at == 0:
+            rows = self._rows if self._samples else 0
+            self.features = {k: np.empty(rows, x.dtype) for k, x in piece.features.items()} if rows else {}
+            self.tracks = tuple(
+                replace(t, statistic=np.empty(rows), active=np.empty(rows, dtype=bool)) for t in piece.tracks
+            )
+        here = slice(self._at, self._at + n)
+        self._at += n
+        if not self._samples:
+            return
+        for name, x in piece.features.items():
+            self.features[name][here] = x
+        for whole, part in zip(self.tracks, piece.tracks, strict=True):
+            whole.statistic[here], whole.active[here] = part.statistic, part.active
+
+
 def detect_drive(
-    signals: Signals, vehicle: Vehicle, *, settings: Settings | None = None, memory: Memory | None = None
+    signals: Signals,
+    vehicle: Vehicle,
+    *,
+    settings: Settings | None = None,
+    memory: Memory | None = None,
+    samples: bool = True,
 ) -> DriveResult:
     """Run all detectors over one drive.
 
@@ -195,6 +233,8 @@ def detect_drive(
     settings : Settings
     memory : Memory, optional
         What is known of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
+    samples : bool
+        Features and tracks with all their samples; without, less memory is touched, and the result has them empty.
 
     Returns
     -------
@@ -207,15 +247,21 @@ def detect_drive(
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
     stream = DriveStream(vehicle, signals.dt_ns, present, settings=settings, memory=memory)
     columns = {s: signals.array(s) for s in (present or ["v_x"])}
-    piece = stream.push(columns)
     plausibility = Plausibility(present, vehicle, signals.dt)
-    plausibility.push(columns, piece.features)
-    events = in_order((*piece.events, *stream.finish()))
+    gathered = _Gathered(signals.frame.height, samples=samples)
+    found: list[Event] = []
+    for at in range(0, max(signals.frame.height, 1), PIECE):
+        part = {s: x[at : at + PIECE] for s, x in columns.items()}
+        piece = stream.push(part)
+        plausibility.push(part, piece.features)
+        found += piece.events
+        gathered.add(piece, min(PIECE, signals.frame.height - at))
+    events = in_order((*found, *stream.finish()))
     slopes = tuple(w.summary() for w in stream.slope_watches)
     return DriveResult(
         signals=signals,
-        features=pl.DataFrame(dict(piece.features)),
-        tracks=piece.tracks,
+        features=pl.DataFrame(gathered.features),
+        tracks=gathered.tracks,
         events=events,
         unavailable=stream.unavailable,
         limited=stream.limited,

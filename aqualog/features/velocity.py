@@ -154,8 +154,21 @@ def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped
 
 @compiled
 def _median(w):  # type: ignore[no-untyped-def]
-    known = w[~np.isnan(w)]
-    return math.nan if known.size == 0 else np.median(known)
+    """Median of the wheels that are known, by how many lie below each: at every sample, so nothing is allocated."""
+    n = 0
+    for i in range(_N):
+        n += not math.isnan(w[i])
+    low, high = math.nan, math.nan
+    for i in range(_N):
+        below = 0
+        for j in range(_N):
+            below += w[j] < w[i] or (w[j] == w[i] and j < i)
+        if not math.isnan(w[i]):
+            if below == (n - 1) // 2:
+                low = w[i]
+            if below == n // 2:
+                high = w[i]
+    return high if n % 2 else (low + high) / 2
 
 
 @compiled

@@ -9,6 +9,7 @@ import numpy as np
 
 from aqualog.figures.record import Axis, Line, Note, Panel, Sheet
 from aqualog.report.theme import GRID, INK, MUTED
+from aqualog.report.wording import plot_text
 from aqualog.types import FloatArray
 
 __all__ = ["PLOT_PX", "panel_figure", "rounded"]
@@ -36,7 +37,7 @@ def _line(line: Line, *, is_solid: bool) -> dict[str, Any]:
     # a line in space looks half as wide as one in the plane
     trace: dict[str, Any] = {
         "type": "scatter3d" if is_solid else "scatter",
-        "name": line.name,
+        "name": plot_text(line.name),
         "mode": line.mode,
         "x": rounded(line.x),
         "y": rounded(line.y),
@@ -99,7 +100,7 @@ def _sizes(line: Line, *, is_solid: bool) -> float | list[float]:
 def _sheet(sheet: Sheet) -> dict[str, Any]:
     return {
         "type": "surface",
-        "name": sheet.name,
+        "name": plot_text(sheet.name),
         "x": rounded(sheet.x),
         "y": rounded(sheet.y),
         "z": [rounded(row) for row in sheet.z],
@@ -114,7 +115,7 @@ def _sheet(sheet: Sheet) -> dict[str, Any]:
 
 def _axis(axis: Axis) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "title": {"text": axis.title, "font": {"size": 12}},
+        "title": {"text": plot_text(axis.title), "font": {"size": 12}},
         "gridcolor": GRID,
         "zerolinecolor": MUTED,
         "linecolor": MUTED,
@@ -133,7 +134,7 @@ def _legend_px(panel: Panel) -> int:
     """Room that the legend takes: its entries set in lines as they come."""
     rows, used = 1, 0.0
     for name in [s.name for s in panel.sheets] + [line.name for line in panel.lines if line.in_legend]:
-        width = 45.0 + 5.5 * len(name)
+        width = 45.0 + 5.5 * len(plot_text(name))
         if used + width > _WIDTH_PX and used > 0.0:
             rows, used = rows + 1, 0.0
         used += width

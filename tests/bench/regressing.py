@@ -106,6 +106,6 @@ def rows(scale: Scale) -> list[Row]:
         Row(
             "same: slopes of the bins with intervals by run", "scipy linregress loop, mean over runs", 25.0,
             lambda: slopes_with_aqualog(s), lambda: slopes_with_scipy(s), _slopes_unlike, rounds=5, needs=needs,
-            conditions=f"{size}; mixed model and cluster-robust intervals beside a mean",
+            conditions=f"{size}; the peer weighs all runs alike, leaves the noise of the traction in, and has plain intervals",
         ),
     ]  # fmt: skip

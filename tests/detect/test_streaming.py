@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from drives import AWD, CAR, FWD, drive, lane
 
-from aqualog.detect.stream import DriveStream
+from aqualog.detect import stream
+from aqualog.detect.stream import DriveStream, detect_drive
 
 DRIVES = {
     "rwd": (CAR, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),
@@ -85,3 +86,23 @@ def test_cut_inside_every_event():
         {round((e.start_s + e.end_s) / 2 / 0.01) for e in whole[2]} | {round(e.end_s / 0.01) for e in whole[2]}
     )
     assert_same(whole, run(vehicle, columns, symbols, [0, *(i for i in inside if 0 < i < n), n]))
+
+
+def test_a_drive_in_pieces_is_the_drive_in_one(monkeypatch):
+    signals, _ = drive(CAR, duration_s=16.0, lanes=(lane(),), speed_kmh=((0.0, 104.0),))
+    assert signals.frame.height < stream.PIECE
+    whole = detect_drive(signals, CAR)
+    assert whole.events
+    monkeypatch.setattr(stream, "PIECE", 333)
+    pieces, bare = detect_drive(signals, CAR), detect_drive(signals, CAR, samples=False)
+    assert pieces.features.equals(whole.features)
+    for one, other in zip(whole.tracks, pieces.tracks, strict=True):
+        assert one.statistic.tobytes() == other.statistic.tobytes(), one.detector
+        assert (one.active == other.active).all()
+        assert other.active.size == signals.frame.height
+    for result in (pieces, bare):
+        assert (result.events, result.notes) == (whole.events, whole.notes)
+        assert repr(result.slopes) == repr(whole.slopes)
+        assert [(t.detector, t.wheel) for t in result.tracks] == [(t.detector, t.wheel) for t in whole.tracks]
+    assert bare.features.is_empty()
+    assert not any(t.statistic.size or t.active.size for t in bare.tracks)

@@ -31,6 +31,7 @@ def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     ("effect", "parameter", "value"),
     [("aero_drag", "delta_drag_area", 0.15)],
 )
+@pytest.mark.long
 def test_what_is_hidden_is_named_with_its_size(tmp_path, effect, parameter, value):
     found = diagnosed(tmp_path, 24, **{effect: value})
     assert found.verdict == "named"

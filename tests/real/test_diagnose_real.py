@@ -241,6 +241,7 @@ def porsche(real_logs):
     return diagnose([("porsche", load_signals(paths, vehicle=car, signal_map=signal_map))], car, options=QUICK)
 
 
+@pytest.mark.long
 def test_porsche_offset_and_road_are_named(porsche):
     assert porsche.verdict in ("named", "compound", "cannot_tell")
     found = {c.key: c for c in porsche.causes}
@@ -253,11 +254,13 @@ def test_porsche_offset_and_road_are_named(porsche):
     assert "road grade" in certain
 
 
+@pytest.mark.long
 def test_without_torque_nothing_is_told_about_forces(porsche):
     assert not {c.effect for c in porsche.causes} & {"torque_gain", "payload_mass", "aero_drag", "head_wind"}
     assert porsche.untested["payload_mass"] == "no wheel torque in the log"
 
 
+@pytest.mark.long
 def test_what_nobody_told_of_the_porsche_is_no_finding(porsche):
     """No inertia is in its file, and the radii in its wheel speeds are the control unit's."""
     assert not {c.effect for c in porsche.causes} & {"wheel_inertia", "tyre_radius", "pressure_loss"}

@@ -115,23 +115,32 @@ def braking_of_wheels(
 
 
 def smoothed(x: FloatArray, width: int) -> FloatArray:
-    """Centred mean; NaN where one of its samples is. No delay: slip and traction stay together."""
+    """Centred mean; NaN where one of its samples is. No delay: slip and traction stay together.
+
+    Each mean is of its own samples alone, so that a piece of a drive has the very means of the whole.
+    """
     if x.size < width:
         return np.full_like(x, np.nan)
     good = np.isfinite(x)
-    level = float(x[good].mean()) if good.any() else 0.0
     half = width // 2
     mean = np.full(x.size, np.nan)
-    mean[half : x.size - half] = _sums(np.where(good, x - level, 0.0), width) / width + level
+    mean[half : x.size - half] = _sums(np.where(good, x, 0.0), width) / width
     mean[_near(~good, width)] = np.nan
     return mean
 
 
 def _sums(x: FloatArray, width: int) -> FloatArray:
-    """Of `width` neighbours each; (n - width + 1,)."""
-    total = np.concatenate([[0.0], np.cumsum(x)])
-    sums: FloatArray = total[width:] - total[:-width]
-    return sums
+    """Of `width` neighbours each; (n - width + 1,). Put together of sums of 1, 2, 4 ... neighbours."""
+    rows = x.size - width + 1
+    total = np.zeros(rows)
+    of, length, done = x, 1, 0
+    while True:
+        if width & length:
+            total += of[done : done + rows]
+            done += length
+        if done == width:
+            return total
+        of, length = of[:-length] + of[length:], 2 * length
 
 
 def _near(bad: BoolArray, width: int) -> BoolArray:
