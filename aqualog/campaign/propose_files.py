@@ -78,11 +78,13 @@ def unmapped_text(unmapped: Sequence[str]) -> str:
 def relative(path: Path, base: Path) -> str:
     """A path as seen from a folder, with /; absolute on another drive letter.
 
-    Links to folders are followed first: what is above a link is not what is above the folder that it names.
+    Links to folders are followed first: what is above a link is not what is above the folder that it names. A name that
+    a spreadsheet would take for a formula gets `./` before it.
     """
     real = Path(os.path.realpath(path.parent)) / path.name
     try:
-        return Path(os.path.relpath(real, os.path.realpath(base))).as_posix()
+        found = Path(os.path.relpath(real, os.path.realpath(base))).as_posix()
+        return f"./{found}" if found[:1] in "=+-@\t\r" else found
     except ValueError:
         return real.as_posix()
 

@@ -108,7 +108,7 @@ def _calibrate(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.console import clean
+    from aqualog.cli.console import clean, clean_line
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
 
@@ -129,7 +129,7 @@ def _calibrate(
             steps("estimating")
             result = _estimated(loaded, failed, setup.vehicle, fixed)
     for line in failed:
-        sys.stderr.write(f"error: {clean(line)}\n")
+        sys.stderr.write(f"error: {clean_line(line)}\n")
     if result is None:
         return int(ExitCode.NOTHING_USABLE)
     drives = [(name, paths) for name, paths in drives if name in loaded]

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aqualog.cli.console import Console, clean, told_if_interrupted
+from aqualog.cli.console import Console, clean_line, told_if_interrupted
 from aqualog.cli.evaluate_inputs import is_campaign
 from aqualog.cli.files import expand, list_files, refuse_existing
 from aqualog.cli.progress import Progress
@@ -139,7 +139,7 @@ def results(
             told.append(name)
             if len(told) <= _TOLD_AT_ONCE:
                 steps.clear()
-                sys.stderr.write(f"error: {clean(_with_name(name, reason))}\n")
+                sys.stderr.write(f"error: {clean_line(_with_name(name, reason))}\n")
 
         with (
             told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"),

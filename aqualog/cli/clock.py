@@ -91,7 +91,7 @@ def _align(
     from aqualog.align.carrier import QUANTITIES, find_carrier
     from aqualog.align.clock import ClockFit
     from aqualog.align.load import read_options
-    from aqualog.cli.console import clean
+    from aqualog.cli.console import clean, clean_line
     from aqualog.cli.setup import prepare
     from aqualog.errors import AqualogError, ConfigError, ExitCode
     from aqualog.io.open_log import DriveLog
@@ -135,7 +135,7 @@ def _align(
             console.note("it holds clocks only: give --signals map.toml to keep the signals of your map in it")
     for file, fit in fits.items():
         if isinstance(fit, AqualogError):
-            sys.stderr.write(f"error: {clean(file)}: {clean(fit.line())}\n")
+            sys.stderr.write(f"error: {clean_line(file)}: {clean_line(fit.line())}\n")
     if not good:
         return int(ExitCode.NOTHING_USABLE)
     return int(ExitCode.PARTIAL) if len(good) < len(fits) else int(ExitCode.DONE)

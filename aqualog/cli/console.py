@@ -15,15 +15,28 @@ import typer
 from aqualog.cli.apart import apart
 from aqualog.errors import AqualogError, ConfigError, ExitCode
 
-__all__ = ["Console", "clean", "guarded", "told_if_interrupted"]
+__all__ = ["Console", "clean", "clean_line", "guarded", "told_if_interrupted"]
 
 SLOW_S = 5.0  # a first step that takes longer than this is compiling
+_LINE = 2000  # characters that anybody reads of a line
 PROGRESS_MODES = ("auto", "bar", "plain", "off")
 
 
 def clean(text: str) -> str:
-    """Text without control characters, so that a name in a log cannot drive the terminal."""
-    return "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
+    """Text without control characters, so that a name in a log cannot drive the terminal; endless lines are cut."""
+    shown = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
+    if len(shown) <= _LINE:
+        return shown
+    return "\n".join(_cut(line) for line in shown.split("\n"))
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= _LINE else f"{line[: _LINE - 40]}… ({len(line)} characters)"
+
+
+def clean_line(text: str) -> str:
+    """The same of a message: what a line break in a name puts on a line of its own is no message of aqualog's."""
+    return clean(text).replace("\n", "\n  ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +57,12 @@ class Console:
     def note(self, text: str) -> None:
         """Something the user should know."""
         if not self.quiet:
-            sys.stderr.write(f"note: {clean(text)}\n")
+            sys.stderr.write(f"note: {clean_line(text)}\n")
 
     def detail(self, text: str) -> None:
         """Something the user may want to know."""
         if self.verbose and not self.quiet:
-            sys.stderr.write(f"{clean(text)}\n")
+            sys.stderr.write(f"{clean_line(text)}\n")
 
     @contextmanager
     def told_if_slow(self, what: str) -> Iterator[None]:
@@ -88,12 +101,12 @@ class Steps:
     def __call__(self, text: str) -> None:
         """Begin a step."""
         if self.mode == "bar":
-            line = f"{clean(text)} ..."
+            line = f"{' '.join(clean(text).split())} ..."
             sys.stderr.write(f"\r{line.ljust(self._width)}")
             sys.stderr.flush()
             self._width = len(line)
         elif self.mode == "plain":
-            sys.stderr.write(f"{clean(text)}\n")
+            sys.stderr.write(f"{clean_line(text)}\n")
 
     def clear(self) -> None:
         """Remove the line."""
@@ -140,7 +153,7 @@ def guarded(*, debug: bool) -> Iterator[None]:
         if error.filename == _StandardOutput.NAME:
             _silence()
             hint = ". Try: another place for the output"
-        sys.stderr.write(f"error: {clean(where)}{error.strerror or error}{hint}\n")
+        sys.stderr.write(f"error: {clean_line(f'{where}{error.strerror or error}')}{hint}\n")
         raise typer.Exit(int(ExitCode.FAILED)) from error
     except KeyboardInterrupt as error:
         # without a word of the command: files are renamed into place, so those that are there are whole
@@ -157,7 +170,9 @@ def guarded(*, debug: bool) -> Iterator[None]:
         if debug:
             traceback.print_exc()
         kind = type(error).__name__
-        sys.stderr.write(f"error: aqualog failed ({kind}: {clean(str(error))[:300]}). Try: --debug, and report it\n")
+        sys.stderr.write(
+            f"error: aqualog failed ({kind}: {clean_line(str(error))[:300]}). Try: --debug, and report it\n"
+        )
         raise typer.Exit(int(ExitCode.FAILED)) from error
 
 

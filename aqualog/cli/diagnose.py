@@ -159,7 +159,7 @@ def _diagnose(
     console: Console,
     cached: bool | None,
 ) -> int:
-    from aqualog.cli.console import clean, told_if_interrupted
+    from aqualog.cli.console import clean_line, told_if_interrupted
     from aqualog.cli.diagnose_drives import check_apart, check_once, find_drives, load_drives
     from aqualog.cli.diagnose_results import tell
     from aqualog.cli.files import expand, list_files, refuse_existing
@@ -192,7 +192,7 @@ def _diagnose(
             options = replace(options, surrogates=surrogates)
         result = _result(given, [n for n, _ in unseen], setup.vehicle, known, options, steps)
     for line in given.failed:
-        sys.stderr.write(f"error: {clean(line)}\n")
+        sys.stderr.write(f"error: {clean_line(line)}\n")
     if result is None:
         return int(ExitCode.NOTHING_USABLE)
     paths = [str(p) for n, files in drives if n in given.loaded for p in files]

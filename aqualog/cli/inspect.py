@@ -143,7 +143,8 @@ def _print(
     notes: list[str],
 ) -> None:
     from aqualog.cli.console import clean
-    from aqualog.report.text import table
+    from aqualog.report.names import cut
+    from aqualog.report.text import CELL, NOTE, table
 
     lines = []
     by_channel = {p.entry.channel[0]: s for s, p in proposals.items()}
@@ -151,18 +152,18 @@ def _print(
         own = [o for o in found if o.file == path.name]
         absolute = any(c.absolute for c in channels if c.info.file == path.name)
         clock = "absolute time" if absolute else "a clock of its own"
-        lines.append(f"{path.name}: {kind.upper()}, {len(own)} channels, {clock}")
+        lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {len(own)} channels, {clock}")
         if own:
             rows = [_row(o, by_channel) for o in own]
             header = ("channel", "unit", "samples", "Hz", "from s", "to s", "min", "max", "gaps", "faults", "signal?")
             lines += [table(header, rows), ""]
     if proposals:
         lines.append("proposed signals:")
-        lines += [f"  {s} = {p.entry.channel[0]}  ({p.reason})" for s, p in proposals.items()]
+        lines += [f"  {s} = {cut(p.entry.channel[0], CELL)}  ({cut(p.reason, CELL)})" for s, p in proposals.items()]
     else:
         lines.append("no channel looks like a signal that aqualog knows")
     if notes:
-        lines += ["", "notes:", *(f"  {n}" for n in notes)]
+        lines += ["", "notes:", *(f"  {cut(n, NOTE)}" for n in notes)]
     sys.stdout.write(clean("\n".join(lines) + "\n"))
 
 

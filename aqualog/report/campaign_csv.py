@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from aqualog.campaign.bins import Group
@@ -81,10 +82,14 @@ def _csv(heading: Row, rows: Iterable[Row]) -> str:
     return out.getvalue()
 
 
+# a spreadsheet takes a cell that begins so for a formula; one that splits at semicolons or tabs makes cells of its own
+_FORMULA = re.compile(r"(?:^|(?<=[;,|\t\r\n]))(?=\s*[=+\-@＝＋－＠])|^(?=[\t\r\n])")
+
+
 def safe_cell(value: object) -> str:
     """A cell that no spreadsheet takes for a formula; empty for what is no number."""
     if isinstance(value, float):
         return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
     text = str(value)
     is_number = text.removeprefix("-").replace(".", "", 1).isdigit()
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") and not is_number else text
+    return text if is_number else _FORMULA.sub("'", text)

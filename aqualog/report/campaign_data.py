@@ -13,9 +13,10 @@ from aqualog.detect.needs import DETECTORS
 from aqualog.notation import WHEELS
 from aqualog.report.campaign_answers import RESISTANCE_LEVEL, Answer
 from aqualog.report.campaign_findings import Curve, Findings
-from aqualog.report.campaign_labels import cut, group_text, key_title, value_text
+from aqualog.report.campaign_labels import group_text, key_title, value_text
 from aqualog.report.campaign_quality import Problem
 from aqualog.report.campaign_runs import RunFacts
+from aqualog.report.names import cut
 from aqualog.report.wording import detector_name
 
 __all__ = ["page_data"]

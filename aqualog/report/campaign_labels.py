@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import unicodedata
 from collections.abc import Sequence
 
 from aqualog.campaign.bins import Group
+from aqualog.report.names import cut, name_digest
 from aqualog.report.wording import number
 
-__all__ = ["cut", "file_name", "group_text", "key_title", "value_text"]
+__all__ = ["file_name", "group_text", "key_title", "value_text"]
 
-LONGEST = 90  # characters of a name that are shown
 _STEM = 60  # characters of a name that stay in a file name
 _TITLES = {
     "pressure_front_bar": "pressure, front", "pressure_rear_bar": "pressure, rear", "water_depth_mm": "water depth",
@@ -21,12 +20,6 @@ _TITLES = {
 }  # fmt: skip
 _UNITS = {"bar": "bar", "mm": "mm", "kg": "kg", "s": "s"}
 _NOT_GIVEN = "not given"
-
-
-def cut(text: str, most: int = LONGEST) -> str:
-    """One line of at most so many characters; what is cut gets a hash, so that two long names stay two."""
-    line = "".join(c if c.isprintable() else "\ufffd" for c in text[:most])
-    return line if len(text) <= most else f"{line[: most - 12]}… #{_digest(text)[:8]}"
 
 
 def key_title(key: str) -> str:
@@ -63,8 +56,4 @@ def file_name(index: int, name: str) -> str:
     stem = name.replace("\\", "/").rpartition("/")[2].rpartition(".")[0] or name[:200]
     plain = unicodedata.normalize("NFKD", stem[:200]).encode("ascii", "ignore").decode("ascii").lower()
     slug = re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:_STEM].strip("-")
-    return "-".join(p for p in (f"{index + 1:04d}", slug, _digest(f"{index}:{name}")[:8]) if p)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+    return "-".join(p for p in (f"{index + 1:04d}", slug, name_digest(f"{index}:{name}")[:8]) if p)

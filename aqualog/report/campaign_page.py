@@ -12,9 +12,10 @@ from aqualog.campaign.samples import CampaignData
 from aqualog.report.campaign_answers import RESISTANCE_LEVEL, answers_of, headline, off_water, summaries
 from aqualog.report.campaign_data import page_data
 from aqualog.report.campaign_findings import Findings
-from aqualog.report.campaign_labels import cut, key_title
+from aqualog.report.campaign_labels import key_title
 from aqualog.report.campaign_quality import Problem, problems_of
 from aqualog.report.campaign_runs import BEHIND_S, RunFacts
+from aqualog.report.names import cut
 from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island
 
 __all__ = ["render_campaign_page", "script_of"]

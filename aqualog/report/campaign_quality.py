@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import TOO_FEW
 from aqualog.campaign.samples import CampaignData, RunInfo
-from aqualog.report.campaign_labels import cut, group_text
+from aqualog.report.campaign_labels import group_text
+from aqualog.report.names import cut
 from aqualog.report.wording import detector_name
 
 __all__ = ["MOST_KINDS", "Problem", "problems_of"]

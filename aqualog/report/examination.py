@@ -7,6 +7,8 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.doctor.records import Examination, Finding
+from aqualog.report.names import cut
+from aqualog.report.text import CELL, NOTE
 
 __all__ = ["examination_document", "examination_text"]
 
@@ -23,10 +25,10 @@ def examination_text(found: Examination) -> str:
     lines = []
     for f in found.files:
         if f.format:
-            lines.append(f"{f.file}: {f.format.upper()}, {f.size:,} bytes, {f.channels} channels, {f.samples:,} samples"
-                         f", {f.end_s or 0.0:.1f} s")  # fmt: skip
+            size = f"{f.size:,} bytes, {f.channels} channels, {f.samples:,} samples, {f.end_s or 0.0:.1f} s"
+            lines.append(f"{cut(f.file, CELL)}: {f.format.upper()}, {size}")
         else:
-            lines.append(f"{f.file}: {f.size:,} bytes")
+            lines.append(f"{cut(f.file, CELL)}: {f.size:,} bytes")
     for level, head in _HEADS.items():
         own = [x for x in found.findings if x.level == level]
         if own:
@@ -42,9 +44,10 @@ def examination_text(found: Examination) -> str:
 
 
 def _lines(finding: Finding) -> list[str]:
-    where = ": ".join(x for x in (finding.file, finding.channel) if x)
-    first = f"  {where}: {finding.what}" if where else f"  {finding.what}"
-    return [first, f"    try: {finding.advice}"] if finding.advice else [first]
+    where = ": ".join(cut(x, CELL) for x in (finding.file, finding.channel) if x)
+    what = cut(finding.what, NOTE)
+    first = f"  {where}: {what}" if where else f"  {what}"
+    return [first, f"    try: {cut(finding.advice, NOTE)}"] if finding.advice else [first]
 
 
 def examination_document(found: Examination) -> dict[str, Any]:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from aqualog.report.names import cut
 from aqualog.types import DriveResult, Event, SlopeSummary
 
-__all__ = ["event_table", "table"]
+__all__ = ["CELL", "NOTE", "event_table", "table"]
+
+CELL = 200  # characters of a table's cell
+NOTE = 1000  # characters of a sentence that names what a log holds
 
 
 def event_table(result: DriveResult) -> str:
@@ -102,8 +106,9 @@ def _evidence(event: Event) -> str:
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns padded to their widest cell; numbers to the right."""
-    widths = [max(len(str(r[i])) for r in (header, *rows)) for i in range(len(header))]
+    """Columns padded to their widest cell; numbers to the right. A cell is one line, of CELL characters at most."""
+    header, *rows = ([cut(str(c), CELL) for c in r] for r in (header, *rows))
+    widths = [max(len(r[i]) for r in (header, *rows)) for i in range(len(header))]
     return "\n".join("  ".join(_pad(c, w) for c, w in zip(r, widths, strict=True)).rstrip() for r in (header, *rows))
 
 

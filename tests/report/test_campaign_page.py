@@ -22,9 +22,10 @@ from aqualog.report.campaign_answers import answers_of
 from aqualog.report.campaign_crossing import crossing
 from aqualog.report.campaign_findings import Curve, Point, find
 from aqualog.report.campaign_folder import MARK, check_folder, page_names, write_report
-from aqualog.report.campaign_labels import cut, file_name, group_text, value_text
+from aqualog.report.campaign_labels import file_name, group_text, value_text
 from aqualog.report.campaign_quality import MOST_KINDS, problems_of
 from aqualog.report.campaign_runs import facts_of
+from aqualog.report.names import cut
 from aqualog.report.run_page import command_of, render_run_page
 
 SECTIONS = ("verdict", "quality", "filters", "answers-section", "matrix-section", "slopes-section",
