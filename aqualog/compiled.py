@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -87,10 +88,19 @@ def _load_lightly(dispatcher: Any) -> None:
 
 @cache
 def _user_cache() -> str:
-    """A folder for machine code in the user's cache; empty where there is none to write to."""
+    """A folder for machine code in the user's cache; empty where there is none to write to.
+
+    What lies in it is run: it must be this user's, and nobody else may write to it.
+    """
     try:
         folder = user_cache() / "compiled"
         folder.mkdir(parents=True, exist_ok=True)
+        if hasattr(os, "geteuid"):
+            state = folder.stat()
+            if state.st_uid != os.geteuid():
+                return ""
+            if state.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                folder.chmod(0o700)
     except (OSError, RuntimeError):
         return ""
     return str(folder) if os.access(folder, os.W_OK) else ""

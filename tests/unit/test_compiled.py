@@ -1,5 +1,7 @@
 """Machine code that is kept from process to process."""
 
+import os
+import re
 import subprocess
 import sys
 
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from aqualog import compiled
 from aqualog.align.load import load_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.slip_slope import drop, history
@@ -70,3 +73,25 @@ def test_the_reference_of_the_history_is_numpys(is_max):
         periods = [history.Period(*row) for row in kept[:count].tolist()]
         expected = history.reference(periods, rule="max" if is_max else "robust")
         assert drop._reference(kept, count, is_max) == pytest.approx(expected, rel=1e-15)
+
+
+def test_kept_code_is_the_users_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    place = tmp_path / "aqualog" / "compiled"
+    place.mkdir(parents=True)
+    place.chmod(0o777)
+    folder = compiled._user_cache.__wrapped__
+    assert folder() == str(place)
+    assert place.stat().st_mode & 0o022 == 0  # nobody else puts code there
+    monkeypatch.setattr(os, "geteuid", lambda: place.stat().st_uid + 1)
+    assert folder() == ""
+
+
+def test_nothing_is_read_as_pickle():
+    """Of what others give. numba keeps its own code so, in the folder above; processes talk among themselves."""
+    sources = {p: p.read_text(encoding="utf-8") for p in (ROOT / "aqualog").rglob("*.py")}
+    risky = re.compile(
+        r"\b(c?pickle|marshal|shelve|dill|joblib|read_pickle|allow_pickle\s*=\s*True)\b|\beval\(|\bexec\("
+    )
+    assert len(sources) > 300
+    assert [f"{p.name}: {m[0]}" for p, text in sources.items() for m in risky.finditer(text)] == []
