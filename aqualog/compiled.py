@@ -8,7 +8,7 @@ import stat
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from numba import config, njit
@@ -27,8 +27,9 @@ def compiled(function: Callable[..., Any]) -> Any:
     A read-only installation without a home folder has no such place; there it is compiled in each process. No fast
     maths: results must not depend on how a drive is cut.
 
-    The kept code is thrown away when a module of `physics` or one beside the function changes: numba itself looks at
-    the file of the function alone and would go on with an old equation.
+    The kept code is thrown away when a module of `physics`, one beside the function or one in the folder of what it
+    calls changes, or a constant that it has from elsewhere: numba itself looks at the file of the function alone and
+    would go on with an old equation.
     """
     # numba chooses the place while it decorates; beside the sources it would leave folders behind that an
     # uninstallation does not remove, and that hide an editable one
@@ -42,7 +43,8 @@ def compiled(function: Callable[..., Any]) -> Any:
     _load_lightly(dispatcher)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
-        index._source_stamp = (index._source_stamp, _stamp(Path(function.__code__.co_filename).parent))
+        assert isinstance(function, FunctionType)
+        index._source_stamp = (index._source_stamp, _stamp_of(function))
     return dispatcher
 
 
@@ -106,8 +108,35 @@ def _user_cache() -> str:
     return str(folder) if os.access(folder, os.W_OK) else ""
 
 
+def _stamp_of(function: FunctionType) -> str:
+    """State of all that the machine code of a function is made of."""
+    folders = {Path(__file__).resolve().parent / "physics"}
+    constants: set[str] = set()
+    _gather(function, folders, constants, set())
+    return hashlib.sha256(repr((sorted(map(_stamp, folders)), sorted(constants))).encode()).hexdigest()
+
+
+def _gather(function: FunctionType, folders: set[Path], constants: set[str], seen: set[FunctionType]) -> None:
+    """Folders of what a function refers to, and values of constants, which are put into its machine code."""
+    if function in seen:
+        return
+    seen.add(function)
+    folders.add(Path(function.__code__.co_filename).parent)
+    package = function.__module__.partition(".")[0]
+    names = function.__code__.co_names
+    found = {n: function.__globals__[n] for n in names if n in function.__globals__}
+    for module in [x for x in found.values() if isinstance(x, ModuleType) and x.__name__.partition(".")[0] == package]:
+        # `module.function`: both are among the names
+        found |= {f"{module.__name__}.{n}": getattr(module, n) for n in names if hasattr(module, n)}
+    for name, value in found.items():
+        called = getattr(value, "py_func", None)
+        if isinstance(called, FunctionType):
+            _gather(called, folders, constants, seen)
+        elif isinstance(value, int | float | str | tuple):
+            constants.add(f"{name} = {value!r}")
+
+
 @cache
 def _stamp(folder: Path) -> str:
-    files = sorted({*folder.glob("*.py"), *(Path(__file__).resolve().parent / "physics").glob("*.py")})
-    state = [(f.name, f.stat().st_mtime_ns, f.stat().st_size) for f in files]
+    state = [(f.name, f.stat().st_mtime_ns, f.stat().st_size) for f in sorted(folder.glob("*.py"))]
     return hashlib.sha256(repr(state).encode()).hexdigest()

@@ -1,5 +1,6 @@
 """Machine code that is kept from process to process."""
 
+import importlib
 import os
 import re
 import subprocess
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from aqualog import compiled
+import aqualog.compiled as compilation
 from aqualog.align.load import load_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.slip_slope import drop, history
@@ -57,6 +58,78 @@ def test_kept_code_is_loaded_without_what_compiles():
     assert done.stdout.splitlines() == [f"False {y.tolist()}", str(y.tolist())]
 
 
+CALLER = """
+from aqualog.compiled import compiled
+from made_here.two import called
+from made_here.two.called import LIMIT, step
+
+
+@compiled
+def by_module(x):
+    return called.step(x)
+
+
+@compiled
+def by_name(x):
+    return step(x)
+
+
+@compiled
+def by_constant(x):
+    return min(x, LIMIT)
+
+
+@compiled
+def alone(x):
+    return x
+"""
+CALLED = """
+from aqualog.compiled import compiled
+
+LIMIT = 1.0
+
+
+@compiled
+def step(x):
+    return 2.0 * x
+"""
+
+
+def test_kept_code_is_that_of_what_it_calls_in_other_folders(tmp_path, monkeypatch):
+    """Numba looks at the caller's own file: the estimator went on with the CUSUM of before an edit."""
+
+    def stamps(called):
+        for name, text in (("one/caller.py", CALLER), ("two/called.py", called)):
+            path = tmp_path / "made_here" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if not path.exists() or path.read_text() != text:
+                path.write_text(text)
+        for name in [n for n in sys.modules if n.startswith("made_here")]:
+            del sys.modules[name]
+        importlib.invalidate_caches()
+        compilation._stamp.cache_clear()
+        module = importlib.import_module("made_here.one.caller")
+        names = ("by_module", "by_name", "by_constant", "alone")
+        return {n: compilation._stamp_of(getattr(module, n).py_func) for n in names}
+
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    before = stamps(CALLED)
+    assert stamps(CALLED) == before
+    other_code = stamps(CALLED.replace("2.0 * x", "2.0 * x + 1.0"))
+    assert {n for n in before if other_code[n] != before[n]} == {"by_module", "by_name"}
+    other_limit = stamps(CALLED.replace("LIMIT = 1.0", "LIMIT = 1.5"))
+    assert other_limit["by_constant"] != before["by_constant"]
+    assert other_limit["alone"] == before["alone"]
+
+
+def test_the_stamp_is_what_kept_code_is_looked_up_by():
+    if not smoothing._lowpass._cache._cache_path:
+        pytest.skip("no place to keep machine code")
+    for kernel in (smoothing._lowpass, velocity._scan):
+        assert kernel._cache._cache_file._source_stamp[1] == compilation._stamp_of(kernel.py_func)
+
+
 def test_the_median_of_the_wheels_is_numpys():
     rng = np.random.default_rng(0)
     for k in range(500):
@@ -80,7 +153,7 @@ def test_kept_code_is_the_users_own(tmp_path, monkeypatch):
     place = tmp_path / "aqualog" / "compiled"
     place.mkdir(parents=True)
     place.chmod(0o777)
-    folder = compiled._user_cache.__wrapped__
+    folder = compilation._user_cache.__wrapped__
     assert folder() == str(place)
     assert place.stat().st_mode & 0o022 == 0  # nobody else puts code there
     monkeypatch.setattr(os, "geteuid", lambda: place.stat().st_uid + 1)
