@@ -66,7 +66,7 @@ def slopes_with_aqualog(s: Samples) -> np.ndarray:
         here = s.bin == b
         mu = s.mu[here]
         columns = np.stack([mu, np.ones_like(mu)])
-        e = estimate(Design(columns, s.slip[here], s.run[here], s.step[here], (True, True), (False, False)))
+        e = estimate(Design(columns, s.slip[here], s.run[here], s.step[here], (True, True), (True, False)))
         found.append((e.value[0], e.half[0]))
     return np.array(found)
 

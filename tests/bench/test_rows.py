@@ -46,6 +46,18 @@ def test_the_script_finds_what_aqualog_finds(tmp_path):
     assert "no spin-down" in detecting.unlike(ours, [])
 
 
+def test_slopes_are_measured_with_what_the_peer_leaves_out():
+    """A row that says that the peer leaves the noise of the traction in must pay for taking it off."""
+    plain = regressing.made(40, 600)
+    noise = np.random.default_rng(0).normal(0.0, 0.008, plain.mu.size)
+    noisy = plain._replace(mu=plain.mu + noise)
+    ours, peer = (
+        f(noisy)[:, 0] / f(plain)[:, 0] for f in (regressing.slopes_with_aqualog, regressing.slopes_with_scipy)
+    )
+    assert peer.mean() < 0.90
+    assert ours.mean() == pytest.approx(1.0, abs=0.03)
+
+
 def test_a_child_tells_its_own_memory_and_time():
     hold = np.ones(40_000_000)  # of this process, not of the child
     small = child.run("-c", "print('done')")
