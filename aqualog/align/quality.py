@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from aqualog.align.clean import Clean
-from aqualog.types import FileFaults, Quality, TimeFaults
+from aqualog.align.resample import gap_limit_ns
+from aqualog.notation import SYMBOLS
+from aqualog.types import FileFaults, Origin, Quality, TimeFaults
 
-__all__ = ["quality_of"]
+__all__ = ["missing_notes", "quality_of"]
+
+MUCH = 0.2  # share of a drive; dropouts and sources that begin a little later stay below
+NAMED = 6  # signals in one line
+
+
+def missing_notes(origins: Iterable[Origin]) -> list[str]:
+    """What has no value for much of the drive, one line for signals of one file that are alike.
+
+    Nothing else tells of a rate that falls to less than a fifth: each step is then a gap, and no detector judges there.
+    """
+    alike: dict[tuple[str, int, int], list[str]] = {}
+    for o in origins:
+        if SYMBOLS[o.symbol].kind == "continuous" and o.missing_fraction >= MUCH:
+            limit_ns = gap_limit_ns(round(1e9 / o.rate_hz) if o.rate_hz else 0, is_state=False)
+            alike.setdefault((o.file, round(100.0 * o.missing_fraction), limit_ns), []).append(o.symbol)
+    return [
+        f"{file}: {_listed(names)}: no value for {share} % of the drive: not recorded there, left out, or samples "
+        f"further apart than {1e-6 * limit_ns:.0f} ms, which are not joined (a rate that changes?)"
+        for (file, share, limit_ns), names in alike.items()
+    ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], notes: Sequence[str]) -> Quality:

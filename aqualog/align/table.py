@@ -11,7 +11,7 @@ import polars as pl
 from aqualog.align.clean import Stamps, clean_channel
 from aqualog.align.grid import columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.quality import quality_of
+from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.resample import placed
 from aqualog.align.shared import OfLast
 from aqualog.errors import SignalError
@@ -83,5 +83,6 @@ def build_signals(
     frame = frame_of(grid.seconds(), columns, ordered)
     files = tuple(dict.fromkeys(c.origin.file for c in cleaned))
     start = grid.start_ns if absolute else None
-    quality = quality_of(cleaned, file_faults, notes)
-    return Signals(frame, grid.dt_ns, start, {n: origins[n] for n in ordered}, quality, files)
+    origins = {n: origins[n] for n in ordered}
+    quality = quality_of(cleaned, file_faults, [*notes, *missing_notes(origins.values())])
+    return Signals(frame, grid.dt_ns, start, origins, quality, files)

@@ -19,7 +19,7 @@ from aqualog.align.freezes import Freeze
 from aqualog.align.grid import Grid, columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.pieces import NotInPiecesError, PieceCleaner
-from aqualog.align.quality import quality_of
+from aqualog.align.quality import missing_notes, quality_of
 from aqualog.errors import SignalError
 from aqualog.io.base import Part
 from aqualog.notation import SYMBOLS
@@ -126,7 +126,8 @@ class LongDrive:
         frame = pl.DataFrame({"t": pl.Series([], dtype=pl.Float64)})
         start = self.grid.start_ns if self.absolute else None
         ordered = {n: origins[n] for n in SYMBOLS if n in origins}
-        return Signals(frame, self.grid.dt_ns, start, ordered, quality_of(self.cleaned, faults, self.notes), self.files)
+        quality = quality_of(self.cleaned, faults, [*self.notes, *missing_notes(ordered.values())])
+        return Signals(frame, self.grid.dt_ns, start, ordered, quality, self.files)
 
 
 def long_drive(

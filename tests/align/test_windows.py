@@ -83,6 +83,27 @@ def test_a_plain_drive_with_signals_of_other_rates():
     ])  # fmt: skip
 
 
+@pytest.mark.parametrize("slower", [4, 10])
+def test_a_rate_that_falls(slower):
+    """Steps of more than five sample times are gaps: half of a drive that nothing else would tell of."""
+    t = np.concatenate([np.arange(3000), np.arange(3000, 6000, slower)]) * 0.01
+    whole = same([channel(f"omega_{w}", t, 60.0 + np.sin(0.1 * t), "rad/s") for w in ("fl", "fr")])
+    told = [n for n in whole.quality.notes if "no value for" in n]
+    if slower == 4:
+        assert told == []
+    else:
+        (note,) = told
+        assert note.startswith("a.mf4: omega_fl, omega_fr: no value for 45 % of the drive")
+        assert "further apart than 50 ms" in note
+
+
+def test_a_signal_that_ends_early_is_told_where_much_is_missing():
+    t = np.arange(5000) * 0.01
+    for last, is_told in ((4200, False), (3900, True)):
+        whole = same([*wheels(), channel("a_x", t[:last], np.sin(t[:last]), "m/s^2", file="b.mf4")])
+        assert any(n.startswith("b.mf4: a_x: no value for 22 %") for n in whole.quality.notes) == is_told
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_channels_with_faults(seed):
     """Gaps, jitter, doubled stamps, values that are none or cannot be, dropouts of a wheel, dead wheels."""
