@@ -90,6 +90,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     """
     found: dict[str, tuple[Entry, ChannelInfo]] = {}
     faults: list[str] = []
+    doubled = 0
     for symbol, entry in signal_map.entries.items():
         matches = next((m for m in (matching(channels, c) for c in entry.channel) if m), [])
         if len(matches) == 1:
@@ -98,7 +99,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             faults.append(f"{symbol}: no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
         else:
             faults.append(f"{symbol}: channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
-    doubled = 0
+            doubled += len({m.file for m in matches}) > 1
     for symbol in (*SYMBOLS, *ACCEPTED):
         if symbol in signal_map.entries:
             continue
@@ -114,7 +115,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             f"several channels bear the same {doubled} names: these look like separate drives",
             where=files,
             expected="the files of ONE drive",
-            hint="run them one by one",
+            hint="run them one by one, or all by `aqualog batch`",
         )
     if faults:
         raise SignalError(

@@ -123,6 +123,13 @@ def test_missing_and_ambiguous_channels_are_named():
     assert build(*twins, entries={"v_x": Entry("v_x", ("g2.speed",))}).symbols == ("v_x",)
 
 
+def test_mapped_channels_that_every_file_has_look_like_separate_drives():
+    mapped = {s: Entry(s, (n,)) for s, n in (("v_x", "speed"), ("a_x", "along"), ("altitude", "height"))}
+    twins = [channel(e.channel[0], np.ones(9), "-", file=f) for f in ("mon.csv", "tue.csv") for e in mapped.values()]
+    with pytest.raises(SignalError, match=r"mon.csv, tue.csv: .* same 3 names: these look like separate drives.*batch"):
+        build(*twins, entries=mapped)
+
+
 def test_lost_samples_of_readers_are_counted():
     s = build(channel("omega_fl", np.ones(9), "rad/s"), file_faults=[FileFaults(truncated=True, lost_samples=7)])
     assert s.quality.truncated
