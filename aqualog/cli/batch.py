@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from aqualog.cli.options import Dbc, Debug, Force, Inputs, Jobs, Json, Progress, Quiet, Signals, Vehicle, Verbose
+from aqualog.cli.options import CarOfLogs, Dbc, Debug, Force, Inputs, Jobs, Json, Progress, Quiet, Signals, Verbose
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome
@@ -34,7 +34,7 @@ def batch(
             metavar="DIR",
         ),
     ] = None,
-    vehicle: Vehicle = None,
+    vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
     thresholds: Annotated[

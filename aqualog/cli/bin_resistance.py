@@ -11,6 +11,7 @@ import typer
 
 from aqualog.cli.bin_slipslope import BinWidth, By, Road, Robust, TableOut, check_table, split, write_table
 from aqualog.cli.options import (
+    CarOfLogs,
     Dbc,
     Debug,
     Force,
@@ -21,7 +22,6 @@ from aqualog.cli.options import (
     Quiet,
     Signals,
     StoreOption,
-    Vehicle,
     Verbose,
 )
 
@@ -41,7 +41,7 @@ def bin_resistance(
         bool, typer.Option("--as-measured", help="Do not take off each run's own level on dry road.")
     ] = False,
     store: StoreOption = None,
-    vehicle: Vehicle = None,
+    vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
     out: TableOut = None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aqualog.cli.options import (
+    CarOfLogs,
     Dbc,
     Debug,
     Force,
@@ -21,7 +22,6 @@ from aqualog.cli.options import (
     Quiet,
     Signals,
     StoreOption,
-    Vehicle,
     Verbose,
 )
 
@@ -56,7 +56,7 @@ def bin_slipslope(
     road: Road = "wet",
     robust: Robust = False,
     store: StoreOption = None,
-    vehicle: Vehicle = None,
+    vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
     out: TableOut = None,

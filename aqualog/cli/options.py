@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 __all__ = [
-    "Cache", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate", "Signals",
-    "StoreOption", "Vehicle", "Verbose",
+    "Cache", "CarOfLogs", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate",
+    "Signals", "StoreOption", "Vehicle", "Verbose",
 ]  # fmt: skip
 
 Logs = Annotated[
@@ -21,6 +21,12 @@ Logs = Annotated[
 Vehicle = Annotated[
     Path | None,
     typer.Option("--vehicle", help="Vehicle file (TOML). Without it a default car is taken.", metavar="FILE"),
+]
+CarOfLogs = Annotated[
+    Path | None,
+    typer.Option(
+        "--vehicle", help="Vehicle file (TOML): must be given for logs, a campaign file names its own.", metavar="FILE"
+    ),
 ]
 Signals = Annotated[
     Path | None,
