@@ -6,6 +6,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -16,7 +17,7 @@ from numba.core.runtime import rtsys
 
 from aqualog.places import user_cache
 
-__all__ = ["compiled", "inlined"]
+__all__ = ["compiled", "inlined", "kept_code"]
 
 _inlined: dict[FunctionType, Any] = {}
 
@@ -46,6 +47,16 @@ def compiled(function: Callable[..., Any]) -> Any:
         assert isinstance(function, FunctionType)
         index._source_stamp = (index._source_stamp, _stamp_of(function))
     return dispatcher
+
+
+def kept_code() -> frozenset[tuple[str, int]]:
+    """Path and time of change of what is kept of machine code: more of it after some work tells that it compiled."""
+    place = config.CACHE_DIR or _user_cache()
+    found = set()
+    for path in Path(place).rglob("*.nb?") if place else ():
+        with suppress(OSError):  # another process has put a newer one in its place
+            found.add((str(path), path.stat().st_mtime_ns))
+    return frozenset(found)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

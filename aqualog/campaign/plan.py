@@ -283,7 +283,7 @@ def _notes(work: Work, trial: Trial, logs_s: float, start_s: float) -> tuple[str
         notes.append(f"{len(failed)} of {len(trial.tried)} logs of the sample give nothing: {failed[0].reason}")
     unknown = sum(f == "unknown" for _, f, _ in work.new)
     if unknown:
-        notes.append(f"{unknown} files are no logs; they fail at once")
+        notes.append(f"{unknown} file{'s are no logs; they fail' if unknown > 1 else ' is no log; it fails'} at once")
     met = {t.format for t in trial.tried if not t.reason}
     blind = sorted({f for _, f, _ in work.new} - met - {"unknown"})
     if blind:

@@ -14,9 +14,12 @@ from typing import Any, NamedTuple
 
 from aqualog.campaign.batch import CRASHED, Configured, Fault, Job, measure_one, run_batch
 from aqualog.campaign.store import Store
+from aqualog.compiled import kept_code
 from aqualog.workers import Crashed, work_on
 
 __all__ = ["Trial", "Tried", "peak_memory", "tried"]
+
+Report = Callable[[int, int, int], None]
 
 _met: set[str] = set()  # formats that this process has met: their libraries are loaded
 
@@ -77,9 +80,13 @@ def tried(
     sample: Sequence[tuple[Job, str, int]],
     *,
     processes: int,
-    report: Callable[[int, int, int], None] = lambda done, total, failed: None,
+    reporter: Callable[[], Report] = lambda: lambda done, total, failed: None,
+    told: Callable[[], None] = lambda: None,
 ) -> Trial:
     """Measure a few logs into a store that is thrown away.
+
+    After an installation the detectors are compiled with the first logs, which no other run pays: the sample is then
+    measured once more, and `told` is called before.
 
     Parameters
     ----------
@@ -87,7 +94,20 @@ def tried(
     sample : sequence of (job, format, bytes)
     processes : int
         At a time, so that they are in each other's way as in the batch.
+    reporter : callable
+        Makes what is told the logs done, all, and failed.
     """
+    before = kept_code()
+    found = _tried_once(configured, sample, processes, reporter())
+    if kept_code() <= before:
+        return found
+    told()
+    return _tried_once(configured, sample, processes, reporter())
+
+
+def _tried_once(
+    configured: Configured, sample: Sequence[tuple[Job, str, int]], processes: int, report: Report
+) -> Trial:
     runs = tuple(configured.campaign.runs[j.runs[0]] for j, _, _ in sample)
     of = {j.logs: (form, size) for j, form, size in sample}
     costs: dict[str, Cost | Crashed] = {}

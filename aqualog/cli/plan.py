@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aqualog.cli.options import (
+    CarOfLogs,
     Dbc,
     Debug,
     Inputs,
@@ -22,7 +23,6 @@ from aqualog.cli.options import (
     Quiet,
     Signals,
     StoreOption,
-    Vehicle,
     Verbose,
 )  # fmt: skip
 
@@ -52,7 +52,7 @@ def plan(
             "--within", help="Tell how many --shard are done in that time: 90s, 30min, 8h, 2d.", metavar="TIME"
         ),
     ] = None,
-    vehicle: Vehicle = None,
+    vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
     thresholds: Annotated[
@@ -126,9 +126,15 @@ def _plan(
         chosen = choose(work.new, count or max(8, 2 * min(processes, cores)))
         found = None
         if chosen:
+
+            def told() -> None:
+                steps.clear()
+                console.note("the detectors were compiled, once after an installation; the sample is measured again")
+
             trial = tried(
-                configured, chosen, processes=min(processes, cores, len(chosen)), report=Counted(steps, "logs")
-            )
+                configured, chosen, processes=min(processes, cores, len(chosen)),
+                reporter=lambda: Counted(steps, "logs"), told=told,
+            )  # fmt: skip
             failed = [t for t in trial.tried if t.reason]
             if len(failed) == len(trial.tried):
                 raise FitError(
@@ -277,7 +283,8 @@ def _text(
     if within is None:
         return text
     if parts is None:
-        return f"{text}\nwithin {within}: no number of shards is enough, the longest log alone takes longer\n"
+        alone = f"a process starts in {lasting(worker.start_s)}, the longest log takes {lasting(found.seconds.max())}"
+        return f"{text}\nwithin {within}: no number of shards is enough: {alone}\n"
     return f"{text}\nwithin {within}: {parts[0]} shard{'s' if parts[0] > 1 else ''} (longest {lasting(parts[1])})\n"
 
 

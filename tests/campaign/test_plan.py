@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -18,8 +19,9 @@ from aqualog.campaign.plan import Work, choose, foretell, makespan, shards_withi
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.shard import Shard, part_of
 from aqualog.campaign.store import Store
-from aqualog.campaign.trial import Trial, Tried
+from aqualog.campaign.trial import Trial, Tried, tried
 from aqualog.cli.main import app
+from aqualog.compiled import kept_code
 from aqualog.config.configured import configure
 from aqualog.io.content import Contents
 from aqualog.vehicle import Vehicle
@@ -199,3 +201,33 @@ def test_errors(tmp_path, campaign):
     result = run("plan", path)
     assert result.exit_code == 4
     assert "none of 2 logs of the sample" in result.stderr
+
+
+# --- compiling --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kept", "times"), [([{"a"}, {"a", "b"}], 2), ([{"a", "b"}, {"a", "b"}], 1), ([{"a"}, set()], 1)]
+)
+def test_a_sample_in_which_was_compiled_is_measured_again(kept, times, monkeypatch):
+    """Only the first plan after an installation compiles; the batch behind it does not."""
+    states, measured, heard = iter(kept), [], []
+    monkeypatch.setattr("aqualog.campaign.trial.kept_code", lambda: frozenset(next(states)))
+    monkeypatch.setattr("aqualog.campaign.trial._tried_once", lambda *given: measured.append(given) or len(measured))
+    assert tried(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
+    assert heard == [1] * (times - 1)
+
+
+def test_kept_code_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
+    assert kept_code() == frozenset()
+    (tmp_path / "beside").mkdir()
+    (tmp_path / "beside" / "f.nbi").write_bytes(b"")
+    (tmp_path / "beside" / "note.txt").write_bytes(b"")
+    assert [Path(p).name for p, _ in kept_code()] == ["f.nbi"]
+
+
+def test_no_number_of_shards_tells_what_takes_long(tmp_path):
+    path = make_campaign(tmp_path, speeds=(70,), repeats=1)
+    text = run("plan", path, "--jobs", "1", "--within", "0.001s").stdout
+    assert re.search(r"no number of shards is enough: a process starts in \d+ s, the longest log takes \d+ s", text)
