@@ -42,7 +42,8 @@ def batch(
     ] = None,
     jobs: Jobs = None,
     limit_s: Annotated[
-        float | None, typer.Option("--limit-s", help="Longest time for one log, in seconds.", min=1.0, metavar="S")
+        float | None,
+        typer.Option("--limit-s", help="Longest time for one log, in seconds.", min=1.0, max=1e9, metavar="S"),
     ] = None,
     limit_mb: Annotated[
         int | None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import NamedTuple
 
 from aqualog.errors import ConfigError
 
-__all__ = ["VARIABLES", "ReadLimits", "limits_from", "machine_memory", "size_of"]
+__all__ = ["LEAST_MB", "VARIABLES", "ReadLimits", "limits_from", "machine_memory", "size_of"]
 
 VARIABLES = {
     "wall": "AQUALOG_LIMIT_S",
@@ -21,6 +22,8 @@ _LEAST_S, _S_PER_MB = 300.0, 5.0  # one step of reading; the slowest reader ther
 _MEMORY_SHARE, _LEAST_MEMORY = 0.8, 2_000_000_000  # what is asked for counts, which is more than what is in use
 _LEAST_FILE, _FILE_PER_BYTE = 10_000_000_000, 4  # an unfinished MF4 is copied once before it is read
 _MB = 1_000_000
+LEAST_MB = 300  # of a process: with less its libraries do not even load
+_MOST = 1e9  # seconds or megabytes; system calls overflow at ten times that
 
 
 class ReadLimits(NamedTuple):
@@ -61,10 +64,15 @@ def limits_from(environment: Mapping[str, str]) -> ReadLimits:
     Raises
     ------
     ConfigError
-        If one is no number.
+        If one is no number, or less memory than any command needs.
     """
     given = {key: _number(environment, name) for key, name in VARIABLES.items()}
-    memory, file = (None if (x := given[key]) is None else int(x * _MB) for key in ("memory", "file"))
+    if 0.0 < (given["memory"] or 0.0) < LEAST_MB:
+        name = VARIABLES["memory"]
+        raise ConfigError(
+            f"is {environment[name].strip()[:40]!r}", where=name, expected=f"{LEAST_MB} or more, or 0 for no limit"
+        )
+    memory, file = (None if (x := given[key]) is None else math.ceil(x * _MB) for key in ("memory", "file"))
     return ReadLimits(given["wall"], given["cpu"], memory, file)
 
 
@@ -76,9 +84,10 @@ def _number(environment: Mapping[str, str], name: str) -> float | None:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0.0 <= value < 1e12:  # NaN too
+    if not 0.0 <= value <= _MOST:  # NaN too
         unit = "seconds" if name.endswith("_S") else "megabytes"
-        raise ConfigError(f"is {text[:40]!r}", where=name, expected=f"a number of {unit}, or 0 for no limit")
+        most = f"a number of {unit}, at most {_MOST:.0e}, or 0 for no limit"
+        raise ConfigError(f"is {text[:40]!r}", where=name, expected=most)
     return value
 
 

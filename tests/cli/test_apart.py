@@ -303,9 +303,12 @@ def test_limits_are_named_by_variables():
     # 100 h of MF4, 4.6 GB, are read in 4 min and 0.7 GB
     assert ReadLimits().wall_for(4_600_000_000) > 3600.0
     assert ReadLimits().memory_here() >= min(2_000_000_000, machine_memory())
-    for text in ("x", "-1", "nan", "inf"):
+    for text in ("x", "-1", "nan", "inf", "1e10"):
         with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_CPU_S: is .* expected a number of seconds"):
             limits_from({"AQUALOG_LIMIT_CPU_S": text})
+    assert limits_from({"AQUALOG_LIMIT_FILE_MB": "1e-300"}).file == 1  # not 0, which is none
+    with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_MB: is '200'; expected 300 or more, or 0 for no limit"):
+        limits_from({"AQUALOG_LIMIT_MB": "200"})
 
 
 def test_memory_of_a_control_group(tmp_path):
