@@ -11,7 +11,7 @@ import polars as pl
 from aqualog.align.clean import Clean, Span
 from aqualog.align.mapping import SignalMap
 from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear, placed
-from aqualog.errors import SignalError
+from aqualog.errors import ConfigError, SignalError
 from aqualog.notation import WHEELS, Symbol
 from aqualog.types import BoolArray, Channel, FloatArray, TimeArray
 from aqualog.vehicle import Vehicle
@@ -64,6 +64,8 @@ def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int =
     ------
     SignalError
         If there is no rate, or the stamps jump.
+    ConfigError
+        If it is the rate asked for that makes too many rows.
     """
     dt_ns = _grid_step(cleaned, rate_hz)
     anchor_of = next((c for c in cleaned if c.symbol.name.startswith("omega_")), cleaned[0])
@@ -73,7 +75,12 @@ def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int =
     start = anchor - (anchor - first) // dt_ns * dt_ns
     rows = (last - start) // dt_ns + 1
     samples = max(c.span.samples for c in cleaned)
-    if rows > most_rows or (rows > _SPARSE_ROWS and rows > 50 * samples):
+    if _is_too_long(rows, samples, most_rows):
+        own_rows = (last - start) // _grid_step(cleaned, None) + 1
+        if rate_hz is not None and not _is_too_long(own_rows, samples, most_rows):
+            raise ConfigError(
+                f"a rate of {rate_hz:g} Hz makes {rows} rows of {samples} samples", expected="one near that of the log"
+            )
         raise SignalError(
             f"the signals span {(last - first) / 1e9:.0f} s with {samples} samples: their time stamps jump",
             where=", ".join(dict.fromkeys(c.origin.file for c in cleaned)),
@@ -81,6 +88,10 @@ def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int =
             hint="`aqualog inspect LOG`; [sources] offset_s in the signal map",
         )
     return Grid(start, rows, dt_ns)
+
+
+def _is_too_long(rows: int, samples: int, most_rows: int) -> bool:
+    return rows > most_rows or (rows > _SPARSE_ROWS and rows > 50 * samples)
 
 
 def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -23,7 +24,7 @@ def expand(names: Iterable[str]) -> list[Path]:
     Raises
     ------
     ConfigError
-        If a glob or folder matches nothing.
+        If a glob or folder matches nothing, or a name is empty.
     """
     found: dict[str, Path] = {}
     for name in names:
@@ -40,6 +41,8 @@ def list_files(names: Iterable[str]) -> list[Path]:
 def _one(name: str) -> list[Path]:
     if name.startswith("@"):
         return _from_list(Path(name[1:]))
+    if not name:  # it would be the folder in which the user happens to be
+        raise ConfigError("a name is empty", expected="a log, folder or glob", hint="check the shell's variables")
     path = Path(name)
     if path.is_dir():
         return _from_folder(path)
@@ -53,7 +56,7 @@ def _one(name: str) -> list[Path]:
 
 def _from_list(path: Path) -> list[Path]:
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = _text_of_list(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"list of logs cannot be read ({error})", where=str(path)) from error
     names = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
@@ -62,6 +65,19 @@ def _from_list(path: Path) -> list[Path]:
         raise ConfigError(f"names {odd[:60]!r}", where=str(path), expected="files, folders and globs, one a line")
     base = path.parent
     return [p for n in names for p in _one(n if Path(n).is_absolute() else str(base / n))]
+
+
+def _text_of_list(path: Path) -> str:
+    """What a list says, if it has an end: of pipes only one of the shell, whose other end is there."""
+    kind = path.stat().st_mode
+    is_nameless = stat.S_ISFIFO(kind) and not Path(os.path.realpath(path)).exists()
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind) or is_nameless):
+        raise ConfigError("list of logs is a device or a pipe", where=str(path), expected="a text file")
+    with path.open("rb") as file:
+        data = file.read(_LARGEST_LIST + 1)
+    if len(data) > _LARGEST_LIST:
+        raise ConfigError(f"list of logs is larger than {_LARGEST_LIST // 1_000_000} MB", where=str(path))
+    return data.decode("utf-8")
 
 
 def _from_folder(path: Path) -> list[Path]:
@@ -73,6 +89,7 @@ def _from_folder(path: Path) -> list[Path]:
     return hits
 
 
+_LARGEST_LIST = 100_000_000  # [byte] a million names
 # In a folder, text files that are no logs (README, notes, maps) stand beside them, so there the suffix is asked too.
 _LOG_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
 

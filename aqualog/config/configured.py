@@ -62,7 +62,7 @@ def _configured(
     map_path = map_file or (campaign.signals if campaign else None)
     signal_map = _tried(load_signal_map, map_path, faults) if map_path else SignalMap()
     settings = _tried(load_settings, thresholds, faults) if thresholds else Settings()
-    faults += [f"{p}: there is no such file" for p in dbc if not p.is_file()]
+    faults += [f"{p}: {'is no file' if p.exists() else 'there is no such file'}" for p in dbc if not p.is_file()]
     if faults or campaign is None or signal_map is None or settings is None:
         raise ConfigError("; ".join(dict.fromkeys(faults)))
     return Configured(

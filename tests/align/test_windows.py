@@ -9,7 +9,7 @@ import pytest
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.table import build_signals
 from aqualog.align.windows import NotInPiecesError, long_drive
-from aqualog.errors import SignalError
+from aqualog.errors import ConfigError, SignalError
 from aqualog.io.base import part_of
 from aqualog.types import Channel, ChannelInfo
 from aqualog.vehicle import Vehicle
@@ -207,3 +207,8 @@ def both_none(c):
         {"omega_fl": (Entry("omega_fl", "omega_fl"), c.info)}, lambda: pieces([c], 3, np.random.default_rng(0)), signal_map=SignalMap(),
         vehicle=CAR,
     )  # fmt: skip
+
+
+def test_a_rate_with_which_the_rows_grow_too_many_is_the_users():
+    with pytest.raises(ConfigError, match=r"a rate of 100000 Hz makes \d+ rows of 5000 samples"):
+        both(wheels(), rate_hz=1e5)

@@ -1,9 +1,12 @@
 """What a command reads is not written over, not even by force; no two results have one name."""
 
+import os
+
 import pytest
 from typer.testing import CliRunner
 
-from aqualog.cli.files import refuse_existing
+from aqualog.cli import files
+from aqualog.cli.files import expand, refuse_existing
 from aqualog.cli.main import app
 from aqualog.errors import ConfigError
 
@@ -99,3 +102,31 @@ def test_two_names_of_one_result_behind_a_link(folder):
 def test_files_of_a_folder_that_is_one_log(folder):
     with pytest.raises(ConfigError, match="source"):
         refuse_existing([folder / "labels" / "a.csv"], force=True, sources=[folder / "labels"])
+
+
+@pytest.mark.parametrize("command", ["detect", "batch", "inspect"])
+def test_an_empty_name_is_not_the_folder_one_is_in(folder, command):
+    result = CliRunner().invoke(
+        app, [command, "", *(("--vehicle", "car.toml", "-o", "s") if command == "batch" else ())]
+    )
+    assert result.exit_code == 2
+    assert "a name is empty" in result.stderr
+
+
+def test_lists_without_an_end(folder, monkeypatch):
+    os.mkfifo(folder / "pipe")
+    for name in ("@pipe", "@/dev/zero", "@/dev/null"):
+        with pytest.raises(ConfigError, match="is a device or a pipe"):
+            expand([name])
+    monkeypatch.setattr(files, "_LARGEST_LIST", 10)
+    (folder / "long.txt").write_text("a.csv\n" * 3)
+    with pytest.raises(ConfigError, match="list of logs is larger"):
+        expand(["@long.txt"])
+
+
+def test_a_list_from_the_shell_may_come_through_a_pipe(folder):
+    out, into = os.pipe()
+    os.write(into, f"{folder / 'a.csv'}\n".encode())
+    os.close(into)
+    assert expand([f"@/dev/fd/{out}"]) == [folder / "a.csv"]
+    os.close(out)
