@@ -12,6 +12,7 @@ import io
 import json
 import os
 import re
+import stat
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -178,7 +179,9 @@ class SignalCache:
             return
         for name in names:
             with suppress(OSError):  # another process has just thrown it away
-                yield self.folder / name, (self.folder / name).stat()
+                state = (self.folder / name).lstat()
+                if stat.S_ISREG(state.st_mode):  # a pipe or a link to a device would be read without end
+                    yield self.folder / name, state
 
     def _make(self) -> None:
         self.folder.parent.mkdir(parents=True, exist_ok=True)
@@ -200,8 +203,9 @@ class SignalCache:
 
     def _known(self) -> Any:
         try:
-            return json.loads((self.folder / _CONTENTS).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            path = self.folder / _CONTENTS
+            return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        except (OSError, ValueError, RecursionError):
             return None
 
     def _keep_known(self, contents: Contents) -> None:

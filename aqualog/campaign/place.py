@@ -18,6 +18,7 @@ Address = Path | str
 """A folder, or the URL of something that fsspec knows."""
 
 _URL = re.compile(r"([a-z][a-z0-9+.\-]+)://(.*)", re.IGNORECASE | re.DOTALL)
+_FILE = re.compile(r"(?:file|local):(?://(?:localhost(?=/))?)?(.*)", re.IGNORECASE | re.DOTALL)
 _CHAIN = re.compile(r"[a-z][a-z0-9+.\-]+(://.*)?::.*://", re.IGNORECASE | re.DOTALL)
 _ORPHAN = re.compile(r"\..{1,40}-\w{8}\.(parquet|json)\.tmp", re.DOTALL)
 
@@ -92,19 +93,24 @@ def address_of(text: Address) -> Address:
     Raises
     ------
     ConfigError
-        If it is a chain of file systems.
+        If it is empty, a chain of file systems, or a file of another machine.
     """
     if isinstance(text, Path):
         return text
+    if not text:  # it would be the folder in which the user happens to be
+        raise ConfigError(
+            "the name of the store is empty", expected="a folder or a URL", hint="check the shell's variables"
+        )
     if _CHAIN.match(text):
         raise ConfigError(
             "is a chain of file systems", where=text.split("::")[0], expected="one, as s3://bucket/store",
             hint="without the cache before it, which would hide what others write",
         )  # fmt: skip
-    match = _URL.fullmatch(text)
-    if match is None:
-        return Path(text)
-    return Path(match[2]) if match[1].lower() in ("file", "local") else match[0]
+    if file := _FILE.fullmatch(text):
+        if not file[1].startswith("/"):  # what stands there is a host; the libraries take it for a folder here
+            raise ConfigError("names no folder of this machine", where=text, expected="the folder, or file:///folder")
+        return Path(file[1])
+    return text if _URL.fullmatch(text) else Path(text)
 
 
 def place_of(address: Address) -> Place:

@@ -47,8 +47,9 @@ class Folder:
                 raise ConfigError("is no folder", where=str(path), expected="the store's folder", hint="remove it")
         for name in files:
             path = self.address / name
-            if path.is_dir():
-                raise ConfigError("is a folder", where=str(path), expected="the store's file", hint="remove it")
+            if path.exists() and not path.is_file():
+                what = "is a folder" if path.is_dir() else "is a device or a pipe"
+                raise ConfigError(what, where=str(path), expected="the store's file", hint="remove it")
         return True
 
     def make(self, folders: Iterable[str]) -> None:

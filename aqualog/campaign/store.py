@@ -200,7 +200,7 @@ class Store:
         """Why a log gave nothing."""
         try:
             return str(json.loads(self._place.read(_failure(key)))["reason"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return "failed, and the reason cannot be read"
 
     def drop(self, key: str) -> None:
@@ -298,7 +298,7 @@ class Store:
         with self._reached():
             try:
                 return json.loads(self._place.read(name))
-            except (FileNotFoundError, ValueError):
+            except (FileNotFoundError, ValueError, RecursionError):
                 return None
             except OSError:
                 if isinstance(self.address, Path):

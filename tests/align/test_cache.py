@@ -221,7 +221,19 @@ def test_an_entry_without_records_is_a_miss(log, place):
     assert not strange.exists()
 
 
-@pytest.mark.parametrize("known", ["", "[1]", '{"a": 1}', '{"a": [1, 2, 3]}'])
+@pytest.mark.parametrize("make", [os.mkfifo, lambda p: p.symlink_to("/dev/zero")], ids=["pipe", "device"])
+def test_what_has_no_end_is_not_read(make, log, place):
+    plain = load_signals([log], vehicle=CAR, cache=place)
+    (entry,) = place.kept()
+    for path in (entry.path, place.folder / "contents.json"):
+        path.unlink(missing_ok=True)
+        make(path)
+    assert place.kept() == []
+    assert_same(plain, load_signals([log], vehicle=CAR, cache=place))
+    assert len(place.kept()) == 1
+
+
+@pytest.mark.parametrize("known", ["", "[" * 100_000, "[1]", '{"a": 1}', '{"a": [1, 2, 3]}'])
 def test_hashes_that_are_none_are_not_believed(known, log, place):
     place.folder.mkdir(parents=True)
     (place.folder / "contents.json").write_text(known)

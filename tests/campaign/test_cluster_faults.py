@@ -4,8 +4,10 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +23,7 @@ from aqualog.campaign import cluster_worker
 from aqualog.campaign.cluster import on_cluster
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.cli.main import app
-from aqualog.errors import AqualogError
+from aqualog.errors import AqualogError, ConfigError
 
 
 @contextmanager
@@ -219,3 +221,26 @@ def test_what_answers_but_is_no_scheduler(campaign, tmp_path):
     assert result.exit_code == 2
     assert "no dask scheduler answers" in result.stderr
     assert time.monotonic() - began < 30.0
+
+
+@pytest.mark.parametrize("kind", ["tcp", "ws"])
+def test_what_talks_before_it_is_asked_is_no_scheduler(kind):
+    # as a length, what this says is more memory than there is
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        said = b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nhi"
+        held = []
+
+        def talk():
+            while True:
+                try:
+                    held.append(server.accept()[0])
+                    held[-1].sendall(said)
+                except OSError:
+                    return
+
+        threading.Thread(target=talk, daemon=True).start()
+        address = f"{kind}://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(ConfigError, match="no dask scheduler answers"), on_cluster(address):
+            pass
+        for one in held:
+            one.close()

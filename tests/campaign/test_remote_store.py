@@ -280,6 +280,10 @@ def test_what_was_half_written_long_ago_is_swept(plain, tmp_path):
 
 def test_addresses(tmp_path):
     assert address_of("file:///a/b") == Path("/a/b")
+    assert address_of("file:/a/b") == address_of("FILE://localhost/a/b") == Path("/a/b")
+    for text in ("", "file:", "file:a", "file://", "file://host/a", "local://a", "file://localhostage/a"):
+        with pytest.raises(ConfigError, match=r"empty|no folder of this machine"):
+            address_of(text)
     assert address_of("a/b:c") == Path("a/b:c")
     assert address_of("S3://b/x") == "S3://b/x"
     assert isinstance(Store(f"file://{tmp_path}")._place, Folder)

@@ -448,3 +448,28 @@ def test_no_result_goes_into_a_store(own):
 def test_processes_are_not_without_end(own):
     result = run("batch", own / "campaign.toml", "--jobs", "1000")
     assert f"--jobs 1000: {most_processes()} processes are the most" in result.stderr
+
+
+def test_lists_of_thousands_of_levels_are_no_json(own):
+    store = Store(own / "campaign.store")
+    for name in ("manifest.json", "contents.json"):
+        (own / "campaign.store" / name).write_text("[" * 100_000)
+        assert store.read_json(name) is None
+    (own / "campaign.store" / "failed").mkdir(exist_ok=True)
+    (own / "campaign.store" / "failed" / "k.json").write_text("[" * 100_000)
+    assert "cannot be read" in store.failure("k")
+
+
+def test_a_pipe_in_a_store_is_not_waited_for(own):
+    (own / "campaign.store" / "contents.json").unlink()
+    os.mkfifo(own / "campaign.store" / "contents.json")
+    result = CliRunner().invoke(app, ["batch", str(own / "campaign.toml"), "--progress", "off"])
+    assert result.exit_code == 2
+    assert "contents.json: is a device or a pipe" in result.stderr
+
+
+@pytest.mark.parametrize("seconds", ["inf", "1e308", "nan"])
+def test_limits_that_no_clock_has_are_refused(own, seconds):
+    result = CliRunner().invoke(app, ["batch", str(own / "campaign.toml"), "--limit-s", seconds])
+    assert result.exit_code == 2
+    assert "Invalid value for '--limit-s'" in result.stderr
