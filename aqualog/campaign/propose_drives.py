@@ -188,8 +188,10 @@ def group_drives(
     for i, own in enumerate(words):
         by_key.setdefault(tuple(w for w in own if w in telling), []).append(i)
     if len(by_key) > 1:  # nothing in their names tells these from others: at most files of one folder are one drive
-        for i in by_key.pop((), []):
-            by_key.setdefault(("", logs[i].name.rpartition("/")[0]), []).append(i)
+        rest = by_key.pop((), [])
+        alone = not _share_a_word(words[i] for i in rest)
+        for i in rest:
+            by_key.setdefault(("", logs[i].name if alone else logs[i].name.rpartition("/")[0]), []).append(i)
     drives: list[Drive] = []
     for members in by_key.values():
         kept = _without_copies(members, logs, kinds, rivals, notes)
@@ -200,6 +202,12 @@ def group_drives(
         if is_one and len(set(names)) < len(names):
             notes.append(f"{', '.join(logs[i].name for i in kept)} may be one drive, but have one name: rename them")
             is_one = False
+        if is_one and not _share_a_word(words[i] for i in kept):
+            told = ", ".join(logs[i].name for i in kept)
+            notes.append(
+                f"{told} are taken for one drive by what they hold, no word is in all of their names; if they are "
+                "several, give each a line in the table of runs"
+            )
         for several in [kept] if is_one else [[i] for i in kept]:
             ordered = sorted(several, key=lambda i: (kinds[i], logs[i].name))
             drives.append(Drive(tuple(logs[i] for i in ordered), tuple(kinds[i] for i in ordered)))
@@ -214,6 +222,11 @@ def drive_name(drive: Drive) -> str:
     shared = set.intersection(*(set(tokens(f.name)) for f in drive.files))
     stem = first.rsplit(".", 1)[0] if "." in first.rsplit("/", 1)[-1] else first
     return _WORD.sub(lambda m: m[0] if m[0].lower() in shared else "", stem).strip("/_- ") + "."
+
+
+def _share_a_word(names: Iterable[Sequence[str]]) -> bool:
+    found = [set(n) for n in names]
+    return bool(found and set.intersection(*found))
 
 
 def _rank(path: Path) -> int:

@@ -177,6 +177,19 @@ def test_a_drive_without_one_logger_is_still_with_its_own(tmp_path):
     assert sorted(map(len, found)) == [1, 1, 2]
 
 
+def test_strangers_among_others_are_no_drive_and_alone_they_are_told(tmp_path):
+    wheels(tmp_path / "monday.csv")
+    imu(tmp_path / "unrelated.csv")
+    found, notes, _ = drives(tmp_path)
+    assert sorted(map(len, found)) == [2]
+    assert "taken for one drive by what they hold" in notes[0]
+    for i in range(3):  # of a kind of their own, so that nothing in the two names tells them apart
+        wheels(tmp_path / f"d{i}.csv", names=[f"{n}_neu" for n in WHEELS])
+    found, notes, _ = drives(tmp_path)
+    assert sorted(map(len, found)) == [1, 1, 1, 1, 1]
+    assert notes == ()
+
+
 def test_one_name_in_two_folders_cannot_be_one_drive(tmp_path):
     for i in range(2):
         wheels(tmp_path / "rad" / f"d{i}.csv")
