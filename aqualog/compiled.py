@@ -15,7 +15,7 @@ from typing import Any
 from numba import config, njit
 from numba.core.runtime import rtsys
 
-from aqualog.places import user_cache
+from aqualog.places import code_folder
 
 __all__ = ["compiled", "inlined", "kept_code"]
 
@@ -106,7 +106,7 @@ def _user_cache() -> str:
     What lies in it is run: it must be this user's, and nobody else may write to it.
     """
     try:
-        folder = user_cache() / "compiled"
+        folder = code_folder()
         folder.mkdir(parents=True, exist_ok=True)
         if hasattr(os, "geteuid"):
             state = folder.stat()

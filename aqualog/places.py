@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["user_cache"]
+__all__ = ["code_folder", "has_kept_code", "user_cache"]
 
 
 def user_cache() -> Path:
@@ -18,3 +18,22 @@ def user_cache() -> Path:
     """
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     return (Path(base) if base else Path.home() / ".cache") / "aqualog"
+
+
+def code_folder() -> Path:
+    """Folder for machine code that is kept from process to process; it need not exist.
+
+    Raises
+    ------
+    RuntimeError
+        If there is no home folder.
+    """
+    return user_cache() / "compiled"
+
+
+def has_kept_code() -> bool:
+    """Whether some machine code is kept; without it the first drive waits for the compiler."""
+    try:
+        return any(code_folder().rglob("*.nbi"))
+    except (OSError, RuntimeError):
+        return False

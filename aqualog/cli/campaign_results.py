@@ -14,6 +14,7 @@ from aqualog.cli.evaluate_inputs import is_campaign
 from aqualog.cli.files import expand, list_files, refuse_existing
 from aqualog.cli.progress import Progress
 from aqualog.errors import ConfigError, ExitCode
+from aqualog.places import has_kept_code
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome, Configured
@@ -131,6 +132,9 @@ def results(
         from aqualog.campaign.samples import load_results
         from aqualog.campaign.store import Store
 
+        if cluster is None and not has_kept_code():
+            steps.clear()
+            console.note("the first logs wait while the detectors are compiled, once after an installation")
         place = Store(store_of(configured, store), shard.name if shard is not None else "")
         _check_apart(configured, place)
         told: list[str] = []
