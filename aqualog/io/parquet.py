@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,6 +17,8 @@ from aqualog.errors import LogError
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.csv_cells import is_clock, is_stamp
+from aqualog.io.memory import bytes_text, free_memory
+from aqualog.io.parquet_groups import SoundRows
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.table_time import (
     FieldKind,
@@ -33,6 +36,7 @@ from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArra
 __all__ = ["ParquetReader"]
 
 _LOOKED_AT = 50
+_PER_SAMPLE = 24  # [bytes] while a column is read as a whole: as stored, as a number, its time
 _PIECE = 1 << 22  # values of all columns together
 _JUDGED = 1 << 16  # rows that tell the unit of a time without one
 _MOST_ROWS = 1 << 26  # what 18 h at 1 kHz have; more are believed of a file that has a byte for 64 of them
@@ -58,11 +62,11 @@ class _Lost:
     rows: int = 0
     first: int = 0
 
-    def add(self, stamps: Stamps, at: int) -> None:
-        """Count those of a piece that begins at a row."""
+    def add(self, stamps: Stamps, row_of: Callable[[int], int]) -> None:
+        """Count those of a piece; `row_of` tells which row of the file each of its rows is."""
         bad = np.flatnonzero(~stamps.valid)
         if bad.size:
-            self.first = self.first if self.rows else at + int(bad[0])
+            self.first = self.first if self.rows else row_of(int(bad[0]))
             self.rows += bad.size
 
 
@@ -80,18 +84,19 @@ class ParquetReader:
         self._faults = FaultLog()
         self._stamps: Stamps | None = None
         schema, metadata = self._wrapped(lambda: _head(path))
+        self._rows: int = self._wrapped(
+            lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
+        )
+        self._sound = SoundRows(path, self._rows, self._faults)
+        if self._rows > max(_MOST_ROWS, 64 * path.stat().st_size):
+            what = f"declares {self._rows} rows in {path.stat().st_size} bytes"
+            raise LogError(what, where=str(path), expected="a recording", hint="write it again")
         about = _about(metadata)
         start = about.get("start_ns")
         self._start_ns = start if isinstance(start, int) else None
         self._columns = self._listed(schema, _units(about) or field_metadata(metadata.get("ARROW:schema", ""), "unit"))
         fields = [TableField(c.path, c.unit, c.kind) for c in self._columns]
         self._time = choose_time(fields, options, where=str(path))
-        self._rows: int = self._wrapped(
-            lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
-        )
-        if self._rows > max(_MOST_ROWS, 64 * path.stat().st_size):
-            what = f"declares {self._rows} rows in {path.stat().st_size} bytes"
-            raise LogError(what, where=str(path), expected="a recording", hint="write it again")
         if self._time.note:
             self._note(self._time.note)
 
@@ -110,10 +115,14 @@ class ParquetReader:
         stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
         if not stored:
             return []
-        scan = pl.scan_parquet(self._path, glob=False).select(stored)
-        frame: pl.DataFrame = self._wrapped(scan.collect)
+        self._check_memory(len(stored))
+        frame = self._sound.collect(stored, 0, self._rows)
         if self._stamps is None:
             self._stamps = self._read_time(frame)
+        elif frame.height != len(self._stamps.t_ns):  # another row group turned out to be damaged
+            self._stamps = None
+            return self.read(asked)
+        self._sound.tell([self._columns[w.key].stored for w in asked])
         return [self._channel(w, frame[self._columns[w.key].stored], self._stamps) for w in asked]
 
     def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
@@ -131,17 +140,27 @@ class ParquetReader:
         absolute: bool | None = None
         lost = _Lost()
         for at in range(0, self._rows, rows):
-            frame: pl.DataFrame = self._wrapped(self._slice(stored, at, rows).collect)
+            frame = self._sound.collect(stored, at, rows)
+            if frame.is_empty():
+                continue
             stamps = self._stamps_of(frame, unit)
             if absolute is None and stamps.valid.any():
                 absolute = stamps.absolute
             stamps = replace(stamps, absolute=bool(absolute))
-            lost.add(stamps, at)
+            lost.add(stamps, partial(self._sound.row_of, at))
             yield [self._channel(w, frame[self._columns[w.key].stored], stamps) for w in asked]
         self._tell_lost(lost)
+        self._sound.tell([self._columns[w.key].stored for w in asked])
 
-    def _slice(self, stored: Sequence[str], at: int, rows: int) -> pl.LazyFrame:
-        return pl.scan_parquet(self._path, glob=False).select(stored).slice(at, rows)
+    def _check_memory(self, columns: int) -> None:
+        """Refuse what cannot be held: a page of one value in a million rows is a few bytes."""
+        need, free = self._rows * (columns + 1) * _PER_SAMPLE, free_memory()
+        if need > free:
+            raise LogError(
+                f"{columns} columns of {self._rows} rows would take {bytes_text(need)}", where=str(self._path),
+                expected=f"at most {bytes_text(free)} that are free",
+                hint="give fewer channels in a signal map, or a machine with more memory",
+            )  # fmt: skip
 
     def _unit_of_ends(self) -> str:
         """Unit of the time; where none is given, by the first rows and the last one: how long a log is tells it."""
@@ -149,7 +168,7 @@ class ParquetReader:
         if unit or not column.dtype.is_numeric():
             return unit
         spans = ((0, _JUDGED), (max(self._rows - 1, 0), 1))
-        ends = [self._wrapped(self._slice([column.stored], at, n).collect) for at, n in spans]
+        ends = [self._sound.collect([column.stored], at, n) for at, n in spans]
         unit, reason = judged_unit(np.concatenate([_floats(frame[column.stored]) for frame in ends]))
         self._note(no_unit_note(unit, reason))
         return unit
@@ -163,7 +182,7 @@ class ParquetReader:
     def _read_time(self, frame: pl.DataFrame) -> Stamps:
         stamps = self._stamps_of(frame, self._time.unit)
         lost = _Lost()
-        lost.add(stamps, 0)
+        lost.add(stamps, partial(self._sound.row_of, 0))
         self._tell_lost(lost)
         return stamps
 
@@ -207,8 +226,8 @@ class ParquetReader:
 
     def _text_kind(self, stored: str) -> FieldKind:
         """Whether a column of text holds times."""
-        scan = pl.scan_parquet(self._path, glob=False).select(pl.col(stored).head(_LOOKED_AT))
-        cells = [c.strip() for c in self._wrapped(scan.collect)[stored].drop_nulls().to_list()]
+        frame = self._sound.collect([stored], 0, min(self._rows, _LOOKED_AT))
+        cells = [c.strip() for c in frame[stored].drop_nulls().to_list()]
         if cells and all(map(is_stamp, cells)):
             return "stamp"
         return "clock" if cells and all(map(is_clock, cells)) else "text"

@@ -1,0 +1,202 @@
+"""The rows of a Parquet file that can be believed, row group by row group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from aqualog.errors import LogError
+from aqualog.io.base import FaultLog
+from aqualog.io.parquet_pages import Group, Index, is_of, page_fault, read_index
+from aqualog.io.thrift import MalformedError
+
+__all__ = ["SoundRows"]
+
+_CODES: dict[type[pl.DataType], str] = {
+    pl.Float64: "d", pl.Float32: "f", pl.Int64: "q", pl.UInt64: "Q", pl.Int32: "i", pl.Int16: "i", pl.Int8: "i",
+    pl.UInt32: "I", pl.UInt16: "I", pl.UInt8: "I",
+}  # fmt: skip
+_LIBRARY = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError)
+_HINT = "check whether it was written to its end: the index stands there"
+
+
+class SoundRows:
+    """Rows of one file, but for those of damaged row groups, which are told and counted.
+
+    Parameters
+    ----------
+    path : Path
+    rows : int
+        As the library counts them.
+    faults : FaultLog
+        What is lost is told there.
+
+    Raises
+    ------
+    LogError
+        If the index cannot be so.
+    """
+
+    def __init__(self, path: Path, rows: int, faults: FaultLog) -> None:
+        self._path, self._rows, self._faults = path, rows, faults
+        try:
+            self._index: Index | None = read_index(path)
+        except (MalformedError, OSError) as error:
+            raise LogError(f"cannot be read as Parquet ({error})", where=str(path), hint=_HINT) from error
+        if self._index is None:
+            self._note("the index is too large to hold the pages against it")
+        elif self._index.unowned:
+            self._note(f"{self._index.unowned} bytes before the index (byte {self._index.end}) belong to no column")
+        self._groups = (Group(0, rows, {}),) if self._index is None else self._index.groups
+        self._bad: dict[int, str] = {}
+        self._checked: set[tuple[int, str]] = set()
+        self._strange: dict[str, tuple[int, int]] = {}
+        self._told: set[tuple[int, str]] = set()
+
+    @property
+    def bad(self) -> frozenset[int]:
+        """Row groups that are left out, as far as they were looked at."""
+        return frozenset(self._bad)
+
+    def collect(self, columns: Sequence[str], at: int, rows: int) -> pl.DataFrame:
+        """Rows of some columns, without those of damaged row groups.
+
+        Raises
+        ------
+        LogError
+            If none of the row groups is sound.
+        """
+        touched = [k for k, g in enumerate(self._groups) if g.first < at + rows and at < g.first + g.rows]
+        self._check(touched, columns)
+        try:
+            return self._frame(columns, at, rows, touched)
+        except _LIBRARY as error:
+            if len(self._groups) == 1:
+                raise _unreadable(self._path, _reason(error)) from error
+        for k in touched:  # which of them cannot be decoded
+            if k not in self._bad:
+                group = self._groups[k]
+                try:
+                    self._slice(columns, group.first, group.rows)
+                except _LIBRARY as error:
+                    self._leave_out(k, _reason(error))
+        try:
+            return self._frame(columns, at, rows, touched)
+        except _LIBRARY as error:
+            raise _unreadable(self._path, _reason(error)) from error
+
+    def row_of(self, at: int, k: int) -> int:
+        """Row of the file that is the k-th of those collected from row `at` on."""
+        for begin, rows in self._spans(at, self._rows - at, range(len(self._groups))):
+            if k < rows:
+                return begin + k
+            k -= rows
+        return self._rows
+
+    def tell(self, columns: Sequence[str]) -> None:
+        """Tell and count what was lost of these columns, each once."""
+        for k, reason in sorted(self._bad.items()):
+            group = self._groups[k]
+            new = {(k, c) for c in columns} - self._told
+            self._told |= new
+            self._faults.lost_samples += group.rows * len(new)
+            span = f"rows {group.first + 1} to {group.first + group.rows}"
+            self._note(f"row group {k + 1} of {len(self._groups)} ({span}) is left out: {reason}")
+        for column, (count, first) in self._strange.items():
+            self._faults.lost_samples += count
+            what = f"{count} value{'s' if count > 1 else ''} (first at row {first + 1}) beyond the least and greatest"
+            self._note(f'column "{column}": {what} that the index tells of; left out')
+        self._strange = {}
+
+    def _check(self, groups: Sequence[int], columns: Sequence[str]) -> None:
+        if self._index is None:
+            return
+        for k in groups:
+            new = [c for c in columns if (k, c) not in self._checked]
+            self._checked |= {(k, c) for c in new}
+            if k in self._bad or not new:
+                continue
+            fault = page_fault(self._path, self._index, self._groups[k], new)
+            if fault:
+                self._leave_out(k, fault)
+
+    def _leave_out(self, group: int, reason: str) -> None:
+        self._bad[group] = reason
+        if len(self._bad) == len(self._groups):
+            raise _unreadable(self._path, next(iter(self._bad.values())))
+
+    def _frame(self, columns: Sequence[str], at: int, rows: int, touched: Sequence[int]) -> pl.DataFrame:
+        spans = list(self._spans(at, rows, touched))
+        frames = [self._within_bounds(self._slice(columns, a, n), a) for a, n in spans]
+        if not frames:
+            return self._slice(columns, 0, 0)
+        return frames[0] if len(frames) == 1 else pl.concat(frames)
+
+    def _spans(self, at: int, rows: int, touched: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """Stretches of rows between the damaged row groups."""
+        begin = at
+        for k in touched:
+            group = self._groups[k]
+            if k in self._bad and group.first + group.rows > at:
+                if group.first > begin:
+                    yield begin, group.first - begin
+                begin = group.first + group.rows
+        if begin < at + rows:
+            yield begin, at + rows - begin
+
+    def _slice(self, columns: Sequence[str], at: int, rows: int) -> pl.DataFrame:
+        return pl.scan_parquet(self._path, glob=False).select(columns).slice(at, rows).collect()
+
+    def _within_bounds(self, frame: pl.DataFrame, at: int) -> pl.DataFrame:
+        """Numbers beyond the bounds of their row group are none: a bit or more of them has changed."""
+        if not frame.height:
+            return frame
+        groups = [g for g in self._groups if g.rows and g.first < at + frame.height and at < g.first + g.rows]
+        starts = np.array([max(g.first - at, 0) for g in groups])
+        for name in frame.columns:
+            column = frame[name]
+            code = _CODES.get(column.dtype.base_type())
+            if code is None:
+                continue
+            values = column.fill_null(0).to_numpy()
+            low, high = _bounds(groups, name, code, values.dtype)
+            outside = (np.fmin.reduceat(values, starts) < low) | (np.fmax.reduceat(values, starts) > high)
+            if not outside.any():
+                continue
+            which = np.searchsorted(starts, np.arange(len(values)), side="right") - 1
+            strange = column.is_not_null().to_numpy() & ((values < low[which]) | (values > high[which]))
+            if strange.any():
+                count, first = self._strange.get(name, (0, at + int(np.argmax(strange))))
+                self._strange[name] = count + int(strange.sum()), first
+                frame = frame.with_columns(pl.when(pl.Series(~strange)).then(column).alias(name))
+        return frame
+
+    def _note(self, text: str) -> None:
+        self._faults.notes.append(f"{self._path.name}: {text}")
+
+
+def _bounds(groups: Sequence[Group], column: str, code: str, dtype: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Least and greatest value of a column in each group, where they are not told the type's own."""
+    limits = np.iinfo(dtype) if dtype.kind in "iu" else np.finfo(dtype)
+    widest = (limits.min, limits.max) if dtype.kind in "iu" else (-np.inf, np.inf)
+    found = []
+    for group in groups:
+        chunk = group.chunks.get(column)
+        known = chunk.bounds.numbers(code) if chunk and chunk.bounds and is_of(chunk, code) else None
+        fits = known is not None and limits.min <= known[0] and known[1] <= limits.max
+        found.append(known if fits or (known and dtype.kind == "f") else widest)
+    low, high = zip(*found, strict=True)
+    return np.array(low, dtype=dtype), np.array(high, dtype=dtype)
+
+
+def _reason(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _unreadable(path: Path, reason: str) -> LogError:
+    return LogError(f"cannot be read as Parquet ({reason})", where=str(path), hint=_HINT)
