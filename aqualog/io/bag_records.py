@@ -10,6 +10,8 @@ from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from typing import BinaryIO
 
+from aqualog.io.unpack import LONGEST
+
 __all__ = [
     "BAG", "CHUNK", "CHUNK_INFO", "CONNECTION", "INDEX", "MAGIC", "MESSAGE", "BagRecords", "Head", "head_fields",
     "kind_of", "number",
@@ -87,7 +89,8 @@ class BagRecords:
         start = offset + size + 8
         end = start + int(_U32.unpack(raw)[0])
         known = self._known(offset + 1)
-        return None if end > (self._size if known is None else known) else (head, start, end)
+        is_long = kind_of(head) != INDEX and end - start > LONGEST
+        return None if is_long or end > (self._size if known is None else known) else (head, start, end)
 
     def _known(self, offset: int) -> int | None:
         """The first chunk of the index from a place on."""

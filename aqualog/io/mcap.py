@@ -30,7 +30,7 @@ from aqualog.io.batches import Batch, Message, batched, damage_notes
 from aqualog.io.mcap_records import HEAD, MAGIC, Records
 from aqualog.io.mcap_scan import scanned
 from aqualog.io.messages import SAMPLES, MessageReader, Stream, UndecodableError, codec_for, make_stream
-from aqualog.io.unpack import Allowance, DamagedError, unpack
+from aqualog.io.unpack import LONGEST, Allowance, DamagedError, unpack
 
 __all__ = ["McapReader", "McapSource"]
 
@@ -115,7 +115,7 @@ class McapSource:
                 continue
             file.seek(chunk.chunk_start_offset)
             opcode, length = HEAD.unpack(file.read(HEAD.size))
-            if opcode == Opcode.CHUNK and length <= self._size:
+            if opcode == Opcode.CHUNK and length <= min(self._size, LONGEST):
                 for batch in batched(self._chunk(chunk.chunk_start_offset, file.read(length), here)):
                     _keep(samples, batch)
             missing = {i for i in missing if len(samples.get(i, ())) < min(SAMPLES, self._counts[i])}
@@ -311,7 +311,7 @@ def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
         return None
     file.seek(0)  # the library looks for the magic bytes where the file stands
     try:
-        summary = SeekingReader(file, record_size_limit=size).get_summary()
+        summary = SeekingReader(file, record_size_limit=min(size, LONGEST)).get_summary()
     except Exception:  # whatever is wrong with it, the data section is still there to be walked
         return None
     return summary if summary is not None and _is_complete(summary, size) else None

@@ -16,6 +16,7 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from aqualog.io.batches import rows_of
+from aqualog.io.unpack import LONGEST
 
 __all__ = ["HEAD", "MAGIC", "Records"]
 
@@ -33,6 +34,8 @@ _BEHIND_DATA = frozenset(
     }
 )  # fmt: skip
 _FOOTER_LENGTH, _DATA_END_LENGTH = 20, 4
+_U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
+_ATTACHMENT = 2 * 8 + 2 * 4 + 8 + 4  # bytes of an attachment beside its name, its type and its data
 
 _BLOCK = 1 << 20
 _NAMES = {0: "plain", 3: "lz4", 4: "zstd"}  # length of the compression's name: where the length of the data stands
@@ -106,8 +109,27 @@ class Records:
             return None
         if opcode == Opcode.DATA_END and (length != _DATA_END_LENGTH or self._head(end)[0] not in _BEHIND_DATA):
             return None
+        if opcode in _WITH_BODY and length > LONGEST:
+            return None
+        if opcode == Opcode.ATTACHMENT and not self._is_attachment(offset + HEAD.size, length):
+            return None
         known = self._known(offset + 1)
         return None if known is not None and end > known else end
+
+    def _is_attachment(self, start: int, length: int) -> bool:
+        """Whether the sizes of its parts fill it: nothing else of it is read."""
+        left, at = length - _ATTACHMENT, start + 16
+        for size in (_U32, _U32, _U64):  # name, type, data
+            self._file.seek(at)
+            raw = self._file.read(size.size)
+            if len(raw) < size.size:
+                return False
+            part = int(size.unpack(raw)[0])
+            left -= part
+            at += size.size + part
+            if left < 0:
+                return False
+        return left == 0
 
     def _known(self, offset: int) -> int | None:
         """The first chunk of the summary from a place on."""

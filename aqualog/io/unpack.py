@@ -11,10 +11,12 @@ import bz2
 import lz4.frame
 import zstandard
 
-__all__ = ["FREE", "MAX_UNPACKED", "RATIO", "Allowance", "DamagedError", "unpack"]
+__all__ = ["FREE", "LONGEST", "MAX_UNPACKED", "RATIO", "Allowance", "DamagedError", "unpack"]
 
 MAX_UNPACKED = 1 << 28
 """Largest block that is decompressed. [byte]"""
+LONGEST = MAX_UNPACKED + (1 << 16)
+"""Longest record of a recording that is read as a whole: one that holds such a block. [byte]"""
 RATIO = 1000
 """To what part recorded messages shrink at most: those of 200 numbers that never change shrink to a 200th."""
 FREE = 1 << 25

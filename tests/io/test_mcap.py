@@ -21,6 +21,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from aqualog.errors import LogError
+from aqualog.io import mcap_records
 from aqualog.io.base import ReadOptions
 from aqualog.io.mcap import McapReader, McapSource
 from aqualog.io.mcap_scan import scanned
@@ -28,6 +29,7 @@ from aqualog.io.unpack import FREE, Allowance, DamagedError
 from aqualog.io.write_mcap import McapTopic, write_mcap
 from aqualog.types import Channel
 
+LONGEST = 1 << 24
 T0 = 1_700_000_000 * 10**9
 SCHEMA = {
     "type": "object",
@@ -442,6 +444,73 @@ def test_a_length_that_lies_costs_that_chunk_only(tmp_path, compression, indexed
     assert v[-1] == 1999
     assert any(f"{offsets[3][0]}" in note for note in reader.faults.notes)
     assert reader.faults.lost_samples == 2000 - v.size if indexed else reader.faults.truncated
+
+
+@pytest.mark.parametrize("opcode", [Opcode.MESSAGE, Opcode.CHUNK, Opcode.SCHEMA, Opcode.ATTACHMENT, Opcode.METADATA])
+@pytest.mark.parametrize("length", [2**63, LONGEST + (1 << 17)])
+@pytest.mark.parametrize("at_end", [False, True])
+def test_a_record_that_tells_of_more_than_there_is_costs_no_memory(tmp_path, monkeypatch, opcode, length, at_end):
+    """Before a chunk, or in front of a hole as large as it tells of."""
+    monkeypatch.setattr(mcap_records, "LONGEST", LONGEST)
+    path = write_json(tmp_path / "a.mcap", numbered(500), chunk_size=4000)
+    raw = path.read_bytes()
+    start = chunk_offsets(path)[2][0]
+    lie = struct.pack("<BQ", opcode, length) + struct.pack("<QQII", 1, 1, 2**32 - 1, 7)
+    with path.open("wb") as file:
+        file.write(raw[:start] + lie)
+        if at_end:
+            file.truncate(LONGEST + (1 << 19))
+        else:
+            file.write(raw[start:])
+    tracemalloc.start()
+    channels, reader = read_all(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < LONGEST / 2
+    v = channels["/car.v"].values
+    assert v[-1] == (499 if not at_end else v.size - 1)
+    assert np.all(np.diff(v) == 1)
+    if opcode != Opcode.METADATA or length > 1 << 40:  # of what is never read the length may be any
+        assert reader.faults.truncated
+        assert any(f"from byte {start}" in note for note in reader.faults.notes)
+
+
+@pytest.mark.parametrize("grown", [0, 5, 3000, 1 << 40])
+def test_an_attachment_that_lies_about_its_size_costs_nothing_else(tmp_path, grown):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4000, use_statistics=False)
+        writer.start()
+        channel = writer.register_channel("/car", "json", writer.register_schema("Car", "jsonschema", b"{}"))
+        for i in range(500):
+            if i == 100:
+                writer.add_attachment(T0, T0, "video.bin", "application/octet-stream", bytes(500))
+            writer.add_message(channel, T0 + i * 10**7, b'{"v": %d}' % i, T0)
+        writer.finish()
+    raw = bytearray(path.read_bytes())
+    start = raw.index(b"video.bin") - 9 - 8 - 8 - 4
+    assert raw[start] == Opcode.ATTACHMENT
+    struct.pack_into("<Q", raw, start + 1, struct.unpack_from("<Q", raw, start + 1)[0] + grown)
+    path.write_bytes(raw)
+    channels, reader = read_all(path)
+    assert channels["/car.v"].values.tolist() == list(range(500))
+    assert reader.faults.truncated == (grown > 0)
+
+
+@pytest.mark.parametrize("outside", [2**63, 2**40, "size", 8])
+def test_a_chunk_index_that_points_elsewhere_is_not_believed(tmp_path, outside):
+    path = write_json(tmp_path / "a.mcap", numbered(500), chunk_size=4000)
+    raw = bytearray(path.read_bytes())
+    with path.open("rb") as file:
+        entry = make_reader(file).get_summary().chunk_indexes[2]
+    raw[-12:-8] = bytes(4)  # no checksum over the summary
+    at = raw.rindex(struct.pack("<QQ", entry.chunk_start_offset, entry.chunk_length))
+    struct.pack_into("<Q", raw, at, len(raw) - 20 if outside == "size" else outside)
+    path.write_bytes(raw)
+    channels, reader = read_all(path)
+    v = channels["/car.v"].values
+    assert np.isin(v, np.arange(500)).all()
+    assert v.size == 500 or reader.faults.lost_samples or reader.faults.truncated
 
 
 @pytest.mark.parametrize("opcode", [Opcode.DATA_END, Opcode.FOOTER, 0])
