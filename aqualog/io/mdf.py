@@ -357,11 +357,13 @@ class MdfReader:
             if full.startswith(_FRAME):
                 continue
             name, _, device = full.partition("\\")
-            reason = self._survey.refused.get(int(channel.address)) or self._refusal(channel)
+            damage = self._survey.refused.get(int(channel.address))
+            reason = damage or self._refusal(channel)
             if not _fits(group, channel, version4=self._version4):
                 reason = "it lies outside the record"
             if reason is not None:
                 self._faults.notes.append(f"channel {prefix}.{name} is left out: {reason}")
+                self._faults.lost_samples += int(group.channel_group.cycles_nr) if damage else 0
                 continue
             if "log" in (formula_text(channel.conversion, version4=self._version4) or "").replace("log10", ""):
                 self._faults.notes.append(f"channel {prefix}.{name}: log is taken as the natural logarithm")

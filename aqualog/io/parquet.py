@@ -122,7 +122,7 @@ class ParquetReader:
         elif frame.height != len(self._stamps.t_ns):  # another row group turned out to be damaged
             self._stamps = None
             return self.read(asked)
-        self._sound.tell([self._columns[w.key].stored for w in asked])
+        self._sound.tell()
         return [self._channel(w, frame[self._columns[w.key].stored], self._stamps) for w in asked]
 
     def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
@@ -150,7 +150,7 @@ class ParquetReader:
             lost.add(stamps, partial(self._sound.row_of, at))
             yield [self._channel(w, frame[self._columns[w.key].stored], stamps) for w in asked]
         self._tell_lost(lost)
-        self._sound.tell([self._columns[w.key].stored for w in asked])
+        self._sound.tell()
 
     def _check_memory(self, columns: int) -> None:
         """Refuse what cannot be held: a page of one value in a million rows is a few bytes."""

@@ -56,7 +56,7 @@ class SoundRows:
         self._bad: dict[int, str] = {}
         self._checked: set[tuple[int, str]] = set()
         self._strange: dict[str, tuple[int, int]] = {}
-        self._told: set[tuple[int, str]] = set()
+        self._told: set[int] = set()
 
     @property
     def bad(self) -> frozenset[int]:
@@ -98,13 +98,12 @@ class SoundRows:
             k -= rows
         return self._rows
 
-    def tell(self, columns: Sequence[str]) -> None:
-        """Tell and count what was lost of these columns, each once."""
+    def tell(self) -> None:
+        """Tell and count what was lost; a row counts once, however many columns it has."""
         for k, reason in sorted(self._bad.items()):
             group = self._groups[k]
-            new = {(k, c) for c in columns} - self._told
-            self._told |= new
-            self._faults.lost_samples += group.rows * len(new)
+            self._faults.lost_samples += 0 if k in self._told else group.rows
+            self._told.add(k)
             span = f"rows {group.first + 1} to {group.first + group.rows}"
             self._note(f"row group {k + 1} of {len(self._groups)} ({span}) is left out: {reason}")
         for column, (count, first) in self._strange.items():

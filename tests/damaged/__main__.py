@@ -10,11 +10,11 @@ from collections import Counter
 from pathlib import Path
 
 from aqualog.workers import Crashed, Limits, work_on
-from tests.damaged.damage import DAMAGES
-from tests.damaged.judge import Seen, attempt, samples_of, verdict
+from tests.damaged.damage import DAMAGES, bombs
+from tests.damaged.judge import LEGEND, OUTCOMES, Seen, attempt, outcome, samples_of, verdict
 from tests.damaged.logs import FORMATS
 
-LIMITS = Limits(seconds=30.0, memory_mb=4000)
+LIMITS = Limits(seconds=30.0, memory_mb=2000)
 
 
 def main() -> int:
@@ -35,9 +35,7 @@ def main() -> int:
             if isinstance(seen, Seen):
                 found[path] = verdict(name, damage, sound[name], seen)
             else:
-                found[path] = (
-                    f"! crashed or out of time after {seen.seconds:.0f} s" if isinstance(seen, Crashed) else seen
-                )
+                found[path] = f"! over limit after {seen.seconds:.0f} s" if isinstance(seen, Crashed) else seen
             if found[path].startswith("!"):
                 print(
                     f"{name}: {damage.fault} {damage.number}: {found[path]}  {getattr(seen, 'words', '')[:300]}",
@@ -57,7 +55,7 @@ def _made(folder, names):  # type: ignore[no-untyped-def]
         source = FORMATS[name](place)
         sound[name], _ = samples_of(source)
         data = source.read_bytes()
-        for damage in DAMAGES:
+        for damage in (*DAMAGES, *bombs(name)):
             path = place / f"{damage.fault}_{damage.number}".replace(" ", "_") / source.name
             path.parent.mkdir()
             path.write_bytes(damage.make(data))
@@ -66,17 +64,20 @@ def _made(folder, names):  # type: ignore[no-untyped-def]
 
 
 def _print(names, found):  # type: ignore[no-untyped-def]
-    faults = list(dict.fromkeys(d.fault for d in DAMAGES))
-    print(
-        f"\n{len(found)} damaged logs\n\n| format | " + " | ".join(faults) + " |\n|---" * 1 + "|---" * len(faults) + "|"
-    )
-    for name in names:
-        cells = []
-        for fault in faults:
-            counts = Counter(v.split(":")[0] for (n, d), v in found.items() if n == name and d.fault == fault)
-            cells.append(", ".join(f"{c} {v}" for v, c in counts.most_common()))
-        print(f"| {name} | " + " | ".join(cells) + " |")
-    print("\nall: " + ", ".join(f"{c} {v}" for v, c in Counter(v.split(":")[0] for v in found.values()).most_common()))
+    by_format = {n: Counter(outcome(v) for (name, _), v in found.items() if name == n) for n in names}
+    faults = dict.fromkeys(d.fault for _, d in found)
+    by_fault = {f: Counter(outcome(v) for (_, d), v in found.items() if d.fault == f) for f in faults}
+    print(f"\n{len(found)} damaged logs\n\n| format | {' | '.join(OUTCOMES)} |\n|---" + "|---:" * len(OUTCOMES) + "|")
+    _print_rows(by_format)
+    print(f"| **damage** |{' |' * len(OUTCOMES)}")
+    _print_rows(by_fault)
+    _print_rows({"**all**": sum(by_format.values(), Counter())})
+    print(f"\n{LEGEND}")
+
+
+def _print_rows(rows):  # type: ignore[no-untyped-def]
+    for name, counts in rows.items():
+        print(f"| {name} | {' | '.join(str(counts[o] or '') for o in OUTCOMES)} |")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.damaged.bombs import bombs_of
+
 HUGE = (2**31 - 1, 2**32 - 1, 2**40, 2**62)
 
 
@@ -87,6 +89,11 @@ def double(number: int, size: int = 1000) -> Damage:
 
 def tail(number: int) -> Damage:
     return Damage("garbage behind", number, 0, lambda data: data + np.random.default_rng(number).bytes(777))
+
+
+def bombs(name: str) -> tuple[Damage, ...]:
+    """Of a format: small files that unpack to more than they say, and that say more than there can be."""
+    return tuple(Damage("bomb", k, 0, make) for k, make in enumerate(bombs_of(name)))
 
 
 DAMAGES: tuple[Damage, ...] = (

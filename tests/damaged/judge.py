@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.types import FileFaults
 from tests.damaged.damage import Damage
 
 # Formats whose samples stand behind no checksum: that one of them is another number cannot be seen.
@@ -19,25 +20,57 @@ CODES = (0, 1, 3, 4)
 Samples = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
+OUTCOMES = (
+    "right", "part, told", "refused", "samples changed, told", "samples changed", "wrong, told", "PART IN SILENCE",
+    "WRONG IN SILENCE", "traceback", "over limit",
+)  # fmt: skip
+"""What may become of a damaged log, in the order of a table; what is in capitals and behind must not be."""
+
+LEGEND = """- right: every sample of the sound log and no other (the damage hit what is not needed)
+- part, told: samples are missing, none is another; what was lost is told (exit code 3)
+- refused: one line says what is wrong (exit code 1 or 4)
+- samples changed: no more samples are other numbers than the damaged bytes can hold, or those of one channel. In plain
+  numbers and text without a checksum (MF4, MDF 3, ROS 1 bags, databases, CSV, Parquet) a bit that has flipped makes another
+  number, and nothing in the file can show it; what goes beyond a signal's range or a column's bounds is told
+- wrong, told: more than that is wrong, and a loss is told
+- IN SILENCE: samples are missing or wrong and nothing is told; over limit: 30 s or 2 GB"""
+
+
 class Seen(NamedTuple):
-    """Of one log: the exit code of `detect --json`, its last words, and what was read; `told` if a loss is told."""
+    """Of one log: the exit code of `detect --json`, its last words, and what was read; `told` if a loss is told.
+
+    `lost` are the samples that the reader counts as lost, None where it says that more may be.
+    """
 
     code: int
     words: str
     told: bool
     samples: Samples
+    lost: int | None = None
 
 
-def samples_of(path: Path) -> tuple[Samples, bool]:
-    """Stamps [ns] and finite values of every channel, and whether the reader tells of a loss."""
+def missing(sound: Samples, seen: Seen) -> int:
+    """How many rows or messages of the sound log were not read: the most samples that a channel lacks."""
+    return max(len(t) - len(seen.samples.get(path, (t[:0],))[0]) for path, (t, _) in sound.items())
+
+
+def outcome(found: str) -> str:
+    """The column of the table that a verdict belongs to."""
+    if not found.startswith("!"):
+        return found
+    silent = {"! part in silence": "PART IN SILENCE", "! wrong in silence": "WRONG IN SILENCE"}
+    return silent.get(found, "over limit" if found.startswith("! over") else "traceback")
+
+
+def samples_of(path: Path) -> tuple[Samples, FileFaults]:
+    """Stamps [ns] and finite values of every channel, and what the reader tells of."""
     from aqualog.io.open_log import open_log
 
     with open_log(path) as reader:
         found = reader.read(reader.channels())
         faults = reader.faults
-    told = faults.truncated or faults.lost_samples > 0 or bool(faults.notes)
     keep = {c.info.path: np.isfinite(c.values) for c in found}
-    return {c.info.path: (c.t_ns[keep[c.info.path]], c.values[keep[c.info.path]]) for c in found}, told
+    return {c.info.path: (c.t_ns[keep[c.info.path]], c.values[keep[c.info.path]]) for c in found}, faults
 
 
 def look(path: Path) -> Seen:
@@ -55,10 +88,11 @@ def look(path: Path) -> Seen:
         json.loads(out.getvalue())
     last = (words.getvalue().strip().splitlines() or [""])[-1]
     try:
-        samples, told = samples_of(path)
+        samples, faults = samples_of(path)
     except AqualogError as error:
         return Seen(code, last or str(error), True, {})
-    return Seen(code, last, told or code == 3, samples)
+    told = faults.truncated or faults.lost_samples > 0 or bool(faults.notes) or code == 3
+    return Seen(code, last, told, samples, None if faults.truncated else faults.lost_samples)
 
 
 def attempt(path: Path) -> Seen | str:
