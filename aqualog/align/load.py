@@ -24,7 +24,7 @@ _Read = TypeVar("_Read")
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
     """What readers need to know of a signal map."""
-    return ReadOptions(dbc=tuple(dbc), time_channel=signal_map.time_channel, time_unit=signal_map.time_unit)
+    return ReadOptions(tuple(dbc), signal_map.time_channel, signal_map.time_unit, signal_map.csv)
 
 
 def load_signals(

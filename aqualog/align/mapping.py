@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
 from aqualog.errors import SignalError
+from aqualog.io.csv_format import CsvFormat
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.types import ChannelInfo
 
@@ -52,6 +53,7 @@ class SignalMap:
     time_channel: str | None = None
     time_unit: str | None = None
     path: str = ""
+    csv: Mapping[str, CsvFormat] = field(default_factory=dict)
 
     def clock_of(self, file: str) -> SourceClock:
         """The clock correction of a file, by name or glob pattern."""
@@ -74,7 +76,7 @@ def channel_id(info: ChannelInfo) -> str:
 def map_text(signal_map: SignalMap) -> str:
     """All of a map that signals depend on, for keys. Order counts: of two patterns for one clock the first holds."""
     entries, clocks = tuple(signal_map.entries.items()), tuple(signal_map.clocks.items())
-    return repr((entries, clocks, signal_map.time_channel, signal_map.time_unit))
+    return repr((entries, clocks, signal_map.time_channel, signal_map.time_unit, tuple(signal_map.csv.items())))
 
 
 def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ import typer
 from aqualog.cli.options import Dbc, Debug, Force, Json, Logs, Progress, Quiet, Signals, Verbose
 
 if TYPE_CHECKING:
+    from aqualog.align.mapping import SignalMap
     from aqualog.align.overview import ChannelOverview
     from aqualog.align.propose import Proposal
     from aqualog.types import Channel
@@ -110,7 +112,7 @@ def _inspect(
         proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
     notes = [*(f"{p.name}: {n}" for p, f in zip(paths, faults, strict=True) for n in f.notes), *find_mounting(found)]
     if write_map is not None:
-        _write_map(write_map, proposals, paths)
+        _write_map(write_map, proposals, paths, setup.signal_map)
     if as_json:
         sys.stdout.write(json.dumps(_document(paths, formats, found, proposals, notes), indent=1) + "\n")
     else:
@@ -121,13 +123,12 @@ def _inspect(
     return 3 if damaged else (0 if found else 4)
 
 
-def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path]) -> None:
-    from aqualog.align.mapping import SignalMap
+def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path], given: SignalMap) -> None:
     from aqualog.cli.files import write_text
     from aqualog.config.signal_map import map_text
 
     text = map_text(
-        SignalMap({s: p.entry for s, p in proposals.items()}),
+        replace(given, entries={s: p.entry for s, p in proposals.items()}),
         comments=[f"proposed for {', '.join(p.name for p in paths)}: check every line"],
         remarks={s: p.reason for s, p in proposals.items()},
     )

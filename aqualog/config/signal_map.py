@@ -9,6 +9,7 @@ from typing import Any
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.config.toml_file import Faults, is_number, load_toml
+from aqualog.io.csv_format import CsvFormat, format_fault
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.units import is_unit
 
@@ -16,7 +17,8 @@ __all__ = ["load_signal_map", "map_text"]
 
 _ENTRY_KEYS = ("channel", "unit", "scale", "offset", "invalid")
 _CLOCK_KEYS = ("offset_s", "drift_ppm", "at_s")
-_TABLES = ("signals", "time", "sources")
+_CSV_KEYS = ("separator", "decimal", "encoding")
+_TABLES = ("signals", "time", "csv", "sources")
 
 
 def load_signal_map(path: Path) -> SignalMap:
@@ -51,8 +53,9 @@ def load_signal_map(path: Path) -> SignalMap:
     unit = time.get("unit")
     if unit is not None and not is_unit(str(unit)):
         faults.add("unit", f'[time] unit = "{unit}" is not known; use s, ms, us or ns')
+    csv = _csv(_table(document, "csv", faults), faults)
     faults.raise_if_any()
-    return SignalMap(entries, clocks, channel, unit, str(path))
+    return SignalMap(entries, clocks, channel, unit, str(path), csv)
 
 
 def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any]:
@@ -61,6 +64,21 @@ def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any
         return table
     faults.add(name, f"{name} is not a table")
     return {}
+
+
+def _csv(table: dict[str, Any], faults: Faults) -> dict[str, CsvFormat]:
+    """How CSV files are written: of those that are named or match a pattern, and of all others (`*`)."""
+    common = {k: v for k, v in table.items() if not isinstance(v, dict)}
+    found = {}
+    for name, own in (*((k, v) for k, v in table.items() if isinstance(v, dict)), ("*", common)):
+        for key, value in own.items():
+            if key not in _CSV_KEYS:
+                faults.unknown(key, _CSV_KEYS)
+            elif fault := format_fault(key, value):
+                faults.add(key, f"[csv] {fault}")
+        if own:
+            found[name] = CsvFormat.of({k: str(v) for k, v in {**common, **own}.items()})
+    return found
 
 
 def _entry(symbol: str, table: Any, faults: Faults) -> Entry | None:
@@ -118,6 +136,10 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
             lines.append(f"channel = {_quote(signal_map.time_channel)}")
         if signal_map.time_unit:
             lines.append(f"unit = {_quote(signal_map.time_unit)}")
+        lines.append("")
+    for name, form in signal_map.csv.items():
+        lines.append("[csv]" if name == "*" else f"[csv.{_quote(name)}]")
+        lines += [f"{key} = {_quote(value)}" for key in _CSV_KEYS if (value := getattr(form, key))]
         lines.append("")
     lines.append("[signals]")
     for symbol, entry in signal_map.entries.items():

@@ -6,12 +6,13 @@ decodes only the channels that are asked for.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
+from aqualog.io.csv_format import CsvFormat
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
 __all__ = ["FaultLog", "Part", "ReadOptions", "Reader", "part_of"]
@@ -21,12 +22,14 @@ __all__ = ["FaultLog", "Part", "ReadOptions", "Reader", "part_of"]
 class ReadOptions:
     """What the user says about the files beyond their content.
 
-    `time_channel` and `time_unit` apply to tables (CSV, Parquet); `dbc` decodes raw CAN frames.
+    `time_channel` and `time_unit` apply to tables (CSV, Parquet), `csv` to CSV files by name or pattern; `dbc` decodes
+    raw CAN frames.
     """
 
     dbc: tuple[Path, ...] = ()
     time_channel: str | None = None
     time_unit: str | None = None
+    csv: Mapping[str, CsvFormat] = field(default_factory=dict)
 
 
 class Reader(Protocol):

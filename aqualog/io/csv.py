@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.csv_cells import numbers, plain
 from aqualog.io.csv_dialect import Column, find_layout
+from aqualog.io.csv_format import csv_hint, format_of
 from aqualog.io.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
 from aqualog.io.csv_text import read_text
 from aqualog.io.table_time import (
@@ -54,8 +56,9 @@ class CsvReader:
         self._stamps: Stamps | None = None
         self._counted: set[int] = set()
         self._lost: dict[tuple[int, str], tuple[int, int]] = {}
+        self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
-        self._layout = find_layout(self._data, where=str(path))
+        self._layout = find_layout(self._data, where=str(path), told=self._told)
         ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
         self._count = max(0, ends - self._layout.first_line + 1)
         self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
@@ -65,13 +68,14 @@ class CsvReader:
         self._note_columns()
 
     def _text(self) -> bytes | TextFile:
+        is_plain = not self._told.encoding or codecs.lookup(self._told.encoding).name in ("utf-8", "ascii")
         try:
-            large = open_text(self._path)
+            large = open_text(self._path) if is_plain else None
         except OSError as error:
             raise LogError(f"cannot be opened: {error.strerror}", where=str(self._path)) from error
         if large is not None:
             return large
-        text = read_text(self._path)
+        text = read_text(self._path, self._told.encoding)
         self._faults.notes += text.notes
         return text.data
 
@@ -206,6 +210,9 @@ class CsvReader:
             self._note(f"ends without a line's end; the last number of line {faults.doubtful_line} may be cut")
 
     def _note_columns(self) -> None:
+        if self._layout.unproven:
+            what = f'whether "{self._layout.unproven}" is a fraction or thousands is not proven; taken as a fraction'
+            self._note(f"{what} ({csv_hint('decimal')})")
         for name in self._layout.twice:
             self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:

@@ -7,6 +7,7 @@ decides. A reading counts as proven only if at least two columns hold (nearly) n
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import Literal
 
 from aqualog.errors import LogError
 from aqualog.io.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
+from aqualog.io.csv_format import CsvFormat, csv_hint
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.text_file import TextFile
 from aqualog.units import is_unit
@@ -32,7 +34,12 @@ _SPREAD = 12  # places behind the head where rows are looked at
 _SPREAD_ROWS = 20
 _COMMENTS = ("#", "%", "//", "!")
 _SHOWN = {"\t": "tab", ",": "comma", ";": "semicolon", "|": "bar"}
-_HINT = "export it with one header line (name [unit]), one separator and one decimal sign"
+_HINT = (
+    f"{csv_hint('separator', 'decimal', 'encoding')}; or export it with one header line (name [unit]), one separator "
+    "and one decimal sign"
+)
+_NONE_TOLD = CsvFormat()
+_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # as good a fraction as it is thousands
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +64,8 @@ class Layout:
     """Everything that is needed to read the cells.
 
     `width` is how many cells a whole row has: that of the header, or more if every row ends with separators.
-    `first_line` counts from 1; `twice` are names that stand over several columns.
+    `first_line` counts from 1; `twice` are names that stand over several columns; `unproven` is a cell that may be a
+    fraction or thousands, if no cell of the file tells.
     """
 
     separator: str
@@ -65,6 +73,7 @@ class Layout:
     width: int
     first_line: int
     twice: tuple[str, ...] = ()
+    unproven: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +102,7 @@ def is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS)
 
 
-def find_layout(data: bytes | TextFile, *, where: str) -> Layout:
+def find_layout(data: bytes | TextFile, *, where: str, told: CsvFormat = _NONE_TOLD) -> Layout:
     """Find and prove the layout of a CSV file.
 
     Parameters
@@ -102,6 +111,8 @@ def find_layout(data: bytes | TextFile, *, where: str) -> Layout:
         The whole file in UTF-8.
     where : str
         Named in an error.
+    told : CsvFormat
+        What the user says of the file: nothing else is tried.
 
     Raises
     ------
@@ -109,14 +120,22 @@ def find_layout(data: bytes | TextFile, *, where: str) -> Layout:
         If no reading of the file is proven; the message says what was tried.
     """
     head, spread = _sample(data)
-    used = [s for s in _SEPARATORS if sum(s in line for line in head) >= 2]
+    if len(head) == 1 and len(data) > _HEAD_BYTES:
+        raise LogError(
+            f"its first line is longer than {_HEAD_BYTES} bytes", where=where, expected="a header", hint=_HINT
+        )
+    used = [s for s in ([told.separator] if told.separator else _SEPARATORS) if sum(s in line for line in head) >= 2]
+    if not used and told.separator:
+        sign = _SHOWN.get(told.separator, told.separator)
+        what = f'has no "{sign}", by which the map says that its cells are separated'
+        raise LogError(what, where=where, hint="name another separator, or none")
     if not used:
         raise LogError("has one column only", where=where, expected="a time and at least one signal", hint=_HINT)
     candidates, reasons = [], []
     for separator in used:
-        found = _with_separator(head, spread, separator)
+        found = _with_separator(head, spread, separator, told.decimal)
         if isinstance(found, str):
-            reasons.append(f"{_SHOWN[separator]}: {found}")
+            reasons.append(f"{_SHOWN.get(separator, separator)}: {found}")
         else:
             candidates.append(found)
     if candidates:
@@ -158,7 +177,7 @@ def _text(line: bytes) -> str:
     return line.decode("utf-8", errors="replace").rstrip("\r")
 
 
-def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str) -> _Candidate | str:
+def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str, decimal: str) -> _Candidate | str:
     """The best reading with this separator, or why there is none."""
     rows = [split_line(line, separator) for line in head]
     reason = ""
@@ -168,7 +187,7 @@ def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str) 
         header, units, body_at = _header_block(head, rows, k)
         body = [r for line, r in zip(head[body_at:], rows[body_at:], strict=True) if any(r) and not is_comment(line)]
         body = body[:_BODY_ROWS] + [split_line(line, separator) for line in spread if line and not is_comment(line)]
-        found = _prove(header, units, body, separator, _first_data(head, rows, body_at) + 1)
+        found = _prove(header, units, body, separator, _first_data(head, rows, body_at) + 1, decimal)
         if not isinstance(found, str):
             return found
         reason = reason or found
@@ -235,8 +254,8 @@ def _uncommented(cell: str) -> str:
 
 
 def _prove(
-    header: Row, units: Row, body: Sequence[Row], separator: str, first_line: int
-) -> _Candidate | str:  # fmt: skip
+    header: Row, units: Row, body: Sequence[Row], separator: str, first_line: int, decimal: str
+) -> _Candidate | str:
     names = _trimmed(header)
     if not body:
         return "a header, but no data below it"
@@ -246,7 +265,7 @@ def _prove(
         return f"{len(names)} names, but {max(used)} cells in a row"
     if not any(len(r) >= len(names) for r in body):
         return f"{len(names)} names, but at most {max(map(len, body))} cells in a row"
-    columns = _columns(names, units, body, separator)
+    columns, unproven = _columns(names, units, body, separator, decimal)
     proven = sum(c.kind not in ("text", "blank") for c in columns)
     sound = sum(c.kind != "text" for c in columns)
     if proven < 1 or sound < 2:
@@ -254,7 +273,7 @@ def _prove(
     twice = tuple(n for n, count in Counter(split_unit(h)[0] for h in names).items() if n and count > 1)
     widths = [len(r) for r in body]
     width = max(len(names), max(set(widths), key=widths.count))
-    return _Candidate(Layout(separator, columns, width, first_line, twice), proven)
+    return _Candidate(Layout(separator, columns, width, first_line, twice, unproven), proven)
 
 
 def _trimmed(row: Row) -> Row:
@@ -263,10 +282,15 @@ def _trimmed(row: Row) -> Row:
     return row[: len(row) - blank]
 
 
-def _columns(names: Row, units: Row, body: Sequence[Row], separator: str) -> tuple[Column, ...]:
-    """Kind and decimal sign of each column; a name or a cell that says neither goes with the rest of the file."""
+def _columns(
+    names: Row, units: Row, body: Sequence[Row], separator: str, decimal: str
+) -> tuple[tuple[Column, ...], str]:
+    """Kind and decimal sign of each column; a name or a cell that says neither goes with the rest of the file.
+
+    Behind them a cell that may be a fraction or thousands, if no cell of the file tells.
+    """
     cells = [_Cells(tuple(r[k] for r in body if k < len(r) and r[k])) for k in range(len(names))]
-    order = _preferred(cells, separator)
+    order = _told_styles(cells, decimal) if decimal else _preferred(cells, separator)
     split = [split_unit(n.removeprefix("'") if _is_defused(n) else n) for n in names]
     paths = unique_names([name for name, _ in split])
     below = units + [""] * len(names)
@@ -275,7 +299,22 @@ def _columns(names: Row, units: Row, body: Sequence[Row], separator: str) -> tup
         style = _style(column, order)
         kind = _kind(column, style)
         columns.append(Column(k, paths[k], split[k][1] or below[k], style, *kind, header=split[k][0] or paths[k]))
-    return tuple(columns)
+    return tuple(columns), "" if decimal or order[0].thousands else _unproven_cell(cells, columns)
+
+
+def _told_styles(columns: Sequence[_Cells], decimal: str) -> tuple[Style, ...]:
+    """The styles with a decimal sign, those with thousands only where these are proven."""
+    plain, grouped = (next(s for s in STYLES if s.decimal == decimal and bool(s.thousands) == t) for t in (False, True))
+    return (grouped, plain) if any(c.explained(grouped) > c.explained(plain) for c in columns) else (plain,)
+
+
+def _unproven_cell(cells: Sequence[_Cells], columns: Sequence[Column]) -> str:
+    """A cell of a number that is as good a fraction as it is thousands, if all with a decimal sign are such."""
+    signed = [
+        x for c, column in zip(cells, columns, strict=True) if column.kind == "number"
+        for x in c.cells if column.style.decimal in x
+    ]  # fmt: skip
+    return signed[0] if signed and all(map(_GROUP.fullmatch, signed)) else ""
 
 
 class _Cells:

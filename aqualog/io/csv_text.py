@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.errors import LogError
+from aqualog.io.csv_format import csv_hint
 from aqualog.io.table_names import split_unit
 from aqualog.io.text_file import check_lines
 from aqualog.units import is_unit
@@ -36,8 +37,8 @@ class LogText:
     notes: tuple[str, ...]
 
 
-def read_text(path: Path) -> LogText:
-    """Read a whole text file.
+def read_text(path: Path, encoding: str = "") -> LogText:
+    """Read a whole text file, in an encoding that the user names or in the one that it seems to be in.
 
     Raises
     ------
@@ -48,11 +49,25 @@ def read_text(path: Path) -> LogText:
         raw = path.read_bytes()
     except OSError as error:
         raise LogError(f"cannot be opened: {error.strerror}", where=str(path)) from error
-    text = _decoded(raw, path)
+    text = _as_told(raw, path, encoding) if encoding else _decoded(raw, path)
     if b"\n" not in text.data and b"\r" in text.data:
         text = LogText(text.data.replace(b"\r", b"\n"), text.encoding, text.notes)
     check_lines(text.data, where=str(path))
     return text
+
+
+def _as_told(raw: bytes, path: Path, encoding: str) -> LogText:
+    """In the encoding that the user has named, strictly."""
+    try:
+        text = raw.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        bad = raw[error.start : error.start + 4].hex(" ")
+        what = f"is not in the {encoding} that the map names (line {line}, byte {error.start}: {bad})"
+        raise LogError(what, where=str(path), hint="name another encoding, or none") from error
+    except UnicodeError as error:
+        raise LogError(f"is not in the {encoding} that the map names ({error})", where=str(path)) from error
+    return LogText(text.removeprefix("\ufeff").encode("utf-8", errors="replace"), encoding, ())
 
 
 def _decoded(raw: bytes, path: Path) -> LogText:
@@ -104,11 +119,13 @@ def _code_page(raw: bytes, path: Path) -> LogText:
     notes: tuple[str, ...] = ()
     if not usable or _known_units(beyond, best) == 0:
         best = _guessed(beyond, usable)
-        notes = (f"{path.name}: does not declare its encoding; taken as {best}",)
+        notes = (f"{path.name}: does not declare its encoding; taken as {best} ({csv_hint('encoding')})",)
     try:
         return LogText(raw.decode(best).encode(), best, notes)
-    except UnicodeDecodeError:  # a byte that the code page does not have, somewhere behind the head
-        return LogText(raw.decode("latin-1").encode(), "latin-1", notes)
+    except UnicodeDecodeError as error:  # a byte that the code page does not have, somewhere behind the head
+        line = raw.count(b"\n", 0, error.start) + 1
+        note = f"{path.name}: is {best}, but not everywhere (first at line {line}); taken as latin-1"
+        return LogText(raw.decode("latin-1").encode(), "latin-1", (f"{note} ({csv_hint('encoding')})",))
 
 
 def _known_units(beyond: bytes, encoding: str) -> int:

@@ -10,6 +10,7 @@ from typing import Any, Self, cast
 
 from aqualog.errors import LogError
 from aqualog.io.base import Part, Reader, ReadOptions, part_of
+from aqualog.io.csv_format import format_of
 from aqualog.io.in_hand import reading
 from aqualog.io.sniff import sniff
 from aqualog.types import Channel, ChannelInfo, FileFaults
@@ -61,8 +62,10 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
     LogError
         If the file is missing, unknown or damaged beyond reading.
     """
+    options = options or ReadOptions()
+    is_told = bool(format_of(options.csv, path.name).encoding)
     with reading(path):
-        reader = _READERS[sniff(path)](path, options or ReadOptions())
+        reader = _READERS[sniff(path, any_text=is_told)](path, options)
     return (_WatchedInPieces if hasattr(reader, "parts") else _Watched)(path, reader)
 
 

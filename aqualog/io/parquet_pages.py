@@ -107,7 +107,8 @@ def read_index(path: Path) -> Index | None:
 
 
 def _index(footer: Struct, end: int) -> Index:
-    groups, first, owned = [], 0, 4
+    groups: list[Group] = []
+    first, owned = 0, len(_MAGIC)
     for record in footer[4]:
         rows = int(record[3])
         if rows < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from aqualog.errors import LogError
+from aqualog.io.csv_format import csv_hint
 
 __all__ = ["sniff"]
 
@@ -12,8 +13,8 @@ _HEAD = 4096
 _MCAP = b"\x89MCAP0\r\n"
 
 
-def sniff(path: Path) -> str:
-    """Format of a log: `mdf`, `mcap`, `ros`, `parquet` or `csv`.
+def sniff(path: Path, *, any_text: bool = False) -> str:
+    """Format of a log: `mdf`, `mcap`, `ros`, `parquet` or `csv`; with `any_text` all that is no other is `csv`.
 
     Raises
     ------
@@ -38,14 +39,14 @@ def sniff(path: Path) -> str:
     for magic, name in _MAGIC:
         if head.startswith(magic):
             return name
-    if _is_text(head):
+    if any_text or _is_text(head):
         return "csv"
     if _is_text(head.replace(b"\0", b"")):
         line = head.count(b"\n", 0, head.index(0)) + 1
         raise LogError(
             f"is text with NUL bytes (first at line {line})",
             where=str(path), expected="CSV in UTF-8, or in UTF-16 with its byte order mark",
-            hint="export it as UTF-8; a power cut leaves NULs, too",
+            hint=f"export it as UTF-8, or {csv_hint('encoding')}; a power cut leaves NULs, too",
         )  # fmt: skip
     raise LogError(
         f"unknown format (starts with {head[:8]!r})",

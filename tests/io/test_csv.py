@@ -13,6 +13,7 @@ from aqualog.errors import ConfigError, LogError, SignalError
 from aqualog.io import text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.csv import CsvReader
+from aqualog.io.csv_format import CsvFormat
 from aqualog.io.open_log import open_log
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.write_table import TableColumn, write_csv
@@ -503,6 +504,83 @@ def test_the_users_time(read):
 def test_the_loggers_clock_before_utc(read):
     log = read("utc [ms],t [s],v\n1.53322649e+12,46408.655,1\n1.53322649e+12,46408.7445,2\n")
     assert log.t("v") == [46408655000000, 46408744500000]
+
+
+# what the user says
+
+
+def told(name="*", **keys):
+    return {"csv": {name: CsvFormat.of(keys)}}
+
+
+def test_a_separator_that_is_not_tried_by_itself(read):
+    text = "t~v\n" + table(separator="~")
+    with pytest.raises(LogError, match=r"one column only.*\[csv\] separator"):
+        read(text)
+    assert read(text, **told(separator="~"))["v"][2] == 3.0
+    assert read(text, **told("lo*.csv", separator="~"))["v"][2] == 3.0
+    with pytest.raises(LogError, match="one column only"):
+        read(text, **told("other.csv", separator="~"))
+
+
+def test_the_separator_that_is_named_alone_is_tried(read):
+    text = "t;v\n" + table(separator=";")
+    with pytest.raises(LogError, match='has no "comma", by which the map says'):
+        read(text, **told(separator="comma"))
+    assert read("t v\n" + table(separator=" "), **told(separator="space"))["v"][2] == 3.0
+
+
+@pytest.mark.parametrize(("sign", "value"), [(".", 1.234), (",", 1234.0)])
+def test_a_decimal_sign_that_no_cell_proves_is_told_and_can_be_said(read, sign, value):
+    text = "t;v\n" + "".join(f"{k};{k}.234\n" for k in range(1, 40))
+    log = read(text)
+    assert log["v"][0] == 1.234
+    assert log.noted('whether "1.234" is a fraction or thousands is not proven', "[csv] decimal")
+    log = read(text, **told(decimal=sign))
+    assert log["v"][0] == value
+    assert not log.noted("not proven")
+
+
+@pytest.mark.parametrize("cell", ["0.234", "1234.567", "1.2345", "1.2"])
+def test_one_cell_proves_the_decimal_sign(read, cell):
+    assert not read("t;v\n" + "".join(f"{k};{k}.234\n" for k in range(1, 40)) + f"40;{cell}\n").noted("not proven")
+
+
+def test_decimal_comma_that_is_said(read):
+    log = read("t;v\n" + "".join(f"{k};{k},5\n" for k in range(1, 40)) + "40;1.234,5\n", **told(decimal=","))
+    assert log["v"][-1] == 1234.5
+    with pytest.raises(LogError, match="columns hold numbers"):
+        read("t;v\n" + "".join(f"{k},0;{k},5\n" for k in range(40)), **told(decimal="."))
+
+
+def test_an_encoding_that_is_said(read):
+    text = "t;Größe\n" + table(separator=";")
+    assert read(text, "cp850", **told(encoding="cp850")).infos[0].name == "Größe"
+    assert read(text, "utf-16-le", **told(encoding="utf-16-le")).infos[0].name == "Größe"
+    assert read(text, "utf-8-sig", **told(encoding="utf-8")).infos[0].name == "Größe"
+    with pytest.raises(LogError, match=r"is not in the utf-8 that the map names \(line 1, byte 4: f6"):
+        read(text, "cp1252", **told(encoding="utf-8"))
+
+
+def test_an_encoding_that_is_guessed_is_told_with_the_way_to_say_it(read):
+    assert read("t;Größe\n" + table(separator=";"), "cp1252").noted("taken as", '[csv] encoding = "cp1252"')
+    odd = ("t;v [°C]\n" + table(8000, ";")).encode("cp1252") + b"99;\x81\n"
+    assert read(odd).noted("is cp1252, but not everywhere (first at line 8002); taken as latin-1")
+
+
+def test_utf_16_without_a_mark_is_opened_if_it_is_said(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(("t,v\n" + table()).encode("utf-16-le"))
+    with pytest.raises(LogError, match=r"NUL bytes.*\[csv\] encoding"):
+        open_log(path)
+    with open_log(path, ReadOptions(**told(encoding="utf-16-le"))) as log:
+        assert log.read(log.channels())[0].values[2] == 3.0
+
+
+def test_a_first_line_without_an_end_is_named(read, monkeypatch):
+    monkeypatch.setattr("aqualog.io.csv_dialect._HEAD_BYTES", 1000)
+    with pytest.raises(LogError, match="first line is longer than 1000 bytes"):
+        read("t," + ",".join(f"x{k}" for k in range(1000)) + "\n" + table())
 
 
 # refusals

@@ -2,10 +2,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aqualog.align.load import read_options
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
+from aqualog.align.mapping import map_text as map_key
 from aqualog.config.signal_map import load_signal_map, map_text
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
+from aqualog.io.csv_format import CsvFormat, format_of
 from aqualog.vehicle import KEYS, vehicle_toml
 
 CONTRACT = """
@@ -132,6 +135,31 @@ def test_faults_of_a_map_come_together(tmp_path):
         assert part in str(error.value)
 
 
+def test_how_csv_files_are_written(tmp_path):
+    text = '[csv]\nseparator = "tab"\nencoding = "latin-1"\n[csv."gps*.csv"]\ndecimal = ","\n[signals]\n'
+    found = load_signal_map(write(tmp_path, text))
+    assert format_of(found.csv, "a.csv") == CsvFormat("\t", "", "latin-1")
+    assert format_of(found.csv, "gps_1.csv") == CsvFormat("\t", ",", "latin-1")
+    assert read_options(found).csv == found.csv
+    assert map_key(found) != map_key(SignalMap())
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ('seperator = ";"', '"separator"'), ('separator = ";;"', "separates no cells"), ("separator = 3", "is no text"),
+        ('separator = "."', "separates no cells"), ('decimal = ";"', "use . or ,"), ('encoding = "utf-9"', "not known"),
+        ('encoding = "base64"', "not known"), ('encoding = "rot13"', "not known"), ('encoding = "a\\u0000b"', "not known"),
+    ],
+)  # fmt: skip
+def test_faults_of_how_csv_files_are_written(tmp_path, line, says):
+    with pytest.raises(ConfigError, match=says) as error:
+        load_signal_map(write(tmp_path, f"[csv]\n{line}\n"))
+    assert "line 2" in str(error.value)
+    with pytest.raises(ConfigError, match=says) as error:
+        load_signal_map(write(tmp_path, f'[csv."gps.csv"]\n{line}\n'))
+
+
 names = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), min_size=1, max_size=20)
 numbers = st.floats(-1e6, 1e6, allow_nan=False).filter(bool)
 
@@ -139,13 +167,15 @@ numbers = st.floats(-1e6, 1e6, allow_nan=False).filter(bool)
 @given(names=st.lists(names, min_size=1, max_size=3), scale=numbers, offset=numbers, remark=names, source=names)
 def test_written_maps_read_back(tmp_path_factory, names, scale, offset, remark, source):
     entry = Entry("a_x", tuple(names), "g", scale, offset, (1023.0, -64.0))
-    before = SignalMap({"a_x": entry}, {source: SourceClock(0.2, 50.0, 12.5)}, "t_ms", "ms")
+    csv = {f"{source}.csv": CsvFormat("\t", ",", "cp1252"), "*": CsvFormat("|")}
+    before = SignalMap({"a_x": entry}, {source: SourceClock(0.2, 50.0, 12.5)}, "t_ms", "ms", csv=csv)
     path = tmp_path_factory.mktemp("map") / "m.toml"
     path.write_text(map_text(before, comments=[remark], remarks={"a_x": remark}), encoding="utf-8")
     after = load_signal_map(path)
     assert after.entries == before.entries
     assert after.clocks == before.clocks
     assert (after.time_channel, after.time_unit) == ("t_ms", "ms")
+    assert after.csv == csv
 
 
 @pytest.mark.parametrize(
