@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 __all__ = [
-    "BoolArray", "Channel", "ChannelInfo", "DriveResult", "Event", "FileFaults", "FloatArray", "Origin", "Quality",
-    "Signals", "SlopeSummary", "TimeArray", "TimeFaults", "Track", "Unavailable",
+    "BoolArray", "Channel", "ChannelInfo", "Drift", "DriveResult", "Event", "FileFaults", "FloatArray", "Origin",
+    "Quality", "Signals", "SlopeSummary", "TimeArray", "TimeFaults", "Track", "Unavailable",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -54,23 +54,40 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
+class Drift:
+    """Two clocks of a log that run apart: `against` gains `ppm` on `clock`, which counts, `shift_s` over the log."""
+
+    clock: str
+    against: str
+    ppm: float
+    shift_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class FileFaults:
-    """What a reader had to leave out. `notes` are sentences for the user."""
+    """What a reader had to leave out. `notes` are sentences for the user.
+
+    `unfinalised`: the logger has not finished the file, and what is missing was made up for. `drifts`: clocks in the
+    file that run apart.
+    """
 
     truncated: bool = False
     lost_samples: int = 0
     notes: tuple[str, ...] = ()
+    unfinalised: bool = False
+    drifts: tuple[Drift, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class TimeFaults:
-    """Faults of one source's time stamps, classified and counted."""
+    """Faults of one source's time stamps, classified and counted; `drifts` are clocks in its file that run apart."""
 
     duplicates: int = 0
     back_steps: int = 0
     resets: int = 0
     wraps: int = 0
     pauses: int = 0
+    drifts: int = 0
 
     def __add__(self, other: TimeFaults) -> TimeFaults:
         return TimeFaults(*(getattr(self, n) + getattr(other, n) for n in TimeFaults.__slots__))
@@ -99,7 +116,8 @@ class Quality:
     """What was lost on the way from the files to the grid.
 
     `dropped_samples` are all samples that were not used; among them `lost_in_files` those that a reader could not get
-    out of a damaged file, `frozen_samples` those with which a sensor repeated itself.
+    out of a damaged file, `frozen_samples` those with which a sensor repeated itself. `unfinalised`: a logger has not
+    finished a file.
     """
 
     dropped_samples: int = 0
@@ -109,6 +127,7 @@ class Quality:
     faults: TimeFaults = field(default_factory=TimeFaults)
     notes: tuple[str, ...] = ()
     frozen_samples: int = 0
+    unfinalised: bool = False
 
 
 @dataclass(frozen=True, slots=True)

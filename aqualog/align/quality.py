@@ -43,7 +43,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     for clean in cleaned:  # the channels of one file mostly share their stamps: the worst one speaks for the file
         seen, new = by_file.get(clean.origin.file, TimeFaults()), clean.origin.faults
         by_file[clean.origin.file] = TimeFaults(*(max(getattr(seen, n), getattr(new, n)) for n in TimeFaults.__slots__))
-    faults = sum(by_file.values(), TimeFaults())
+    faults = sum(by_file.values(), TimeFaults(drifts=sum(len(f.drifts) for f in file_faults)))
     own = sum(
         c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
         + c.origin.faults.duplicates
@@ -60,6 +60,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
         frozen_samples=sum(c.origin.frozen for c in cleaned),
         time_jumps=faults.back_steps + faults.resets + faults.wraps + faults.pauses,
         truncated=any(f.truncated for f in file_faults),
+        unfinalised=any(f.unfinalised for f in file_faults),
         faults=faults,
         notes=tuple(dict.fromkeys([*(n for f in file_faults for n in f.notes), *notes])),
     )

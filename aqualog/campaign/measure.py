@@ -129,6 +129,7 @@ def _about(result: DriveResult, vehicle: Vehicle, thinning: Thinning, samples: p
             "dropped_samples": quality.dropped_samples,
             "time_jumps": quality.time_jumps,
             "truncated": quality.truncated,
+            "unfinalised": quality.unfinalised,
             "lost_in_files": quality.lost_in_files,
             **{n: getattr(quality.faults, n) for n in type(quality.faults).__slots__},
         },

@@ -23,7 +23,9 @@ NUMBERS = (
     "tread_depth_mm", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm", "water_depth_left_mm",
     "load_front_kg", "load_rear_kg", "lane_start_s", "lane_end_s",
 )  # fmt: skip
-_QUALITY = ("dropped_samples", "time_jumps", "lost_in_files", "duplicates", "back_steps", "resets", "wraps", "pauses")
+_QUALITY = (
+    "dropped_samples", "time_jumps", "lost_in_files", "duplicates", "back_steps", "resets", "wraps", "pauses", "drifts",
+)  # fmt: skip
 _EVENT = {
     "run": pl.Int64, "name": pl.String, "key": pl.String, "detector": pl.String, "wheel": pl.String, "side": pl.String,
     "start_s": pl.Float64, "end_s": pl.Float64, "severity": pl.String, "peak": pl.Float64, "threshold": pl.Float64,
@@ -108,7 +110,7 @@ def _run_row(
     found = [e["detector"] for e in about["events"]]
     row |= {f"events_{d}": None if d in about["unavailable"] else found.count(d) for d in DETECTORS}
     row["unavailable"] = ", ".join(about["unavailable"])
-    row |= {n: about["quality"][n] for n in ("truncated", *_QUALITY)}
+    row |= {n: about["quality"][n] for n in ("truncated", "unfinalised", *_QUALITY)}
     row["notes"] = "\n".join(about["notes"])
     return row
 

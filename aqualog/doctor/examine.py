@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from aqualog.align.carrier import Carrier
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
+from aqualog.doctor.clocks import clock_findings, speed_of
 from aqualog.doctor.records import Examination, FileState, Finding
 from aqualog.errors import AqualogError
 from aqualog.io.base import ReadOptions
+from aqualog.io.clock_drift import drift_note
 from aqualog.io.open_log import open_log
-from aqualog.types import FileFaults
+from aqualog.types import Channel, FileFaults
 from aqualog.vehicle import Vehicle
 
 __all__ = ["examine"]
@@ -47,14 +50,18 @@ def examine(
     A file that cannot be read is a finding and no error, as is a drive without signals.
     """
     files, findings = [], []
+    speeds: list[Carrier] = []
     for path in paths:
         report(f"reading {path.name}")
-        state, own = _file(path, read_options(signal_map, dbc))
+        state, own, channels = _file(path, read_options(signal_map, dbc))
         files.append(state)
         findings += own
+        speed = speed_of(channels, signal_map=signal_map, vehicle=vehicle) if len(paths) > 1 and channels else None
+        speeds += [speed] if speed is not None else []
     if any(f.level == "unreadable" for f in findings):
         return Examination(tuple(files), tuple(findings))
     report("looking at the drive")
+    findings += clock_findings(speeds)
     try:
         signals = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
         result = detect_drive(signals, vehicle)
@@ -67,8 +74,8 @@ def examine(
     return Examination(tuple(files), tuple(findings), tuple(d for d in _DETECTORS if d not in lacking), missing)
 
 
-def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding]]:
-    """State of one file, and what is wrong with it."""
+def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding], list[Channel]]:
+    """State of one file, what is wrong with it, and its channels."""
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
@@ -77,7 +84,8 @@ def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding]]:
     except AqualogError as error:
         # the line names the file itself
         what = error.what + (f"; expected {error.expected}" if error.expected else "")
-        return FileState(path.name, "", size), [Finding("unreadable", "unreadable", path.name, "", what, error.hint)]
+        unreadable = Finding("unreadable", "unreadable", path.name, "", what, error.hint)
+        return FileState(path.name, "", size), [unreadable], []
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
@@ -87,7 +95,7 @@ def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding]]:
     findings += [Finding("doubt", "mounting", path.name, "", text) for text in find_mounting(found)]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
-    return state, findings
+    return state, findings, channels
 
 
 def _of_file(name: str, faults: FileFaults) -> Iterator[Finding]:
@@ -98,8 +106,17 @@ def _of_file(name: str, faults: FileFaults) -> Iterator[Finding]:
         what = f"{faults.lost_samples} samples could not be read"
         yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",
                       faults.lost_samples)  # fmt: skip
+    for drift in faults.drifts:
+        advice = "look which of the two is right; `aqualog align` compares with another source"
+        yield Finding("doubt", "drifts", name, "", drift_note(drift), advice, 1)
+    if faults.unfinalised:
+        what = "was not finalised by the logger; this was made up for while reading"
+        yield Finding("mended", "unfinalised", name, "", what, "", 1)
     is_lossy = faults.truncated or faults.lost_samples > 0
+    told = {drift_note(d) for d in faults.drifts}
     for note in faults.notes:
+        if note.removeprefix(f"{name}: ") in told or (faults.unfinalised and "was not finalised" in note):
+            continue
         yield Finding("lost" if is_lossy else "doubt", "note", name, "", note.removeprefix(f"{name}: "))
 
 

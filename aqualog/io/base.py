@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
 from aqualog.io.csv_format import CsvFormat
-from aqualog.types import Channel, ChannelInfo, FileFaults
+from aqualog.types import Channel, ChannelInfo, Drift, FileFaults
 
 __all__ = ["FaultLog", "Part", "ReadOptions", "Reader", "part_of"]
 
@@ -86,7 +86,10 @@ class FaultLog:
     truncated: bool = False
     lost_samples: int = 0
     notes: list[str] = field(default_factory=list)
+    unfinalised: bool = False
+    drifts: list[Drift] = field(default_factory=list)
 
     def freeze(self) -> FileFaults:
         """The record for the outside."""
-        return FileFaults(self.truncated, self.lost_samples, tuple(dict.fromkeys(self.notes)))
+        notes, drifts = tuple(dict.fromkeys(self.notes)), tuple(dict.fromkeys(self.drifts))
+        return FileFaults(self.truncated, self.lost_samples, notes, self.unfinalised, drifts)

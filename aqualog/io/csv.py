@@ -14,6 +14,7 @@ import polars as pl
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import numbers, plain
 from aqualog.io.csv_dialect import Column, find_layout
 from aqualog.io.csv_format import csv_hint, format_of
@@ -55,6 +56,7 @@ class CsvReader:
         self._rows: Rows | None = None
         self._stamps: Stamps | None = None
         self._counted: set[int] = set()
+        self._drift = DriftWatch()
         self._lost: dict[tuple[int, str], tuple[int, int]] = {}
         self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
@@ -99,11 +101,14 @@ class CsvReader:
         """Parse these columns only."""
         asked = list(wanted)
         rows = self._found_rows()
-        times = [k for k in (self._time.index, self._time.day) if k is not None and self._stamps is None]
+        choice = self._time
+        times = [k for k in (choice.index, choice.day, choice.other) if k is not None and self._stamps is None]
         needed = list({w.key for w in asked}.union(times))
         cells = rows.cells(needed, where=str(self._path)) if needed else {}
         if self._stamps is None:
             self._stamps = self._read_time(cells, rows)
+            self._compare_clocks(self._stamps, cells)
+            self._tell_drift()
         found = [self._channel(w, cells, self._stamps, rows) for w in asked]
         self._counted |= {w.key for w in asked}
         self._tell_lost()
@@ -125,7 +130,8 @@ class CsvReader:
         for body, line, is_last in bodies(text, behind(text, self._layout.first_line - 1), self._layout.first_line):
             rows = rows_of(body, self._layout, line, is_cut=is_last and text[-1:] not in (b"\n", b"\r"))
             faults, count = faults + rows.faults, count + len(rows.lines)
-            cells = rows.cells(list({choice.index, *(w.key for w in asked)}), where=where)
+            other = self._numeric_clock()
+            cells = rows.cells(list({choice.index, *other, *(w.key for w in asked)}), where=where)
             column = columns[choice.index]
             values = numbers(cells[choice.index], column.style).values
             if not unit:
@@ -133,9 +139,12 @@ class CsvReader:
                 self._note(no_unit_note(unit, reason))
             stamps = from_numbers(values, unit, cells=plain(cells[choice.index], column.style))
             first = first or stamps
+            if other:
+                self._compare_clocks(stamps, cells)
             self._count_lost(~stamps.valid, rows, -1, self._no_time(column))
             yield [self._channel(w, cells, replace(stamps, absolute=first.absolute), rows) for w in asked]
         self._note_rows(faults, count)
+        self._tell_drift()
         self._tell_lost()
 
     def _last_times(self, text: TextFile) -> FloatArray:
@@ -159,6 +168,34 @@ class CsvReader:
             self._note(note)
         self._count_lost(~stamps.valid, rows, -1, self._no_time(column))
         return stamps
+
+    def _numeric_clock(self) -> list[int]:
+        """The second clock, if pieces of it tell as much as the whole."""
+        other = self._time.other
+        return [other] if other is not None and self._layout.columns[other].kind == "number" else []
+
+    def _compare_clocks(self, stamps: Stamps, cells: dict[int, pl.Series]) -> None:
+        """Hold the second clock of these rows against their stamps."""
+        other = self._time.other
+        if other is None:
+            return
+        column = self._layout.columns[other]
+        try:
+            if column.kind == "stamp":
+                found = from_dates(cells[other], None, "stamp")
+            else:
+                found = from_numbers(numbers(cells[other], column.style).values, self._time.other_unit)
+        except LogError:  # no date-times after all: not the clock that counts
+            return
+        self._drift.push(stamps.t_ns, found.t_ns, stamps.valid & found.valid)
+
+    def _tell_drift(self) -> None:
+        other = self._time.other
+        names = [self._layout.columns[k].name for k in (self._time.index, other or 0)]
+        drift = self._drift.finish(*(f'"{n}"' for n in names))
+        if drift is not None:
+            self._faults.drifts = [drift]
+            self._note(drift_note(drift))
 
     def _no_time(self, column: Column) -> str:
         return f'time column "{column.name}": {{}} without a time, the row is left out'

@@ -238,6 +238,7 @@ class MdfReader:
 
     def _tell(self, survey: Survey) -> None:
         self._faults.truncated |= survey.truncated
+        self._faults.unfinalised = survey.finalised
         self._faults.lost_samples += survey.lost_samples
         self._faults.notes += survey.notes
 

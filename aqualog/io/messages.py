@@ -33,9 +33,10 @@ from rosbags.typesys.store import Typestore
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, part_of
 from aqualog.io.batches import Batch, rows_of
+from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.fixed_layout import Layout, ros_layout
 from aqualog.io.ros_types import MAX_TEXT, RefusedError, checked
-from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
+from aqualog.types import Channel, ChannelInfo, Drift, FileFaults, FloatArray, TimeArray
 
 __all__ = [
     "SAMPLES", "Codec", "Leaf", "MessageReader", "Source", "Stream", "UndecodableError", "codec_for",
@@ -498,6 +499,7 @@ class _Sink:
         self.undecoded = 0
         self.stamped = False
         self._unlogged = True
+        self._drift = DriftWatch()
         self._taken = self._rejected = 0
 
     def feed(self, stream: Stream) -> Callable[[int, bytes], None]:
@@ -559,6 +561,8 @@ class _Sink:
         stamps = np.array(self.stamps, dtype=np.int64)
         plausible = (stamps > 0) & (self._unlogged | (np.abs(stamps - log) <= _DAY_NS))
         self._rejected += int(np.count_nonzero(~plausible))
+        if not self._unlogged:
+            self._drift.push(stamps, log, plausible)
         return np.where(plausible, stamps, log)
 
     def forget(self) -> None:
@@ -578,6 +582,10 @@ class _Sink:
         if self.undecoded:
             found.append(f'topic "{self.topic}": {self.undecoded} messages cannot be decoded')
         return found
+
+    def drift(self) -> Drift | None:
+        """How the time of recording runs against the messages' own stamps."""
+        return self._drift.finish(f'the stamp of "{self.topic}"', "the time of recording")
 
     def values(self, text: str) -> FloatArray:
         return np.array(self.columns[text], dtype=np.float64)
@@ -783,6 +791,12 @@ class MessageReader:
         for topic, sink in sinks.items():
             self._lost[topic, -1, -1] = sink.undecoded
             self._log.notes += sink.notes()
+        # the topics of one recorder share its clock: the one that drifts most speaks for the file
+        found = [d for sink in sinks.values() if (d := sink.drift()) is not None]
+        if found:
+            worst = max(found, key=lambda d: abs(d.ppm))
+            self._log.drifts = [worst]
+            self._log.notes.append(f"{self.path.name}: {drift_note(worst)}")
 
     def _guard(self) -> _Guard:
         return _Guard(self.path)
@@ -794,7 +808,7 @@ class MessageReader:
         truncated = self._log.truncated or any(source.truncated for source in self._sources)
         unassigned = sum(source.unassigned for source in self._sources)
         lost = self._log.lost_samples + sum(self._lost.values()) + unassigned
-        return FaultLog(truncated, lost, notes).freeze()
+        return FaultLog(truncated, lost, notes, drifts=self._log.drifts).freeze()
 
     def close(self) -> None:
         """Release the file. Sources open theirs only while they read."""

@@ -16,6 +16,7 @@ import polars as pl
 from aqualog.errors import LogError
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import is_clock, is_stamp
 from aqualog.io.memory import bytes_text, free_memory
 from aqualog.io.parquet_groups import SoundRows
@@ -111,7 +112,8 @@ class ParquetReader:
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         """Read these columns only."""
         asked = list(wanted)
-        times = [k for k in (self._time.index, self._time.day) if k is not None and self._stamps is None]
+        choice = self._time
+        times = [k for k in (choice.index, choice.day, choice.other) if k is not None and self._stamps is None]
         stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
         if not stored:
             return []
@@ -119,6 +121,9 @@ class ParquetReader:
         frame = self._sound.collect(stored, 0, self._rows)
         if self._stamps is None:
             self._stamps = self._read_time(frame)
+            drift = DriftWatch()
+            self._compare_clocks(drift, self._stamps, frame)
+            self._tell_drift(drift)
         elif frame.height != len(self._stamps.t_ns):  # another row group turned out to be damaged
             self._stamps = None
             return self.read(asked)
@@ -133,12 +138,12 @@ class ParquetReader:
         return [part_of(asked, self._pieces(asked))]
 
     def _pieces(self, asked: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
-        times = [k for k in (self._time.index, self._time.day) if k is not None]
+        times = [k for k in (self._time.index, self._time.day, self._time.other) if k is not None]
         stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
         rows = max(1, _PIECE // len(stored))
         unit = self._unit_of_ends()
         absolute: bool | None = None
-        lost = _Lost()
+        lost, drift = _Lost(), DriftWatch()
         for at in range(0, self._rows, rows):
             frame = self._sound.collect(stored, at, rows)
             if frame.is_empty():
@@ -148,8 +153,10 @@ class ParquetReader:
                 absolute = stamps.absolute
             stamps = replace(stamps, absolute=bool(absolute))
             lost.add(stamps, partial(self._sound.row_of, at))
+            self._compare_clocks(drift, stamps, frame)
             yield [self._channel(w, frame[self._columns[w.key].stored], stamps) for w in asked]
         self._tell_lost(lost)
+        self._tell_drift(drift)
         self._sound.tell()
 
     def _check_memory(self, columns: int) -> None:
@@ -198,6 +205,21 @@ class ParquetReader:
         for note in stamps.notes:
             self._note(note)
         return stamps
+
+    def _compare_clocks(self, drift: DriftWatch, stamps: Stamps, frame: pl.DataFrame) -> None:
+        """Hold the second clock of these rows against their stamps; not if it is text, which only the whole tells."""
+        other = None if self._time.other is None else self._columns[self._time.other]
+        if other is None or other.dtype == pl.String:
+            return
+        found = _stamps(frame[other.stored], None, self._time.other_unit, other.kind)
+        drift.push(stamps.t_ns, found.t_ns, stamps.valid & found.valid)
+
+    def _tell_drift(self, watch: DriftWatch) -> None:
+        names = [self._columns[k].path for k in (self._time.index, self._time.other or 0)]
+        drift = watch.finish(*(f'"{n}"' for n in names))
+        if drift is not None:
+            self._faults.drifts = [drift]
+            self._note(drift_note(drift))
 
     def _tell_lost(self, lost: _Lost) -> None:
         if lost.rows:

@@ -53,12 +53,17 @@ class TableField:
 
 @dataclass(frozen=True, slots=True)
 class TimeChoice:
-    """The time column, the column of the day beside it if there is one, and the unit, empty if not given."""
+    """The time column, the column of the day beside it if there is one, and the unit, empty if not given.
+
+    `other` is a second clock beside it, as a receiver's, with the unit `other_unit` if it is a number.
+    """
 
     index: int
     day: int | None
     unit: str
     note: str = ""
+    other: int | None = None
+    other_unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +101,17 @@ def choose_time(fields: Sequence[TableField], options: ReadOptions, *, where: st
         raise LogError(f"no time column{asked} among: {listed}", where=where, expected="t [s] or time", hint=_HINT)
     unit = _given_unit(options.time_unit, where) if options.time_unit else _own_unit(fields[found])
     day = next((k for k, f in enumerate(fields) if f.kind == "date" and k != found), None)
-    return TimeChoice(found, day if fields[found].kind == "clock" else None, unit, note)
+    other = _second_clock(fields, found)
+    other_unit = "" if other is None else _own_unit(fields[other])
+    return TimeChoice(found, day if fields[found].kind == "clock" else None, unit, note, other, other_unit)
+
+
+def _second_clock(fields: Sequence[TableField], found: int) -> int | None:
+    """The next usual column that is a date-time, or a number with a unit of time."""
+    is_clock = [f.kind == "stamp" or (f.kind == "number" and bool(_own_unit(f))) for f in fields]
+    usable = [k for k, is_one in enumerate(is_clock) if is_one and k != found]
+    best = _usual([fields[k] for k in usable])
+    return None if best is None else usable[best]
 
 
 def _named(fields: Sequence[TableField], name: str) -> int | None:

@@ -43,7 +43,7 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
         _of_done(data, "loss", "samples lost in damaged files", "", lambda r: _count(r, "lost_in_files", "lost")),
         _of_done(data, "loss", "samples dropped", "not used", lambda r: _count(r, "dropped_samples", "dropped")),
         _of_done(data, "loss", "time jumps", "the clock of the log is not even", lambda r: _count(r, "time_jumps", "")),
-        _of_done(data, "loss", "clock faults", "same time twice, steps back, resets, wrapped counters, pauses", _clock),
+        _of_done(data, "loss", "clock faults", "stamps twice, back, reset, wrapped, paused, drifting", _clock),
         _of_done(
             data, "limit", "lane not known", "neither lane times, labels, a signal on_water nor a dry run: they count "
             "in no figure over speed", lambda r: "" if r.water_from else "no lane",
@@ -100,7 +100,7 @@ def _count(r: RunInfo, name: str, word: str) -> str:
 
 
 def _clock(r: RunInfo) -> str:
-    names = ("duplicates", "back_steps", "resets", "wraps", "pauses")
+    names = ("duplicates", "back_steps", "resets", "wraps", "pauses", "drifts")
     return ", ".join(f"{_q(r, n)} {n.replace('_', ' ')}" for n in names if _q(r, n))
 
 

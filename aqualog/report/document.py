@@ -41,6 +41,7 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
             "dropped_samples": quality.dropped_samples,
             "time_jumps": quality.time_jumps,
             "truncated": quality.truncated,
+            "unfinalised": quality.unfinalised,
             "frozen_samples": quality.frozen_samples,
             **{n: getattr(quality.faults, n) for n in type(quality.faults).__slots__},
             "notes": [*quality.notes, *result.notes],

@@ -1,12 +1,14 @@
 """What `aqualog doctor` finds in sound and in damaged logs."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 from conftest import ROOT
 
-from aqualog.align.mapping import SignalMap
+from aqualog.align.load import load_signals
+from aqualog.align.mapping import SignalMap, SourceClock
 from aqualog.cli.main import app
 from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor.channels import frozen_longest
@@ -15,6 +17,9 @@ from aqualog.types import Channel, ChannelInfo
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
+
+
+WHEELS = "t [s],omega_fl [rad/s],omega_fr [rad/s]"
 
 
 def table(rows, header="t [s],omega_fl [rad/s],omega_fr [rad/s],v_x [m/s]"):
@@ -83,6 +88,37 @@ def test_time_faults(change, expected, tmp_path):
     found, _ = kinds(tmp_path, table(change(drive())))
     assert expected in found
     assert found[expected].what
+
+
+@pytest.mark.parametrize(("ppm", "is_told"), [(0.0, False), (1000.0, True)])
+def test_two_files_whose_clocks_run_apart(tmp_path, ppm, is_told):
+    rng = np.random.default_rng(3)
+    t = np.arange(12000) * 0.05
+    v = 20.0 + np.convolve(rng.normal(0.0, 1.0, t.size + 200), np.hanning(201) / 12.0, mode="valid")
+    noise = rng.normal(0.0, 0.01, (2, t.size))
+    (tmp_path / "wheels.csv").write_text(table(np.column_stack([t, *[(v + noise[0]) / 0.317] * 2]), header=WHEELS))
+    late = t * (1.0 + 1e-6 * ppm)
+    (tmp_path / "gps.csv").write_text(table(np.column_stack([late, v + noise[1]]), header="t [s],v_x [m/s]"))
+    found = examine([tmp_path / "wheels.csv", tmp_path / "gps.csv"], vehicle=CAR, signal_map=SignalMap())
+    told = [f for f in found.findings if f.kind == "drifts"]
+    assert len(told) == is_told
+    if is_told:
+        assert (told[0].level, told[0].file) == ("doubt", "gps.csv")
+        assert re.match(r"its clock drifts by \+(9[89]\d|100\d|101\d) ppm .* against wheels.csv", told[0].what)
+        fixed = SignalMap(clocks={"gps.csv": SourceClock(0.0, 1000.0 / 1.001, 0.0)})
+        again = examine([tmp_path / "wheels.csv", tmp_path / "gps.csv"], vehicle=CAR, signal_map=fixed)
+        assert not [f for f in again.findings if f.kind == "drifts"]
+
+
+def test_a_file_that_was_not_finalised_is_told_once(tmp_path):
+    data = bytearray((SAMPLES / "lane_drive.mf4").read_bytes())
+    data[:8] = b"UnFinMF "
+    path = tmp_path / "a.mf4"
+    path.write_bytes(data)
+    found = examine([path], vehicle=CAR, signal_map=SignalMap())
+    assert [(f.level, f.kind) for f in found.findings if "finalised" in f.what] == [("mended", "unfinalised")]
+    assert load_signals([path], vehicle=CAR, signal_map=SignalMap()).quality.unfinalised
+    assert not load_signals([SAMPLES / "lane_drive.mf4"], vehicle=CAR, signal_map=SignalMap()).quality.unfinalised
 
 
 def test_values(tmp_path):

@@ -1,0 +1,56 @@
+"""Clocks of several files of one drive against each other, by the speed that they carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from aqualog.align.carrier import Carrier, find_carrier
+from aqualog.align.clean import corrected
+from aqualog.align.clock import estimate_clock
+from aqualog.align.mapping import SignalMap
+from aqualog.doctor.records import Finding
+from aqualog.errors import FitError, SignalError
+from aqualog.types import Channel
+from aqualog.vehicle import Vehicle
+
+__all__ = ["clock_findings", "speed_of"]
+
+_LEAST_SHIFT_S = 0.01  # a sample time of 100 Hz
+_MAX_OFFSET_S = 10.0
+
+
+def speed_of(channels: Sequence[Channel], *, signal_map: SignalMap, vehicle: Vehicle) -> Carrier | None:
+    """The speed in the channels of one file, on the clock that the map gives it; None if it carries none."""
+    try:
+        found = find_carrier(channels, quantity="speed", signal_map=signal_map, vehicle=vehicle)
+    except SignalError:
+        return None
+    return replace(found, t_ns=corrected(found.t_ns, signal_map, found.file)) if found.t_ns.size else None
+
+
+def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
+    """A finding for each file whose clock runs at another rate than the first one's.
+
+    Where the match of the speeds is weak or their common time short nothing is told of the clocks.
+    """
+    for source in speeds[1:]:
+        reference = speeds[0]
+        apart = source.t_ns[0] > reference.t_ns[-1] or reference.t_ns[0] > source.t_ns[-1]
+        began = float(source.t_ns[0] - reference.t_ns[0]) * 1e-9
+        try:
+            fit = estimate_clock(
+                reference.t_ns, reference.x, source.t_ns, source.x, max_offset_s=_MAX_OFFSET_S,
+                start_offset_s=began if apart else 0.0,
+            )  # fmt: skip
+        except FitError:
+            continue
+        shift = fit.drift_ppm * 1e-6 * fit.overlap_s
+        if fit.drift_significant and abs(shift) > _LEAST_SHIFT_S:
+            low, high = fit.drift_ppm_ci95
+            what = (
+                f"its clock drifts by {fit.drift_ppm:+.0f} ppm (95 % {low:+.0f} to {high:+.0f}) against "
+                f"{reference.file}, {shift:+.3f} s over {fit.overlap_s:.0f} s, by the speed in both"
+            )
+            advice = f"aqualog align {reference.file} {source.file} --write-map"
+            yield Finding("doubt", "drifts", source.file, source.label, what, advice, 1)
