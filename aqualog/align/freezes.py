@@ -3,7 +3,8 @@
 A speed or a torque that is measured never stays the same to the last digit for long: on five measured cars the longest
 such stretch of a moving wheel is 0.9 s, of a torque 18 s. Only signals are judged whose own noise shows elsewhere, so
 that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel and
-a torque of zero may stay as they are for ever.
+a torque of zero may stay as they are for ever. Of a channel of any other kind only one stop that is unlike all else in
+it is worth a look.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["Freeze", "FreezeWatch", "freeze_note", "in_freezes", "watch_of"]
+__all__ = ["Freeze", "FreezeWatch", "freeze_note", "in_freezes", "longest_stop", "watch_of"]
 
 Freeze = tuple[int, int]
 """Stamps of the last sample that counts and of the last that repeats it. [ns]"""
@@ -24,6 +25,12 @@ _TIMES_LONGER = 20  # than that time
 _LEAST_CHANGES = 50
 _NOISE = 0.05  # least share of steps against the step before: measured speeds have 0.11 and more
 _GAP_NS = 1_000_000_000
+# of channels of any kind
+_STOP_S = 10.0
+_TIMES_USUAL = 20.0
+_LEAST_MOVING = 100  # changes, to know a channel by
+_LIVELY = 0.2  # of the samples differ from the one before: such a signal does not stand still by itself
+_SLOW = 0.02  # of the time outside
 
 
 def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
@@ -98,6 +105,32 @@ class FreezeWatch:
         if between > _MOST_BETWEEN * 1e9:
             return ()
         return tuple((start, end) for start, end in found if end - start >= _TIMES_LONGER * between)
+
+
+def longest_stop(t_ns: TimeArray, values: FloatArray) -> tuple[float, float, float]:
+    """Longest time that any channel (n,) stands still as nowhere else: how long [s], from when [s], at what value.
+
+    0.0, 0.0, NaN if there is none. For channels of which nobody knows what they are: the watch would take a pedal that
+    is let go for a dead one. A signal with noise hardly ever repeats itself; one that is coarse or slow does all
+    the time, and a car at rest stands at zero: both are let be. So the stop must be one of a value other than zero, of
+    at least 10 s, and next to nothing of the time outside it (and stops half as long) may lie in stops that are a
+    twentieth as long.
+    """
+    same = (values[1:] == values[:-1]) & (np.diff(t_ns) > 0) & (values[1:] != 0.0)
+    begin, end = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8))).reshape(-1, 2).T
+    lengths_s = (t_ns[end] - t_ns[begin]) * 1e-9
+    longest = float(lengths_s.max(initial=0.0))
+    if longest < _STOP_S:
+        return 0.0, 0.0, np.nan
+    stops = lengths_s >= longest / 2.0
+    rest_s = float(t_ns[-1] - t_ns[0]) * 1e-9 - float(lengths_s[stops].sum())
+    slow_s = float(lengths_s[~stops & (lengths_s >= longest / _TIMES_USUAL)].sum())
+    is_set = values[1:] != 0.0
+    moving, steps = int((is_set & ~same).sum()), int(is_set.sum() - (end - begin)[stops].sum())
+    if slow_s > _SLOW * rest_s or moving < max(_LEAST_MOVING, _LIVELY * steps):
+        return 0.0, 0.0, np.nan
+    k = int(np.argmax(lengths_s))
+    return longest, float(t_ns[begin[k]] - t_ns[0]) * 1e-9, float(values[begin[k]])
 
 
 def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:

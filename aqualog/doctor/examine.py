@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 from aqualog.align.carrier import Carrier
@@ -68,7 +68,10 @@ def examine(
     except AqualogError as error:
         whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
         return Examination(tuple(files), (*findings, whole), (), tuple((d, ()) for d in _DETECTORS))
-    findings += _of_signals(findings, [*signals.quality.notes, *result.notes])
+    frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
+    # what the drive leaves out as frozen need not be looked at
+    findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]
+    findings += _of_signals(findings, [*signals.quality.notes, *result.notes], frozen)
     missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
     lacking = {u.detector for u in result.unavailable}
     return Examination(tuple(files), tuple(findings), tuple(d for d in _DETECTORS if d not in lacking), missing)
@@ -120,9 +123,14 @@ def _of_file(name: str, faults: FileFaults) -> Iterator[Finding]:
         yield Finding("lost" if is_lossy else "doubt", "note", name, "", note.removeprefix(f"{name}: "))
 
 
-def _of_signals(before: Sequence[Finding], notes: Sequence[str]) -> Iterator[Finding]:
-    """What is told of a drive beyond what its files told."""
+def _of_signals(
+    before: Sequence[Finding], notes: Sequence[str], frozen: Collection[tuple[str, str]]
+) -> Iterator[Finding]:
+    """What is told of a drive beyond what its files told; `frozen` are file and channel of signals that stand still."""
     told = {f.what for f in before}
     for note in dict.fromkeys(notes):
-        if not any(what in note for what in told) and "time stamps:" not in note:
+        own = next(((f, c) for f, c in frozen if note.startswith(f"{f}:{c}: ") and "is frozen" in note), None)
+        if own is not None:
+            yield Finding("lost", "frozen", *own, note.removeprefix(f"{own[0]}:{own[1]}: "))
+        elif not any(what in note for what in told) and "time stamps:" not in note:
             yield Finding("lost" if "left out" in note else "doubt", "signal", "", "", note)

@@ -6,7 +6,7 @@ import struct
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.io.mdf_survey import BlockError, Survey
+from aqualog.io.mdf_survey import BlockError, Survey, Walk
 
 __all__ = ["survey3"]
 
@@ -17,6 +17,7 @@ _LONG_NAME, _DISPLAY_NAME = 222, 226  # length of a channel block with such a li
 _NUMBERS = {0: 2, 6: 6, 7: 7, 8: 7, 9: 6}
 _BY_COUNT = {1: 16, 2: 16, 11: 40, 12: 20}  # [bytes] an entry of a table
 _FORMULA = 10
+_HEAD = struct.Struct("<2sH")
 _NO_CONVERSION = 65535
 
 
@@ -46,16 +47,7 @@ def survey3(data: Any, path: Path) -> Survey:
     return _Walk(data, path).run()
 
 
-class _Walk:
-    def __init__(self, data: Any, path: Path) -> None:
-        self._data = data
-        self._path = path
-        self._size = len(data)
-        self._found = Survey(self._size)
-        self._linked: set[int] = set()
-        self._begins: set[int] = set()  # of all blocks seen
-        self._conversions: dict[int, str | None] = {}
-
+class _Walk(Walk):
     def run(self) -> Survey:
         try:
             self._block(_HD, b"HD")
@@ -68,24 +60,16 @@ class _Walk:
     def _block(self, at: int, kind: bytes) -> int:
         """Length of a block of this kind, inside the file."""
         name = kind.decode()
-        if at + 4 > self._size:
-            raise BlockError(name, at, f"is missing, the file ends at byte {self._size}", is_cut=True)
-        mark, length = struct.unpack_from("<2sH", self._data, at)
-        if mark != kind:
-            raise BlockError(name, at, f"is none, there is {mark!r}")
+        (length,) = self._head(name, at, _HEAD, kind)
         if length < _LEAST[kind]:
             raise BlockError(name, at, f"is damaged, it has {length} bytes")
-        if at + length > self._size:
-            raise BlockError(name, at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
-        self._begins.add(at)
-        return int(length)
+        self._seen(name, at, length)
+        return length
 
     def _once(self, at: int, kind: bytes) -> int:
         """The same, of which there must be one link only."""
         length = self._block(at, kind)
-        if at in self._linked:
-            raise BlockError(kind.decode(), at, "is linked twice")
-        self._linked.add(at)
+        self._link_once(kind.decode(), at)
         return length
 
     def _link(self, at: int) -> int:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aqualog.errors import LogError
-from aqualog.io.mdf_survey import BlockError, Survey
+from aqualog.io.mdf_survey import BlockError, Survey, Walk
 from aqualog.io.memory import bytes_text
 
 __all__ = ["LARGEST_BLOCK", "survey4"]
@@ -29,6 +29,7 @@ _DEEPEST = 16  # conversions in conversions, channels in channels
 _MOST_CONVERSIONS = 10_000  # that one channel leads to
 _MOST_ELEMENTS = 1_000_000  # of an array
 _HEAD, _HD = 24, 64
+_HEAD_OF = struct.Struct("<4s4xQQ")
 _FLAGS_AT = 60
 _COUNTERS, _LAST_DT, _LAST_DL, _VLSD_OFFSETS = 0x1, 0x4, 0x10, 0x40  # what an unfinished file has not been given
 _CG_FORMS = ((104, 6), (112, 7))
@@ -97,15 +98,9 @@ def survey4(data: Any, path: Path) -> Survey:
     return _Walk(data, path).run()
 
 
-class _Walk:
+class _Walk(Walk):
     def __init__(self, data: Any, path: Path) -> None:
-        self._data = data
-        self._path = path
-        self._size = len(data)
-        self._found = Survey(self._size)
-        self._linked: set[int] = set()  # blocks that one link alone may lead to
-        self._begins: set[int] = set()  # of all blocks seen
-        self._conversions: dict[int, str | None] = {}
+        super().__init__(data, path)
         self._texts: dict[int, int] = {}
         self._text_bytes = 0
         self._unfinished = 0
@@ -127,23 +122,15 @@ class _Walk:
     def _block(self, at: int, kind: bytes, links: int, length: int) -> _Block:
         """A block of this kind with at least so many links and bytes, inside the file."""
         name = kind.decode()
-        if at + _HEAD > self._size:
-            raise BlockError(name, at, f"is missing, the file ends at byte {self._size}", is_cut=True)
-        mark, size, count = struct.unpack_from("<4s4xQQ", self._data, at)
-        if mark != b"##" + kind:
-            raise BlockError(name, at, f"is none, there is {mark!r}")
+        size, count = self._head(name, at, _HEAD_OF, b"##" + kind)
         if size < max(length, _HEAD) or count < links or count > (size - _HEAD) // 8:
             raise BlockError(name, at, f"is damaged, it has {size} bytes and {count} links")
-        if at + size > self._size:
-            raise BlockError(name, at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
-        self._begins.add(at)
+        self._seen(name, at, size)
         return _Block(name, at, size, struct.unpack_from(f"<{count}Q", self._data, at + _HEAD), at + _HEAD + 8 * count)
 
     def _once(self, block: _Block) -> _Block:
-        """The same, of which there must be one link only: no cycles, and no tree that grows without end."""
-        if block.at in self._linked:
-            raise BlockError(block.kind, block.at, "is linked twice")
-        self._linked.add(block.at)
+        """The same, of which there must be one link only."""
+        self._link_once(block.kind, block.at)
         return block
 
     def _mark(self, at: int) -> bytes:

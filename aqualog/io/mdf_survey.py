@@ -17,7 +17,7 @@ from typing import Any
 
 from aqualog.errors import LogError
 
-__all__ = ["BlockError", "Survey", "mapped"]
+__all__ = ["BlockError", "Survey", "Walk", "mapped"]
 
 _COMPLETE = "a complete MDF file"
 _COPY_AGAIN = "copy it from the logger again or stop the recording properly"
@@ -90,6 +90,44 @@ class Survey:
         if broken.is_cut:
             return LogError(f"file is cut: {broken}", where=str(path), expected=_COMPLETE, hint=_COPY_AGAIN)
         return LogError(f"file is damaged: {broken}", where=str(path), hint=_OWN_TOOL)
+
+
+class Walk:
+    """What both formats' walks begin with: the file, what is found, and which blocks were seen.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+    path : Path
+    """
+
+    def __init__(self, data: Any, path: Path) -> None:
+        self._data, self._path, self._size = data, path, len(data)
+        self._found = Survey(self._size)
+        self._linked: set[int] = set()  # blocks that one link alone may lead to
+        self._begins: set[int] = set()  # of all blocks seen
+        self._conversions: dict[int, str | None] = {}
+
+    def _head(self, name: str, at: int, layout: struct.Struct, mark: bytes) -> tuple[int, ...]:
+        """Numbers behind the mark of a block, which must be the right one and inside the file."""
+        if at + layout.size > self._size:
+            raise BlockError(name, at, f"is missing, the file ends at byte {self._size}", is_cut=True)
+        found, *numbers = layout.unpack_from(self._data, at)
+        if found != mark:
+            raise BlockError(name, at, f"is none, there is {found!r}")
+        return tuple(numbers)
+
+    def _seen(self, name: str, at: int, size: int) -> None:
+        """A block of a size, which must lie inside the file."""
+        if at + size > self._size:
+            raise BlockError(name, at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
+        self._begins.add(at)
+
+    def _link_once(self, name: str, at: int) -> None:
+        """A block of which there must be one link only: no cycles, and no tree that grows without end."""
+        if at in self._linked:
+            raise BlockError(name, at, "is linked twice")
+        self._linked.add(at)
 
 
 @contextmanager

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
+from aqualog.align.freezes import longest_stop
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap, SourceClock
 from aqualog.cli.main import app
 from aqualog.config.vehicle import load_vehicle
-from aqualog.doctor.channels import frozen_longest
 from aqualog.doctor.examine import examine
-from aqualog.types import Channel, ChannelInfo
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
@@ -126,15 +125,26 @@ def test_values(tmp_path):
     x[500:1900, 1] = x[500, 1]
     x[10:20, 3] = np.nan
     found, _ = kinds(tmp_path, table(x))
-    frozen = found["doubt", "frozen"]
+    frozen = found["lost", "frozen"]  # once, and not as worth a look, too
+    assert ("doubt", "frozen") not in found
     assert (frozen.channel, frozen.file) == ("omega_fl", "x.csv")
-    assert "for 14 s (from 5 s)" in frozen.what
+    assert "1399 samples (first at 5.00 s) only repeat the one before, for up to 14.0 s" in frozen.what
     assert found["doubt", "not_finite"].count == 10
 
 
-def channel(values, step_s=0.1):
-    t_ns = np.arange(len(values), dtype=np.int64) * int(step_s * 1e9)
-    return Channel(ChannelInfo("x", "x", "", len(values), "x"), t_ns, np.asarray(values, dtype=float), False)
+def test_a_channel_that_is_no_signal_is_worth_a_look(tmp_path):
+    x = drive()
+    x[:, 1] = np.where((np.arange(3000) > 500) & (np.arange(3000) < 1900), x[500, 1], x[:, 1])
+    found, _ = kinds(
+        tmp_path, table(x[:, [0, 2, 2, 3, 1]], header="t [s],omega_fl [rad/s],omega_fr [rad/s],v_x [m/s],other")
+    )
+    assert found["doubt", "frozen"].channel == "other"
+    assert "for 14 s (from 5 s)" in found["doubt", "frozen"].what
+
+
+def stop_of(values):
+    t_ns = np.arange(len(values), dtype=np.int64) * 10**8
+    return longest_stop(t_ns, np.asarray(values, dtype=float))
 
 
 def test_a_coarse_signal_and_a_car_at_rest_are_not_frozen():
@@ -144,12 +154,12 @@ def test_a_coarse_signal_and_a_car_at_rest_are_not_frozen():
     stuck = np.where((np.arange(3000) >= 1000) & (np.arange(3000) < 2000), 1.5, noise)
     slow = np.where((np.arange(3000) // 20) % 2 == 0, 3.0 + np.arange(3000) // 40, noise)  # stops of 2 s all the time
     slow[1000:1150] = 7.5
-    assert frozen_longest(channel(slow))[0] == 0.0
-    assert frozen_longest(channel(coarse))[0] == 0.0
-    assert frozen_longest(channel(at_rest))[0] == 0.0
-    assert frozen_longest(channel(stuck)) == pytest.approx((99.9, 100.0, 1.5))
-    assert frozen_longest(channel([]))[0] == 0.0
-    assert frozen_longest(channel([1.0]))[0] == 0.0
+    assert stop_of(slow)[0] == 0.0
+    assert stop_of(coarse)[0] == 0.0
+    assert stop_of(at_rest)[0] == 0.0
+    assert stop_of(stuck) == pytest.approx((99.9, 100.0, 1.5))
+    assert stop_of([])[0] == 0.0
+    assert stop_of([1.0])[0] == 0.0
 
 
 @pytest.mark.parametrize(("keep", "code"), [(1.0, 0), (0.5, 3), (0.0, 1)], ids=["sound", "cut in half", "empty"])
