@@ -86,7 +86,9 @@ class BagSource:
         chunks: dict[int, frozenset[int]] = {}
         counts: dict[int, int] = {}
         records = BagRecords(file, self._size, start)
+        is_pure = True
         for _, record, data in records:
+            is_pure &= kind_of(record) in (CONNECTION, CHUNK_INFO)
             at = number(record, b"chunk_pos", 8)
             if kind_of(record) == CONNECTION:
                 self._note_connection(record, data)
@@ -95,12 +97,18 @@ class BagSource:
                 chunks[at] = frozenset(connection for connection, _ in pairs)
                 for connection, count in pairs:
                     counts[connection] = counts.get(connection, 0) + count
-        is_whole = not records.gaps and len(chunks) == number(head, b"chunk_count")
+        is_whole = is_pure and not records.gaps and len(chunks) == number(head, b"chunk_count")
+        # bytes too many or too few before it move the last chunk at least
+        is_whole = is_whole and all(self._is_chunk(file, at) for at in {min(chunks, default=0), max(chunks, default=0)})
         if not is_whole or len(self._connections) != number(head, b"conn_count") or counts.keys() - self._connections:
             self._connections = {}
             return None
         self._counts, self._chunks, self._indexed = counts, tuple(chunks), True
         return chunks
+
+    def _is_chunk(self, file: BinaryIO, at: int) -> bool:
+        offset, head, _ = next(iter(BagRecords(file, self._size, at)), (-1, {}, b""))
+        return offset == at and kind_of(head) == CHUNK
 
     def _sample(self, file: BinaryIO, chunks: dict[int, frozenset[int]]) -> dict[int, list[bytes]]:
         """First messages of each connection, from as few chunks as hold them all."""

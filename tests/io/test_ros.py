@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aqualog.errors import LogError
-from aqualog.io.bag_records import CHUNK, BagRecords, kind_of
+from aqualog.io.bag_records import CHUNK, INDEX, BagRecords, kind_of
 from aqualog.io.base import ReadOptions
 from aqualog.io.ros import RosReader
 from aqualog.types import Channel
@@ -153,6 +153,25 @@ def test_a_length_that_lies_costs_that_chunk_of_a_bag(tmp_path, indexed, length)
     assert omega[-1] == 599 * 0.1
     lost = sum(600 - channels[p].values.size for p in ("/omega_fl.data", "/slip.slip[0]"))
     assert reader.faults.lost_samples == lost if indexed else reader.faults.truncated
+
+
+@pytest.mark.parametrize("where", ["first", "last"])
+def test_an_index_whose_chunks_have_moved_is_not_believed(tmp_path, where):
+    """Its own place is moved by a whole record, so that all that is read from there looks sound."""
+    path = write_bag1(tmp_path / "a.bag", 600)
+    raw = path.read_bytes()
+    index_pos = struct.unpack_from("<Q", raw, raw.index(b"index_pos=") + 10)[0]
+    with path.open("rb") as file:
+        last = max(o for o, head, _ in BagRecords(file, len(raw)) if kind_of(head) == INDEX and o < index_pos)
+    size = index_pos - last
+    foreign = bag_record(
+        {b"op": b"\x04", b"pad": bytes(size - len(bag_record({b"op": b"\x04", b"pad": b""}, b"")))}, b""
+    )
+    assert len(foreign) == size
+    at = chunk_starts(path)[0 if where == "first" else -1]
+    path.write_bytes(raw[:at] + foreign + raw[at:])
+    channels, _ = read_all(path)
+    assert channels["/omega_fl.data"].values.size == 600
 
 
 @pytest.mark.parametrize("compression", ["bz2", "lz4"])
