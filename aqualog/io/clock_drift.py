@@ -24,7 +24,7 @@ class DriftWatch:
     """Goes through the stamps of one source on two clocks, in any pieces."""
 
     def __init__(self) -> None:
-        self._bins: dict[int, tuple[int, int]] = {}
+        self._bins: dict[int, int] = {}  # the least difference of each
         self._origin: tuple[int, int] | None = None
 
     def push(self, t_ns: TimeArray, other_ns: TimeArray, good: BoolArray) -> None:
@@ -37,18 +37,15 @@ class DriftWatch:
         t = t - self._origin[0]
         lag = lag - self._origin[1] - t
         bins = t // _BIN_NS
-        order = np.lexsort((lag, bins))
-        first = order[np.append(True, np.diff(bins[order]) != 0)]
-        for k, at, least in zip(bins[first].tolist(), t[first].tolist(), lag[first].tolist(), strict=True):
-            known = self._bins.get(k)
-            if known is None or least < known[1]:
-                self._bins[k] = at, least
+        runs = np.flatnonzero(np.append(True, np.diff(bins) != 0))  # stamps mostly rise, so a bin is one run
+        for k, least in zip(bins[runs].tolist(), np.minimum.reduceat(lag, runs).tolist(), strict=True):
+            self._bins[k] = min(least, self._bins.get(k, least))
 
     def finish(self, clock: str, against: str) -> Drift | None:
         """The drift of the other clock, called `against`, over the one that counts; None if there is none."""
         if len(self._bins) < _LEAST_BINS:
             return None
-        points = np.array([self._bins[k] for k in sorted(self._bins)], dtype=np.float64) * 1e-9
+        points = np.array([(k * _BIN_NS, self._bins[k]) for k in sorted(self._bins)], dtype=np.float64) * 1e-9
         t, lag = _thinned(points)
         slope, rms = _line(t, lag)
         span = float(t[-1] - t[0])
