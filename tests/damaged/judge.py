@@ -30,8 +30,8 @@ LEGEND = """- right: every sample of the sound log and no other (the damage hit 
 - part, told: samples are missing, none is another; what was lost is told (exit code 3)
 - refused: one line says what is wrong (exit code 1 or 4)
 - samples changed: no more samples are other numbers than the damaged bytes can hold, or those of one channel. In plain
-  numbers and text without a checksum (MF4, MDF 3, ROS 1 bags, databases, CSV, Parquet) a bit that has flipped makes another
-  number, and nothing in the file can show it; what goes beyond a signal's range or a column's bounds is told
+  numbers and text without a checksum (MF4, MDF 3, ROS 1 bags, databases, CSV, Parquet), and in what was packed without one
+  (Parquet, lz4 in bags), a bit that has flipped makes another number, and nothing in the file can show it; what goes beyond a signal's range or a column's bounds is told
 - wrong, told: more than that is wrong, and a loss is told
 - IN SILENCE: samples are missing or wrong and nothing is told; over limit: 30 s or 2 GB"""
 
