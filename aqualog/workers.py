@@ -17,7 +17,9 @@ from typing import Any, NamedTuple, TypeVar
 from aqualog.io.in_hand import InHand, bound_memory, watched_by
 from aqualog.io.limits import ReadLimits, limits_from
 
-__all__ = ["NO_LIMITS", "Crashed", "Limits", "WorkOn", "most_processes", "work_on"]
+__all__ = [
+    "NO_LIMITS", "Crashed", "Limits", "WorkOn", "begin_worker", "most_processes", "within", "work_on",
+]  # fmt: skip
 
 _PER_CORE = 4  # more processes than this many a core only take memory
 _THREADS = ("POLARS_MAX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -104,12 +106,12 @@ def _round(
     pending: dict[Future[Any], Name] = {}
     spawn = multiprocessing.get_context("spawn")
     begin = (limits, limits_from(os.environ))
-    with ProcessPoolExecutor(jobs, spawn, initializer=_quiet_worker, initargs=begin) as pool:
+    with ProcessPoolExecutor(jobs, spawn, initializer=begin_worker, initargs=begin) as pool:
         try:
             # few in the queue: when a pool breaks, only those that it held are in doubt
             for name, task in todo:
                 with _no_interrupt():
-                    pending[pool.submit(_within, limits.seconds, work, *task)] = name
+                    pending[pool.submit(within, limits.seconds, work, *task)] = name
                 if len(pending) >= 2 * jobs:
                     broken = _collect(pending, left, record)
                     if broken:
@@ -166,7 +168,7 @@ def _no_interrupt() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
+def within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
     """`work(*task)`; this process ends if that takes too long, be it in a library that never comes back to Python."""
     if seconds is None:
         return work(*task)
@@ -178,7 +180,7 @@ def _within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
             faulthandler.cancel_dump_traceback_later()
 
 
-def _quiet_worker(limits: Limits, read_limits: ReadLimits) -> None:
+def begin_worker(limits: Limits, read_limits: ReadLimits) -> None:
     """An interrupt is the parent's business; a worker finishes what it has in hand, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):

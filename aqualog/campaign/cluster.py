@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any, NamedTuple
 
+from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.errors import AqualogError, ConfigError
-from aqualog.workers import Crashed, WorkOn
+from aqualog.io.limits import limits_from
+from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn
 
 __all__ = ["on_cluster"]
 
@@ -27,25 +30,30 @@ _LOOK_S = 0.02
 
 
 @contextmanager
-def on_cluster(address: str, *, tell: Callable[[str], None] = lambda _: None) -> Iterator[WorkOn]:
+def on_cluster(
+    address: str, *, limits: Limits = NO_LIMITS, tell: Callable[[str], None] = lambda _: None
+) -> Iterator[WorkOn]:
     """Workers behind a scheduler in place of `aqualog.workers.work_on`.
 
     Parameters
     ----------
     address : str
         As dask writes it: `tcp://host:8786`.
+    limits : Limits
+        What one item may take; of a step of reading what this process's environment says holds there too.
     tell : callable
         Told how many workers there are.
 
-    A worker that ends is replaced by another one: dask gives its task to the next; a task that has ended several
-    is taken apart, and the item that ends one by itself is recorded as `Crashed`. All paths of the tasks must mean the
-    same on every worker, also on those that join later.
+    Workers have each item done in a process beside them; one that ends its process is recorded as `Crashed`. A worker
+    that ends is replaced by another one: dask gives its task to the next; a task that has lost several is taken apart,
+    and the item that still loses them is recorded as `Crashed`, too. All paths of the tasks must mean the same on every
+    worker, also on those that join later.
 
     Raises
     ------
     ConfigError
         If dask is not installed, no scheduler answers, it has no workers, or one of these runs another aqualog or does
-        not see the files.
+        not see the files; if a limit of the environment is no number.
     AqualogError
         If the scheduler, or the last worker, is lost at work.
     """
@@ -53,6 +61,7 @@ def on_cluster(address: str, *, tell: Callable[[str], None] = lambda _: None) ->
         from distributed import Client
     except ImportError as error:
         raise ConfigError("--cluster needs dask", hint="pip install 'aqualog[cluster]'") from error
+    bounds = Bounds(limits, limits_from(os.environ))
     with _quiet():
         try:
             # a client waits for ever where something else answers
@@ -66,7 +75,7 @@ def on_cluster(address: str, *, tell: Callable[[str], None] = lambda _: None) ->
         try:
             threads = _ready(client, address)
             tell(f"{len(client.scheduler_info(n_workers=-1)['workers'])} workers, {threads} threads")
-            yield lambda tasks, work, record: _work_on(client, address, threads, tasks, work, record)
+            yield lambda tasks, work, record: _work_on(client, address, threads, bounds, tasks, work, record)
         finally:
             client.close(timeout=_ANSWER_S)
 
@@ -145,6 +154,7 @@ def _work_on(
     client: Any,
     address: str,
     threads: int,
+    bounds: Bounds,
     tasks: Mapping[Any, tuple[Any, ...]],
     work: Callable[..., Any],
     record: Callable[[Any, Any], None],
@@ -153,13 +163,14 @@ def _work_on(
         for worker, lack in _everywhere(client, address, unlike, asked).items():
             if lack is not None:
                 raise _unfit(address, worker, lack)
-        _all(client, address, threads, asked, tasks, work, record)
+        _all(client, address, threads, bounds, asked, tasks, work, record)
 
 
 def _all(
     client: Any,
     address: str,
     threads: int,
+    bounds: Bounds,
     asked: Asked,
     tasks: Mapping[Any, tuple[Any, ...]],
     work: Callable[..., Any],
@@ -177,7 +188,7 @@ def _all(
     held: dict[Any, Sequence[tuple[Any, tuple[Any, ...]]]] = {}
 
     def submit(part: Sequence[tuple[Any, tuple[Any, ...]]]) -> Any:
-        future = client.submit(_part, asked, work, [t for _, t in part], pure=False)
+        future = client.submit(_part, asked, bounds, work, [t for _, t in part], pure=False)
         held[future] = part
         return future
 
@@ -254,13 +265,22 @@ class Unfit(NamedTuple):
     lack: ConfigError
 
 
-def _part(asked: Asked, work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> list[Any] | Unfit:
+def _part(
+    asked: Asked, bounds: Bounds, work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]
+) -> list[Any] | Unfit:
+    from distributed import get_worker
+
+    worker: Any = get_worker()
     lack = unlike(asked)
     if lack is not None:
-        from distributed import get_worker
-
-        return Unfit(str(get_worker().address), lack)
-    return [work(*t) for t in tasks]
+        return Unfit(str(worker.address), lack)
+    try:
+        here = bounds_here(bounds, worker.memory_manager.memory_limit)
+    except ConfigError as error:
+        lack = ConfigError(f"has {error.where}, which {error.what}", expected=error.expected)
+        return Unfit(str(worker.address), lack)
+    with hand(here, worker.local_directory) as do:
+        return [do(work, *t) for t in tasks]
 
 
 def _unfit(address: str, worker: str, lack: ConfigError) -> ConfigError:

@@ -149,12 +149,10 @@ def _placed(
 ) -> Placed:
     from aqualog.campaign.shard import shard_of
     from aqualog.errors import ConfigError
-    from aqualog.workers import NO_LIMITS, Limits
+    from aqualog.workers import Limits
 
     limits = Limits(limit_s, limit_mb)
     if cluster is not None:
-        if limits != NO_LIMITS:
-            raise ConfigError("--limit-s and --limit-mb beside --cluster", expected="limits of the workers themselves")
         if jobs is not None:
             raise ConfigError("--jobs beside --cluster", expected="as many as there are workers")
         if not cluster.strip():

@@ -147,7 +147,7 @@ def results(
 
         with (
             told_if_interrupted("the logs that are done are kept, the same command goes on with the rest"),
-            _elsewhere(cluster, steps) as elsewhere,
+            _elsewhere(cluster, limits or NO_LIMITS, steps) as elsewhere,
         ):
             outcome = run_batch(
                 configured, place, jobs=jobs or os.cpu_count() or 1, force=force, limits=limits or NO_LIMITS,
@@ -161,13 +161,13 @@ def results(
 
 
 @contextmanager
-def _elsewhere(address: str | None, steps: Steps) -> Iterator[WorkOn | None]:
+def _elsewhere(address: str | None, limits: Limits, steps: Steps) -> Iterator[WorkOn | None]:
     if address is None:
         yield None
         return
     from aqualog.campaign.cluster import on_cluster
 
-    with on_cluster(address, tell=lambda text: steps(f"{address}: {text}")) as work_on:
+    with on_cluster(address, limits=limits, tell=lambda text: steps(f"{address}: {text}")) as work_on:
         yield work_on
 
 

@@ -1,5 +1,7 @@
 """What goes wrong on a cluster: each is told in a line, and what is done stays."""
 
+import collections
+import itertools
 import json
 import os
 import shutil
@@ -7,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import contextmanager
@@ -19,11 +22,14 @@ from typer.testing import CliRunner
 
 import aqualog
 from aqualog.campaign import cluster as asking
-from aqualog.campaign import cluster_worker
+from aqualog.campaign import cluster_hand, cluster_worker
 from aqualog.campaign.cluster import on_cluster
+from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.cli.main import app
 from aqualog.errors import AqualogError, ConfigError
+from aqualog.io.limits import ReadLimits
+from aqualog.workers import NO_LIMITS, Crashed, Limits
 
 
 @contextmanager
@@ -57,6 +63,68 @@ def double(x):
 def slowly(x):
     time.sleep(0.3)
     return x
+
+
+def badly(kind, folder):
+    if kind == "leaves":
+        (Path(folder) / "tries").open("a").write("x")
+        tempfile.mkstemp()
+        os._exit(3)
+    if kind == "hangs":  # in C, with the interpreter's lock held
+        collections.deque(itertools.repeat(0), maxlen=0)
+    if kind == "takes":
+        try:
+            bytearray(2_000_000_000)
+        except MemoryError:
+            return "no memory"
+    return os.getpid()
+
+
+@pytest.mark.parametrize("kind", ["leaves", "hangs", "takes"])
+def test_an_item_that_ends_its_process_costs_itself_only(tmp_path, monkeypatch, kind):
+    """Not the worker, which here is the process of the tests; and it is tried no more than twice."""
+    monkeypatch.setenv("AQUALOG_LIMIT_MB", "1500")
+    found = {}
+    limits = Limits(seconds=2.0) if kind == "hangs" else NO_LIMITS
+    with here() as made, on_cluster(made.scheduler_address, limits=limits) as work_on:
+        scratch = Path(next(iter(made.workers.values())).local_directory)
+        work_on({k: (k, str(tmp_path)) for k in ("a", kind, "b")}, badly, found.__setitem__)
+        assert len(list(scratch.glob("aqualog-*/*"))) == 0
+    if kind == "takes":
+        assert found[kind] == "no memory"
+    else:
+        assert isinstance(found[kind], Crashed)
+        assert (found[kind].seconds >= 2.0) or kind == "leaves"
+    if kind == "leaves":
+        assert len((tmp_path / "tries").read_text()) <= 2
+    assert os.getpid() not in {found["a"], found["b"]}
+    assert {type(found[k]) for k in "ab"} == {int}
+
+
+def test_what_a_worker_may_take(monkeypatch):
+    """The command's word first, then the worker's own, and no more memory than dask gives."""
+    monkeypatch.setenv("AQUALOG_LIMIT_S", "7")
+    monkeypatch.setenv("AQUALOG_LIMIT_CPU_S", "8")
+    monkeypatch.setenv("AQUALOG_LIMIT_MB", "900")
+    asked = Bounds(Limits(3.0), ReadLimits(wall_s=5.0))
+    assert bounds_here(asked, 10**9) == Bounds(Limits(3.0), ReadLimits(5.0, 8.0, 900_000_000))
+    assert bounds_here(asked, 5 * 10**8).reading.memory == 5 * 10**8
+    assert bounds_here(asked, None).reading.memory == 900_000_000
+    monkeypatch.setenv("AQUALOG_LIMIT_CPU_S", "soon")
+    with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_CPU_S: is 'soon'; expected"):
+        bounds_here(asked, None)
+
+
+def test_a_process_that_is_idle_ends(monkeypatch):
+    monkeypatch.setattr(cluster_hand, "_IDLE_S", 0.3)
+    with hand(Bounds(NO_LIMITS, ReadLimits())) as do:
+        worker = do(os.getpid)
+        assert do(os.getpid) == worker
+    for _ in range(100):
+        if not Path(f"/proc/{worker}").exists():
+            break
+        time.sleep(0.1)
+    assert not Path(f"/proc/{worker}").exists()
 
 
 def test_no_workers_is_said_after_a_while(campaign, tmp_path, monkeypatch):

@@ -113,10 +113,7 @@ def test_no_scheduler_is_a_clear_error(whole, tmp_path):
         assert "no dask scheduler answers" in result.stderr
 
 
-@pytest.mark.parametrize(
-    "more",
-    [["--cluster", "tcp://h:1", "--jobs", "2"], ["--cluster", "tcp://h:1", "--limit-s", "5"], ["--cluster", " "]],
-)
+@pytest.mark.parametrize("more", [["--cluster", "tcp://h:1", "--jobs", "2"], ["--cluster", " "]])
 def test_options_that_do_not_go_together(whole, tmp_path, more):
     assert run("batch", whole[0], "-o", tmp_path / "s", *more).exit_code == 2
 
