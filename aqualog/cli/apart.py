@@ -86,9 +86,10 @@ class _End(NamedTuple):
 def _worker(limits: ReadLimits, *, debug: bool) -> Board:
     """Returns in the worker only."""
     from aqualog.cli.board import Board
+    from aqualog.cli.scratch import Scratch
 
     board = Board()
-    scratch = _Scratch()
+    scratch = Scratch()
     refused: dict[str, str] = {}
     waited = {getattr(signal, n) for n in _ENDING}
     waited = {s for s in waited if signal.getsignal(s) is not signal.SIG_IGN} | {signal.SIGCHLD}
@@ -241,33 +242,3 @@ def _clear_away(held: InHand) -> None:
         else:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
-
-
-class _Scratch:
-    """A folder for temporary files of the worker and its libraries, so that none outlives it."""
-
-    def __init__(self) -> None:
-        self._base = os.environ.get("TMPDIR") or "/tmp"
-        self._folder: Path | None = None
-
-    def make(self) -> None:
-        """Make it, if that can be done, and let TMPDIR name it."""
-        folder = Path(self._base).absolute() / f"aqualog-{os.getpid()}-{os.urandom(4).hex()}"
-        with suppress(OSError):
-            folder.mkdir(mode=0o700)
-            self._folder = folder
-            os.environ["TMPDIR"] = str(folder)
-            import tempfile
-
-            tempfile.tempdir = None  # it may remember the one before
-
-    def remove(self) -> None:
-        """Remove it with what is in it."""
-        if self._folder is None:
-            return
-        try:
-            self._folder.rmdir()
-        except OSError:
-            import shutil
-
-            shutil.rmtree(self._folder, ignore_errors=True)

@@ -16,6 +16,7 @@ __all__ = ["Contents", "Remembered", "Seen", "change_since", "hash_of", "sources
 Seen = tuple[tuple[str, int, int], ...]
 """Files with size and time of change."""
 
+_PIECE = 1 << 20
 _LENGTH = 32  # hexadecimal digits of a key: 128 bit
 
 
@@ -46,8 +47,7 @@ class Contents:
         entry = self.known.get(name)
         if entry and entry[:2] == [state.st_size, state.st_mtime_ns]:
             return str(entry[2])
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        digest = _digest(path, state.st_size)
         self.known[name] = [state.st_size, state.st_mtime_ns, digest]
         self.has_changed = True
         return digest
@@ -102,6 +102,17 @@ def sources_stamp(names: tuple[str, ...]) -> str:
 def hash_of(parts: Iterable[str]) -> str:
     """One key of many texts; 32 hexadecimal digits."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_LENGTH]
+
+
+def _digest(path: Path, size: int) -> str:
+    """Hash of the first `size` bytes: a file that grows faster than it is read would have no end."""
+    digest = hashlib.sha256()
+    left = size
+    with path.open("rb", buffering=0) as file:
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
+    return digest.hexdigest()
 
 
 def _files(path: Path) -> list[Path]:

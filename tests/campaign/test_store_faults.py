@@ -376,6 +376,20 @@ def test_a_loop_does_not_end_the_command(bare):
     assert "2 logs done" in result.stdout
 
 
+def test_a_log_that_grows_while_it_is_hashed_has_an_end(tmp_path):
+    """The hash is of the bytes that were there when it began."""
+    log = tmp_path / "log"
+    log.write_bytes(b"x" * 3_000_000)
+    whole = Contents().of(log)
+    real, state = type(log).stat, log.stat()
+    with log.open("ab") as file:
+        file.write(b"y" * 1000)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(log), "stat", lambda p, **kw: state if p == log else real(p, **kw))
+        assert Contents().of(log) == whole
+    assert Contents().of(log) != whole
+
+
 # --- side by side -----------------------------------------------------------------------------------------------------
 
 

@@ -187,12 +187,25 @@ def test_an_interrupt_ends_both_at_once(folder, kind, to_all):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there a process is told of its parent's end")
 def test_a_command_that_is_killed_leaves_no_worker(folder):
+    """And what it had in the temporary folder goes with the next command, but for what one that lives has there."""
     process = started(folder, "hang.csv")
     worker = int(process.stderr.readline().split()[1])
     assert worker != process.pid
     process.kill()
     process.communicate(timeout=20)
     assert gone(worker)
+    (left,) = (folder / "tmp").iterdir()
+    (left / "unpacked").mkdir()
+    (left / "unpacked" / "piece").write_text("x")
+    beside = started(folder, "sleep.csv")
+    beside.stderr.readline()
+    (living,) = (folder / "tmp").iterdir()
+    assert living != left
+    assert ended(started(folder, "good.csv"))[0] == 0
+    assert list((folder / "tmp").iterdir()) == [living]
+    beside.send_signal(signal.SIGTERM)
+    assert ended(beside)[0] == 130
+    assert not list((folder / "tmp").iterdir())
 
 
 def test_switched_off_a_command_works_in_the_process_that_was_called(folder, monkeypatch):
