@@ -222,6 +222,11 @@ def run_batch(
                 with suppress(AqualogError):  # what has ended the batch is what the user should know
                     write_tables(configured, store, todo)
             raise
+        if lost := tally.made - len(store.keys()[0] & plan.new.keys()):
+            raise AqualogError(
+                f"{lost} results that were written are not here", where=store.name, expected="the disk of the start",
+                hint="its mounts; the same command goes on with the rest",
+            )  # fmt: skip
         if is_held and not store.part:
             write_tables(configured, store, todo)
     return BatchOutcome(tally.made, plan.kept, tally.failed)

@@ -79,8 +79,8 @@ class Folder:
         return (self.address / name).read_bytes()
 
     def write(self, name: str, data: bytes | memoryview) -> None:
-        """A file, whole."""
-        write_whole(self.address / name, lambda temporary: _put(temporary, data))
+        """A file, whole. Folders are made at the start only: one that is gone was on a disk that is."""
+        write_whole(self.address / name, lambda temporary: _put(temporary, data), makes_folder=False)
 
     def remove(self, name: str) -> None:
         """Remove a file."""

@@ -352,6 +352,11 @@ class Store:
                 f"{error.strerror}".lower(), where=self.name, expected="room for the results",
                 hint="make room, or --store DIR; the same command goes on with the rest",
             )  # fmt: skip
+        if isinstance(error, FileNotFoundError):
+            return AqualogError(
+                "is gone", where=self.name, expected="the folder in which this batch began",
+                hint="its disk or the network; then the same command goes on with the rest",
+            )  # fmt: skip
         file = error.filename2 or error.filename or self.name
         return AqualogError(
             f"cannot be written ({error.strerror or error})", where=str(file), hint="its permissions, or --store DIR"

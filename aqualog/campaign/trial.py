@@ -113,13 +113,13 @@ def _tried_once(
     costs: dict[str, Cost | Crashed] = {}
     spent: dict[str, tuple[Path, ...]] = {}
     marks: list[float] = []
-    asked: list[float] = []  # the clock that processes share
+    asked: list[float] = []  # of a clock that all processes of a machine share and nobody sets
 
     def work_timed(
         tasks: Mapping[Any, tuple[Any, ...]], work: Callable[..., Any], record: Callable[[Any, Any], None]
     ) -> None:
         marks.append(time.perf_counter())
-        asked.append(time.time())
+        asked.append(time.monotonic())
         timed = {key: (of[task[3]][0], task) for key, task in tasks.items()}
         spent.update({key: task[3] for key, task in tasks.items()})
 
@@ -129,7 +129,7 @@ def _tried_once(
 
         work_on(timed, _timed, jobs=processes, record=taken)
         marks.append(time.perf_counter())
-        asked.append(time.time())
+        asked.append(time.monotonic())
 
     with tempfile.TemporaryDirectory(prefix="aqualog-plan-") as folder:
         store = Store(Path(folder) / "store")
@@ -188,8 +188,9 @@ def _timed(form: str, task: tuple[Any, ...]) -> Cost:
         outcome, wall_s, cpu_s = _measured(task)
         loading_s, loading_cpu_s = first_s - wall_s, first_cpu_s - cpu_s
     return Cost(
-        outcome, os.getpid(), wall_s, cpu_s, loading_s, loading_cpu_s, time.time(), time.process_time(), peak_memory()
-    )
+        outcome, os.getpid(), wall_s, cpu_s, loading_s, loading_cpu_s, time.monotonic(), time.process_time(),
+        peak_memory(),
+    )  # fmt: skip
 
 
 def _measured(task: tuple[Any, ...]) -> tuple[Fault | None, float, float]:

@@ -17,12 +17,14 @@ __all__ = ["only_here", "write_text", "write_whole"]
 _ASKING = Lock()
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path, write: Callable[[Path], None], *, makes_folder: bool = True) -> None:
     """Let `write` make a file under a temporary name beside its place, then rename it.
 
-    Whatever goes wrong, the old file is still there or the new one is complete.
+    Whatever goes wrong, the old file is still there or the new one is complete. The folder is made if it is not there,
+    or, without `makes_folder`, an OSError.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if makes_folder:
+        path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}-", suffix=f"{path.suffix}.tmp", dir=path.parent)
     os.close(handle)
     temporary = Path(name)

@@ -199,10 +199,10 @@ def test_a_full_disk_is_the_stores_fault_and_ends_the_batch(bare, jobs):
 
 
 def test_no_space_left(bare, monkeypatch):
-    def full(path, write):
+    def full(path, write, **options):
         if path.suffix == ".parquet":
             raise OSError(28, "No space left on device")
-        real(path, write)
+        real(path, write, **options)
 
     real = place_local.write_whole
     monkeypatch.setattr(place_local, "write_whole", full)
