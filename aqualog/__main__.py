@@ -1,5 +1,5 @@
 """`python -m aqualog`."""
 
-from aqualog.cli.main import run
+from aqualog.cli.start import run
 
 run()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -73,12 +76,32 @@ class Commands(TyperGroup):
         super().__init__(**attributes)
         self.commands = {n: TyperCommand(n, help=c.line) for n, c in COMMANDS.items()} | dict(self.commands)
 
+    def make_context(self, *args: Any, **options: Any) -> Any:
+        """Look at the arguments, for which libraries are loaded."""
+        with _told_if_interrupted():
+            return super().make_context(*args, **options)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Load a command and run it."""
+        with _told_if_interrupted():
+            return super().invoke(ctx)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the arguments begin with."""
         name = args[0]
         if name in COMMANDS:
             self.commands[name] = _made(name, COMMANDS[name])
         return super().resolve_command(ctx, args)
+
+
+@contextmanager
+def _told_if_interrupted() -> Iterator[None]:
+    """Of a command at work it is told there (`console.guarded`); typer would leave without a word."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        raise typer.Exit(130) from None
 
 
 def _made(name: str, command: Command) -> Any:

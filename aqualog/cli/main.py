@@ -14,6 +14,7 @@ import typer
 from aqualog import __version__
 from aqualog.cli.apart import ask
 from aqualog.cli.commands import Commands
+from aqualog.cli.start import interrupted
 
 __all__ = ["app", "run"]
 
@@ -58,10 +59,17 @@ def run() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # nohup, or a job in the background
             signal.signal(number, _leave)
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _raise)
+        sys.unraisablehook = _lost
     ask()
-    app()
+    try:
+        app()
+    except KeyboardInterrupt:  # before it was known which command it is
+        interrupted()
 
 
+_AGAIN_S = 0.05
 _TWICE_S = 0.5  # what a terminal, a shell and a watching process send of one request to end
 _left_at = -_TWICE_S
 
@@ -73,3 +81,15 @@ def _leave(number: int, _: object) -> None:
         return
     _left_at = now
     raise KeyboardInterrupt
+
+
+def _raise(number: int, _: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _lost(unraisable: sys.UnraisableHookArgs) -> None:
+    """An interrupt that comes while a compiled library calls back goes no further; it is raised again after that."""
+    if unraisable.exc_type is KeyboardInterrupt:
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
+    else:
+        sys.__unraisablehook__(unraisable)

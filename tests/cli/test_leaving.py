@@ -23,6 +23,48 @@ from aqualog.cli.main import run
 sys.argv = ["aqualog", *sys.argv[1:]]
 run()
 """
+CALLED_BACK = """
+import ctypes, sys, time
+from pathlib import Path
+import typer
+from aqualog.cli import main
+from aqualog.cli.console import guarded
+app = typer.Typer()
+def called():
+    sys.stderr.write("READY\\n")
+    sys.stderr.flush()
+    time.sleep(30)
+@app.command()
+def work():
+    with guarded(debug=False):
+        ctypes.CFUNCTYPE(None)(called)()
+        time.sleep(30)
+main.app = app
+main.run()
+"""
+LOADING = """
+import sys, time
+from aqualog.cli import commands, start
+def load(*_):
+    sys.stderr.write("READY\\n")
+    sys.stderr.flush()
+    time.sleep(30)
+commands.import_module = load
+sys.argv = ["aqualog", "detect", "a.csv"]
+start.run()
+"""
+STARTING = """
+import sys, time
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "aqualog.cli.main":
+            sys.stderr.write("READY\\n")
+            sys.stderr.flush()
+            time.sleep(30)
+from aqualog.cli import start
+sys.meta_path.insert(0, Slow())
+start.run()
+"""
 PRINTING = """
 import sys
 import typer
@@ -59,6 +101,15 @@ def test_interrupted(tmp_path, command, told, number):
     assert err.splitlines() == [told]
     assert out == ""
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "car.toml"]
+
+
+@pytest.mark.parametrize("code", [CALLED_BACK, LOADING, STARTING], ids=["called back", "loading", "starting"])
+def test_interrupted_where_python_alone_would_lose_it_or_show_where(code):
+    with subprocess.Popen([sys.executable, "-c", code], text=True, stderr=subprocess.PIPE) as process:
+        assert process.stderr.readline() == "READY\n"
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert (process.returncode, err) == (130, "interrupted\n")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")

@@ -1,0 +1,30 @@
+"""The long batch of `poisoned`, short: it is killed and goes on, and the store is that of one that nobody disturbed."""
+
+import signal
+import sys
+
+import pytest
+from campaign.poison import hooked
+from campaign.poisoned import batch, disturbed, left_in, make, reasons, unlike
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
+@pytest.mark.parametrize(
+    "hooks", [(), pytest.param(("crash.csv",), marks=pytest.mark.long)], ids=["no logs", "a crash, too"]
+)
+def test_a_batch_with_poison_in_it_that_is_killed_ends_as_one_that_is_not(tmp_path, hooks):
+    count = 30
+    campaign = make(tmp_path / "c", count, contents=4, hooks=hooks, are_bombs=False)
+    env = {**hooked(tmp_path, MB=1500), "TMPDIR": str(tmp_path / "tmp")}
+    (tmp_path / "tmp").mkdir()
+    plain = batch(campaign, tmp_path / "plain", env)
+    failed = reasons(plain.document)
+    assert plain.code == 3
+    assert len(failed) == 6 + len(hooks)
+    assert plain.document["made"] == count - len(failed)
+    assert all("ended without a word" in failed[f"logs/poison_{name}"] for name in hooks)
+    again = disturbed(campaign, tmp_path / "killed", env, count, 1, [signal.SIGKILL])
+    assert again.document["kept"] > 0
+    assert reasons(again.document) == failed
+    assert not unlike(tmp_path / "plain", tmp_path / "killed")
+    assert left_in(tmp_path / "tmp") == []
