@@ -157,7 +157,7 @@ def growth(memory: Sequence[tuple[int, int, int]], least: int) -> list[tuple[int
     for number in dict.fromkeys(n for n, _, _ in memory):
         done, size = np.array([(d, s) for n, d, s in memory if n == number], dtype=float).T
         late = (done >= done[0] + 0.2 * (done[-1] - done[0])) & (size < 1.5 * np.median(size))
-        if done[-1] - done[0] >= least and np.ptp(done[late]) > 0:
+        if done[-1] - done[0] >= least and np.unique(done[late]).size > 2:
             slope = np.polyfit(done[late], size[late], 1)[0]
             found.append((number, int(done[-1] - done[0]), size[-1] / 1e6, slope * 1e3 / 1e6))
     return found
@@ -178,20 +178,26 @@ def reasons(document: dict) -> dict[str, str]:
 
 
 def disturbed(
-    campaign: Path, store: Path, env: dict[str, str], count: int, seed: int, signals: Sequence[signal.Signals]
+    campaign: Path,
+    store: Path,
+    env: dict[str, str],
+    count: int,
+    seed: int,
+    signals: Sequence[signal.Signals],
+    *more: str,
 ) -> Watched:
     """A batch that is ended by each of the signals in turn, and then let go on to its end."""
     chance = random.Random(seed)
     moments = sorted(chance.sample(range(count // 20, min(count * 9 // 10, count - 20)), len(signals)))
     for moment, number in zip(moments, chance.sample(signals, len(signals)), strict=True):
-        found = batch(campaign, store, env, end=(moment, number))
+        found = batch(campaign, store, env, *more, end=(moment, number))
         lines = [line for line in found.error.splitlines() if not line.startswith(("error: ", "note: "))]
         print(
             f"  {number.name} at {moment}: code {found.code}, {done_in(store)} done after {found.seconds:.1f} s, {lines}"
         )
         assert found.code == (-signal.SIGKILL if number == signal.SIGKILL else 130)
         assert "Traceback" not in found.error
-    return batch(campaign, store, env)
+    return batch(campaign, store, env, *more)
 
 
 def unlike(a: Path, b: Path) -> list[str]:
@@ -219,7 +225,7 @@ def main() -> None:
     print(f"undisturbed: {plain.seconds:.1f} s, {plain.document['made']} made, {len(failed)} failed:")
     for name, reason in sorted(failed.items()):
         print(f"  {name}: {reason}")
-    for number, logs, last, slope in growth(plain.memory, given.logs // 20):
+    for number, logs, last, slope in growth(plain.memory, 100):
         who = "command" if number == plain.parent else "process"
         print(f"  {who} {number} over {logs} logs: {last:.0f} MB at the end, {slope:+.2f} MB per 1,000 logs")
     print(f"  left in the temporary folder: {left_in(folder / 'tmp')}", flush=True)

@@ -17,13 +17,14 @@ def test_a_batch_with_poison_in_it_that_is_killed_ends_as_one_that_is_not(tmp_pa
     campaign = make(tmp_path / "c", count, contents=4, hooks=hooks, are_bombs=False)
     env = {**hooked(tmp_path, MB=1500), "TMPDIR": str(tmp_path / "tmp")}
     (tmp_path / "tmp").mkdir()
-    plain = batch(campaign, tmp_path / "plain", env)
+    jobs = ("--jobs", "2" if hooks else "1")  # processes take longer to start than these logs
+    plain = batch(campaign, tmp_path / "plain", env, *jobs)
     failed = reasons(plain.document)
     assert plain.code == 3
     assert len(failed) == 6 + len(hooks)
     assert plain.document["made"] == count - len(failed)
     assert all("ended without a word" in failed[f"logs/poison_{name}"] for name in hooks)
-    again = disturbed(campaign, tmp_path / "killed", env, count, 1, [signal.SIGKILL])
+    again = disturbed(campaign, tmp_path / "killed", env, count, 1, [signal.SIGKILL], *jobs)
     assert again.document["kept"] > 0
     assert reasons(again.document) == failed
     assert not unlike(tmp_path / "plain", tmp_path / "killed")
