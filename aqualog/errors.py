@@ -28,6 +28,17 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
+MOST_OF_LOG = 500
+
+
+def _short(text: str) -> str:
+    """Begin and end of a long text."""
+    if len(text) <= MOST_OF_LOG:
+        return text
+    half = MOST_OF_LOG // 2 - 3
+    return f"{text[:half]} ... {text[-half:]}"
+
+
 class AqualogError(Exception):
     """Base of all errors that a user can act on.
 
@@ -69,9 +80,16 @@ class ConfigError(AqualogError):
 
 
 class LogError(AqualogError):
-    """A log cannot be read."""
+    """A log cannot be read.
+
+    What a damaged file says may be of any length (a name, a line that a library cannot understand): no part of the
+    message is longer than `MOST_OF_LOG` characters.
+    """
 
     exit_code = ExitCode.FAILED
+
+    def __init__(self, what: str, *, where: str = "", expected: str = "", hint: str = "") -> None:
+        super().__init__(_short(what), where=where, expected=_short(expected), hint=_short(hint))
 
 
 class SignalError(AqualogError):

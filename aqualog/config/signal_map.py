@@ -147,7 +147,7 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
         lines.append(f"{symbol} = {_entry_text(entry)}{remark}")
     for name, clock in signal_map.clocks.items():
         lines += ["", f"[sources.{_quote(name)}]", f"offset_s = {clock.offset_s!r}"]
-        if clock.drift_ppm:
+        if clock.drift_ppm or clock.at_s:
             lines += [f"drift_ppm = {clock.drift_ppm!r}", f"at_s = {clock.at_s!r}"]
     return "\n".join(lines) + "\n"
 

@@ -177,7 +177,15 @@ def _regular(body: bytes, layout: Layout) -> int | None:
 
 
 def _is_quoted_plainly(rows: Rows) -> bool:
-    """Whether the library, too, finds one row per line: then no quotes hold a separator or a line's end."""
+    """Whether the library, too, finds one row per line: then no quotes hold a separator or a line's end.
+
+    A line with an odd quote may still be a row of its own to the library, but only where it is the last one.
+    """
+    octets = np.frombuffer(rows.text, dtype=np.uint8)
+    ends = np.append(np.flatnonzero(octets == ord("\n")), len(octets))
+    before = np.searchsorted(np.flatnonzero(octets == ord('"')), ends)  # quotes up to the end of each line
+    if (before % 2).any():
+        return False
     try:
         rows.cells([0], where="")
     except LogError:

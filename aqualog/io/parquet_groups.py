@@ -53,6 +53,10 @@ class SoundRows:
         elif self._index.unowned:
             self._note(f"{self._index.unowned} bytes before the index (byte {self._index.end}) belong to no column")
         self._groups = (Group(0, rows, {}),) if self._index is None else self._index.groups
+        there = sum(g.rows for g in self._groups)
+        if there != rows:
+            what = f"declares other rows than its row groups hold ({rows} and {there})"
+            raise LogError(what, where=str(path), hint="check whether it was damaged: its index says so")
         self._bad: dict[int, str] = {}
         self._checked: set[tuple[int, str]] = set()
         self._strange: dict[str, tuple[int, int]] = {}

@@ -1,23 +1,28 @@
-"""What can be fuzzed. A target makes small files, and judges what a reader makes of a damaged one."""
+"""What can be fuzzed: a target has small sound files and says what is wrong with what aqualog makes of any other."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
-SECONDS = 10.0  # a reader that takes longer hangs
+SECONDS = 10.0  # of processor time: what takes longer hangs
 MEGABYTES = 400.0  # that a small file may take
 
 
 @dataclass(frozen=True)
 class Target:
-    """Files by name, and `judge(name, damages, path)`: what is wrong with the outcome, or None.
+    """Files of one kind.
 
-    `path` holds the file `name` with these damages.
+    `seeds()` gives sound files by name. `one(data)` works on a file with this content and raises whatever is wrong: an
+    `AssertionError`, or what aqualog raises and should not. `known(seed, damages, data)`, where there is one, does the
+    same and more: it knows which file that was, and so what may come of it. Of texts, words are damaged as well as bytes.
+    `may_end`: a library may end the process, which is counted and is no fault: aqualog reads logs in one of their own.
     """
 
-    makers: dict[str, Callable[[Path], bytes]]
-    judge: Callable[[str, tuple, Path], str | None]
-    suffix: str
+    about: str
+    seeds: Callable[[], Mapping[str, bytes]]
+    one: Callable[[bytes], None]
+    known: Callable[[str, tuple, bytes], None] | None = None
+    is_text: bool = False
+    may_end: bool = False
 
 
 TARGETS: dict[str, Callable[[], Target]] = {}
@@ -31,3 +36,20 @@ def target(name: str) -> Callable[[Callable[[], Target]], Callable[[], Target]]:
         return make
 
     return add
+
+
+def all_targets() -> dict[str, Callable[[], Target]]:
+    """Every target, by name."""
+    from tests.fuzz import (  # noqa: F401 - each adds itself
+        targets_campaign,
+        targets_config,
+        targets_csv,
+        targets_dbc,
+        targets_mcap,
+        targets_mdf,
+        targets_parquet,
+        targets_ros,
+        targets_simulation,
+    )
+
+    return dict(sorted(TARGETS.items()))

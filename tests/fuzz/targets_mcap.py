@@ -7,24 +7,22 @@ from io import BytesIO
 
 from mcap.writer import CompressionType, Writer
 
-from tests.fuzz.damaged_files import T0_NS, check_samples, read
-
-__all__ = ["one", "seeds"]
+from tests.fuzz.readers import T0_NS, check_samples, outcome
+from tests.fuzz.registry import Target, target
 
 _SCHEMA = {"type": "object", "properties": {"v": {"type": "number", "unit": "km/h"}}}
 _STATE = b"float64 v\nfloat64[3] more\n"
 
 
 @cache
-def seeds() -> tuple[bytes, ...]:
+def seeds() -> dict[str, bytes]:
     """Small sound files: each compression, with and without a summary, JSON and ROS 2 messages."""
-    return tuple(
-        _written(compression, indexed=indexed, ros=ros)
-        for compression, indexed, ros in (
-            (CompressionType.ZSTD, True, False), (CompressionType.LZ4, False, True), (CompressionType.NONE, True, True),
-            (CompressionType.NONE, False, False),
-        )
-    )  # fmt: skip
+    return {
+        "zstd": _written(CompressionType.ZSTD, indexed=True, ros=False),
+        "lz4": _written(CompressionType.LZ4, indexed=False, ros=True),
+        "plain_ros": _written(CompressionType.NONE, indexed=True, ros=True),
+        "plain_json": _written(CompressionType.NONE, indexed=False, ros=False),
+    }
 
 
 def _written(compression: CompressionType, *, indexed: bool, ros: bool) -> bytes:
@@ -43,5 +41,15 @@ def _written(compression: CompressionType, *, indexed: bool, ros: bool) -> bytes
 
 
 def one(data: bytes) -> None:
-    """Read a file with this content."""
-    check_samples(read(data, "a.mcap"), lambda v: T0_NS + v * 10**7)
+    """Read a file with this content; it may be a file whose writer made no checksums."""
+    outcome(data, "a.mcap")
+
+
+def known(seed: str, damages: tuple, data: bytes) -> None:
+    """Read a file of `seeds`, all of which have checksums, with these damages."""
+    check_samples(outcome(data, "a.mcap").channels, lambda v: T0_NS + v * 10**7)
+
+
+@target("mcap")
+def mcap() -> Target:
+    return Target("MCAP, JSON and ROS 2 messages", seeds, one, known)

@@ -9,23 +9,24 @@ from pathlib import Path
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from tests.fuzz.damaged_files import T0_NS, check_samples, read
+from tests.fuzz.readers import T0_NS, check_samples, outcome
+from tests.fuzz.registry import Target, target
 
-__all__ = ["one", "seeds", "seeds_with_checksums", "with_checksums"]
-
-
-@cache
-def seeds() -> tuple[bytes, ...]:
-    """Small sound files without checksums."""
-    with tempfile.TemporaryDirectory() as folder:
-        return _bag(Path(folder, "a.bag"), None), _db3(Path(folder, "a.db3"))
+_WRITERS = {"plain": None, "bz2": Writer.CompressionFormat.BZ2, "lz4": Writer.CompressionFormat.LZ4}
 
 
 @cache
-def seeds_with_checksums() -> tuple[bytes, ...]:
-    """A small bag in chunks of bz2."""
+def bags() -> dict[str, bytes]:
+    """Small bags."""
     with tempfile.TemporaryDirectory() as folder:
-        return (_bag(Path(folder, "a.bag"), Writer.CompressionFormat.BZ2),)
+        return {name: _bag(Path(folder, f"{name}.bag"), kind) for name, kind in _WRITERS.items()}
+
+
+@cache
+def bases() -> dict[str, bytes]:
+    """Small sqlite files, with an index and without."""
+    with tempfile.TemporaryDirectory() as folder:
+        return {n: _db3(Path(folder, f"{n}.db3"), indexed=n == "indexed") for n in ("plain", "indexed")}
 
 
 def _bag(path: Path, compression: Writer.CompressionFormat | None) -> bytes:
@@ -41,10 +42,12 @@ def _bag(path: Path, compression: Writer.CompressionFormat | None) -> bytes:
     return path.read_bytes()
 
 
-def _db3(path: Path) -> bytes:
+def _db3(path: Path, *, indexed: bool) -> bytes:
     with sqlite3.connect(path) as base:
         base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
         base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        if indexed:
+            base.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
         base.execute("INSERT INTO topics VALUES (1, '/v', 'std_msgs/msg/Float64', 'cdr')")
         rows = ((T0_NS + i * 10**7, b"\0\1\0\0" + struct.pack("<d", i)) for i in range(300))
         base.executemany("INSERT INTO messages VALUES (NULL, 1, ?, ?)", rows)
@@ -52,12 +55,30 @@ def _db3(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def one(data: bytes) -> None:
-    """Read a file with this content."""
-    read(data, "a.bag")
+def bag(data: bytes) -> None:
+    """Read a bag with this content."""
+    outcome(data, "a.bag")
 
 
-def with_checksums(data: bytes) -> None:
-    """Read a bag whose chunks have checksums."""
-    # the record of the connection, which names the type, has none: it is the same at the end of the bag
-    check_samples([c for c in read(data, "a.bag") if c.info.path == "/v.data"], lambda v: T0_NS + v * 10**7)
+def known_bag(seed: str, damages: tuple, data: bytes) -> None:
+    """Read a bag of `bags` with these damages."""
+    found = outcome(data, "a.bag")
+    if seed == "bz2":
+        # the record of the connection, which names the type, has no checksum: it is the same at the end of the bag
+        told = [c for c in found.channels if c.info.path == "/v.data"]
+        check_samples(told, lambda v: T0_NS + v * 10**7)
+
+
+def base(data: bytes) -> None:
+    """Read a sqlite file with this content."""
+    outcome(data, "a.db3")
+
+
+@target("bag")
+def bag_target() -> Target:
+    return Target("ROS 1 bags", bags, bag, known_bag)
+
+
+@target("db3")
+def db3_target() -> Target:
+    return Target("ROS 2 sqlite files", bases, base)

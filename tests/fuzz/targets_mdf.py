@@ -6,9 +6,10 @@ a file was only cut, or only bytes inside of deflated blocks were changed, every
 whole file, in its place, and what is missing must be told.
 """
 
-import functools
 import re
+import tempfile
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 import asammdf
@@ -16,10 +17,8 @@ import mdf_by_hand
 import numpy as np
 from asammdf.blocks.conversion_utils import from_dict
 
-from aqualog.errors import LogError
-from aqualog.io.base import ReadOptions
-from aqualog.io.mdf import MdfReader
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
+from tests.fuzz.readers import Outcome, outcome
 from tests.fuzz.registry import Target, target
 
 T = np.arange(120) * 0.01
@@ -61,13 +60,12 @@ def _frames(folder: Path) -> bytes:
     return (folder / "f.mf4").read_bytes()
 
 
-DBC = 'VERSION ""\n\nBU_: E\n\nBO_ 256 M: 8 E\n SG_ S : 0|16@1+ (0.1,0) [0|0] "m/s" E\n'
+DBC = b'VERSION ""\n\nBU_: E\n\nBO_ 256 M: 8 E\n SG_ S : 0|16@1+ (0.1,0) [0|0] "m/s" E\n'
 
-MAKERS = {
+VERSION_4 = {
     "plain": lambda p: _written(p, "4.10", 0),
     "deflated": lambda p: _written(p, "4.10", 1),
     "transposed": lambda p: _written(p, "4.11", 2),
-    "version3": lambda p: _written(p, "3.30", 0),
     "frames": _frames,
     "streamed": lambda _: mdf_by_hand.streamed(),
     "streamed_deflated": lambda _: mdf_by_hand.streamed(compressed=True),
@@ -75,21 +73,24 @@ MAKERS = {
     "unfinished": lambda _: mdf_by_hand.streamed(unfinished=1 | 4),
     "unfinished_unsorted": lambda _: mdf_by_hand.unsorted(unfinished=1 | 4),
 }
+VERSION_3 = {"version3": lambda p: _written(p, "3.30", 0), "version310": lambda p: _written(p, "3.10", 0)}
 
 
-def read(path: Path):
-    """Channels by path and what was lost, with every piece of the other way to read as well."""
-    dbc = path.with_name("fuzz.dbc")
-    if not dbc.exists():
-        dbc.write_text(DBC)
-    with MdfReader(path, ReadOptions(dbc=(dbc,))) as reader:
-        found = {c.info.path: (c.t_ns, c.values) for c in reader.read(reader.channels())}
-        faults = reader.faults
-    with MdfReader(path, ReadOptions()) as reader:
-        for part in reader.parts(reader.channels()):
-            for piece in part.pieces:
-                assert all(len(c.t_ns) == len(c.values) for c in piece)
-    return found, faults
+@cache
+def version_4() -> dict[str, bytes]:
+    """Small sound files of the layouts that loggers and libraries write."""
+    return _made(VERSION_4)
+
+
+@cache
+def version_3() -> dict[str, bytes]:
+    """Small sound files of version 3."""
+    return _made(VERSION_3)
+
+
+def _made(makers) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        return {name: make(Path(folder)) for name, make in makers.items()}
 
 
 def _deflated(data: bytes) -> list[range]:
@@ -108,56 +109,59 @@ def _is_checked(data: bytes, damages: tuple) -> bool:
     for kind, *how in damages:
         if kind == "cut":
             continue
-        at = how[-2] if kind == "copy" else how[0]
-        if kind == "copy":
-            at = how[1]
-        if kind in ("swap",) or len(damages) > 1:
+        if kind not in ("flip", "zero", "number", "copy") or len(damages) > 1:
             return False
+        at = how[1] if kind == "copy" else how[0]
         width = {"flip": 1, "zero": how[1], "number": how[1], "copy": 8}[kind]
         if not any(at % size in b and min(at % size + width, size) - 1 in b for b in blocks):
             return False
     return True
 
 
-@functools.cache
-def _whole(name: str, folder: Path):
-    data = MAKERS[name](folder)
-    path = folder / f"whole_{name}.mf4"
-    path.write_bytes(data)
-    return data, read(path)[0]
+@cache
+def _whole(seed: str) -> Outcome:
+    return outcome({**version_4(), **version_3()}[seed], _name(seed), dbc=DBC)
 
 
-def judge(name: str, damages: tuple, path: Path) -> str | None:
-    """What is wrong with the outcome, or None."""
-    data, expected = _whole(name, path.parent)
-    try:
-        found, faults = read(path)
-    except LogError as error:
-        return None if len(error.line()) < 2000 and "\n" not in error.line() else "a long error"
-    except Exception as error:
-        return f"{type(error).__name__}: {error}"
-    for channel, (t, values) in found.items():
-        if t.shape != values.shape:
-            return f"{channel}: {t.shape} times and {values.shape} values"
-    if not _is_checked(data, damages):
-        return None
-    for channel, (t, values) in found.items():
-        if channel not in expected:
-            return f"{channel} has come from nowhere"
-        whole_t, whole = expected[channel]
-        rows = np.searchsorted(whole_t, t)
-        if (rows >= len(whole_t)).any() or not np.array_equal(whole_t[rows], t):
-            return f"{channel} has times that were not measured"
-        if not np.array_equal(whole[rows], values, equal_nan=True):
-            return f"{channel} has values that were not measured"
-    is_less = any(c not in found or len(found[c][0]) < len(e[0]) for c, e in expected.items())
+def _name(seed: str) -> str:
+    return "a.mdf" if seed in VERSION_3 else "a.mf4"
+
+
+def one(data: bytes) -> None:
+    """Read a file with this content."""
+    outcome(data, "a.mf4", dbc=DBC)
+
+
+def known(seed: str, damages: tuple, data: bytes) -> None:
+    """Read a file of the seeds with these damages."""
+    found = outcome(data, _name(seed), dbc=DBC)
+    if not found.refusal and _is_checked({**version_4(), **version_3()}[seed], damages):
+        check_recorded(_whole(seed), found)
+
+
+def check_recorded(whole: Outcome, found: Outcome) -> None:
+    """What was found is of the whole file, and what is missing is told."""
+    expected = {c.info.path: c for c in whole.channels}
+    for c in found.channels:
+        assert c.info.path in expected, f"{c.info.path} has come from nowhere"
+        of = expected[c.info.path]
+        rows = np.searchsorted(of.t_ns, c.t_ns)
+        assert (rows < len(of.t_ns)).all(), f"{c.info.path} has times that were not measured"
+        assert np.array_equal(of.t_ns[rows], c.t_ns), f"{c.info.path} has times that were not measured"
+        assert np.array_equal(of.values[rows], c.values, equal_nan=True), f"{c.info.path} has values of another time"
+    lengths = {c.info.path: len(c.t_ns) for c in found.channels}
+    is_less = any(lengths.get(path, -1) < len(c.t_ns) for path, c in expected.items())
     # a recording that its logger did not finish has no end that could be missed
-    is_open = any("not finalised" in n for n in faults.notes)
-    if is_less and not (faults.truncated or faults.lost_samples or is_open):
-        return "something is missing and nothing is told"
-    return None
+    is_open = any("not finalised" in n for n in found.faults.notes)
+    told = found.faults.truncated or found.faults.lost_samples or is_open
+    assert told or not is_less, "something is missing and nothing is told"
 
 
 @target("mdf")
 def mdf() -> Target:
-    return Target(MAKERS, judge, ".mf4")
+    return Target("MDF 4", version_4, one, known)
+
+
+@target("mdf3")
+def mdf3() -> Target:
+    return Target("MDF 3", version_3, one, known)
