@@ -251,3 +251,17 @@ def test_more_rows_than_the_file_can_hold_are_refused(tmp_path, monkeypatch):
     pl.DataFrame({"t": np.arange(2000.0), "v": np.arange(2000.0)}).write_parquet(path)
     with ParquetReader(path, ReadOptions()) as reader:
         assert reader.channels()[0].count == 2000
+
+
+@pytest.mark.parametrize("rows", [99, 101])
+def test_an_index_that_declares_other_rows_than_there_are(rows, tmp_path, monkeypatch):
+    """The library counts the rows of the file by its index, and of a column by its pages."""
+    path = tmp_path / "a.parquet"
+    pl.DataFrame({"t [s]": np.arange(100) * 0.01, "v_x": np.arange(100.0)}).write_parquet(path)
+    counted = pl.DataFrame({"len": [rows]})
+    collect = pl.LazyFrame.collect
+    monkeypatch.setattr(
+        pl.LazyFrame, "collect", lambda self, *a, **k: counted if self.collect_schema().names() == ["len"] else collect(self, *a, **k)
+    )  # fmt: skip
+    with pytest.raises(LogError, match=rf"declares other rows than its row groups hold \({rows} and 100\)"):
+        ParquetReader(path, ReadOptions())
