@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.errors import ConfigError
+from aqualog.io.small_file import read_small
 
 __all__ = ["RunTable", "as_point", "decimal_sign", "read_table"]
 
@@ -41,14 +42,7 @@ def read_table(path: Path, *, key: str) -> RunTable:
         If it cannot be read or is no table.
     """
     what = "table of runs"
-    try:
-        if path.stat().st_size > LARGEST:
-            raise ConfigError(f"{what} is larger than {LARGEST // 2**20} MiB", where=str(path))
-        data = path.read_bytes()
-    except FileNotFoundError as error:
-        raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
-    except OSError as error:
-        raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
+    data = read_small(path, what=what, expected="a CSV file", largest=LARGEST)
     if data.startswith(b"PK\x03\x04") or data.startswith(b"\xd0\xcf\x11\xe0"):
         raise ConfigError(f"{what} is a spreadsheet", where=str(path), expected="CSV", hint='"save as" CSV UTF-8')
     text = _text(data)

@@ -11,6 +11,7 @@ from pathlib import Path
 from aqualog.config.table_faults import LineFaults
 from aqualog.errors import ConfigError
 from aqualog.evaluate.labels import Label, joined
+from aqualog.io.small_file import read_small
 from aqualog.notation import WHEELS
 
 __all__ = ["load_labels"]
@@ -76,16 +77,11 @@ def read_csv(path: Path, *, what: str) -> list[list[str]]:
     ConfigError
         If it cannot be read.
     """
+    data = read_small(path, what=what, expected="a CSV file", largest=_LARGEST)
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ConfigError(f"{what} is larger than {_LARGEST // 2**20} MiB", where=str(path))
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")  # as a file of text is read
     except UnicodeDecodeError as error:
         raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a CSV file") from error
-    except OSError as error:
-        raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
     try:
         return list(csv.reader(io.StringIO(text), strict=True))
     except csv.Error as error:

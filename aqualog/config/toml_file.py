@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.errors import ConfigError
+from aqualog.io.small_file import read_small
 
 __all__ = ["Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]
 
@@ -37,20 +38,11 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
     ConfigError
         If the file is missing, not UTF-8 or not TOML.
     """
+    data = read_small(path, what=what, expected="a TOML file", largest=LARGEST)
     try:
-        if path.exists() and not path.is_dir() and not path.is_file():
-            raise ConfigError(f"{what} is a device or a pipe", where=str(path), expected="a TOML file")
-        if path.is_file() and path.stat().st_size > LARGEST:
-            raise ConfigError(f"{what} is larger than {LARGEST // 2**20} MiB", where=str(path), expected="a TOML file")
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
-    except IsADirectoryError as error:
-        raise ConfigError(f"{what} is a folder", where=str(path), expected="a TOML file") from error
+        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")  # as a file of text is read
     except UnicodeDecodeError as error:
         raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a TOML file") from error
-    except OSError as error:
-        raise ConfigError(f"{what} cannot be read: {error.strerror}", where=str(path)) from error
     try:
         document = tomllib.loads(text)
         if _has_endless_number(document):

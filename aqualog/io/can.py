@@ -109,6 +109,8 @@ def _load(path: Path) -> Sequence[Any]:
     import cantools.database
     from cantools.database.can.database import Database
 
+    if path.exists() and not path.is_file():  # some devices have no end
+        raise LogError("is a folder, a device or a pipe", where=str(path), expected="a .dbc file", hint="check --dbc")
     try:
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:

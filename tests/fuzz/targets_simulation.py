@@ -111,8 +111,19 @@ def _simulated(scenario: Scenario, model: Model) -> None:
         check_error(error)
         return
     for group in found.measured:
-        for name, values in group.signals.items() if hasattr(group, "signals") else ():
-            assert not np.isinf(np.asarray(values, dtype=float)).any(), f"{name} is infinite"
+        assert np.isfinite(group.t).all(), f"{group.name} has times that are none"
+        for name, values in group.columns.items():
+            assert len(values) == len(group.t), f"{name} has {len(values)} values at {len(group.t)} times"
+            assert not np.isinf(values).any(), f"{name} is infinite"
+    for name, values in found.truth.columns.items():
+        assert not np.isinf(values).any(), f"{name} is infinite"
+    for name in (
+        "true_v_x",
+        "true_v_y",
+        "true_position",
+        "true_grade",
+    ):  # others are told where there is something to tell
+        assert np.isfinite(found.truth.columns[name]).all(), f"{name} is no number"
 
 
 def model(data: bytes) -> None:
