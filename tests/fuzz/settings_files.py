@@ -35,12 +35,12 @@ def folder_with(files: Mapping[str, bytes]) -> Iterator[Path]:
         assert {p.name for p in folder.iterdir()} == set(files), "files were left behind"
 
 
-def loaded(load: Callable[[Path], Any], path: Path) -> Any:
-    """What a file says, or None if it is refused as it should be."""
+def loaded(load: Callable[[Path], Any], path: Path, *names: str) -> Any:
+    """What a file says, or None if it is refused as it should be: it is named, or one of the files that it names."""
     try:
         return load(path)
     except ConfigError as error:
-        check_error(error, path.name)
+        check_error(error, next((n for n in names if n in error.line()), path.name))
         return None
 
 

@@ -69,7 +69,7 @@ def runs() -> dict[str, bytes]:
 def _worked_with(campaign: bytes, table: bytes) -> None:
     with folder_with({**_FILES, "campaign.toml": campaign, "runs.csv": table}) as folder:
         path = folder / "campaign.toml"
-        found = loaded(read_campaign, path)
+        found = loaded(read_campaign, path, "runs.csv")
         if found is None:
             return
         assert len(found.places) == len(found.campaign.runs) > 0
