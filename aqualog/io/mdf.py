@@ -404,7 +404,7 @@ class MdfReader:
 
     def _fragments(self, group: int, indexes: Sequence[int]) -> Iterator[tuple[_Array, dict[int, _Array]]]:
         inner = self._inner
-        for fragment in inner._load_data(inner.groups[group]):
+        for fragment in self._stored(group):
             if self._version4:
                 t = inner.get_master(group, fragment, one_piece=True)
             else:
@@ -412,6 +412,20 @@ class MdfReader:
             yield t.astype(np.float64), {i: self._values(group, i, fragment, len(t)) for i in indexes}
         with suppress(AttributeError):
             inner._invalidation_cache.clear()
+
+    def _stored(self, group: int) -> Iterator[Any]:
+        """Stretches of records, to the end of a file that was cut."""
+        stretches = self._inner._load_data(self._inner.groups[group])
+        while True:
+            try:
+                fragment = next(stretches, None)
+            except ValueError:  # asammdf goes on behind the end, where a file in memory has nothing to go to
+                if self._version4 or not self._faults.truncated:
+                    raise
+                return
+            if fragment is None:
+                return
+            yield fragment
 
     def _whole(self, group: int, indexes: Sequence[int]) -> tuple[_Array, dict[int, _Array]] | None:
         """The same of all records at once where blocks are plain and sound; asammdf says what is wrong otherwise."""

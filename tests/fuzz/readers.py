@@ -18,7 +18,7 @@ from aqualog.types import Channel, FileFaults
 T0_NS = 1_700_000_000 * 10**9
 LONGEST_LINE = 2000
 _SMALL = (
-    (messages, "_PIECE", 50), (batches, "_ENOUGH", 1000), (mdf, "_PIECE", 25), (mdf_blocks, "_PIECE", 400),
+    (messages, "_PIECE", 50), (batches, "_ENOUGH", 1000), (mdf, "_PIECE", 25), (mdf, "_FRAGMENT", 500), (mdf_blocks, "_PIECE", 400),
     (parquet, "_PIECE", 60), (text_file, "LARGE", 1), (text_file, "_BLOCK", 333), (csv_rows, "PIECE", 200),
 )  # fmt: skip
 
