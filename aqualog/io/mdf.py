@@ -8,6 +8,7 @@ inflates nothing beyond the size that it tells of, writes only into a folder of 
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import shutil
 import tempfile
@@ -416,14 +417,16 @@ class MdfReader:
     def _stored(self, group: int) -> Iterator[Any]:
         """Stretches of records, to the end of a file that was cut."""
         stretches = self._inner._load_data(self._inner.groups[group])
-        while True:
+        may_end = not self._version4 and self._faults.truncated
+        for n in itertools.count():
             try:
                 fragment = next(stretches, None)
             except ValueError:  # asammdf goes on behind the end, where a file in memory has nothing to go to
-                if self._version4 or not self._faults.truncated:
+                if not may_end:
                     raise
                 return
-            if fragment is None:
+            # elsewhere it goes on with nothing, up to as many records as are declared
+            if fragment is None or (may_end and n and not fragment[0]):
                 return
             yield fragment
 
