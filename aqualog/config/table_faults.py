@@ -11,6 +11,7 @@ from aqualog.errors import ConfigError
 
 __all__ = ["LineFaults"]
 
+LONGEST = 500  # characters of one fault; a cell may be of any length
 MOST = 20  # faults that are spelt out; a table with a wrong column has one in every line
 
 
@@ -23,7 +24,8 @@ class LineFaults:
 
     def add(self, line: int | None, message: str) -> None:
         """Note a fault on a line (from 1), or of the file."""
-        self._found.append(f"line {line}: {message}" if line else message)
+        short = message if len(message) <= LONGEST else f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
+        self._found.append(f"line {line}: {short}" if line else short)
 
     def unknown(self, line: int | None, what: str, name: str, known: Iterable[str], *, hint: str = "") -> None:
         """Note a name that does not exist, with the nearest one that does; the hint where none is near."""
