@@ -59,7 +59,9 @@ class SoundRows:
             raise LogError(what, where=str(path), hint="check whether it was damaged: its index says so")
         self._bad: dict[int, str] = {}
         self._checked: set[tuple[int, str]] = set()
+        self._gone_through: set[tuple[int, frozenset[str]]] = set()
         self._strange: dict[str, tuple[int, int]] = {}
+        self._left_out: dict[str, NDArray[np.int64]] = {}
         self._told: set[int] = set()
 
     @property
@@ -77,6 +79,7 @@ class SoundRows:
         """
         touched = [k for k, g in enumerate(self._groups) if g.first < at + rows and at < g.first + g.rows]
         self._check(touched, columns)
+        self._go_through([k for k in touched if not self._is_within(k, at, rows)], columns, rows)
         try:
             return self._frame(columns, at, rows, touched)
         except _LIBRARY as error:
@@ -128,6 +131,24 @@ class SoundRows:
             if fault:
                 self._leave_out(k, fault)
 
+    def _is_within(self, group: int, at: int, rows: int) -> bool:
+        first = self._groups[group].first
+        return at <= first and first + self._groups[group].rows <= at + rows
+
+    def _go_through(self, groups: Sequence[int], columns: Sequence[str], rows: int) -> None:
+        """Decode row groups to their ends before a part of them is handed out: the rest may be none."""
+        for k in groups:
+            asked = (k, frozenset(columns))
+            if k in self._bad or asked in self._gone_through:
+                continue
+            self._gone_through.add(asked)
+            group = self._groups[k]
+            try:
+                for at in range(group.first, group.first + group.rows, rows):
+                    self._slice(columns, at, min(rows, group.first + group.rows - at))
+            except _LIBRARY as error:
+                self._leave_out(k, _reason(error))
+
     def _leave_out(self, group: int, reason: str) -> None:
         self._bad[group] = reason
         if len(self._bad) == len(self._groups):
@@ -174,10 +195,18 @@ class SoundRows:
             which = np.searchsorted(starts, np.arange(len(values)), side="right") - 1
             strange = column.is_not_null().to_numpy() & ((values < low[which]) | (values > high[which]))
             if strange.any():
-                count, first = self._strange.get(name, (0, at + int(np.argmax(strange))))
-                self._strange[name] = count + int(strange.sum()), first
+                self._count(name, at + np.flatnonzero(strange))
                 frame = frame.with_columns(pl.when(pl.Series(~strange)).then(column).alias(name))
         return frame
+
+    def _count(self, column: str, rows: NDArray[np.int64]) -> None:
+        """Values that are left out, each once: the ends of a time are looked at before it is read."""
+        known = self._left_out.get(column, np.zeros(0, dtype=np.int64))
+        new = np.setdiff1d(rows, known)
+        self._left_out[column] = np.union1d(known, rows)
+        if new.size:
+            count, first = self._strange.get(column, (0, int(new[0])))
+            self._strange[column] = count + new.size, min(first, int(new[0]))
 
     def _note(self, text: str) -> None:
         self._faults.notes.append(f"{self._path.name}: {text}")
