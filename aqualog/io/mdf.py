@@ -211,7 +211,10 @@ class MdfReader:
         except LogError:
             raise
         except Exception as error:
-            reason = f"{what} ({type(error).__name__}: {error})"
+            why = f"{type(error).__name__}: {error}"
+            if why.startswith("DeflateError") or type(error).__module__ == "zlib":
+                why = "a compressed block is damaged or not of the size that it tells of"
+            reason = f"{what} ({why})"
             raise LogError(reason, where=str(self._path), hint="check it with the logger's own tool") from error
 
     def _open(self) -> None:
