@@ -110,7 +110,8 @@ def _inspect(
         found = [overview(c, origin_ns=origin) for c in channels]
         rotated = rotated_channels(found)
         proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
-    notes = [*(f"{p.name}: {n}" for p, f in zip(paths, faults, strict=True) for n in f.notes), *find_mounting(found)]
+    told = [(p.name, n) for p, f in zip(paths, faults, strict=True) for n in f.notes]
+    notes = [*(n if n.startswith(f"{name}: ") else f"{name}: {n}" for name, n in told), *find_mounting(found)]
     if write_map is not None:
         _write_map(write_map, proposals, paths, setup.signal_map)
     if as_json:

@@ -19,7 +19,7 @@ from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import is_clock, is_stamp
 from aqualog.io.memory import bytes_text, free_memory
-from aqualog.io.parquet_groups import SoundRows
+from aqualog.io.parquet_groups import SoundRows, reason_of
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.table_time import (
     FieldKind,
@@ -259,7 +259,7 @@ class ParquetReader:
         try:
             return action()
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError) as error:
-            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            reason = reason_of(error)
             hint = "check whether it was written to its end: the index stands there"
             raise LogError(f"cannot be read as Parquet ({reason})", where=str(self._path), hint=hint) from error
 

@@ -15,7 +15,7 @@ from aqualog.io.base import FaultLog
 from aqualog.io.parquet_pages import Group, Index, is_of, page_fault, read_index
 from aqualog.io.thrift import MalformedError
 
-__all__ = ["SoundRows"]
+__all__ = ["SoundRows", "reason_of"]
 
 _CODES: dict[type[pl.DataType], str] = {
     pl.Float64: "d", pl.Float32: "f", pl.Int64: "q", pl.UInt64: "Q", pl.Int32: "i", pl.Int16: "i", pl.Int8: "i",
@@ -84,18 +84,18 @@ class SoundRows:
             return self._frame(columns, at, rows, touched)
         except _LIBRARY as error:
             if len(self._groups) == 1:
-                raise _unreadable(self._path, _reason(error)) from error
+                raise _unreadable(self._path, reason_of(error)) from error
         for k in touched:  # which of them cannot be decoded
             if k not in self._bad:
                 group = self._groups[k]
                 try:
                     self._slice(columns, group.first, group.rows)
                 except _LIBRARY as error:
-                    self._leave_out(k, _reason(error))
+                    self._leave_out(k, reason_of(error))
         try:
             return self._frame(columns, at, rows, touched)
         except _LIBRARY as error:
-            raise _unreadable(self._path, _reason(error)) from error
+            raise _unreadable(self._path, reason_of(error)) from error
 
     def row_of(self, at: int, k: int) -> int:
         """Row of the file that is the k-th of those collected from row `at` on."""
@@ -147,7 +147,7 @@ class SoundRows:
                 for at in range(group.first, group.first + group.rows, rows):
                     self._slice(columns, at, min(rows, group.first + group.rows - at))
             except _LIBRARY as error:
-                self._leave_out(k, _reason(error))
+                self._leave_out(k, reason_of(error))
 
     def _leave_out(self, group: int, reason: str) -> None:
         self._bad[group] = reason
@@ -226,7 +226,10 @@ def _bounds(groups: Sequence[Group], column: str, code: str, dtype: Any) -> tupl
     return np.array(low, dtype=dtype), np.array(high, dtype=dtype)
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
+    """Why the library cannot read, in a line."""
+    if isinstance(error, pl.exceptions.PanicException):
+        return "its pages and its index do not fit together"
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
