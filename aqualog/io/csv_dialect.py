@@ -129,6 +129,9 @@ def find_layout(data: bytes | TextFile, *, where: str, told: CsvFormat = _NONE_T
         sign = _SHOWN.get(told.separator, told.separator)
         what = f'has no "{sign}", by which the map says that its cells are separated'
         raise LogError(what, where=where, hint="name another separator, or none")
+    if not used and sum(bool(line.strip()) for line in head) == 1:
+        hint = "check whether the logger has recorded anything"
+        raise LogError("has one line only", where=where, expected="a header and rows of data", hint=hint)
     if not used:
         raise LogError("has one column only", where=where, expected="a time and at least one signal", hint=_HINT)
     candidates, reasons = [], []

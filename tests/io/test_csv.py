@@ -593,7 +593,7 @@ def test_a_first_line_without_an_end_is_named(read, monkeypatch):
         ("a,b\n0.0,1\n0.1,2\n", r"no time column among: a, b.*\[time\] channel"),
         ("just one\ncolumn of\ntext\n", "one column only"),
         ("t,v\nx,y\nz,w\n", "not a table|no data"),
-        ("t,v\n", "one column only|no data"),
+        ("t,v\n", "one line only"),
         ("a,b,c\none,two,three\nfour,five,six\nseven,eight,nine\n", "not a table"),
         ("t,v\n0,1,2\n1,2,3\n2,3,4\n3,4,5\n", "2 names, but 3 cells"),
     ],
