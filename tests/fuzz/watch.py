@@ -13,6 +13,7 @@ from tests.fuzz.registry import SECONDS
 
 ROOT = Path(__file__).resolve().parents[2]
 STILL = "never comes back"
+START_S = 600.0  # before the first one: instrumenting takes a minute of an idle processor
 STILL_S = 12 * SECONDS  # without another case; wall-clock, for a machine that is busy
 
 
@@ -76,8 +77,9 @@ def _turn(
             try:
                 child.wait(timeout=2.0)
             except subprocess.TimeoutExpired:
-                last = journal.stat().st_mtime if journal.exists() else begin
-                still = time.time() - max(last, begin) > STILL_S
+                has_begun = journal.exists()
+                last = journal.stat().st_mtime if has_begun else begin
+                still = time.time() - max(last, begin) > (STILL_S if has_begun else START_S)
     finally:
         if child.poll() is None:
             child.kill()
