@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from aqualog import __version__
 from aqualog.campaign.key import code_stamp
-from aqualog.errors import ConfigError
+from aqualog.campaign.place import is_url, place_of
+from aqualog.errors import AqualogError, ConfigError
 from aqualog.io.whole import write_text
 
 __all__ = ["Asked", "Stamp", "asked_of", "own_stamp", "unlike"]
@@ -20,10 +21,13 @@ Stamp = tuple[str, str]
 
 
 class Asked(NamedTuple):
-    """What is asked of a worker: to run this code, and to see these files with their sizes [byte]."""
+    """What is asked of a worker: to run this code, to see these files with their sizes [byte], and to reach these
+    places behind URLs, each with a mark in it.
+    """
 
     stamp: Stamp
     files: tuple[tuple[Path, int], ...]
+    places: tuple[tuple[str, str], ...] = ()
 
 
 def own_stamp() -> Stamp:
@@ -40,17 +44,31 @@ def asked_of(tasks: Mapping[Any, tuple[Any, ...]]) -> Iterator[Asked]:
     some = list(tasks.values())
     some = [some[i] for i in sorted({0, len(some) // 2, len(some) - 1})] if some else []
     paths = list(dict.fromkeys(p for task in some for p in _paths(task)))
-    marks = [p / f".seen-{secrets.token_hex(4)}.json.tmp" for p in paths if p.is_dir()]
+    marks = [p / _mark() for p in paths if p.is_dir()]
+    urls = dict.fromkeys(v for task in some for v in task if isinstance(v, str) and is_url(v))
+    places: list[tuple[str, str]] = []
     try:
+        for url in urls:
+            name = _mark()
+            with suppress(OSError, AqualogError):  # the batch's own results say so
+                place_of(url).write(name, b"seen\n")
+                places.append((url, name))
         for mark in marks:
             with suppress(OSError):  # a source that is a folder and read-only; what cannot be written says so itself
                 write_text(mark, "seen\n")
         files = [p for p in (*paths, *marks) if p.is_file()]
-        yield Asked(own_stamp(), tuple((p, p.stat().st_size) for p in files))
+        yield Asked(own_stamp(), tuple((p, p.stat().st_size) for p in files), tuple(places))
     finally:
+        for url, name in places:
+            with suppress(OSError, AqualogError):
+                place_of(url).remove(name)
         for mark in marks:
             with suppress(OSError):
                 mark.unlink(missing_ok=True)
+
+
+def _mark() -> str:
+    return f".seen-{secrets.token_hex(4)}.json.tmp"
 
 
 def _paths(values: Iterable[Any]) -> Iterator[Path]:
@@ -80,8 +98,29 @@ def unlike(asked: Asked) -> ConfigError | None:
             f"does not see {missing}", expected="logs and store under the same paths on every machine",
             hint="a disk that all share; for results also --store with a URL",
         )  # fmt: skip
+    for url, name in asked.places:
+        lack = _out_of_reach(url, name)
+        if lack:
+            return ConfigError(
+                f"cannot use the store {place_of(url).name} ({lack})", expected="what this machine can",
+                hint="keys and packages of the store's protocol in the environment of every worker",
+            )  # fmt: skip
     _fit.add(asked)
     return None
+
+
+def _out_of_reach(url: str, name: str) -> str:
+    """Why results cannot be written there, or that it is another place than the one with the mark."""
+    try:
+        place = place_of(url)
+        if not place.has(name):
+            return "it is another one here"
+        own = _mark()
+        place.write(own, b"seen\n")
+        place.remove(own)
+    except (OSError, AqualogError) as error:
+        return (error.what if isinstance(error, AqualogError) else error.strerror) or type(error).__name__
+    return ""
 
 
 def _missing(files: Sequence[tuple[Path, int]]) -> str:

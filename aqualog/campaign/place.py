@@ -12,7 +12,7 @@ from typing import Protocol
 
 from aqualog.errors import ConfigError
 
-__all__ = ["Address", "Place", "address_of", "is_orphan", "place_of", "temporary_name"]
+__all__ = ["Address", "Place", "address_of", "is_orphan", "is_url", "place_of", "temporary_name"]
 
 Address = Path | str
 """A folder, or the URL of something that fsspec knows."""
@@ -111,6 +111,11 @@ def address_of(text: Address) -> Address:
             raise ConfigError("names no folder of this machine", where=text, expected="the folder, or file:///folder")
         return Path(file[1])
     return text if _URL.fullmatch(text) else Path(text)
+
+
+def is_url(text: str) -> bool:
+    """Whether a text is the address of a place behind a URL."""
+    return bool(_URL.fullmatch(text))
 
 
 def place_of(address: Address) -> Place:

@@ -21,7 +21,8 @@ from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
 from typer.testing import CliRunner
 
-from aqualog.campaign.place import address_of
+from aqualog.campaign.cluster_worker import asked_of, unlike
+from aqualog.campaign.place import address_of, place_of
 from aqualog.campaign.place_local import Folder
 from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store
@@ -263,6 +264,26 @@ def test_a_network_that_fails_damages_nothing(plain, tmp_path):
         assert "secret" not in result.stderr + result.stdout
     Shaky.fails = ""
     assert files_of(url) == before
+
+
+def test_a_worker_is_asked_whether_it_can_use_the_store(plain, url, monkeypatch):
+    place_of(url).make(())
+    with asked_of({"a": (url, plain[0])}) as asked:
+        assert [u for u, _ in asked.places] == [url]
+        assert unlike(asked) is None
+        again = asked._replace(files=())
+        with monkeypatch.context() as patch:
+            patch.setattr(Remote, "has", lambda *_: False)  # a place of the same name on another machine
+            assert "it is another one here" in unlike(again).what
+        with monkeypatch.context() as patch:
+
+            def refused(*_):
+                raise PermissionError(13, "no credentials")
+
+            patch.setattr(Remote, "write", refused)
+            assert "(no credentials)" in unlike(again).what
+        assert unlike(again) is None
+    assert files_of(url) == {}
 
 
 def test_what_was_half_written_long_ago_is_swept(plain, tmp_path):
