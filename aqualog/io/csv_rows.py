@@ -179,12 +179,16 @@ def _regular(body: bytes, layout: Layout) -> int | None:
 def _is_quoted_plainly(rows: Rows) -> bool:
     """Whether the library, too, finds one row per line: then no quotes hold a separator or a line's end.
 
-    A line with an odd quote may still be a row of its own to the library, but only where it is the last one.
+    A line with an odd quote may still be a row of its own to the library, but only where it is the last one; and of a
+    quoted cell that goes on behind its quote it makes nothing.
     """
-    octets = np.frombuffer(rows.text, dtype=np.uint8)
-    ends = np.append(np.flatnonzero(octets == ord("\n")), len(octets))
-    before = np.searchsorted(np.flatnonzero(octets == ord('"')), ends)  # quotes up to the end of each line
+    octets = np.frombuffer(b"\n" + rows.text + b"\n", dtype=np.uint8)
+    quotes = np.flatnonzero(octets == ord('"'))
+    before = np.searchsorted(quotes, np.flatnonzero(octets == ord("\n")))  # quotes up to the end of each line
     if (before % 2).any():
+        return False
+    around = np.frombuffer(f'\r\n"{rows.separator}'.encode(), dtype=np.uint8)
+    if not (np.isin(octets[quotes - 1], around) | np.isin(octets[quotes + 1], around)).all():
         return False
     try:
         rows.cells([0], where="")
