@@ -90,6 +90,7 @@ _V4_ALGEBRAIC, _V4_VALUE_TO_TEXT, _V4_RANGE_TO_TEXT = 3, 7, 8
 _V4_NEEDS_TEXT = (9, 10)  # text to value, text to text
 _V4_BITFIELD = 11
 _V4_BY_VALUE = (1, 2, 4, 5)  # linear, rational, tables with and without interpolation
+_V4_RANGE_TO_VALUE = 6
 _V3_ALGEBRAIC, _V3_VALUE_TO_TEXT = 10, 11
 
 
@@ -116,8 +117,11 @@ def refusal(conversion: Any, *, version4: bool) -> str | None:
             Formula(text)
         except LogError as error:
             return error.line()
-    if any(formula_text(c, version4=True) is not None for c in _nested(conversion, version4=version4)):
+    nested = _nested(conversion, version4=version4)
+    if any(formula_text(c, version4=True) is not None for c in nested):
         return "conversion table with a formula in it is not supported"
+    if any(c.conversion_type == _V4_RANGE_TO_VALUE for c in nested):
+        return "conversion table with a table of ranges in it is not supported"
     return None
 
 
@@ -162,8 +166,25 @@ def _physical4(conversion: Any, raw: _Array) -> FloatArray:
         return _numbers(conversion.convert(raw), raw)
     if kind == _V4_BITFIELD:
         return raw.astype(np.float64)
+    if kind == _V4_RANGE_TO_VALUE:
+        return _of_ranges(conversion, raw)
     # float64 first: asammdf would scale float32 samples in float32
     return _numbers(conversion.convert(raw.astype(np.float64) if kind in _V4_BY_VALUE else raw), raw)
+
+
+def _of_ranges(conversion: Any, raw: _Array) -> FloatArray:
+    """Values of a table of ranges: whole numbers belong to both ends of a range, others to its lower end only.
+
+    asammdf gives whole numbers inside a range the default.
+    """
+    found: FloatArray = np.full(raw.shape, float(conversion.default))
+    is_free = np.ones(raw.shape, dtype=np.bool_)
+    for i in range((conversion.val_param_nr - 1) // 3):
+        low, high = conversion[f"lower_{i}"], conversion[f"upper_{i}"]
+        here = is_free & (raw >= low) & ((raw < high) if raw.dtype.kind == "f" else (raw <= high))
+        found[here] = conversion[f"phys_{i}"]
+        is_free &= ~here
+    return found
 
 
 def _numbers(converted: _Array, raw: _Array) -> FloatArray:

@@ -129,6 +129,26 @@ def test_all_texts_of_a_mixed_table_are_missing(tmp_path: Path):
     assert np.isnan(read_all(path)[0]["group0.x"].values).all()
 
 
+@pytest.mark.parametrize("kind", ["u1", "<i4", "<f8"])
+def test_tables_of_ranges(tmp_path: Path, kind: str):
+    """Expected by the standard: whole numbers belong to both ends of a range, others to the lower one."""
+    ranges = {"lower_0": 0.0, "upper_0": 9.0, "phys_0": 1.5, "lower_1": 10.0, "upper_1": 20.0, "phys_1": 2.5}
+    table = from_dict({**ranges, "default": -1.0})
+    raw = np.array([0, 5, 9, 10, 15, 20, 21, 100] * 25, dtype=kind)
+    values = read_all(save(tmp_path / "a.mf4", [signal("x", raw, conversion=table)]))[0]["group0.x"].values
+    ends = [-1.0, 2.5, 2.5, -1.0] if kind == "<f8" else [1.5, 2.5, 2.5, 2.5]
+    np.testing.assert_array_equal(values[:8], [1.5, 1.5, *ends, -1.0, -1.0])
+
+
+def test_a_table_of_ranges_within_a_table_of_texts_is_refused(tmp_path: Path):
+    inner = from_dict({"lower_0": 0.0, "upper_0": 9.0, "phys_0": 1.5, "default": -1.0})
+    mixed = from_dict({"val_0": 3, "text_0": b"error", "default_addr": inner})
+    path = save(tmp_path / "a.mf4", [signal("x", np.arange(200, dtype="u1"), conversion=mixed), signal("y", T)])
+    channels, faults = read_all(path)
+    assert list(channels) == ["group0.y"]
+    assert any("table of ranges" in n for n in faults.notes)
+
+
 def test_invalid_samples_are_nan_and_the_rest_keeps_its_time(tmp_path: Path):
     bad = np.zeros(200, dtype=bool)
     bad[[3, 50]] = True
