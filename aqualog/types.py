@@ -80,7 +80,10 @@ class FileFaults:
 
 @dataclass(frozen=True, slots=True)
 class TimeFaults:
-    """Faults of one source's time stamps, classified and counted; `drifts` are clocks in its file that run apart."""
+    """Faults of one source's time stamps, classified and counted.
+
+    `drifts` are clocks in its file that run apart, `strays` samples that have a stamp from elsewhere and are left out.
+    """
 
     duplicates: int = 0
     back_steps: int = 0
@@ -88,6 +91,7 @@ class TimeFaults:
     wraps: int = 0
     pauses: int = 0
     drifts: int = 0
+    strays: int = 0
 
     def __add__(self, other: TimeFaults) -> TimeFaults:
         return TimeFaults(*(getattr(self, n) + getattr(other, n) for n in TimeFaults.__slots__))

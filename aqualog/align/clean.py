@@ -95,7 +95,8 @@ def clean_channel(
     is_explicit = name in signal_map.entries
     t_ns = corrected(channel.t_ns, signal_map, info.file)
     t_ns, order, faults = stamps.repair(info.file).repair(t_ns)
-    raw = channel.values[order] if faults.back_steps or faults.duplicates else channel.values
+    is_changed = faults.back_steps or faults.duplicates or faults.strays
+    raw = channel.values[order] if is_changed else channel.values
     try:
         own = judged(symbol, entry, raw, unit, vehicle, where)
     except SignalError as error:

@@ -46,7 +46,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     faults = sum(by_file.values(), TimeFaults(drifts=sum(len(f.drifts) for f in file_faults)))
     own = sum(
         c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
-        + c.origin.faults.duplicates
+        + c.origin.faults.duplicates + c.origin.faults.strays
         for c in cleaned
     )  # fmt: skip
     doubled = max((c.origin.faults.duplicates for c in cleaned), default=0)
@@ -73,6 +73,7 @@ def _time_note(file: str, faults: TimeFaults) -> str:
         "resets": "resets",
         "wraps": "wraps",
         "pauses": "pauses",
+        "strays": "from elsewhere, left out",
     }
     counts = ", ".join(f"{getattr(faults, n)} {word}" for n, word in words.items() if getattr(faults, n))
     return f"{file}: time stamps: {counts}"

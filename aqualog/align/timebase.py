@@ -4,7 +4,9 @@
 |---|---|---|
 | duplicate | same stamp again | the later sample wins |
 | back-step | up to 1 s back | sorted into place |
-| wrap | back by 2^16, 2^32, ... ticks of the counter | unwrapped |
+| clock set back | up to 1 s back, then through the same times again | the later samples win, as of duplicates |
+| stray | up to 100 samples elsewhere, then on as before | left out |
+| wrap | back by 2^16, 2^32, ... ticks of the counter, a minute, an hour, a day, a week | unwrapped |
 | reset | back by more than 1 s, no wrap | goes on 1 s after the last sample: the true pause is unknown |
 | pause | more than 1 s and 10 sample times without a sample | left as a gap |
 """
@@ -15,14 +17,18 @@ import numpy as np
 
 from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.shared import OfLast
-from aqualog.types import TimeArray, TimeFaults
+from aqualog.types import BoolArray, TimeArray, TimeFaults
 
 __all__ = ["ClockRepair"]
 
 _SECOND = 1_000_000_000
 _TICKS_NS = (1, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 1_000_000_000)
 _WIDTHS = (16, 24, 32)
-_WRAPS_NS = tuple(sorted({(1 << w) * tick for w in _WIDTHS for tick in _TICKS_NS} | {24 * 3600 * _SECOND}))
+_CLOCKS_S = (60, 3600, 24 * 3600, 7 * 24 * 3600)  # of the minute, the hour, the day, the (GNSS) week
+_WRAPS_NS = tuple(sorted({(1 << w) * tick for w in _WIDTHS for tick in _TICKS_NS} | {s * _SECOND for s in _CLOCKS_S}))
+_STRAYS = 100  # samples, at most, that have a stamp from elsewhere
+_SET_BACK = 5  # samples, at least, that a clock that was set back goes through once more
+_MOST_AGAIN = 20_000  # samples that are looked at
 
 
 class ClockRepair:
@@ -56,27 +62,36 @@ class ClockRepair:
 
     def _repaired(self, t_ns: TimeArray) -> tuple[TimeArray, TimeArray, TimeFaults]:
         n = t_ns.size
+        order = np.arange(n)
         if n < 2:
-            return t_ns.copy(), np.arange(n), TimeFaults()
+            return t_ns.copy(), order, TimeFaults()
         steps = np.diff(t_ns)
         period = _median_period(steps)
-        fixed, wraps, resets = t_ns, 0, 0
+        fixed, wraps, resets, strays = t_ns, 0, 0, 0
         if (steps < -_SECOND).any():
-            fixed, wraps, resets = self._large_steps(t_ns, steps, period)
+            order = np.flatnonzero(~_is_stray(t_ns, steps, period))
+            strays = n - order.size
+            fixed = t_ns[order]
+            fixed, wraps, resets = self._large_steps(fixed, np.diff(fixed), period)
             steps = np.diff(fixed)
         back_steps = int((steps < 0).sum())
-        order = np.arange(n)
+        again = 0
         if back_steps:
-            order = np.argsort(fixed, kind="stable")
-            fixed = fixed[order]
+            is_again = _is_again(fixed, steps, period)
+            again = int(is_again.sum())
+            fixed, order = fixed[~is_again], order[~is_again]
+            by_time = np.argsort(fixed, kind="stable")
+            fixed, order = fixed[by_time], order[by_time]
             steps = np.diff(fixed)
-        duplicates = int((steps == 0).sum())
-        if duplicates:
+        duplicates = again + int((steps == 0).sum())
+        if duplicates > again:
             last = np.append(steps != 0, True)
             fixed, order = fixed[last], order[last]
             steps = np.diff(fixed)
         pauses = int((steps > max(10 * period, _SECOND)).sum())
-        return fixed.copy(), order, TimeFaults(duplicates, back_steps, resets, wraps, max(pauses - resets, 0))
+        return fixed.copy(), order, TimeFaults(
+            duplicates, back_steps, resets, wraps, max(pauses - resets, 0), strays=strays
+        )  # fmt: skip
 
     def _large_steps(self, t_ns: TimeArray, steps: TimeArray, period: int) -> tuple[TimeArray, int, int]:
         shift = np.zeros(t_ns.size, dtype=np.int64)
@@ -95,6 +110,47 @@ class ClockRepair:
             shift[i + 1 :] += own
             resets += 1
         return t_ns + shift, wraps, resets
+
+
+def _is_stray(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
+    """Which stamps (n,) are from elsewhere: those before and behind them belong together.
+
+    Were they taken for a reset, all that follows would be moved, in one channel of a file and not in the others.
+    """
+    stray = np.zeros(t_ns.size, dtype=np.bool_)
+    leaps = np.abs(steps) > _SECOND
+    for k in np.flatnonzero(steps < -_SECOND).tolist():
+        if stray[k] or stray[k + 1]:
+            continue
+        # the way ends with the step back (stamps ahead of their time) or begins with it (stamps behind their time)
+        first = max(k - _STRAYS, 0)
+        begins = first + np.flatnonzero(leaps[first:k] & (steps[first:k] > 0))
+        ends = k + 1 + np.flatnonzero(leaps[k + 1 : k + 1 + _STRAYS] & (steps[k + 1 : k + 1 + _STRAYS] > 0))
+        ways = [(int(i), k) for i in begins[::-1]] + [(k, int(j)) for j in ends]
+        for before, last in ways:
+            step = int(t_ns[last + 1] - t_ns[before])
+            if 0 < step <= (last - before + 1) * 2 * period + _SECOND:
+                stray[before + 1 : last + 1] = True
+                break
+    return stray
+
+
+def _is_again(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
+    """Which stamps (n,) a clock that was set back, by up to 1 s, goes through once more.
+
+    A late sample fills a hole among those before it; a clock that was set back has none there, and sorted its samples
+    would be those of two times in turns.
+    """
+    again = np.zeros(t_ns.size, dtype=np.bool_)
+    for k in np.flatnonzero(steps <= min((1 - _SET_BACK) * period, -1)).tolist():
+        most = min(int(-steps[k]) // max(period, 1) * 2 + _SET_BACK, _MOST_AGAIN)
+        behind, before = t_ns[k + 1 : k + 2 + most], t_ns[max(k + 1 - most, 0) : k + 1]
+        through = int(np.searchsorted(np.maximum.accumulate(behind), t_ns[k]))  # samples until it is where it was
+        start = k + 1 - int((before >= t_ns[k + 1]).sum())
+        ways = np.concatenate([np.diff(behind[: through + 1]), np.diff(t_ns[start : k + 1])])
+        if min(through, k + 1 - start) >= _SET_BACK and through < behind.size and ways.size:
+            again[start : k + 1] = bool(ways.min() >= 0 and ways.max() <= 3 * period)
+    return again
 
 
 def _median_period(steps: TimeArray) -> int:

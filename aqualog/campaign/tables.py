@@ -25,6 +25,7 @@ NUMBERS = (
 )  # fmt: skip
 _QUALITY = (
     "dropped_samples", "time_jumps", "lost_in_files", "duplicates", "back_steps", "resets", "wraps", "pauses", "drifts",
+    "strays",
 )  # fmt: skip
 _EVENT = {
     "run": pl.Int64, "name": pl.String, "key": pl.String, "detector": pl.String, "wheel": pl.String, "side": pl.String,
@@ -110,7 +111,9 @@ def _run_row(
     found = [e["detector"] for e in about["events"]]
     row |= {f"events_{d}": None if d in about["unavailable"] else found.count(d) for d in DETECTORS}
     row["unavailable"] = ", ".join(about["unavailable"])
-    row |= {n: about["quality"][n] for n in ("truncated", "unfinalised", *_QUALITY)}
+    # results of before do not count every fault
+    row |= {n: about["quality"].get(n, 0) for n in _QUALITY}
+    row |= {n: about["quality"][n] for n in ("truncated", "unfinalised")}
     row["notes"] = "\n".join(about["notes"])
     return row
 

@@ -21,6 +21,7 @@ _TIMES: dict[str, tuple[Level, str, str]] = {
     ),
     "wraps": ("mended", "overflows of the time counter; undone", ""),
     "pauses": ("doubt", "pauses of the recording; nothing is judged in them", ""),
+    "strays": ("lost", "time stamps from elsewhere; their samples are left out", "check the logger's clock"),
 }  # fmt: skip
 
 

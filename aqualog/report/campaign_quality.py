@@ -100,7 +100,7 @@ def _count(r: RunInfo, name: str, word: str) -> str:
 
 
 def _clock(r: RunInfo) -> str:
-    names = ("duplicates", "back_steps", "resets", "wraps", "pauses", "drifts")
+    names = ("duplicates", "back_steps", "resets", "wraps", "pauses", "drifts", "strays")
     return ", ".join(f"{_q(r, n)} {n.replace('_', ' ')}" for n in names if _q(r, n))
 
 

@@ -17,7 +17,7 @@ __all__ = [
 
 _FAULTS = {
     "duplicates": "same time twice", "back_steps": "steps back", "resets": "clock resets", "wraps": "wrapped counters",
-    "pauses": "pauses", "drifts": "clocks that drift",
+    "pauses": "pauses", "drifts": "clocks that drift", "strays": "stray stamps",
 }  # fmt: skip
 
 

@@ -97,3 +97,49 @@ def test_a_shared_vector_is_repaired_once_and_another_one_anew():
 def test_tiny_vectors(n):
     fixed, order, _ = ClockRepair().repair(np.zeros(n, dtype=np.int64))
     assert fixed.size == order.size == n
+
+
+@pytest.mark.parametrize("elsewhere", [0, 5000 * S, 32 * S, 28 * S])
+@pytest.mark.parametrize("length", [1, 10])
+def test_strays_are_left_out_and_move_nothing(elsewhere, length):
+    t = 10 * S + steady(4000)
+    t[2000 : 2000 + length] = elsewhere + np.arange(length)
+    fixed, order, faults = repair(t)
+    assert (faults.strays, faults.resets, faults.pauses) == (length, 0, 0)
+    assert order.tolist() == [k for k in range(4000) if not 2000 <= k < 2000 + length]
+    assert (fixed == t[order]).all()
+
+
+def test_a_reset_with_few_samples_before_the_next_is_none():
+    t = np.concatenate([steady(3000), steady(50), steady(3000)])
+    fixed, order, faults = repair(t)
+    assert (faults.resets, faults.strays) == (1, 0)
+    assert order.size < t.size
+    assert (np.diff(fixed) <= S).all()
+
+
+@pytest.mark.parametrize("back", [50, 5, 99])
+def test_a_clock_that_was_set_back_does_not_mix_two_times(back):
+    t = steady(3000)
+    t[1500:] -= back * 10 * MS + 3 * MS
+    fixed, order, faults = repair(t)
+    assert (faults.back_steps, faults.duplicates, faults.resets) == (1, back, 0)
+    assert order.tolist() == [*range(1500 - back), *range(1500, 3000)]
+    assert (fixed == t[order]).all()
+
+
+def test_late_samples_are_no_clock_that_was_set_back():
+    t = steady(3000)
+    t[1000:1060] = np.roll(t[1000:1060], 30)  # a message of 30 samples comes after the one behind it
+    fixed, order, faults = repair(t)
+    assert (faults.back_steps, faults.duplicates) == (1, 0)
+    assert (fixed == steady(3000)).all()
+    assert (t[order] == fixed).all()
+
+
+@pytest.mark.parametrize("seconds", [60, 3600, 604_800])
+def test_seconds_of_the_minute_hour_and_week_go_on(seconds):
+    t = steady(4000, start=(seconds - 20) * S)
+    fixed, _, faults = repair(t % (seconds * S))
+    assert (faults.wraps, faults.resets) == (1, 0)
+    assert (np.diff(fixed) == 10 * MS).all()
