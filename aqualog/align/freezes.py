@@ -3,14 +3,16 @@
 A speed or a torque that is measured never stays the same to the last digit for long: on five measured cars the longest
 such stretch of a moving wheel is 0.9 s, of a torque 18 s. Only signals are judged whose own noise shows elsewhere, so
 that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel and
-a torque of zero may stay as they are for ever. Of a channel of any other kind only one stop that is unlike all else in
-it is worth a look.
+a torque of zero may stay as they are for ever. A wheel whose first value stays until a step that no wheel can make was
+not measured until then: control units send zeros or a code before their sensors are awake. Of a channel of any other
+kind only one stop that is unlike all else in it is worth a look.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from aqualog.align.glitches import is_leap
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
 __all__ = ["Freeze", "FreezeWatch", "freeze_note", "in_freezes", "longest_stop", "watch_of"]
@@ -24,6 +26,7 @@ _MOST_BETWEEN = 0.3  # [s] mean time between two changes of a signal that is jud
 _TIMES_LONGER = 20  # than that time
 _LEAST_CHANGES = 50
 _NOISE = 0.05  # least share of steps against the step before: measured speeds have 0.11 and more
+_STILL = 3  # samples that repeat the first one, at least, of a sensor that is not awake yet
 _GAP_NS = 1_000_000_000
 # of channels of any kind
 _STOP_S = 10.0
@@ -38,7 +41,7 @@ def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
     if name == "v_x":
         return FreezeWatch(*_SPEED)
     if name.startswith("omega_") and r_e is not None:
-        return FreezeWatch(_SPEED[0], _SPEED[1] / r_e, _SPEED[2] / r_e)
+        return FreezeWatch(_SPEED[0], _SPEED[1] / r_e, _SPEED[2] / r_e, r_e=r_e)
     return FreezeWatch(*_TORQUE) if name.startswith("torque_") else None
 
 
@@ -53,9 +56,11 @@ class FreezeWatch:
         Magnitude up to which the signal may stay the same.
     coarsest : float
         Smallest step of a signal that is judged, at most.
+    r_e : float, optional
+        Effective radius of a wheel [m]: its sensor may wake up late.
     """
 
-    def __init__(self, least_s: float, standing: float, coarsest: float) -> None:
+    def __init__(self, least_s: float, standing: float, coarsest: float, *, r_e: float | None = None) -> None:
         self._least_ns, self._standing, self._coarsest = round(least_s * 1e9), standing, coarsest
         self._t: TimeArray = np.zeros(0, dtype=np.int64)  # the last sample
         self._x: FloatArray = np.zeros(0)
@@ -63,6 +68,10 @@ class FreezeWatch:
         self._sign = 0.0
         self._changes = self._turns = self._moving_ns = 0
         self._smallest = np.inf
+        self._r_e = r_e
+        self._first_ns, self._still = 0, 0
+        self._is_awake = r_e is None
+        self._asleep: Freeze | None = None
         self._long: list[Freeze] = []
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
@@ -70,10 +79,12 @@ class FreezeWatch:
         if not t_ns.size:
             return
         if not self._t.size:
-            self._since = int(t_ns[0])
+            self._since = self._first_ns = int(t_ns[0])
         t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
         self._t, self._x = t[-1:].copy(), x[-1:].copy()
         steps, dt = np.diff(x), np.diff(t)
+        if not self._is_awake:
+            self._wake(t, steps, dt)
         is_moving = (np.abs(x[1:]) > self._standing) & (np.abs(x[:-1]) > self._standing) & (dt <= _GAP_NS)
         self._moving_ns += int(dt[is_moving].sum())
         self._count(steps[is_moving & (steps != 0.0)])
@@ -83,6 +94,17 @@ class FreezeWatch:
             self._since = int(t[ends[-1] + 1])
             found = (t[ends] - starts >= self._least_ns) & (np.abs(x[ends]) > self._standing)
             self._long += list(zip(starts[found].tolist(), t[ends[found]].tolist(), strict=True))
+
+    def _wake(self, t: TimeArray, steps: FloatArray, dt: TimeArray) -> None:
+        assert self._r_e is not None
+        changes = np.flatnonzero(steps != 0.0)
+        if not changes.size:
+            self._still += steps.size
+            return
+        k = int(changes[0])
+        self._is_awake = True
+        if self._still + k >= _STILL and is_leap(dt[k : k + 1], self._r_e * steps[k : k + 1])[0]:
+            self._asleep = self._first_ns - 1, int(t[k])
 
     def _count(self, changes: FloatArray) -> None:
         if not changes.size:
@@ -95,6 +117,11 @@ class FreezeWatch:
 
     def finish(self) -> tuple[Freeze, ...]:
         """Stretches in which the signal is frozen, in order."""
+        if self._asleep is None:
+            return self._frozen()
+        return (self._asleep, *(f for f in self._frozen() if f[0] > self._asleep[1]))
+
+    def _frozen(self) -> tuple[Freeze, ...]:
         found = list(self._long)
         if self._t.size and self._t[0] - self._since >= self._least_ns and abs(self._x[0]) > self._standing:
             found.append((self._since, int(self._t[0])))
@@ -143,7 +170,7 @@ def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:
 
 def freeze_note(where: str, count: int, first_ns: int, freezes: tuple[Freeze, ...]) -> str:
     """What was left out because the sensor stood still; `first_ns` is the signal's first stamp."""
-    longest, after = max(end - start for start, end in freezes), freezes[0][0] - first_ns
+    longest, after = max(end - start for start, end in freezes), max(freezes[0][0] - first_ns, 0)
     return (
         f"{where}: {count} samples (first at {after * 1e-9:.2f} s) only repeat the one before, for up to "
         f"{longest * 1e-9:.1f} s; the signal is frozen there, left out"

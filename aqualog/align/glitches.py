@@ -6,11 +6,12 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["RETURN_NS", "RIM_LIMIT", "sensor_glitches"]
+__all__ = ["RETURN_NS", "RIM_LIMIT", "is_leap", "sensor_glitches"]
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
 _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
 RETURN_NS = 1_000_000_000
+_STANDS = 10  # samples of one value, at least, that are no slow signal's
 
 
 def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
@@ -29,14 +30,13 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
     -------
     bool array (n,)
         From a step faster than `RIM_LIMIT` to the step back within 1 s; and, where nothing leads back, as long as the
-        signal stands at exactly zero (a dead sensor).
+        signal stands at exactly zero (a dead sensor) or, for 1 s or more, at any one value (a code for "no value").
     """
     glitch = np.zeros(omega.size, dtype=bool)
     if omega.size < 3:
         return glitch
     v = omega * r_e
-    allowed = RIM_LIMIT * np.diff(t_ns) * 1e-9 + _SLACK
-    jumps = np.flatnonzero(np.abs(np.diff(v)) > allowed)
+    jumps = np.flatnonzero(is_leap(np.diff(t_ns), np.diff(v)))
     done = -1
     for position, i in enumerate(jumps.tolist()):
         if i < done:
@@ -53,9 +53,20 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
         if back is not None:
             glitch[i + 1 : back + 1] = True
             done = back + 1
-        elif omega[i + 1] == 0.0:
-            moving = np.flatnonzero(omega[i + 1 :] != 0.0)
+        elif omega[i + 1] == 0.0 or _is_code(t_ns, omega, i + 1):
+            moving = np.flatnonzero(omega[i + 1 :] != omega[i + 1])
             end = i + 1 + (int(moving[0]) if moving.size else omega.size)
             glitch[i + 1 : end] = True
             done = end
     return glitch
+
+
+def is_leap(dt_ns: TimeArray, dv: FloatArray) -> BoolArray:
+    """Which steps (n,) of a wheel's speed [m/s at the rim] no wheel can make in their time [ns]."""
+    return np.abs(dv) > RIM_LIMIT * dt_ns * 1e-9 + _SLACK
+
+
+def _is_code(t_ns: TimeArray, omega: FloatArray, start: int) -> bool:
+    """Whether the signal stands at one value from a sample on until 1 s later."""
+    end = int(np.searchsorted(t_ns, t_ns[start] + RETURN_NS, side="left"))
+    return end < t_ns.size and end - start >= _STANDS and bool((omega[start : end + 1] == omega[start]).all())

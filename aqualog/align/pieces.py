@@ -126,7 +126,7 @@ class PieceCleaner:
         self._last_ns: int | None = None  # of the stamps let through
         self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # a second in which a wheel's jump may turn back
         self._done = 0  # of these, let through already
-        self._dead = False
+        self._dead: float | None = None  # the value at which a sensor stands since a step that no wheel can make
 
     def push(self, t_ns: TimeArray, raw: FloatArray, *, absolute: bool) -> tuple[TimeArray, FloatArray]:
         """Usable samples that are now certain, in SI; the rest comes with later pieces."""
@@ -191,15 +191,14 @@ class PieceCleaner:
 
     def _without_glitches(self, t: TimeArray, x: FloatArray, *, is_last: bool) -> tuple[TimeArray, FloatArray]:
         """Wheel speeds whose next second is known, less those that no wheel can have turned."""
-        if self._dead:
-            moving = np.flatnonzero(x != 0.0)
+        if self._dead is not None:
+            moving = np.flatnonzero(x != self._dead)
             dead = int(moving[0]) if moving.size else x.size
             self._found(t[:dead], x[:dead])
             t, x = t[dead:], x[dead:]
-            self._dead = not moving.size
-            if self._dead:
+            if not moving.size:
                 return _NO_TIMES, _NO_VALUES
-            self._wait_t, self._wait_x, self._done = _NO_TIMES, _NO_VALUES, 0
+            self._dead, self._wait_t, self._wait_x, self._done = None, _NO_TIMES, _NO_VALUES, 0
         t, x = np.concatenate([self._wait_t, t]), np.concatenate([self._wait_x, x])
         if t.size == 0:
             return t, x
@@ -207,7 +206,7 @@ class PieceCleaner:
         # a jump is judged once all within a second behind it is known
         certain = t.size if is_last else int(np.searchsorted(t, t[-1] - RETURN_NS, side="left"))
         if not is_last and glitch[-1] and _dead_since(glitch, x) < certain:
-            self._dead, certain = True, t.size
+            self._dead, certain = float(x[-1]), t.size
         while 0 < certain < t.size and glitch[certain - 1 : certain + 1].any():
             certain -= 1  # neither in a glitch nor at its end
         new = slice(self._done, max(certain, self._done))
@@ -273,7 +272,7 @@ class PieceCleaner:
 
 
 def _dead_since(glitch: BoolArray, x: FloatArray) -> int:
-    """Where the zeros begin in which the glitch at the end stands; beyond the end if it is no dead sensor."""
+    """Where the one value begins at which the glitch at the end stands; beyond the end if it is no dead sensor."""
     last = np.flatnonzero(~glitch)
     start = int(last[-1]) + 1 if last.size else 0
-    return start if not x[start:].any() else glitch.size
+    return start if bool((x[start:] == x[-1]).all()) else glitch.size

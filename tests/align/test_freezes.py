@@ -143,3 +143,26 @@ def test_no_detector_alarms_on_a_frozen_signal(name):
     assert 590 < told["quality"]["frozen_samples"] == told["signals"][name]["frozen"] < 610
     assert told["quality"]["dropped_samples"] >= told["quality"]["frozen_samples"]
     assert any(name in note and "6.0 s; the signal is frozen" in note for note in told["quality"]["notes"])
+
+
+@pytest.mark.parametrize("value", [0.0, 587.0])
+def test_no_detector_alarms_on_wheels_that_wake_up_late(value):
+    channels, car = lane_and_braking()
+    sound = detected(channels, car)
+    for w in WHEELS:
+        t, x = channels[f"omega_{w}"]
+        channels[f"omega_{w}"] = t, np.where(t < t[0] + 2 * S, value, x)
+    result = detected(channels, car)
+    assert [(e.detector, e.wheel) for e in result.events] == [(e.detector, e.wheel) for e in sound.events]
+    assert min(e.start_s for e in result.events) > 8.0
+    assert [result.signals.origins[f"omega_{w}"].frozen for w in WHEELS] == [200] * 4
+    assert all(result.signals.frame[f"omega_{w}"][:200].is_null().all() for w in WHEELS)
+
+
+@pytest.mark.parametrize("pieces", [1, 7, 1000])
+def test_a_wheel_that_starts_by_itself_was_awake(pieces):
+    t, x = moving(seconds=20.0)
+    x[:500] = 0.0
+    assert found(t, x, "omega_fl", pieces) == ((t[0] - 1, t[499]),)
+    x[500:600] *= np.linspace(0.0, 1.0, 100)
+    assert found(t, x, "omega_fl", pieces) == ()

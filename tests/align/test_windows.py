@@ -143,6 +143,19 @@ def test_many_short_dropouts_of_a_wheel(seed):
     same([channel("omega_fl", np.arange(3000) * 0.01, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_codes_that_stand_for_seconds_and_wheels_that_wake_up_late(seed):
+    rng = np.random.default_rng(seed)
+    signals = wheels()
+    for c in signals:
+        for a in np.cumsum(rng.integers(50, 900, 8)):
+            c.values[a : a + rng.choice([5, 99, 100, 101, 250])] = rng.choice([0.0, 590.0, 300.0])
+        if rng.random() < 0.7:
+            c.values[: rng.integers(2, 900)] = rng.choice([0.0, 590.0])
+    whole = same(signals, size=int(rng.choice([1, 40, 300])), seed=seed)
+    assert whole.quality.dropped_samples > 100
+
+
 @pytest.mark.parametrize("size", [40, 300, 6000])
 def test_a_signal_that_is_frozen_for_a_while(size):
     rng = np.random.default_rng(3)

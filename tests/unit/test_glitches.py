@@ -42,3 +42,17 @@ def test_slow_logs_are_left_alone():
     x = np.full(300, 80.0)
     x[100:102] = 10.0
     assert not sensor_glitches(t, x, r_e=R_E).any()
+
+
+@pytest.mark.parametrize("level", [587.0, 287.1, 140.0 / R_E])
+def test_a_code_that_stands_for_seconds(level):
+    x = wheel()
+    x[1000:1300] = level
+    assert np.flatnonzero(sensor_glitches(T, x, r_e=R_E)).tolist() == list(range(1000, 1300))
+
+
+def test_a_step_to_a_value_that_lives_stays():
+    """Nobody knows which of the two sides is the wheel's."""
+    x = wheel()
+    x[1000:] += 60.0 / R_E
+    assert not sensor_glitches(T, x, r_e=R_E).any()
