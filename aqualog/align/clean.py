@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ __all__ = [
     "out_note", "symbol_of",
 ]  # fmt: skip
 
+_ROUNDING = 1e-7  # of a number in 32 bits, at most
 BURST = 5  # median sample times; longer steps are gaps and no sample time
 
 
@@ -158,10 +160,18 @@ def judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Ve
         If the unit is not one of the symbol.
     """
     values = _to_si(symbol, raw, unit, vehicle, where) * entry.scale + entry.offset
-    is_code = np.isin(raw, np.array(entry.invalid)) if entry.invalid else np.zeros(raw.size, dtype=bool)
+    is_code = _is_any_of(raw, entry.invalid)
     is_bad = ~np.isfinite(values)
     is_out = ~is_bad & ~is_code & ((values < symbol.low) | (values > symbol.high))
     return Judged(values, is_bad, is_code, is_out)
+
+
+def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
+    """Which samples (n,) are one of the codes, but for rounding: of 32 bits, or of 1023 * 0.1 against 102.3."""
+    found = np.zeros(raw.size, dtype=np.bool_)
+    for code in codes:
+        found |= np.isclose(raw, code, rtol=_ROUNDING, atol=0.0)
+    return found
 
 
 def glitch_note(where: str, count: int, after_ns: int) -> str:

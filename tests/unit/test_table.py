@@ -25,6 +25,14 @@ def build(*channels, entries=None, clocks=None, **kw):
     return build_signals(mapped, signal_map=signal_map, vehicle=CAR, **kw)
 
 
+@pytest.mark.parametrize("narrow", [np.float64, np.float32])
+def test_codes_are_known_but_for_rounding(narrow):
+    x = np.sin(np.arange(100.0))
+    x[[3, 50]], x[51] = 1023 * 0.1, 1022.9 * 0.1
+    s = build(channel("tq", x.astype(narrow), "Nm"), entries={"torque_r": Entry("torque_r", ("tq",), invalid=(102.3,))})
+    assert s.origins["torque_rl"].invalid_code == 2
+
+
 def test_canonical_names_need_no_map():
     s = build(channel("omega_fl", np.full(100, 90.0), "rad/s"), channel("v_x", np.full(100, 100.0), "km/h"))
     assert s.symbols == ("v_x", "omega_fl")
