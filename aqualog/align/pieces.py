@@ -15,6 +15,7 @@ from aqualog.align.freezes import Freeze, freeze_note, in_freezes, watch_of
 from aqualog.align.glitches import RETURN_NS, sensor_glitches
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
+from aqualog.align.timebase import DAY_NS
 from aqualog.errors import ConfigError, SignalError
 from aqualog.types import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
 from aqualog.vehicle import Vehicle
@@ -141,6 +142,8 @@ class PieceCleaner:
         steps = np.diff(t)
         if (steps < 0).any():
             raise NotInPiecesError(f"{self._where}: time stamps out of order")
+        if (steps > DAY_NS).any():
+            raise NotInPiecesError(f"{self._where}: time stamps that leap")
         same = steps == 0
         self._duplicates += int(same.sum())
         return self._settled(t[:-1][~same], raw[:-1][~same])

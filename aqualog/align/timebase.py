@@ -5,7 +5,7 @@
 | duplicate | same stamp again | the later sample wins |
 | back-step | up to 1 s back | sorted into place |
 | clock set back | up to 1 s back, then through the same times again | the later samples win, as of duplicates |
-| stray | up to 100 samples elsewhere, then on as before | left out |
+| stray | up to 100 samples elsewhere, then on as before; at either end a day or more away | left out |
 | wrap | back by 2^16, 2^32, ... ticks of the counter, a minute, an hour, a day, a week | unwrapped |
 | reset | back by more than 1 s, no wrap | goes on 1 s after the last sample: the true pause is unknown |
 | pause | more than 1 s and 10 sample times without a sample | left as a gap |
@@ -19,13 +19,14 @@ from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.shared import OfLast
 from aqualog.types import BoolArray, TimeArray, TimeFaults
 
-__all__ = ["ClockRepair"]
+__all__ = ["DAY_NS", "ClockRepair"]
 
 _SECOND = 1_000_000_000
 _TICKS_NS = (1, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 1_000_000_000)
 _WIDTHS = (16, 24, 32)
 _CLOCKS_S = (60, 3600, 24 * 3600, 7 * 24 * 3600)  # of the minute, the hour, the day, the (GNSS) week
 _WRAPS_NS = tuple(sorted({(1 << w) * tick for w in _WIDTHS for tick in _TICKS_NS} | {s * _SECOND for s in _CLOCKS_S}))
+DAY_NS = 24 * 3600 * _SECOND
 _STRAYS = 100  # samples, at most, that have a stamp from elsewhere
 _SET_BACK = 5  # samples, at least, that a clock that was set back goes through once more
 _MOST_AGAIN = 20_000  # samples that are looked at
@@ -68,7 +69,7 @@ class ClockRepair:
         steps = np.diff(t_ns)
         period = _median_period(steps)
         fixed, wraps, resets, strays = t_ns, 0, 0, 0
-        if (steps < -_SECOND).any():
+        if (steps < -_SECOND).any() or (steps > DAY_NS).any():
             order = np.flatnonzero(~_is_stray(t_ns, steps, period))
             strays = n - order.size
             fixed = t_ns[order]
@@ -132,6 +133,13 @@ def _is_stray(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
             if 0 < step <= (last - before + 1) * 2 * period + _SECOND:
                 stray[before + 1 : last + 1] = True
                 break
+    # a first header without a time, a last record that was cut
+    few = min(_STRAYS, t_ns.size // 10)
+    for k in np.flatnonzero(steps > DAY_NS).tolist():
+        if k < few:
+            stray[: k + 1] = True
+        elif k + 1 >= t_ns.size - few:
+            stray[k + 1 :] = True
     return stray
 
 

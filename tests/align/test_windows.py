@@ -202,6 +202,15 @@ def test_stamps_that_step_back_need_the_whole_log(at):
         both([replace(left, t_ns=t), right])
 
 
+@pytest.mark.parametrize("at", [1, 4990])
+def test_stamps_that_leap_by_a_day_need_the_whole_log(at):
+    left, right = wheels()
+    t = left.t_ns.copy()
+    t[at:] += 100_000 * S
+    with pytest.raises(NotInPiecesError, match="leap"):
+        both([replace(left, t_ns=t), replace(right, t_ns=t)])
+
+
 def test_a_unit_that_is_none_of_the_signal_leaves_it_out():
     left, right = wheels()
     found = same([left, replace(right, info=replace(right.info, unit="V"))])

@@ -110,6 +110,24 @@ def test_strays_are_left_out_and_move_nothing(elsewhere, length):
     assert (fixed == t[order]).all()
 
 
+@pytest.mark.parametrize("at", [slice(0, 1), slice(0, 20), slice(990, 1000)])
+def test_strays_at_an_end_are_left_out(at):
+    t = steady(start=1_700_000_000 * S)
+    t[at] = 10 * MS * np.arange(t[at].size) + (0 if at.start == 0 else 2 * t[0])
+    fixed, order, faults = repair(t)
+    assert faults.strays == t[at].size
+    assert (faults.resets, faults.pauses) == (0, 0)
+    assert order.tolist() == np.delete(np.arange(1000), at).tolist()
+    assert (fixed == t[order]).all()
+
+
+def test_a_drive_of_two_days_keeps_both():
+    t = np.concatenate([steady(500), steady(500, start=30 * 3600 * S)])
+    fixed, _, faults = repair(t)
+    assert (faults.strays, faults.pauses) == (0, 1)
+    assert (fixed == t).all()
+
+
 def test_a_reset_with_few_samples_before_the_next_is_none():
     t = np.concatenate([steady(3000), steady(50), steady(3000)])
     fixed, order, faults = repair(t)
