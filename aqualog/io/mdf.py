@@ -601,21 +601,29 @@ class MdfReader:
         found: dict[str, Channel] = {}
         for code, infos in by_code.items():
             t_ns, data, length = frames[code]
+            short: list[tuple[ChannelInfo, int]] = []
             for info in infos:
                 carried, values = decode_signal(info.key.message, info.key.name, data, length)
-                self._count_short(info, data, length, int(carried.sum()))
+                # frames that select the signal but are too short for it
+                signal = info.key.message.get_signal_by_name(info.key.name)
+                missed = int(selected(info.key.message, signal, data, length).sum()) - int(carried.sum())
+                short += [(info, missed)] if missed else []
                 found[info.path] = Channel(info, t_ns[carried], values, self._absolute)
+            self._tell_short(short)
         return found
 
-    def _count_short(self, info: ChannelInfo, data: _Array, length: _Array, carried: int) -> None:
-        """Count the frames that select the signal but are too short for it."""
-        signal = info.key.message.get_signal_by_name(info.key.name)
-        short = int(selected(info.key.message, signal, data, length).sum()) - carried
-        if short:
-            self._faults.lost_samples += short
-            need = BitField.of(signal).needed
+    def _tell_short(self, short: Sequence[tuple[ChannelInfo, int]]) -> None:
+        """Count the frames of one message that are too short for some of its signals; told in one line."""
+        self._faults.lost_samples += sum(n for _, n in short)
+        if len(short) == 1:
+            info, n = short[0]
+            need = BitField.of(info.key.message.get_signal_by_name(info.key.name)).needed
+            self._faults.notes.append(f"{info.path}: {n} frames are shorter than the {need} bytes it needs; left out")
+        elif short:
+            most, first = max(n for _, n in short), short[0][0]
             self._faults.notes.append(
-                f"{info.path}: {short} frames are shorter than the {need} bytes it needs; left out"
+                f"{first.path.removesuffix(f'.{first.key.name}')}: {most} frames are shorter than {len(short)} of its "
+                f"signals need ({first.name}, ...), cut off or without payload; left out"
             )
 
     def _payloads(self, wanted: set[int]) -> dict[int, tuple[TimeArray, _Array, _Array]]:
@@ -641,13 +649,14 @@ class MdfReader:
             own = group.codes[at : at + len(t)]
             at += len(t)
             rows = np.isin(own, codes)
-            data = self._payload_bytes(group.index, members["DataBytes"], fragment, len(t))
-            length = np.full(len(t), data.shape[1])
+            data, stored = self._payload_bytes(group.index, members["DataBytes"], fragment, len(t))
+            length = stored
             if size is not None:
                 length = self._values(group.index, size, fragment, len(t)).astype(np.int64)
                 if "DataLength" not in members:
                     length = _DLC_LENGTH[np.clip(length, 0, 15)]
-            length = np.minimum(length, data.shape[1])
+            # the frame tells what was sent; what the file has lost of it is filled up with zeros and no value
+            length = np.minimum(length, stored)
             kept.append((t[rows], own[rows], data[rows], length[rows]))
         t = _joined([k[0] for k in kept])
         t_ns, usable = self._nanoseconds(t)
@@ -656,17 +665,21 @@ class MdfReader:
         own, length = _joined([k[1] for k in kept]), _joined([k[3] for k in kept])
         return t_ns, own[usable], _stacked([k[2] for k in kept])[usable], length[usable]
 
-    def _payload_bytes(self, group: int, index: int, fragment: Any, n: int) -> NDArray[np.uint8]:
+    def _payload_bytes(
+        self, group: int, index: int, fragment: Any, n: int
+    ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Payloads (n, width), filled up with zeros, and how many bytes of each the file holds (n,)."""
         owner = self._inner.groups[group]
         channel = owner.channels[index]
         if channel.channel_type != _VARIABLE_LENGTH:
-            return _octets(self._raw(group, index, fragment)[0], n)
+            data = _octets(self._raw(group, index, fragment)[0], n)
+            return data, np.full(n, data.shape[1], dtype=np.int64)
         # asammdf's C code follows the offsets of a damaged file out of the memory, so they are followed here
         at = self._inner._get_scalar(
             channel, owner, group, index, None, None, fragment, True, 0, None, False, skip_vlsd=True  # noqa: FBT003
         )[0].astype(np.int64)  # fmt: skip
         if not n or not np.all(at >= at[0]):
-            return np.zeros((n, 0), dtype=np.uint8)
+            return np.zeros((n, 0), dtype=np.uint8), np.zeros(n, dtype=np.int64)
         stored = self._inner._load_signal_data(group=owner, index=index, offsets=(int(at[0]), int(at[-1])))
         return _variable(np.frombuffer(stored, dtype=np.uint8), at - at[0])
 
@@ -785,15 +798,18 @@ def _octets(raw: _Array, n: int) -> NDArray[np.uint8]:
     return data.reshape(n, -1).astype(np.uint8, copy=False)
 
 
-def _variable(stored: NDArray[np.uint8], at: TimeArray) -> NDArray[np.uint8]:
-    """Payloads of variable length; each is stored as its length in 4 bytes, then its bytes. Shape (n, width)."""
+def _variable(stored: NDArray[np.uint8], at: TimeArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """Payloads of variable length; each is stored as its length in 4 bytes, then its bytes.
+
+    Returns them filled up with zeros (n, width), and how many bytes of each are stored (n,): none behind a cut.
+    """
     padded = np.concatenate([stored, np.zeros(4 + _LONGEST_PAYLOAD, dtype=np.uint8)])
     at = np.minimum(at, len(stored))  # the zeros behind the end are an empty payload
     length = padded[at[:, None] + np.arange(4)].astype(np.int64) @ (1 << 8 * np.arange(4))
     width = int(min(length.max(initial=0), _LONGEST_PAYLOAD))
     octet = np.arange(width)
     payload: NDArray[np.uint8] = np.where(octet < length[:, None], padded[at[:, None] + 4 + octet], 0).astype(np.uint8)
-    return payload
+    return payload, np.clip(length, 0, np.minimum(width, np.maximum(len(stored) - at - 4, 0)))
 
 
 def _stacked(parts: Sequence[_Array]) -> _Array:

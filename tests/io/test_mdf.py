@@ -18,7 +18,7 @@ from asammdf.blocks.conversion_utils import from_dict
 
 from aqualog.errors import ConfigError, LogError
 from aqualog.io.base import ReadOptions
-from aqualog.io.mdf import MdfReader
+from aqualog.io.mdf import MdfReader, _variable
 from aqualog.io.mdf_conversion import Formula
 from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
 from aqualog.types import Channel, FileFaults
@@ -542,6 +542,14 @@ def test_writer_writes_exactly_its_path(tmp_path: Path, compression):
     np.testing.assert_array_equal(x.values, gaps)
 
 
+def test_payload_behind_a_cut_has_no_length():
+    """What the frame says was sent is no value where the file does not hold it."""
+    whole = b"".join(n.to_bytes(4, "little") + bytes(range(1, n + 1)) for n in (3, 2, 4))
+    data, stored = _variable(np.frombuffer(whole[:-2], dtype=np.uint8), np.array([0, 7, 13, 21]))
+    assert data.tolist() == [[1, 2, 3, 0], [1, 2, 0, 0], [1, 2, 0, 0], [0, 0, 0, 0]]
+    assert stored.tolist() == [3, 2, 2, 0]
+
+
 # --- measured drives ---
 
 
@@ -572,6 +580,22 @@ class TestRealDrives:
             group = reader._frames[0]
             data = reader._frame_rows(group, np.unique(group.codes))[2]
         np.testing.assert_array_equal(data, expected)
+
+    def test_cut_in_the_payloads(self, tmp_path: Path):
+        """Frames stand before their payloads: a cut there leaves frames of full length without a byte."""
+        options = ReadOptions(dbc=(REAL / "canedge" / "canmod-gps.dbc",))
+        sound, _ = read_all(REAL / "canedge" / "00000002-60FE415D.MF4", options)
+        cut = tmp_path / "cut.mf4"
+        cut.write_bytes((REAL / "canedge" / "00000002-60FE415D.MF4").read_bytes()[:1_674_198])
+        channels, faults = read_all(cut, options)
+        for name, channel in channels.items():
+            n = len(channel.values)
+            assert 0 < n < 0.05 * len(sound[name].values)
+            np.testing.assert_array_equal(channel.values, sound[name].values[:n])
+        assert len([n for n in faults.notes if "shorter than" in n]) == len({n.split(".")[0] for n in channels})
+        assert faults.lost_samples == sum(len(c.values) for c in sound.values()) - sum(
+            len(c.values) for c in channels.values()
+        )
 
     def test_many_groups(self):
         path = REAL / "canedge" / "00000001-63BEF5CD.MF4"
