@@ -7,6 +7,7 @@
 | clock set back | up to 1 s back, then through the same times again | the later samples win, as of duplicates |
 | stray | up to 100 samples elsewhere, then on as before; at either end a day or more away | left out |
 | wrap | back by 2^16, 2^32, ... ticks of the counter, a minute, an hour, a day, a week | unwrapped |
+| doubled block | back by more than 1 s, then the same uneven stamps again up to where it was | the later copy wins |
 | reset | back by more than 1 s, no wrap | goes on 1 s after the last sample: the true pause is unknown |
 | pause | more than 1 s and 10 sample times without a sample | left as a gap |
 """
@@ -22,6 +23,7 @@ from aqualog.types import BoolArray, TimeArray, TimeFaults
 __all__ = ["DAY_NS", "ClockRepair"]
 
 _SECOND = 1_000_000_000
+_EVEN, _LEAST_UNEVEN = 1e-3, 3  # of the sample time; steps by which a block of stamps is known again
 _TICKS_NS = (1, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 1_000_000_000)
 _WIDTHS = (16, 24, 32)
 _CLOCKS_S = (60, 3600, 24 * 3600, 7 * 24 * 3600)  # of the minute, the hour, the day, the (GNSS) week
@@ -96,8 +98,11 @@ class ClockRepair:
 
     def _large_steps(self, t_ns: TimeArray, steps: TimeArray, period: int) -> tuple[TimeArray, int, int]:
         shift = np.zeros(t_ns.size, dtype=np.int64)
-        wraps = resets = 0
+        wraps = resets = begin = 0
         for i in np.flatnonzero(steps < -_SECOND):
+            if _is_doubled(t_ns, begin, int(i)):  # nothing to shift: what comes after goes on where it stopped
+                continue
+            begin = int(i) + 1
             wrap = _wrap_of(int(-steps[i]) + period, period)
             if wrap is not None:
                 shift[i + 1 :] += wrap
@@ -159,6 +164,22 @@ def _is_again(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
         if min(through, k + 1 - start) >= _SET_BACK and through < behind.size and ways.size:
             again[start : k + 1] = bool(ways.min() >= 0 and ways.max() <= 3 * period)
     return again
+
+
+def _is_doubled(t_ns: TimeArray, begin: int, last: int) -> bool:
+    """Whether behind sample `last` the block that ends there stands once more, as a disk or stick may write it.
+
+    `begin` is where the clock last began: a drive that repeats all stamps since then is another drive on the same
+    clock, and stamps on an even grid prove nothing: a clock that was put back has them, too. The sample at the joint
+    may be of two halves, so that its own stamp need not come again.
+    """
+    first = np.flatnonzero(t_ns[begin : last + 1] == t_ns[last + 1])
+    if not first.size or first[-1] == 0:
+        return False
+    block = t_ns[begin + int(first[-1]) : last + 1]
+    steps = np.diff(block[:-1])
+    uneven = int((np.abs(steps - np.median(steps)) > _EVEN * np.median(steps)).sum()) if steps.size else 0
+    return uneven >= _LEAST_UNEVEN and bool(np.array_equal(block[:-1], t_ns[last + 1 : last + block.size]))
 
 
 def _median_period(steps: TimeArray) -> int:

@@ -13,11 +13,14 @@ __all__ = ["channel_findings"]
 
 _HABIT = 0.01  # of the stamps doubled here and there are a logger's habit; more are samples lost to a wrong clock
 _TIMES: dict[str, tuple[Level, str, str]] = {
-    "duplicates": ("lost", "time stamps doubled; the last sample of each is kept", "check the logger's clock"),
+    "duplicates": (
+        "lost", "time stamps doubled; the last sample of each is kept",
+        "check the logger's clock, and whether a block of the file stands twice",
+    ),
     "back_steps": ("mended", "time stamps out of order; samples are sorted by time", ""),
     "resets": (
         "mended", "resets of the clock; what follows is put behind what came before, the pause between is not known",
-        "cut the log there if it holds two drives",
+        "cut the log there if it holds two drives; beside other files what follows is out of step with them",
     ),
     "wraps": ("mended", "overflows of the time counter; undone", ""),
     "pauses": ("doubt", "pauses of the recording; nothing is judged in them", ""),

@@ -161,3 +161,43 @@ def test_seconds_of_the_minute_hour_and_week_go_on(seconds):
     fixed, _, faults = repair(t % (seconds * S))
     assert (faults.wraps, faults.resets) == (1, 0)
     assert (np.diff(fixed) == 10 * MS).all()
+
+
+def uneven(n=1000):
+    return steady(n) + np.random.default_rng(1).integers(-2 * MS, 2 * MS, n)
+
+
+def doubled(t, begin, end, copies=1):
+    return np.concatenate([t[:end], *[t[begin:end]] * copies, t[end:]])
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+@pytest.mark.parametrize("end", [700, 1000], ids=["in the middle", "at the end"])
+def test_a_block_that_stands_twice_shifts_nothing(end, copies):
+    t = uneven()
+    fixed, order, faults = repair(doubled(t, 400, end, copies))
+    assert (fixed == t).all()
+    assert (order[400:end] == np.arange(400, end) + copies * (end - 400)).all()  # the last copy
+    assert (faults.resets, faults.duplicates) == (0, copies * (end - 400))
+
+
+def test_the_joint_of_a_doubled_block_may_be_of_two_halves():
+    t = doubled(uneven(), 400, 700)
+    t[699] += 3 * MS
+    fixed, _, faults = repair(t)
+    assert faults.resets == 0
+    assert fixed[-1] == t[-1]
+
+
+@pytest.mark.parametrize(
+    ("t", "resets"),
+    [
+        (np.concatenate([uneven()[:500], uneven()[:800]]), 1),
+        (np.concatenate([uneven()[:900], uneven()[:300], uneven()[:800]]), 2),
+        (np.concatenate([steady()[:700], steady()[400:]]), 1),
+        (np.concatenate([doubled(uneven(), 400, 700), uneven()[:800]]), 1),
+    ],
+    ids=["two drives", "three drives", "even stamps prove nothing", "another drive behind a doubled block"],
+)
+def test_a_drive_with_the_stamps_of_another_is_a_reset(t, resets):
+    assert repair(t)[2].resets == resets
