@@ -20,6 +20,7 @@ LEAST_WINDOWS = 40
 LEAST_SAMPLES = 50
 MOST = 1 << 17  # samples of which a median is taken
 RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
+MOVING = 3.0  # [m/s] from which a ratio of speeds tells something
 LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less tells no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 
@@ -70,7 +71,7 @@ class Plausibility:
     def push(self, columns: Mapping[str, FloatArray], features: Mapping[str, FloatArray]) -> None:
         """Take the signals and features of the next piece, arrays (n,)."""
         n = next(iter(columns.values())).size
-        own = [s for s in (*(f"omega_{w}" for w in WHEELS), "yaw_rate") if s in self._available]
+        own = [s for s in (*(f"omega_{w}" for w in WHEELS), "yaw_rate", "v_x") if s in self._available]
         for s in own:
             self._keep(s, columns[s][-self._n % self._step :: self._step])
         if "a_x" in self._available:
@@ -103,11 +104,35 @@ class Plausibility:
         }
         drive = {a: self._sampled[f"torque_{a}"].finite() for a in AXLES}
         return (
+            *_speeds(self._whole("v_x"), wheels),
             *_acceleration(self._whole("a_x"), wheels, self._step * self._dt),
             *_yaw(self._whole("yaw_rate"), wheels),
             *_resistance(self._sampled["delta_a_x"].finite()),
             *_drivetrain(drive, self._vehicle),
         )
+
+
+def _speeds(v_x: FloatArray, wheels: Mapping[str, FloatArray]) -> list[str]:
+    """Wheels that turn at another speed than the others all the time, else all of them than the car drives."""
+    if not wheels:
+        return []
+    with np.errstate(invalid="ignore"):
+        common = np.median(list(wheels.values()), axis=0)
+    ratios = {w: _ratio(x, common) for w, x in wheels.items()} if len(wheels) > 2 else {}
+    odd = [f"omega_{w} is {r:.2g} times" for w, r in ratios.items() if not 1 / RATIO < r < RATIO]
+    if odd:
+        return [f"{', '.join(odd)} the speed of the other wheels: check its unit (km/h, m/s, rad/s) and scale"]
+    ratio = _ratio(common, v_x) if v_x.size else 1.0
+    if 1 / RATIO < ratio < RATIO:
+        return []
+    return [f"wheel speeds times radius are {ratio:.2g} times v_x: check the units of both (km/h, m/s, rad/s)"]
+
+
+def _ratio(x: FloatArray, y: FloatArray) -> float:
+    """Median of x over y where both are known and the faster one moves; 1 where too few do."""
+    with np.errstate(invalid="ignore"):
+        good = (np.maximum(x, y) > MOVING) & (np.minimum(x, y) > 0.0)
+    return float(np.median(x[good] / y[good])) if int(good.sum()) >= LEAST_WINDOWS else 1.0
 
 
 def _acceleration(a_x: FloatArray, wheels: Mapping[str, FloatArray], step_s: float) -> list[str]:

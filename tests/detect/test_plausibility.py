@@ -31,6 +31,17 @@ def test_unit_of_the_wheel_speeds(factor):
     assert any("wheel speeds change" in n for n in found)
 
 
+@pytest.mark.parametrize("factor", [3.6, 1 / 3.6, 1 / 0.316])
+def test_wheel_speeds_against_the_reference(factor):
+    (found,) = (n for n in notes(v_x=lambda f: f["v_x"] / factor) if "v_x" in n)
+    assert found.startswith(f"wheel speeds times radius are {factor:.2g} times v_x")
+
+
+def test_one_wheel_in_another_unit():
+    (found,) = (n for n in notes(omega_rr=lambda f: f["omega_rr"] * 3.6) if "other wheels" in n)
+    assert found.startswith("omega_rr is 3.6 times the speed of the other wheels")
+
+
 def test_drivetrain_against_the_torques():
     """A vehicle file of another car: the free axle is driven, or a driven one never is."""
     pushed = {f"torque_f{s}": lambda f: f["torque_rl"] for s in "lr"}
