@@ -142,9 +142,12 @@ def find_channels(
 
 def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) -> SignalError:
     if not channels:
+        frames = next((n for n in notes if "raw CAN frames" in n), "")
+        hint = "--dbc FILE with the database of this car" if frames else "the recording may have ended at once"
+        told = frames or (notes[0] if notes else "")
         return SignalError(
-            "holds no channel" + (f" ({notes[0]})" if notes else ""), where=", ".join(p.name for p in paths),
-            expected="measured signals", hint="`aqualog inspect LOG`; the recording may have ended at once",
+            "holds no channel" + (f" ({told})" if told else ""), where=", ".join(p.name for p in paths),
+            expected="measured signals", hint=f"{hint}; `aqualog inspect LOG`",
         )  # fmt: skip
     return SignalError(
         f"none of {channels} channels is a signal that aqualog knows by name"

@@ -75,6 +75,10 @@ def _remark(channel: Channel, finite: FloatArray) -> str:
     is_code = top >= 511 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
     if is_code and finite.size > 10 and (finite == top).mean() < 0.2:
         return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
+    # the last but one of a width is a code, too, where nothing comes near it: a measured value climbs there
+    is_next = top >= 510 and float(top).is_integer() and (int(top) + 2) & (int(top) + 1) == 0
+    if is_next and 3 <= (finite == top).sum() < 0.2 * finite.size and finite[finite < top].max() < 0.8 * top:
+        return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
     if finite.size > 100:
         inner_low, inner_high = np.percentile(finite, (1.0, 99.0))
         reach = 3.0 * (inner_high - inner_low)

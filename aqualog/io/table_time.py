@@ -31,7 +31,8 @@ _STEMS = (
 )  # fmt: skip
 _SUFFIX = re.compile(r"^(?P<stem>.*?)[ _]?(?P<unit>seconds|secs|sec|s|ms|msec|us|µs|usec|ns|nsec|min)$")
 _DATES = ("date", "datum", "utc date", "gps date", "day")
-_HINT = '[time] channel = "..." in the map'
+_NAME = '[time] channel = "{}" in the map'
+_HINT = _NAME.format("...")
 
 _NS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _DIGITS = {10**9: 9, 10**6: 6, 10**3: 3, 1: 0}
@@ -98,6 +99,11 @@ def choose_time(fields: Sequence[TableField], options: ReadOptions, *, where: st
     if found is None:
         listed = ", ".join(f.name for f in fields[:20]) + (", ..." if len(fields) > 20 else "")
         asked = f' "{options.time_channel}"' if options.time_channel else ""
+        text = next((f for f in fields if f.kind == "text" and _rank(f) is not None), None)
+        if text is not None:
+            what = f'column "{text.name}" is no time: too many of its cells are no numbers'
+            hint = f"look for lines with another separator or decimal mark; {_NAME.format(text.name)} reads the others"
+            raise LogError(what, where=where, expected="times as numbers or dates", hint=hint)
         raise LogError(f"no time column{asked} among: {listed}", where=where, expected="t [s] or time", hint=_HINT)
     unit = _given_unit(options.time_unit, where) if options.time_unit else _own_unit(fields[found])
     day = next((k for k, f in enumerate(fields) if f.kind == "date" and k != found), None)

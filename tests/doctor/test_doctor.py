@@ -132,6 +132,17 @@ def test_values(tmp_path):
     assert found["doubt", "not_finite"].count == 10
 
 
+@pytest.mark.parametrize(("top", "is_code"), [(1022.0, True), (1021.0, False)])
+def test_the_last_but_one_of_a_width_is_a_code(top, is_code, tmp_path):
+    x = drive()
+    x[:, 1] = np.arange(3000) % 476
+    x[500:555, 1] = top
+    found, _ = kinds(tmp_path, table(x, header="t [s],torque_raw,omega_fr [rad/s],v_x [m/s]"))
+    assert (("doubt", "code") in found) is is_code
+    if is_code:
+        assert found["doubt", "code"].advice == "invalid = [1022] in the map"
+
+
 def test_a_channel_that_is_no_signal_is_worth_a_look(tmp_path):
     x = drive()
     x[:, 1] = np.where((np.arange(3000) > 500) & (np.arange(3000) < 1900), x[500, 1], x[:, 1])

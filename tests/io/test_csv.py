@@ -591,6 +591,10 @@ def test_a_first_line_without_an_end_is_named(read, monkeypatch):
     [
         ("0.0,1\n0.1,2\n0.2,3\n", "no header line"),
         ("a,b\n0.0,1\n0.1,2\n", r"no time column among: a, b.*\[time\] channel"),
+        (
+            "t,a,b\n" + "".join(f"{k}.5,{k},1\n" for k in range(60)) + "".join(f"{k}.5;{k};1\n" for k in range(60, 99)),
+            r'column "t" is no time: .*separator or decimal mark; \[time\] channel = "t"',
+        ),
         ("just one\ncolumn of\ntext\n", "one column only"),
         ("t,v\nx,y\nz,w\n", "not a table|no data"),
         ("t,v\n", "one line only"),

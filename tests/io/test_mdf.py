@@ -16,12 +16,15 @@ import pytest
 from asammdf.blocks import mdf_v4, v2_v3_blocks, v4_blocks
 from asammdf.blocks.conversion_utils import from_dict
 
-from aqualog.errors import ConfigError, LogError
+from aqualog.align.load import load_signals
+from aqualog.align.mapping import SignalMap
+from aqualog.errors import ConfigError, LogError, SignalError
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import MdfReader, _variable
 from aqualog.io.mdf_conversion import Formula
 from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
 from aqualog.types import Channel, FileFaults
+from aqualog.vehicle import Vehicle
 
 REAL = Path(__file__).parents[2].parent / "shared" / "real_logs"
 START = 1_700_000_000_123_456_789
@@ -489,6 +492,9 @@ def test_without_a_dbc_the_frames_are_announced(tmp_path: Path, dbc: Path):
     channels, faults = read_all(tmp_path / "a.mf4")
     assert not channels
     assert faults.notes == ("holds 200 raw CAN frames with 1 ids on bus 0; give --dbc FILE to decode them",)
+    with pytest.raises(SignalError, match=r"holds no channel .*200 raw CAN frames") as caught:
+        load_signals([tmp_path / "a.mf4"], vehicle=Vehicle(), signal_map=SignalMap())
+    assert caught.value.hint.startswith("--dbc FILE")
 
 
 def test_bus_stands_in_front_only_where_needed(tmp_path: Path, dbc: Path):
