@@ -38,6 +38,9 @@ _PLAIN = (b"DT", b"DV", b"SD", b"DI", b"RD", b"RV", b"RI")
 _CG_VLSD, _CG_REMOTE_MASTER = 0x1, 0x8
 _CN_INVALIDATION = 0x3
 _VIRTUAL = (3, 6)  # types of channels without bytes in the record
+_RANGES = 8  # type of a conversion
+_INTEGERS, _REALS, _COMPLEX = (0, 1, 2, 3), (4, 5), (15, 16)  # types of values
+_REAL_BITS, _COMPLEX_BITS = (16, 32, 64), (64, 128)
 _DL_EQUAL = 0x1
 _KINDS_OF_DZ = range(6)
 _ALGEBRAIC = 3
@@ -353,6 +356,7 @@ class _Walk(Walk):
         kind, bit, begin, bits, flags = struct.unpack_from("<BxxBIII", self._data, block.data)
         if kind not in _VIRTUAL:
             self._extent = max(self._extent, begin + (bit + bits + 7) // 8)
+            self._layout(block, bit, bits)
         self._has_invalidation |= bool(flags & _CN_INVALIDATION)
         if self._described(block, 2, f"the name of the channel at byte {block.at}") is not None:
             self._found.refused[block.at] = "its name is lost"
@@ -369,6 +373,19 @@ class _Walk(Walk):
             self._signal_data(block)
         if part:
             self._composition(block, 1, block.at, depth)
+
+    def _layout(self, block: _Block, bit: int, bits: int) -> None:
+        """Refuse numbers that no number is laid out as: asammdf would give up the file, or take others for them."""
+        values = self._data[block.data + 2]
+        is_number = {
+            **dict.fromkeys(_INTEGERS, bit < 8 and (bits > 64 or 1 <= bits <= 64 - bit)),  # longer ones are bytes
+            **dict.fromkeys(_REALS, bit == 0 and bits in _REAL_BITS),
+            **dict.fromkeys(_COMPLEX, bit == 0 and bits in _COMPLEX_BITS),
+        }.get(values, True)
+        if not is_number:
+            self._found.patch(block.data + 2, "<BB", 0, 0)
+            self._found.patch(block.data + 8, "<I", 8)
+            self._found.refused[block.at] = f"it is damaged, values of type {values} with {bits} bits from bit {bit} on"
 
     def _composition(self, owner: _Block, index: int, channel: int, depth: int) -> None:
         """The parts of a channel: a list of channels, or an array of whatever follows."""
@@ -426,6 +443,11 @@ class _Walk(Walk):
             raise BlockError("CC", at, "has lost its unit")
         for link in (0, 2):
             self._described(block, link, f"a text of the conversion at byte {at}")
+        inner = [a for a in block.links[4:] if a and self._mark(a) == b"CC"]
+        if kind == _RANGES and inner:  # asammdf sorts the ranges and, of equal ones, what they lead to
+            ranges = list(struct.iter_unpack("<2d", self._data[block.data + 24 : block.data + 24 + 8 * numbers]))
+            if len(set(ranges)) < len(ranges):
+                raise BlockError("CC", at, "is damaged, it has a range twice")
         for index in range(4, len(block.links)):
             if not block.links[index]:
                 continue
@@ -509,6 +531,7 @@ class _Walk(Walk):
         return out
 
     def _list(self, place: int, at: int, out: _Records, *, is_last: bool) -> None:
+        seen: set[int] = set()  # one small block, listed again and again, would unpack to more than any disk holds
         while at:
             try:
                 block = self._once(self._block(at, b"DL", 1, 40))
@@ -530,6 +553,9 @@ class _Walk(Walk):
                 try:
                     if not link:
                         raise BlockError("DT", 0, f"has no address, number {index + 1} of the list at byte {at}")
+                    if link in seen:
+                        raise BlockError("data", link, "is linked twice")
+                    seen.add(link)
                     self._add(link, out, 1, is_end=is_last_block)
                     kept = 1  # also where only its beginning is there
                 except BlockError as broken:
@@ -559,13 +585,17 @@ class _Walk(Walk):
                 return
 
     def _column_list(self, at: int, out: _Records) -> None:
+        seen: set[int] = set()
         while at:
             block = self._once(self._block(at, b"LD", 1, 40))
             count = struct.unpack_from("<I", self._data, block.data + 4)[0]
             if count > len(block.links) - 1:
                 raise BlockError("LD", at, f"is damaged, it has {len(block.links)} links and {count} blocks")
             for link in block.links[1:]:
+                if link in seen:
+                    raise BlockError("data", link, "is linked twice")
                 if link:
+                    seen.add(link)
                     self._add(link, out, 1, is_end=False)
                     if out.broken is not None:
                         raise out.broken

@@ -297,6 +297,46 @@ def test_conversions_in_conversions_have_an_end(tmp_path):
     assert "its conversion cannot be read" in " ".join(faults.notes)
 
 
+def test_ranges_that_cannot_be_sorted_cost_their_channel(tmp_path):
+    b = Blocks()
+    b.header()
+    describe(b, "a", 200)
+    b.conversion("in", 1, numbers=(1.0, 2.0))
+    b.conversion("acc", 8, ["in", "in", "in"], [0.0, 9.0, 0.0, 9.0])
+    b.group("dg0", None, "acg", "data")
+    b.add("data", "DT", [], records(200))
+    found, faults = read_bytes(tmp_path, b.bytes())
+    assert list(found) == ["group0.y"]
+    assert "has a range twice" in " ".join(faults.notes)
+
+
+@pytest.mark.parametrize(
+    ("data_type", "bit", "bits"),
+    [(4, 0, 2**32 - 1), (4, 255, 64), (4, 0, 24), (4, 0, 0), (15, 0, 8), (0, 7, 64), (0, 255, 16), (2, 0, 0)],
+)
+def test_a_number_of_no_layout_costs_its_channel(tmp_path, data_type, bit, bits):
+    """asammdf gave up the whole file for it, or read 24 bits as they came."""
+    data = streamed()
+    at = find(data, b"CN", 1) + 24 + 64
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 2, "<BBII", data_type, bit, 8, bits))
+    assert list(found) == ["group0.y"]
+    assert found["group0.y"].tolist() == (np.arange(200) % 251).tolist()
+    assert f"group0.x is left out: it is damaged, values of type {data_type} with {bits} bits" in " ".join(faults.notes)
+    assert faults.lost_samples == 200
+
+
+def test_a_data_block_listed_again_and_again_is_read_once(tmp_path):
+    b = Blocks()
+    b.header()
+    describe(b, "a", 50 * 1000)
+    b.group("dg0", None, "acg", "dl")
+    b.listed("dl", ["dz"] * 1000, size=24 * 50)
+    b.deflated("dz", records(50))
+    found, faults = read_bytes(tmp_path, b.bytes())
+    assert len(found["group0.y"]) == 50
+    assert "is linked twice" in " ".join(faults.notes)
+
+
 @pytest.mark.parametrize("damage", ["no block", "behind the end", "size", "type"])
 def test_a_conversion_that_cannot_be_read_leaves_no_raw_numbers(tmp_path, damage):
     """asammdf gives the raw samples without a word."""
