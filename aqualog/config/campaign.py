@@ -98,10 +98,9 @@ def read_campaign(path: Path) -> CampaignFile:
         tables = []
     found: list[tuple[Run | None, RunFaults]] = []
     heads = [i for i, line in enumerate(text.splitlines(), 1) if re.match(r"\s*\[\[\s*[\"']?run[\"']?\s*\]\]", line)]
-    counted = [0]
     for index, one in enumerate(tables):
         place = f"{path.name}: line {heads[index]}" if len(heads) == len(tables) else path.name
-        sink = TomlRun(faults, index, place, counted)
+        sink = TomlRun(faults, index, place)
         found.append((_run(one, named, vehicle, sink), sink))
     check_twice(found)
     table = _beside(path.parent, document["runs"]) if isinstance(document.get("runs"), str) else None
@@ -110,8 +109,6 @@ def read_campaign(path: Path) -> CampaignFile:
             found = _from_table(table, named if table.parent == named.base else _NamedFiles(table.parent), vehicle)
         except ConfigError as error:
             faults.add("runs", error.line())
-    if counted[0] > TomlRun.most:
-        faults.add("", f"and {counted[0] - TomlRun.most} more in [[run]] tables")
     faults.raise_if_any()
     done = [(run, sink.place) for run, sink in found if run is not None]
     if not done:

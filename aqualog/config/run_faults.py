@@ -42,32 +42,21 @@ class RunFaults(Protocol):
 
 
 class TomlRun:
-    """Faults of the `index`-th `[[run]]` table; `counted` holds how many all tables have so far.
+    """Faults of the `index`-th `[[run]]` table."""
 
-    Only the first `most` of them are told: each is looked up in the whole text.
-    """
-
-    most = 100
-
-    def __init__(self, faults: TableFaults, index: int, place: str, counted: list[int]) -> None:
-        self._faults, self._index, self._counted = faults, index, counted
+    def __init__(self, faults: TableFaults, index: int, place: str) -> None:
+        self._faults, self._index = faults, index
         self.place = place
-
-    def _is_told(self) -> bool:
-        self._counted[0] += 1
-        return self._counted[0] <= self.most
 
     def add(self, key: str, message: str) -> None:
         """Note a fault at a key."""
-        if self._is_told():
-            with self._faults.inside("run", self._index):
-                self._faults.add(key, message)
+        with self._faults.inside("run", self._index):
+            self._faults.add(key, message)
 
     def unknown(self, key: str, known: Sequence[str]) -> None:
         """Note a key that does not exist."""
-        if self._is_told():
-            with self._faults.inside("run", self._index):
-                self._faults.unknown(key, known)
+        with self._faults.inside("run", self._index):
+            self._faults.unknown(key, known)
 
     def number(self, key: str, value: Any, of: RunKey) -> float | None:
         """A number within its bounds, or None with the fault noted."""
@@ -76,8 +65,6 @@ class TomlRun:
             return None
         if isinstance(value, int | float) and not isinstance(value, bool) and of.low <= value <= of.high:
             return float(value)
-        if not self._is_told():
-            return None
         with self._faults.inside("run", self._index):
             return self._faults.number({key: value}, key, low=of.low, high=of.high, unit=of.unit)
 

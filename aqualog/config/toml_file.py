@@ -16,6 +16,11 @@ from aqualog.io.small_file import read_small
 __all__ = ["Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]
 
 LARGEST = 16 * 2**20  # [byte]
+_DEEPEST = 100  # parts of a dotted key; tomllib takes time with their square
+_MOST_TOLD = 20  # faults of a file; each is looked for in the whole text
+_LONGEST_KEY = 60  # characters of an unknown key that are shown
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_DEEP = re.compile(rf"""(?:^|[\[{{,])[ \t]*+{_PART}(?:\.[ \t]*+{_PART}){{{_DEEPEST}}}""", re.MULTILINE)
 _HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
 
 
@@ -43,6 +48,8 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
         text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")  # as a file of text is read
     except UnicodeDecodeError as error:
         raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a TOML file") from error
+    if _DEEP.search(text):
+        raise ConfigError(f"{what} has a key of more than {_DEEPEST} parts", where=str(path), expected="a TOML file")
     try:
         document = tomllib.loads(text)
         if _has_endless_number(document):
@@ -81,23 +88,33 @@ def is_number(value: Any) -> bool:
 
 
 class Faults:
-    """Collects all faults of one file, then raises them in one message."""
+    """Collects the faults of one file, then raises them in one message; of very many the first are told."""
 
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
         self._text = text
         self._found: list[str] = []
+        self._untold = 0
 
     def add(self, key: str, message: str) -> None:
         """Note a fault at a key."""
-        line = line_of(self._text, key.rsplit(".", maxsplit=1)[-1])
+        if len(self._found) == _MOST_TOLD:
+            self._untold += 1
+            return
+        line = self._line(key)
         self._found.append(f"line {line}: {message}" if line else message)
+
+    def _line(self, key: str) -> int | None:
+        return line_of(self._text, key.rsplit(".", maxsplit=1)[-1])
 
     def unknown(self, key: str, known: Iterable[str]) -> None:
         """Note a key that does not exist, with the nearest one that does."""
-        names = sorted(known)
-        near = difflib.get_close_matches(key, names, n=1, cutoff=0.5)
-        self.add(key, f'unknown key "{key}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
+        if len(self._found) == _MOST_TOLD:
+            self._untold += 1
+            return
+        near = difflib.get_close_matches(key[:_LONGEST_KEY], sorted(known), n=1, cutoff=0.5)
+        shown = key if len(key) <= _LONGEST_KEY else f"{key[:_LONGEST_KEY]} ..."
+        self.add(key, f'unknown key "{shown}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
 
     def number(self, table: Mapping[str, Any], key: str, *, low: float, high: float, unit: str) -> float | None:
         """A number within its bounds, or None with the fault noted."""
@@ -111,9 +128,10 @@ class Faults:
         return float(value)
 
     def raise_if_any(self) -> None:
-        """Raise one ConfigError with all faults."""
+        """Raise one ConfigError with the faults."""
         if self._found:
-            raise ConfigError("; ".join(self._found), where=str(self._path))
+            more = [f"and {self._untold} more"] if self._untold else []
+            raise ConfigError("; ".join([*self._found, *more]), where=str(self._path))
 
 
 class TableFaults(Faults):
@@ -134,12 +152,8 @@ class TableFaults(Faults):
         finally:
             self._table, self._index = before
 
-    def add(self, key: str, message: str) -> None:
-        """Note a fault at a key of the table, or at a table."""
-        line = self._line(key)
-        self._found.append(f"line {line}: {message}" if line else message)
-
     def _line(self, key: str) -> int | None:
+        """Line of a key of the table, or of a table."""
         headers = [(i, m[1]) for i, line in enumerate(self._lines) if (m := _HEADER.match(line))]
         here = -1
         if self._table:

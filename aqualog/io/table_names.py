@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from aqualog.units import is_unit
 
@@ -35,19 +35,18 @@ def split_unit(header: str) -> tuple[str, str]:
 def unique_names(names: Sequence[str]) -> tuple[str, ...]:
     """The names, those that come again as `name#2`, `name#3`; a column without a name is `column_1`, counted from 1."""
     taken = set(names)
-    seen: set[str] = set()
+    numbers: dict[str, int] = {}
     result = []
     for position, name in enumerate(names, start=1):
-        wanted = name or f"column_{position}"
-        if wanted in seen:
-            wanted = _free(wanted, taken | seen)
-        seen.add(wanted)
+        own = name or f"column_{position}"
+        wanted = own
+        if own in numbers:  # counted on from the last one of that name: a header may repeat one thousands of times
+            number = numbers[own] + 1
+            while f"{own}#{number}" in taken:
+                number += 1
+            numbers[own] = number
+            wanted = f"{own}#{number}"
+            taken.add(wanted)
+        numbers.setdefault(wanted, 1)
         result.append(wanted)
     return tuple(result)
-
-
-def _free(name: str, taken: Iterable[str]) -> str:
-    number = 2
-    while f"{name}#{number}" in taken:
-        number += 1
-    return f"{name}#{number}"

@@ -641,6 +641,9 @@ def test_split_unit(header, name, unit):
 
 def test_unique_names():
     assert unique_names(["a", "a", "a#2", "", "a"]) == ("a", "a#3", "a#2", "column_4", "a#4")
+    many = unique_names(["a"] * 50_000)  # at once, not after a minute
+    assert many[-1] == "a#50000"
+    assert len(set(many)) == 50_000
 
 
 # the writer

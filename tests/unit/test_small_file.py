@@ -50,3 +50,29 @@ def test_what_is_no_such_file_is_told(make, told, tmp_path):
 def test_the_content_as_it_is(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbfa\r\n")
     assert read_small(tmp_path / "a.csv", what="", expected="", largest=2**20) == b"\xef\xbb\xbfa\r\n"
+
+
+@pytest.mark.parametrize("line", ["a = {{{}}}", "[{}]", "[[{}]]", "{} = 1"])
+@pytest.mark.parametrize("part", ["a", '"a.b"', "' '", "a-1 "])
+def test_a_key_of_very_many_parts_is_refused_at_once(tmp_path, line, part):
+    text = line.format(".".join([part] * 50_000) + ("= 1" if "{{" in line else ""))
+    (tmp_path / "car.toml").write_text(text)
+    with pytest.raises(ConfigError, match="more than 100 parts"):
+        load_vehicle(tmp_path / "car.toml")
+
+
+def test_of_very_many_faults_the_first_are_told(tmp_path):
+    (tmp_path / "car.toml").write_text("\n".join(f"k{i} = 1" for i in range(20_000)))
+    with pytest.raises(ConfigError) as error:
+        load_vehicle(tmp_path / "car.toml")
+    line = error.value.line()
+    assert "k19" in line
+    assert "k20" not in line
+    assert line.endswith("and 19980 more")
+
+
+def test_a_long_key_is_shown_in_part(tmp_path):
+    (tmp_path / "car.toml").write_text("k" * 100_000 + " = 1")
+    with pytest.raises(ConfigError) as error:
+        load_vehicle(tmp_path / "car.toml")
+    assert len(error.value.line()) < 300 + len(str(tmp_path))
