@@ -136,7 +136,9 @@ def find_channels(
             raise
         raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
     if not found:
-        raise _nothing_mapped(log.paths, len(log.channels()), notes)
+        count = len(log.channels())
+        # where there is none, whatever was left out is the reason
+        raise _nothing_mapped(log.paths, count, notes if notes or count else [n for f in log.faults for n in f.notes])
     return found
 
 

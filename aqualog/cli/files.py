@@ -123,14 +123,14 @@ def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Pat
         targets.add(real)
         if path.is_dir():
             raise ConfigError("is a folder", where=str(path), expected="a file to write")
-        if path.exists() and not force:
+        if os.path.lexists(path) and not force:  # also a link that leads nowhere
             raise ConfigError("exists already", where=str(path), hint="--force to overwrite, or another name")
         _check_folder(path)
 
 
 def _check_folder(path: Path) -> None:
     """The nearest folder above a result that exists: it must be one, and be writable."""
-    folder = next((p for p in path.absolute().parents if p.exists()), None)
+    folder = next((p for p in path.absolute().parents if os.path.lexists(p)), None)  # also a link that leads nowhere
     if folder is None or not folder.is_dir():
         raise ConfigError("cannot be made", where=str(path), expected=f"a folder, and {folder} is none")
     if not os.access(folder, os.W_OK | os.X_OK):

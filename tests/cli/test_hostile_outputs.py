@@ -148,3 +148,32 @@ def test_tables_hold_no_formulas():
     cells = re.split(r"[;\t\r\n]+", text.getvalue().replace('"', ""))
     assert not [c for c in cells if re.match(r"\s*[=+\-@＝]", c)]
     assert [safe_cell(c) for c in ("-1.5", "12", "a-b", "wet, 3 mm")] == ["-1.5", "12", "a-b", "wet, 3 mm"]
+
+
+def test_a_link_that_leads_nowhere_is_not_replaced_without_force(tmp_path):
+    table(tmp_path / "drive.csv", "v_x")
+    (tmp_path / "out.csv").symlink_to(tmp_path / "nowhere" / "x.csv")
+    result = CliRunner().invoke(app, ["convert", str(tmp_path / "drive.csv"), "-o", str(tmp_path / "out.csv")])
+    assert result.exit_code == 2
+    assert "out.csv: exists already" in result.stderr
+    assert (tmp_path / "out.csv").is_symlink()
+    (tmp_path / "out").symlink_to(tmp_path / "nowhere")
+    result = CliRunner().invoke(app, ["detect", str(tmp_path / "drive.csv"), "-o", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "expected a folder" in result.stderr
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_log_without_channels_says_what_was_left_out(tmp_path):
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("pkg/msg/A", "ros2msg", b"float64[1000000000] a\nfloat64 v_x\n")
+        topic = writer.register_channel("/t", "cdr", schema)
+        for i in range(20):
+            writer.add_message(topic, i * 10**7, b"\0\1\0\0" + bytes(64), i * 10**7)
+        writer.finish()
+    result = CliRunner().invoke(app, ["detect", str(tmp_path / "a.mcap"), "--vehicle", str(CAR)])
+    assert result.exit_code == 4
+    assert "holds no channel (" in result.stderr
+    assert "1000000000 elements" in result.stderr
