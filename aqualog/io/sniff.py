@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from aqualog.errors import LogError
@@ -22,7 +23,7 @@ def sniff(path: Path, *, any_text: bool = False) -> str:
         If there is no such file, it is empty, or its content is none of these.
     """
     if path.is_dir():
-        if any(path.glob("*.db3")) or any(path.glob("*.mcap")) or (path / "metadata.yaml").exists():
+        if (path / "metadata.yaml").exists() or _is_recording(path):
             return "ros"
         raise LogError("is a folder without a ROS 2 bag", where=str(path), expected="a log file", hint="name the files")
     if path.exists() and not path.is_file():
@@ -54,6 +55,26 @@ def sniff(path: Path, *, any_text: bool = False) -> str:
         expected="MDF 3/4, MCAP, ROS 1 bag, ROS 2 bag, Parquet or CSV",
     )
 
+
+def _is_recording(folder: Path) -> bool:
+    """Whether a folder without metadata holds one ROS 2 recording and no other log: one file, or parts counted from 0,
+    as ROS names them. A folder of drives, each in a file of its own, would otherwise be read as one.
+    """
+    logs = [p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES]
+    if len(logs) == 1:
+        return logs[0].suffix.lower() in (".db3", ".mcap")
+    parts = [_PART.fullmatch(p.name) for p in logs]
+    found = [(m[1], m[3], int(m[2])) for m in parts if m]
+    return (
+        bool(found)
+        and len(found) == len(logs)
+        and len({(stem, suffix) for stem, suffix, _ in found}) == 1
+        and sorted(n for _, _, n in found) == list(range(len(found)))
+    )
+
+
+_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
+_PART = re.compile(r"(.*)_(\d{1,6})\.(db3|mcap)", re.DOTALL)
 
 _MAGIC = (
     (b"MDF     ", "mdf"),

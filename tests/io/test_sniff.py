@@ -1,0 +1,33 @@
+"""Which folders are one recording."""
+
+import pytest
+
+from aqualog.cli.files import expand
+from aqualog.errors import LogError
+from aqualog.io.sniff import sniff
+
+ONE = (["a_0.mcap", "a_1.mcap"], ["a.db3"], ["a.mcap"], ["a_0.db3", "notes.txt"], ["metadata.yaml"])
+SEVERAL = (
+    ["a.mcap", "b.mcap"], ["run_1.mcap", "run_2.mcap"], ["a_0.mcap", "b_1.mcap"], ["a_0.mcap", "a_0.db3"],
+    ["a_0.mcap", "gps.csv"], ["a.db3", "a.mf4"], ["a_0.mcap", "a_2.mcap"], [],
+)  # fmt: skip
+
+
+def fill(folder, names):
+    for name in names:
+        (folder / name).write_bytes(b"\x89MCAP0\r\n")
+
+
+@pytest.mark.parametrize("names", ONE)
+def test_a_recording_in_parts_is_one(names, tmp_path):
+    fill(tmp_path, names)
+    assert sniff(tmp_path) == "ros"
+
+
+@pytest.mark.parametrize("names", SEVERAL)
+def test_a_folder_of_drives_is_none(names, tmp_path):
+    fill(tmp_path, names)
+    with pytest.raises(LogError, match="folder without a ROS 2 bag"):
+        sniff(tmp_path)
+    if names:
+        assert [p.name for p in expand([str(tmp_path)])] == sorted(names)
