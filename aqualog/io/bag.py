@@ -48,6 +48,7 @@ class BagSource:
         self.path = path
         self.truncated = False
         self.unassigned = 0
+        self.unfinalised = False
         self._notes: list[str] = []
         self._damaged: dict[int, str] = {}
         self._lost: dict[int, int] = {}

@@ -42,6 +42,7 @@ class Db3Source:
         self.path = path
         self.truncated = False
         self.unassigned = 0
+        self.unfinalised = False
         self._release = release
         self._notes: list[str] = []
         self._counts: dict[int, int] = {}

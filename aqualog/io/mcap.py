@@ -71,6 +71,7 @@ class McapSource:
         self._indexed = False
         self._unproven = False  # something without a checksum of its own has been read
         self.unassigned = 0
+        self.unfinalised = False
         self._allowance = Allowance()
         _check_magic(path)
         self._size = path.stat().st_size
@@ -79,6 +80,9 @@ class McapSource:
         """All connections with messages that can be decoded, in the order of their ids."""
         with self.path.open("rb") as file:
             summary = _sound_summary(file, self._size)
+            if not _is_ended(file, self._size):
+                self.unfinalised = True
+                self._notes.append("file was not finalised by the recorder: it has no index; read from its beginning")
             samples = self._scan(file) if summary is None else self._sample(file, summary)
         return [s for i in sorted(self._channels) if (s := self._stream(i, samples.get(i, []))) is not None]
 
@@ -296,6 +300,11 @@ def _unpacked(body: bytes, allowance: Allowance) -> tuple[bytes, bool]:
     if crc and zlib.crc32(data) != crc:
         raise DamagedError("its checksum is wrong")
     return data, crc != 0
+
+
+def _is_ended(file: BinaryIO, size: int) -> bool:
+    file.seek(max(size - len(MAGIC), 0))
+    return file.read() == MAGIC
 
 
 def _sound_summary(file: BinaryIO, size: int) -> Summary | None:

@@ -136,11 +136,13 @@ class Stream:
 class Source(Protocol):
     """One file of recorded messages.
 
-    `truncated`: something is lost, and how much is not known; `unassigned`: lost messages of no known topic.
+    `truncated`: something is lost, and how much is not known; `unassigned`: lost messages of no known topic;
+    `unfinalised`: the recorder has not written the index that ends a file.
     """
 
     truncated: bool
     unassigned: int
+    unfinalised: bool
 
     def streams(self) -> Sequence[Stream]:
         """All connections with messages that can be decoded, in file order."""
@@ -808,7 +810,8 @@ class MessageReader:
         truncated = self._log.truncated or any(source.truncated for source in self._sources)
         unassigned = sum(source.unassigned for source in self._sources)
         lost = self._log.lost_samples + sum(self._lost.values()) + unassigned
-        return FaultLog(truncated, lost, notes, drifts=self._log.drifts).freeze()
+        unfinalised = any(source.unfinalised for source in self._sources)
+        return FaultLog(truncated, lost, notes, unfinalised, self._log.drifts).freeze()
 
     def close(self) -> None:
         """Release the file. Sources open theirs only while they read."""

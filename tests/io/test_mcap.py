@@ -593,3 +593,16 @@ def test_negative_time_is_refused(tmp_path):
     with pytest.raises(LogError, match="before 0"):
         write_mcap(tmp_path / "out.mcap", [topic], None)
     assert not (tmp_path / "out.mcap").exists()
+
+
+def test_a_recording_without_its_end_is_told_and_read(tmp_path):
+    path = write_json(tmp_path / "a.mcap", numbered(100))
+    data = path.read_bytes()
+    assert not read_all(path)[1].faults.unfinalised
+    end = data.rindex(bytes([Opcode.DATA_END]) + struct.pack("<Q", 4)) + 13  # all messages, and nothing behind them
+    path.write_bytes(data[:end])
+    channels, reader = read_all(path)
+    assert channels["/car.v"].values.tolist() == list(range(100))
+    assert reader.faults.unfinalised
+    assert any("was not finalised" in n for n in reader.faults.notes)
+    assert reader.faults.lost_samples == 0
