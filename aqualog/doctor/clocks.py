@@ -17,6 +17,7 @@ from aqualog.vehicle import Vehicle
 __all__ = ["clock_findings", "speed_of"]
 
 _LEAST_SHIFT_S = 0.01  # a sample time of 100 Hz
+_SENSOR_S = 0.3  # by which a speed of GNSS comes late without a fault of its clock
 _MAX_OFFSET_S = 10.0
 
 
@@ -30,7 +31,7 @@ def speed_of(channels: Sequence[Channel], *, signal_map: SignalMap, vehicle: Veh
 
 
 def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
-    """A finding for each file whose clock runs at another rate than the first one's.
+    """Findings for each file whose clock runs at another rate than the first one's, or stands apart from it.
 
     Where the match of the speeds is weak or their common time short nothing is told of the clocks.
     """
@@ -52,5 +53,16 @@ def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
                 f"its clock drifts by {fit.drift_ppm:+.0f} ppm (95 % {low:+.0f} to {high:+.0f}) against "
                 f"{reference.file}, {shift:+.3f} s over {fit.overlap_s:.0f} s, by the speed in both"
             )
-            advice = f"aqualog align {reference.file} {source.file} --write-map"
-            yield Finding("doubt", "drifts", source.file, source.label, what, advice, 1)
+            yield Finding("doubt", "drifts", source.file, source.label, what, _advice(reference, source), 1)
+        low, high = fit.offset_ci95
+        if not apart and low * high > 0.0 and min(abs(low), abs(high)) > _SENSOR_S:
+            side = "after" if fit.offset_s > 0.0 else "before"
+            what = (
+                f"what it tells comes {abs(fit.offset_s):.2f} s {side} the same in {reference.file} "
+                f"(95 % {low:+.2f} to {high:+.2f} s), by the speed in both"
+            )
+            yield Finding("doubt", "offset", source.file, source.label, what, _advice(reference, source), 1)
+
+
+def _advice(reference: Carrier, source: Carrier) -> str:
+    return f"aqualog align {reference.file} {source.file} --write-map"

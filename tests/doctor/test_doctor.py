@@ -109,6 +109,24 @@ def test_two_files_whose_clocks_run_apart(tmp_path, ppm, is_told):
         assert not [f for f in again.findings if f.kind == "drifts"]
 
 
+@pytest.mark.parametrize(("late_s", "is_told"), [(0.2, False), (0.7, True), (-0.7, True)])
+def test_two_files_whose_clocks_stand_apart(tmp_path, late_s, is_told):
+    rng = np.random.default_rng(4)
+    t = np.arange(4000) * 0.05
+    v = 20.0 + np.convolve(rng.normal(0.0, 1.0, t.size + 200), np.hanning(201) / 12.0, mode="valid")
+    noise = rng.normal(0.0, 0.01, (2, t.size))
+    other = np.column_stack([t + 5.0 + late_s, v + noise[1]])
+    (tmp_path / "gps.csv").write_text(table(other[20:], header="t [s],v_x [m/s]"))
+    (tmp_path / "wheels.csv").write_text(
+        table(np.column_stack([t + 5.0, *[(v + noise[0]) / 0.317] * 2]), header=WHEELS)
+    )
+    found = examine([tmp_path / "wheels.csv", tmp_path / "gps.csv"], vehicle=CAR, signal_map=SignalMap())
+    told = [f for f in found.findings if f.kind == "offset"]
+    assert len(told) == is_told
+    if is_told:
+        assert f"comes 0.70 s {'after' if late_s > 0 else 'before'} the same in wheels.csv" in told[0].what
+
+
 def test_a_file_that_was_not_finalised_is_told_once(tmp_path):
     data = bytearray((SAMPLES / "lane_drive.mf4").read_bytes())
     data[:8] = b"UnFinMF "
