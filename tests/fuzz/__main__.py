@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from tests.fuzz.corpus import Case, case_of
 from tests.fuzz.registry import Target, all_targets
-from tests.fuzz.turn import judged, limited
+from tests.fuzz.turn import judged, limited_meanwhile
 from tests.fuzz.watch import watched
 from tests.fuzz.work import warmed
 
@@ -71,9 +71,9 @@ def _again(target: Target, case: Case, *, debug: bool) -> int:
         known = target.known if case.seed else None
         _ = target.one(data) if known is None else known(case.seed, case.damages, data)
         return 0
-    limited()
-    warmed(target)
-    verdict = judged(target, case)
+    with limited_meanwhile():
+        warmed(target)
+        verdict = judged(target, case)
     print(verdict or "right")
     return int(verdict is not None)
 

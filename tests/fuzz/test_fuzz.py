@@ -268,10 +268,13 @@ def test_a_turn_of_the_command(capsys):
 
 
 def test_one_case_again(capsys):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_DATA)
     assert command.main(["labels", "--case", json.dumps(["all", [["cut", 3]]])]) == 0
     assert capsys.readouterr().out == "right\n"
     with pytest.raises(SystemExit):
         command.main(["labels", "--case", "nonsense"])
+    assert resource.getrlimit(resource.RLIMIT_DATA) == before  # a browser that another test starts would inherit it
 
 
 @pytest.mark.long

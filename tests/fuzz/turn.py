@@ -2,6 +2,8 @@
 
 import signal
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -25,6 +27,20 @@ def limited() -> None:
 
     resource.setrlimit(resource.RLIMIT_DATA, (MOST, resource.getrlimit(resource.RLIMIT_DATA)[1]))
     signal.signal(signal.SIGPROF, _stop)
+
+
+@contextmanager
+def limited_meanwhile() -> Iterator[None]:
+    """The same in a process that goes on with other work, and whose children must not inherit it."""
+    import resource
+
+    had, handler = resource.getrlimit(resource.RLIMIT_DATA), signal.getsignal(signal.SIGPROF)
+    limited()
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, had)
+        signal.signal(signal.SIGPROF, handler)
 
 
 def peak() -> float:
