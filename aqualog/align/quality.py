@@ -49,10 +49,10 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
         + c.origin.faults.duplicates + c.origin.faults.strays
         for c in cleaned
     )  # fmt: skip
-    doubled = max((c.origin.faults.duplicates for c in cleaned), default=0)
-    # a doubled stamp here and there is a logger's habit; many are samples lost to a wrong clock
-    is_lossy = any(c.origin.faults.duplicates > 0.01 * c.origin.samples for c in cleaned)
-    lost = sum(f.lost_samples for f in file_faults) + (doubled if is_lossy else 0)
+    left_out = [(c.origin.faults.duplicates + c.origin.faults.strays, c.origin.samples) for c in cleaned]
+    # a doubled or stray stamp here and there is a logger's habit; many are samples lost to a wrong clock
+    is_lossy = any(n > 0.01 * samples for n, samples in left_out)
+    lost = sum(f.lost_samples for f in file_faults) + (max(n for n, _ in left_out) if is_lossy else 0)
     notes = [*(_time_note(file, faults) for file, faults in by_file.items() if faults != TimeFaults()), *notes]
     return Quality(
         dropped_samples=own + lost,
