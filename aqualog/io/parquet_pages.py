@@ -167,7 +167,7 @@ def page_fault(path: Path, index: Index, group: Group, columns: Iterable[str]) -
                 return f'it has no column "{name}"'
             try:
                 _check_chunk(handle, index, group, chunk)
-            except (MalformedError, AttributeError, KeyError, TypeError) as error:
+            except (MalformedError, AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
                 reason = str(error) if isinstance(error, MalformedError) else "a page's header lacks what it must have"
                 return f'column "{name}": {reason}'
         return ""
