@@ -25,7 +25,7 @@ from aqualog.io.bag_records import (
     kind_of,
     number,
 )
-from aqualog.io.batches import Batch, Message, batched, damage_notes
+from aqualog.io.batches import Batch, Message, batched, damage_notes, gap_note
 from aqualog.io.messages import SAMPLES, Stream, UndecodableError, codec_for, make_stream
 from aqualog.io.unpack import Allowance, DamagedError, unpack
 
@@ -196,14 +196,7 @@ class BagSource:
     def _note_gap(self, start: int, end: int) -> None:
         # with counts of all messages what a gap costs is known
         self.truncated |= not self._indexed
-        if end < self._size:
-            what = f"no sound record from byte {start} to {end}: damaged there; what stands before and behind is read"
-        else:
-            what = (
-                f"no sound record from byte {start} of {self._size} on: cut off, damaged there or never closed; "
-                "what stands before is read"
-            )
-        self._notes.append(f"{self.path.name}: {what}")
+        self._notes.append(gap_note(self.path.name, start, end, self._size))
 
     def _chunk(self, offset: int, head: Head, data: bytes) -> list[Message]:
         """Messages of one chunk; none if it is damaged."""

@@ -9,7 +9,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Batch", "Message", "batched", "damage_notes", "rows_of"]
+__all__ = ["Batch", "Message", "batched", "damage_notes", "gap_note", "rows_of"]
 
 Message = tuple[int, int, bytes]
 """Stream id, log time [ns] and bytes."""
@@ -97,3 +97,13 @@ def damage_notes(name: str, damaged: Mapping[int, str]) -> list[str]:
     offset, reason = min(damaged.items())
     many = f"{len(damaged)} damaged chunk{'s are' if len(damaged) > 1 else ' is'} left out"
     return [f"{name}: {many} (first at byte {offset}: {reason})"]
+
+
+def gap_note(name: str, start: int, end: int, size: int) -> str:
+    """What a stretch of bytes without a sound record means for what is read."""
+    if end < size:
+        return (
+            f"{name}: no sound record from byte {start} to {end}: damaged there; what stands before and behind is read"
+        )
+    what = f"no sound record from byte {start} of {size} on: cut off, damaged there or never closed"
+    return f"{name}: {what}; what stands before is read"

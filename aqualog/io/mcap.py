@@ -26,7 +26,7 @@ from mcap.summary import Summary
 
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
-from aqualog.io.batches import Batch, Message, batched, damage_notes
+from aqualog.io.batches import Batch, Message, batched, damage_notes, gap_note
 from aqualog.io.mcap_records import HEAD, MAGIC, Records
 from aqualog.io.mcap_scan import scanned
 from aqualog.io.messages import SAMPLES, MessageReader, Stream, UndecodableError, codec_for, make_stream
@@ -189,14 +189,7 @@ class McapSource:
     def _note_gap(self, start: int, end: int) -> None:
         # with counts of all messages what a gap costs is known
         self.truncated |= not self._indexed
-        if end < self._size:
-            what = f"no sound record from byte {start} to {end}: damaged there; what stands before and behind is read"
-        else:
-            what = (
-                f"no sound record from byte {start} of {self._size} on: cut off, damaged there or never closed; "
-                "what stands before is read"
-            )
-        self._notes.append(f"{self.path.name}: {what}")
+        self._notes.append(gap_note(self.path.name, start, end, self._size))
 
     def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> Sequence[Batch | Message]:
         """Messages of one chunk; none if it is damaged, for then no byte of it can be trusted."""
