@@ -11,7 +11,7 @@ from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.config.toml_file import Faults, is_number, load_toml
 from aqualog.io.csv_format import CsvFormat, format_fault
 from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.units import is_unit
+from aqualog.units import is_unit, parse_unit
 
 __all__ = ["load_signal_map", "map_text"]
 
@@ -51,8 +51,8 @@ def load_signal_map(path: Path) -> SignalMap:
     if channel is not None and not isinstance(channel, str):
         faults.add("channel", f"[time] channel = {str(channel)[:40]} is not a name")
     unit = time.get("unit")
-    if unit is not None and not is_unit(str(unit)):
-        faults.add("unit", f'[time] unit = "{unit}" is not known; use s, ms, us or ns')
+    if unit is not None and not (isinstance(unit, str) and is_unit(unit) and parse_unit(unit).dimension == "time"):
+        faults.add("unit", f"[time] unit = {str(unit)[:40]!r} is no unit of time; use s, ms, us or ns")
     csv = _csv(_table(document, "csv", faults), faults)
     faults.raise_if_any()
     return SignalMap(entries, clocks, channel, unit, str(path), csv)

@@ -48,6 +48,10 @@ def survey3(data: Any, path: Path) -> Survey:
 
 
 class _Walk(Walk):
+    def __init__(self, data: Any, path: Path) -> None:
+        super().__init__(data, path)
+        self._declared: list[tuple[int, int, int, list[_Group]]] = []
+
     def run(self) -> Survey:
         try:
             self._block(_HD, b"HD")
@@ -55,6 +59,8 @@ class _Walk(Walk):
             raise self._found.hopeless(self._path, broken) from broken
         self._texts(_HD, (8, 12), "the file's comment")
         self._groups()
+        for owner, records, id_size, groups in self._declared:
+            self._measured(owner, records, id_size, groups)
         return self._found
 
     def _block(self, at: int, kind: bytes) -> int:
@@ -138,7 +144,7 @@ class _Walk(Walk):
             self._texts(at, (12,), "a group's comment")
             self._channels(at)
             at = self._link(at + 4)
-        self._measured(owner, records, id_size, groups)
+        self._declared.append((owner, records, id_size, groups))
 
     def _cut_group(self, records: int, broken: BlockError) -> _Group:
         """A group whose own block the file ends in, where the size of its records is left.
@@ -167,13 +173,22 @@ class _Walk(Walk):
 
     def _measured(self, owner: int, records: int, id_size: int, groups: list[_Group]) -> None:
         declared = sum(g.cycles * (g.record + id_size) for g in groups)
-        there = max(self._size - records, 0) if records else 0
+        begins = self._begins | {r for _, r, _, _ in self._declared}
+        end = min((b for b in begins if b > records), default=self._size)
+        there = max(end - records, 0) if records else 0
         self._found.inflated |= {g.at: min(declared, there) for g in groups}
         if id_size:
             self._found.unsorted += min(declared, there)
         if declared > there:
-            why = f"begin there and take {declared} bytes, the file ends at byte {self._size}"
+            next_one = "the file ends" if end == self._size else "another block begins"
+            why = f"begin there and take {declared} bytes, {next_one} at byte {end}"
             self._found.lost(f"a part of the records of the group at byte {owner}", BlockError("data", records, why))
+        if declared > there and end < self._size and not id_size and len(groups) == 1 and groups[0].record:
+            # what is read beyond would be the next block, taken for numbers
+            fits = there // groups[0].record
+            self._found.patch(groups[0].at + 22, "<I", fits)
+            self._found.lost_samples += groups[0].cycles - fits
+            return
         for group in groups:
             if group.cycles and group.record + id_size > there:
                 self._found.patch(group.at + 22, "<I", 0)

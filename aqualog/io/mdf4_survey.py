@@ -37,6 +37,7 @@ _CN_FORMS = {160: 8, 168: 9}
 _PLAIN = (b"DT", b"DV", b"SD", b"DI", b"RD", b"RV", b"RI")
 _CG_VLSD, _CG_REMOTE_MASTER = 0x1, 0x8
 _CN_INVALIDATION = 0x3
+_CN_SOME_INVALID = 0x2
 _VIRTUAL = (3, 6)  # types of channels without bytes in the record
 _RANGES = 8  # type of a conversion
 _INTEGERS, _REALS, _COMPLEX = (0, 1, 2, 3), (4, 5), (15, 16)  # types of values
@@ -109,6 +110,7 @@ class _Walk(Walk):
         self._unfinished = 0
         self._records: dict[int, _Records] = {}  # of groups that were gone through before the others
         self._extent, self._has_invalidation = 0, False  # what the channels of a group take of a record
+        self._invalidation_bits = 0  # that records of the group have
 
     def run(self) -> Survey:
         self._identification()
@@ -278,6 +280,7 @@ class _Walk(Walk):
             self._described(block, 2, "a group's name")
             self._described(block, 5, "a group's comment")
             self._source(block, 3)
+            self._invalidation_bits = 8 * invalidation
             self._channels(block, 1, 0)
             if block.links[0] and not id_size:
                 other = BlockError("CG", block.links[0], "is a second kind of records, which have no ids")
@@ -358,6 +361,8 @@ class _Walk(Walk):
             self._extent = max(self._extent, begin + (bit + bits + 7) // 8)
             self._layout(block, bit, bits)
         self._has_invalidation |= bool(flags & _CN_INVALIDATION)
+        if flags & _CN_SOME_INVALID:
+            self._invalidation(block, flags)
         if self._described(block, 2, f"the name of the channel at byte {block.at}") is not None:
             self._found.refused[block.at] = "its name is lost"
         if self._described(block, 6, f"the unit of the channel at byte {block.at}") is not None:
@@ -373,6 +378,19 @@ class _Walk(Walk):
             self._signal_data(block)
         if part:
             self._composition(block, 1, block.at, depth)
+
+    def _invalidation(self, block: _Block, flags: int) -> None:
+        """Look for the bit that tells invalid samples: where no record has it, what lies in memory would tell."""
+        bit = struct.unpack_from("<I", self._data, block.data + 16)[0]
+        if bit < self._invalidation_bits:
+            return
+        self._found.patch(block.data + 12, "<I", flags & ~_CN_SOME_INVALID)
+        if self._invalidation_bits:
+            what = f"it is damaged, its invalidation bit {bit} is none of the {self._invalidation_bits} of its records"
+            self._found.refused[block.at] = what
+        else:
+            what = "declares an invalidation bit, and its records have none; its samples are taken for valid"
+            self._found.remark(f"the channel at byte {block.at} {what}")
 
     def _layout(self, block: _Block, bit: int, bits: int) -> None:
         """Refuse numbers that no number is laid out as: asammdf would give up the file, or take others for them."""

@@ -84,6 +84,7 @@ class ParquetReader:
         self._path = path
         self._faults = FaultLog()
         self._stamps: Stamps | None = None
+        self._unit: str | None = None
         schema, metadata = self._wrapped(lambda: _head(path))
         self._rows: int = self._wrapped(
             lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
@@ -118,9 +119,10 @@ class ParquetReader:
         if not stored:
             return []
         self._check_memory(len(stored))
+        unit = self._time_unit()
         frame = self._sound.collect(stored, 0, self._rows)
         if self._stamps is None:
-            self._stamps = self._read_time(frame)
+            self._stamps = self._read_time(frame, unit)
             drift = DriftWatch()
             self._compare_clocks(drift, self._stamps, frame)
             self._tell_drift(drift)
@@ -141,7 +143,7 @@ class ParquetReader:
         times = [k for k in (self._time.index, self._time.day, self._time.other) if k is not None]
         stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
         rows = max(1, _PIECE // len(stored))
-        unit = self._unit_of_ends()
+        unit = self._time_unit()
         absolute: bool | None = None
         lost, drift = _Lost(), DriftWatch()
         for at in range(0, self._rows, rows):
@@ -169,16 +171,20 @@ class ParquetReader:
                 hint="give fewer channels in a signal map, or a machine with more memory",
             )  # fmt: skip
 
-    def _unit_of_ends(self) -> str:
-        """Unit of the time; where none is given, by the first rows and the last one: how long a log is tells it."""
+    def _time_unit(self) -> str:
+        """Unit of the time; where none is given, by the first rows and the last one: how long a log is tells it.
+
+        Looked at before any other column, so that a log has the same unit whichever of its channels are read, and how.
+        """
         column, unit = self._columns[self._time.index], self._time.unit
         if unit or not column.dtype.is_numeric():
             return unit
-        spans = ((0, _JUDGED), (max(self._rows - 1, 0), 1))
-        ends = [self._sound.collect([column.stored], at, n) for at, n in spans]
-        unit, reason = judged_unit(np.concatenate([_floats(frame[column.stored]) for frame in ends]))
-        self._note(no_unit_note(unit, reason))
-        return unit
+        if self._unit is None:
+            spans = ((0, _JUDGED), (max(self._rows - 1, 0), 1))
+            ends = [self._sound.collect([column.stored], at, n) for at, n in spans]
+            self._unit, reason = judged_unit(np.concatenate([_floats(frame[column.stored]) for frame in ends]))
+            self._note(no_unit_note(self._unit, reason))
+        return self._unit
 
     def _channel(self, info: ChannelInfo, column: pl.Series, stamps: Stamps) -> Channel:
         keep = stamps.valid & column.is_not_null().to_numpy()
@@ -186,8 +192,8 @@ class ParquetReader:
         values[~np.isfinite(values)] = np.nan
         return Channel(info, stamps.t_ns[keep], values, stamps.absolute)
 
-    def _read_time(self, frame: pl.DataFrame) -> Stamps:
-        stamps = self._stamps_of(frame, self._time.unit)
+    def _read_time(self, frame: pl.DataFrame, unit: str) -> Stamps:
+        stamps = self._stamps_of(frame, unit)
         lost = _Lost()
         lost.add(stamps, partial(self._sound.row_of, 0))
         self._tell_lost(lost)

@@ -60,8 +60,8 @@ class SoundRows:
         self._bad: dict[int, str] = {}
         self._checked: set[tuple[int, str]] = set()
         self._gone_through: set[tuple[int, frozenset[str]]] = set()
-        self._strange: dict[str, tuple[int, int]] = {}
         self._left_out: dict[str, NDArray[np.int64]] = {}
+        self._counted: dict[str, NDArray[np.int64]] = {}
         self._told: set[int] = set()
 
     @property
@@ -106,18 +106,33 @@ class SoundRows:
         return self._rows
 
     def tell(self) -> None:
-        """Tell and count what was lost; a row counts once, however many columns it has."""
+        """Tell and count what was lost; a row counts once, however many columns it has.
+
+        Values of a row group that is left out as a whole are none of their own: which of its columns is looked at first
+        makes no difference.
+        """
         for k, reason in sorted(self._bad.items()):
+            if k in self._told:
+                continue
             group = self._groups[k]
-            self._faults.lost_samples += 0 if k in self._told else group.rows
             self._told.add(k)
+            before = [np.count_nonzero(self._is_in(group, rows)) for rows in self._counted.values()]
+            self._faults.lost_samples += max(0, group.rows - int(sum(before)))
             span = f"rows {group.first + 1} to {group.first + group.rows}"
             self._note(f"row group {k + 1} of {len(self._groups)} ({span}) is left out: {reason}")
-        for column, (count, first) in self._strange.items():
-            self._faults.lost_samples += count
-            what = f"{count} value{'s' if count > 1 else ''} (first at row {first + 1}) beyond the least and greatest"
-            self._note(f'column "{column}": {what} that the index tells of; left out')
-        self._strange = {}
+        for column, rows in self._left_out.items():
+            new = np.setdiff1d(rows, self._counted.get(column, np.zeros(0, dtype=np.int64)))
+            for k in self._bad:
+                new = new[~self._is_in(self._groups[k], new)]
+            if new.size:
+                self._counted[column] = np.union1d(self._counted.get(column, new), new)
+                self._faults.lost_samples += new.size
+                what = f"{new.size} value{'s' if new.size > 1 else ''} (first at row {new[0] + 1}) beyond the least and"
+                self._note(f'column "{column}": {what} greatest that the index tells of; left out')
+
+    @staticmethod
+    def _is_in(group: Group, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return (rows >= group.first) & (rows < group.first + group.rows)
 
     def _check(self, groups: Sequence[int], columns: Sequence[str]) -> None:
         if self._index is None:
@@ -201,12 +216,7 @@ class SoundRows:
 
     def _count(self, column: str, rows: NDArray[np.int64]) -> None:
         """Values that are left out, each once: the ends of a time are looked at before it is read."""
-        known = self._left_out.get(column, np.zeros(0, dtype=np.int64))
-        new = np.setdiff1d(rows, known)
-        self._left_out[column] = np.union1d(known, rows)
-        if new.size:
-            count, first = self._strange.get(column, (0, int(new[0])))
-            self._strange[column] = count + new.size, min(first, int(new[0]))
+        self._left_out[column] = np.union1d(self._left_out.get(column, rows), rows)
 
     def _note(self, text: str) -> None:
         self._faults.notes.append(f"{self._path.name}: {text}")

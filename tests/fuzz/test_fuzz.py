@@ -13,7 +13,7 @@ from aqualog.errors import ConfigError, LogError
 from aqualog.types import FileFaults
 from tests.fuzz import __main__ as command
 from tests.fuzz import readers, settings_files, targets_campaign, targets_config, targets_simulation, turn, watch
-from tests.fuzz.corpus import HERE, Case, case_of, cases
+from tests.fuzz.corpus import Case, case_of, cases
 from tests.fuzz.damage import TOKEN, damaged, drawn
 from tests.fuzz.registry import MEGABYTES, SECONDS, Target, all_targets
 from tests.fuzz.targets_csv import seeds as csv_seeds
@@ -287,16 +287,3 @@ def test_much_damage_drawn_by_chance(name, capsys):
 def test_guided_by_coverage(capsys):
     pytest.importorskip("atheris")
     assert command.main(["mcap", "--seconds", "20", "--guided"]) == 0, capsys.readouterr()
-
-
-OPEN = [(p.stem, line) for p in sorted((HERE / "open").glob("*.txt")) for line in p.read_text().splitlines()]
-
-
-@pytest.mark.xfail(
-    strict=True,
-    raises=AssertionError,
-    reason="known, not mended: damaged Parquet files that differ in one and in pieces",
-)
-@pytest.mark.parametrize(("name", "line"), OPEN, ids=[f"{n} {k}" for k, (n, _) in enumerate(OPEN)])
-def test_what_is_known_and_open(name, line):
-    assert judged(name, case_of(line)) is None

@@ -185,6 +185,18 @@ def test_a_cut_through_the_records_of_mdf_3(tmp_path, cut):
         assert r.faults.lost_samples == 200 - left
 
 
+@pytest.mark.parametrize("declared", [201, 300, 2**28])
+def test_records_of_mdf_3_end_where_the_next_block_begins(tmp_path, declared):
+    """Blocks behind them would be read as numbers."""
+    data = saved(tmp_path / "w", 2, "3.30")
+    group = struct.unpack_from("<I", data, struct.unpack_from("<I", data, 68)[0] + 8)[0]
+    found, faults = read_bytes(tmp_path, numbers_at(data, group + 22, "<I", declared))
+    for k in range(2):
+        np.testing.assert_array_equal(found[f"group{k}.x{k}"], X + k)
+    assert faults.lost_samples == declared - 200
+    assert "another block begins at byte" in faults.notes[0]
+
+
 @pytest.mark.parametrize("version", ["4.10", "3.30"])
 @pytest.mark.parametrize(("groups", "cut", "left"), [(1, 3, 1), (2, 3, 2), (3, 150, 2), (3, 700, 1)])
 def test_a_cut_where_descriptions_come_last(tmp_path, version, groups, cut, left):
@@ -323,6 +335,29 @@ def test_a_number_of_no_layout_costs_its_channel(tmp_path, data_type, bit, bits)
     assert found["group0.y"].tolist() == (np.arange(200) % 251).tolist()
     assert f"group0.x is left out: it is damaged, values of type {data_type} with {bits} bits" in " ".join(faults.notes)
     assert faults.lost_samples == 200
+
+
+@pytest.mark.parametrize(("bit", "kept"), [(0, True), (3, True), (8, False), (2**29, False)])
+def test_an_invalidation_bit_outside_of_the_record_costs_its_channel(tmp_path, bit, kept):
+    """asammdf takes it from whatever lies in memory: other samples are missing with each reading."""
+    mdf = asammdf.MDF(version="4.10")
+    mdf.append([asammdf.Signal(X, K * 0.01, name="x", invalidation_bits=K % 9 == 0)], common_timebase=True)
+    mdf.save(tmp_path / "b.mf4", overwrite=True)
+    mdf.close()
+    data = (tmp_path / "b.mf4").read_bytes()
+    at = next(a for k in range(2) if data[(a := find(data, b"CN", k)) + 24 + 64 + 12] & 2)
+    found, faults = read_bytes(tmp_path, numbers_at(data, at + 24 + 64 + 16, "<I", bit))
+    assert list(found) == (["group0.x"] if kept else [])
+    assert faults.lost_samples == (0 if kept else 200)
+    if not kept:
+        assert f"its invalidation bit {bit} is none of the 8 of its records" in faults.notes[0]
+
+
+def test_an_invalidation_bit_where_records_have_none_is_told(tmp_path):
+    data = streamed()
+    found, faults = read_bytes(tmp_path, numbers_at(data, find(data, b"CN", 1) + 24 + 64 + 12, "<I", 2))
+    np.testing.assert_array_equal(found["group0.x"], X)
+    assert "declares an invalidation bit, and its records have none" in faults.notes[0]
 
 
 def test_a_data_block_listed_again_and_again_is_read_once(tmp_path):

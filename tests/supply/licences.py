@@ -34,7 +34,7 @@ def needed(name: str, extra: str = "", seen: set[str] | None = None) -> Iterator
     seen = set() if seen is None else seen
     for text in distribution(name).requires or []:
         wanted = Requirement(text)
-        key = re.sub(r"[-_.]+", "-", wanted.name).lower()
+        key = plain(wanted.name)
         if key in seen or not (wanted.marker is None or wanted.marker.evaluate({"extra": extra})):
             continue
         seen.add(key)
@@ -46,13 +46,27 @@ def needed(name: str, extra: str = "", seen: set[str] | None = None) -> Iterator
         yield from needed(wanted.name, seen=seen)
 
 
+def plain(name: str) -> str:
+    """A package's name as it is listed."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def asked() -> list[str]:
+    """Names of what aqualog itself requires, on any system."""
+    wanted = [Requirement(text) for text in distribution("aqualog").requires or []]
+    of_users = [
+        w for w in wanted
+        if w.name != "aqualog" and (w.marker is None or any(w.marker.evaluate({"extra": e}) for e in EXTRAS))
+    ]  # fmt: skip
+    return sorted({plain(w.name) for w in of_users})
+
+
 def packages() -> dict[str, tuple[str, str]]:
     """Licence and extra ("" for all installations) by name."""
     out: dict[str, tuple[str, str]] = {}
     for extra in EXTRAS:
         for found in needed("aqualog", extra):
-            name = re.sub(r"[-_.]+", "-", found.metadata["Name"]).lower()
-            out.setdefault(name, (licence(found), extra))
+            out.setdefault(plain(found.metadata["Name"]), (licence(found), extra))
     return out
 
 
