@@ -67,6 +67,8 @@ class Drift:
 class FileFaults:
     """What a reader had to leave out. `notes` are sentences for the user.
 
+    `lost_samples` counts what the format stores as one: records of an MDF group, messages, rows of a table (cells,
+    where the rest of the row is sound), whatever the number of channels in them.
     `unfinalised`: the logger has not finished the file, and what is missing was made up for. `drifts`: clocks in the
     file that run apart.
     """

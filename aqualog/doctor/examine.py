@@ -25,6 +25,8 @@ __all__ = ["examine"]
 _DETECTORS = ("spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
               "joint_cusum")  # fmt: skip
 
+_STORED = {"mdf": "records", "csv": "rows or cells", "parquet": "rows or values"}  # messages elsewhere
+
 
 def examine(
     paths: Sequence[Path],
@@ -94,19 +96,19 @@ def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding], l
     found = [overview(c, origin_ns=origin) for c in channels]
     samples = sum(c.values.size for c in channels)
     state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
-    findings = [*_of_file(path.name, faults), *channel_findings(found, channels)]
+    findings = [*_of_file(path.name, kind, faults), *channel_findings(found, channels)]
     findings += [Finding("doubt", "mounting", path.name, "", text) for text in find_mounting(found)]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
     return state, findings, channels
 
 
-def _of_file(name: str, faults: FileFaults) -> Iterator[Finding]:
+def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
     if faults.truncated:
         advice = "record again if the end matters; a logger that loses power needs a buffered supply"
         yield Finding("lost", "truncated", name, "", "is cut off: its end is missing", advice)
     if faults.lost_samples:
-        what = f"{faults.lost_samples} samples could not be read"
+        what = f"{faults.lost_samples} {_STORED.get(kind, 'messages')} could not be read"
         yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",
                       faults.lost_samples)  # fmt: skip
     for drift in faults.drifts:

@@ -62,6 +62,7 @@ _FRAME = "CAN_DataFrame."
 _ARCHIVES = (".bz2", ".gzip", ".mf4z", ".zip")  # asammdf unpacks these by suffix, and deletes the file it then reads
 _DLC_LENGTH = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64])
 _EXTENDED = np.uint64(1 << 32)  # in a frame code: id in bits 0-28, IDE in bit 32, bus from bit 33
+_EMPTY = np.uint64(2**63)  # no bus and no id
 _OLDEST = int(datetime(1990, 1, 1, tzinfo=UTC).timestamp()) * 10**9
 _LARGEST_XML = 1 << 20
 _PER_SAMPLE = 24  # [bytes] of a sample while a channel is read as a whole: raw, physical, time
@@ -173,7 +174,7 @@ class MdfReader:
             t_ns, usable = self._nanoseconds(t)
             n, n_bad = n + len(t), n_bad + len(t) - len(t_ns)
             yield [Channel(i, t_ns, _where(usable, columns[i.key.index]), self._absolute) for i in infos]
-        self._count_records(group, n, n_bad, len(infos))
+        self._count_records(group, n, n_bad)
 
     @property
     def faults(self) -> FileFaults:
@@ -502,19 +503,19 @@ class MdfReader:
         usable = np.isfinite(t) & (np.abs(t) < _LATEST_S - self._start_ns * 1e-9)
         return np.round(t[usable] * 1e9).astype(np.int64) + self._start_ns, usable
 
-    def _count_records(self, group: int, n: int, n_bad: int, channels: int) -> None:
+    def _count_records(self, group: int, n: int, n_bad: int) -> None:
         declared = int(self._inner.groups[group].channel_group.cycles_nr)
         name = self._group_name(group)
         if n < declared:
             self._faults.truncated = True
-            self._faults.lost_samples += (declared - n) * channels
+            self._faults.lost_samples += declared - n
             self._faults.notes.append(f"group {name} is cut: {n} of {declared} records are there")
-        self._count_bad_times(group, n_bad, channels)
+        self._count_bad_times(group, n_bad)
 
-    def _count_bad_times(self, group: int, n_bad: int, channels: int) -> None:
+    def _count_bad_times(self, group: int, n_bad: int) -> None:
         if n_bad:
             name = self._group_name(group)
-            self._faults.lost_samples += n_bad * channels
+            self._faults.lost_samples += n_bad
             self._faults.notes.append(f"group {name}: {n_bad} records without a usable time stamp are left out")
 
     def _read_measured(self, wanted: Sequence[ChannelInfo]) -> dict[str, Channel]:
@@ -527,7 +528,7 @@ class MdfReader:
             pieces = list(self._columns(group, [i.key.index for i in infos]))
             t = _joined([p[0] for p in pieces])
             t_ns, usable = self._nanoseconds(t)
-            self._count_records(group, len(t), len(t) - len(t_ns), len(infos))
+            self._count_records(group, len(t), len(t) - len(t_ns))
             for info in infos:
                 values = _joined([p[1][info.key.index] for p in pieces])
                 found[info.path] = Channel(info, t_ns, _where(usable, values), self._absolute)
@@ -541,6 +542,7 @@ class MdfReader:
         self._check_memory(group, len(heads))
         default_bus = _bus_number(self._inner.groups[group])
         codes = []
+        empty, latest = 0, 0.0
         for t, columns in self._columns(group, heads):
             ids = columns[members["ID"]].astype(np.uint64)
             ide = np.zeros(len(t)) if "IDE" not in members else columns[members["IDE"]]
@@ -549,18 +551,26 @@ class MdfReader:
                 extended |= ids > np.uint64(0x7FF)
             bus = np.full(len(t), default_bus) if "BusChannel" not in members else columns[members["BusChannel"]]
             ids &= np.uint64(0x1FFFFFFF)
-            codes.append(
-                ids + _EXTENDED * extended.astype(np.uint64) + _EXTENDED * np.uint64(2) * bus.astype(np.uint64)
-            )
+            code = ids + _EXTENDED * extended.astype(np.uint64) + _EXTENDED * np.uint64(2) * bus.astype(np.uint64)
+            # a page of the file that was never written is records of zeros: no frame, and a time gone by long ago
+            before = np.maximum.accumulate(np.concatenate([[latest], np.nan_to_num(t)]))
+            is_empty = (t == 0.0) & (ids == 0) & ~extended & (before[:-1] > 0.0)
+            empty, latest = empty + int(is_empty.sum()), float(before[-1])
+            codes.append(np.where(is_empty, _EMPTY, code))
         found = _joined(codes).astype(np.uint64)
-        self._count_records(group, len(found), 0, 1)
+        self._count_records(group, len(found), 0)
+        if empty:
+            name = self._group_name(group)
+            self._faults.lost_samples += empty
+            self._faults.notes.append(f"group {name}: {empty} records are empty (zeros in place of a frame); left out")
         return found
 
     def _describe_frames(self, dbc: Dbc | None) -> None:
         self._census: Counter[int] = Counter()
         for group in self._frames:
             for code, count in zip(*np.unique(group.codes, return_counts=True), strict=True):
-                self._census[int(code)] += int(count)
+                self._census[int(code)] += int(count) if code != _EMPTY else 0
+        self._census = +self._census
         if not self._census:
             if dbc is not None:
                 self._faults.notes.append("holds no raw CAN frames; --dbc has no effect on it")
@@ -661,7 +671,7 @@ class MdfReader:
         t = _joined([k[0] for k in kept])
         t_ns, usable = self._nanoseconds(t)
         # records behind a cut were counted when the ids were read
-        self._count_bad_times(group.index, len(t) - len(t_ns), 1)
+        self._count_bad_times(group.index, len(t) - len(t_ns))
         own, length = _joined([k[1] for k in kept]), _joined([k[3] for k in kept])
         return t_ns, own[usable], _stacked([k[2] for k in kept])[usable], length[usable]
 

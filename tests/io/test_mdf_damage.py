@@ -21,6 +21,7 @@ from aqualog.io import mdf4_survey, mdf_blocks, mdf_harness
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import MdfReader
 from aqualog.io.patched_file import PatchedFile
+from aqualog.io.write_mdf import CanFrames, write_frames_mf4
 
 K = np.arange(200)
 X = (np.sin(K) + K) * 2 + 1
@@ -124,7 +125,7 @@ def test_what_precedes_a_cut_is_kept_where_descriptions_come_first(tmp_path, cut
     left = 200 - -(-cut // RECORD)
     np.testing.assert_array_equal(found.get("group0.x", np.zeros(0)), X[:left])
     assert faults.truncated
-    assert faults.lost_samples == (200 - left) * (2 if left else 1)
+    assert faults.lost_samples == 200 - left
     at = find(streamed(), b"DT")
     assert f"its DT block at byte {at} is incomplete" in faults.notes[0]
 
@@ -135,7 +136,7 @@ def test_deflated_blocks_before_a_cut_are_kept(tmp_path, lost):
     found, faults = read_bytes(tmp_path, data[: find(data, b"DZ", 4 - lost) + 60])
     np.testing.assert_array_equal(found["group0.x"], X[: 200 - 50 * lost])
     assert faults.truncated
-    assert faults.lost_samples == 50 * lost * 2
+    assert faults.lost_samples == 50 * lost
     with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
         assert r.faults.truncated  # also where nothing is read
     assert "DZ block" in faults.notes[0]
@@ -358,6 +359,37 @@ def test_an_invalidation_bit_where_records_have_none_is_told(tmp_path):
     found, faults = read_bytes(tmp_path, numbers_at(data, find(data, b"CN", 1) + 24 + 64 + 12, "<I", 2))
     np.testing.assert_array_equal(found["group0.x"], X)
     assert "declares an invalidation bit, and its records have none" in faults.notes[0]
+
+
+def test_frames_that_were_never_written_are_counted_and_are_no_frames(tmp_path):
+    n = 60
+    frames = CanFrames(
+        np.arange(1, n + 1) * 10**7, [256 + k % 3 for k in range(n)], [False] * n, [bytes([k] * 8) for k in range(n)],
+        [1] * n,
+    )  # fmt: skip
+    write_frames_mf4(tmp_path / "packed.mf4", frames, 1_700_000_000 * 10**9, "")
+    with asammdf.MDF(tmp_path / "packed.mf4") as packed:
+        packed.save(tmp_path / "f.mf4", compression=0)
+    (tmp_path / "a.dbc").write_bytes(
+        b'VERSION ""\n\nBU_: E\n\nBO_ 256 M: 8 E\n SG_ S : 0|8@1+ (1,0) [0|0] "m/s" E\n\nBO_ 0 Z: 8 E\n SG_ T : 0|8@1+ (1,0) [0|0] "" E\n'
+    )
+    options = ReadOptions(dbc=(tmp_path / "a.dbc",))
+    with MdfReader(tmp_path / "f.mf4", options) as r:
+        sound = r.read(r.channels())[0]
+        (group,) = r._inner.groups
+        size = int(group.channel_group.samples_byte_nr)
+    data = bytearray((tmp_path / "f.mf4").read_bytes())
+    at = find(data, b"DT") + 24
+    data[at + 20 * size : at + 35 * size] = bytes(15 * size)
+    (tmp_path / "g.mf4").write_bytes(data)
+    with MdfReader(tmp_path / "g.mf4", options) as r:
+        assert [c.path for c in r.channels()] == ["M.S"]
+        (left,) = r.read(r.channels())
+        assert r.faults.lost_samples == 15
+        assert "15 records are empty (zeros in place of a frame)" in " ".join(r.faults.notes)
+    whole = [k for k in range(n) if k % 3 == 0]
+    np.testing.assert_array_equal(sound.values, whole)
+    np.testing.assert_array_equal(left.values, [k for k in whole if not 20 <= k < 35])
 
 
 def test_a_data_block_listed_again_and_again_is_read_once(tmp_path):
