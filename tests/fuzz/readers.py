@@ -31,12 +31,12 @@ class Outcome(NamedTuple):
     refusal: str = ""
 
 
-def outcome(data: bytes, name: str, *, dbc: bytes | None = None, named: str = "", alike: bool = True) -> Outcome:
+def outcome(data: bytes, name: str, *, dbc: bytes | None = None, named: str = "") -> Outcome:
     """What a file with this content and name says.
 
     Fails unless all of this holds: it is read or refused with one line that names it; each channel has as many times as
     values; read in pieces, or one channel alone, it says the same; and the file stays as it was. `named` is what an error
-    has to name, the file by default. Where not `alike`, a file may be refused in one way and read in the other.
+    has to name, the file by default.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, name)
@@ -51,8 +51,7 @@ def outcome(data: bytes, name: str, *, dbc: bytes | None = None, named: str = ""
         assert path.read_bytes() == data, "the file was changed"
     _check_form(whole, named or name)
     _check_form(pieces, named or name)
-    if alike or not (whole.refusal or pieces.refusal):
-        _check_same(whole, pieces)
+    _check_same(whole, pieces)
     return whole
 
 

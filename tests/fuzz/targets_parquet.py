@@ -1,7 +1,6 @@
 """Parquet: its checksums are not looked at by the library; a file is read or refused.
 
-Where the index is damaged, the library may see it in one way of reading only; and a few lengths make it end the process,
-which those who call aqualog are kept from by a process of its own.
+A few lengths make the library end the process, which those who call aqualog are kept from by a process of its own.
 """
 
 from functools import cache
@@ -35,7 +34,7 @@ def _written(frame: pl.DataFrame, compression: str) -> bytes:
 
 def one(data: bytes) -> None:
     """Read a file with this content."""
-    for c in outcome(data, "a.parquet", alike=False).channels:
+    for c in outcome(data, "a.parquet").channels:
         assert not np.isinf(c.values).any(), f"{c.info.path} is infinite"
 
 
