@@ -15,7 +15,7 @@ import polars as pl
 from aqualog.errors import LogError
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.csv_cells import numbers, plain
+from aqualog.io.csv_cells import STYLES, numbers, plain
 from aqualog.io.csv_dialect import Column, find_layout
 from aqualog.io.csv_format import csv_hint, format_of
 from aqualog.io.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
@@ -104,7 +104,7 @@ class CsvReader:
         choice = self._time
         times = [k for k in (choice.index, choice.day, choice.other) if k is not None and self._stamps is None]
         needed = list({w.key for w in asked}.union(times))
-        cells = rows.cells(needed, where=str(self._path)) if needed else {}
+        cells = rows.cells(needed, where=str(self._path), numbers=self._plain(asked)) if needed else {}
         if self._stamps is None:
             self._stamps = self._read_time(cells, rows)
             self._compare_clocks(self._stamps, cells)
@@ -122,6 +122,11 @@ class CsvReader:
             return [part_of(asked, self._pieces(asked, self._data))]
         return [part_of(asked, (self.read(asked) for _ in range(1)))]
 
+    def _plain(self, asked: Sequence[ChannelInfo]) -> frozenset[int]:
+        """Columns that the library reads as numbers as they stand: three times faster than by their text."""
+        times = {self._time.index, self._time.day, self._time.other}
+        return frozenset(w.key for w in asked if self._layout.columns[w.key].style == STYLES[0]) - times
+
     def _pieces(self, asked: Sequence[ChannelInfo], text: TextFile) -> Iterator[Sequence[Channel]]:
         columns, choice = self._layout.columns, self._time
         where = str(self._path)
@@ -131,7 +136,8 @@ class CsvReader:
             rows = rows_of(body, self._layout, line, is_cut=is_last and text[-1:] not in (b"\n", b"\r"))
             faults, count = faults + rows.faults, count + len(rows.lines)
             other = self._numeric_clock()
-            cells = rows.cells(list({choice.index, *other, *(w.key for w in asked)}), where=where)
+            needed = list({choice.index, *other, *(w.key for w in asked)})
+            cells = rows.cells(needed, where=where, numbers=self._plain(asked))
             column = columns[choice.index]
             values = numbers(cells[choice.index], column.style).values
             if not unit:
@@ -159,6 +165,8 @@ class CsvReader:
         keep = stamps.valid & ~samples.blank
         if info.key not in self._counted:
             self._count_lost(samples.unreadable & keep, rows, info.key, f'column "{info.path}": {{}} not a number')
+        if keep.all():  # nearly always: all channels have one time
+            return Channel(info, stamps.t_ns, samples.values, stamps.absolute)
         return Channel(info, stamps.t_ns[keep], samples.values[keep], stamps.absolute)
 
     def _read_time(self, cells: dict[int, pl.Series], rows: Rows) -> Stamps:

@@ -90,7 +90,9 @@ class Numbers:
 
 
 def numbers(cells: pl.Series, style: Style) -> Numbers:
-    """Convert the cells of one column; a cell is never guessed at."""
+    """Convert the cells of one column, which are text or read as numbers already; a cell is never guessed at."""
+    if cells.dtype == pl.Float64:
+        return _read(cells)
     found = plain(cells, style).cast(pl.Float64, strict=False)
     values: FloatArray = found.fill_null(np.nan).to_numpy().astype(np.float64)
     blank = cells.is_null().to_numpy().copy()
@@ -100,6 +102,12 @@ def numbers(cells: pl.Series, style: Style) -> Numbers:
         _second_look(cells.gather(left), left, style, Numbers(values, blank, unreadable))
     values[~np.isfinite(values)] = np.nan
     return Numbers(values, blank, unreadable)
+
+
+def _read(cells: pl.Series) -> Numbers:
+    values: FloatArray = cells.fill_null(np.nan).to_numpy().astype(np.float64)
+    values[~np.isfinite(values)] = np.nan
+    return Numbers(values, cells.is_null().to_numpy().copy(), np.zeros(len(cells), dtype=np.bool_))
 
 
 def _second_look(cells: pl.Series, rows: NDArray[np.int64], style: Style, into: Numbers) -> None:

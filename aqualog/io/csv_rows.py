@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ Text = bytes | TextFile
 PIECE = 1 << 24  # [bytes]
 _TAIL, _ABOVE = 1 << 16, 20  # [bytes], lines
 _JOIN = "\x1f"  # unit separator: in no cell
+_ALL, _COMMENT = bytes(range(256)), b"#%!/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,33 +53,37 @@ class Rows:
     lines: NDArray[np.int64]
     faults: RowFaults
 
-    def cells(self, columns: Sequence[int], *, where: str) -> dict[int, pl.Series]:
-        """Cells of these columns as text, null where blank.
+    def cells(self, columns: Sequence[int], *, where: str, numbers: Collection[int] = ()) -> dict[int, pl.Series]:
+        """Cells of these columns as text, null where blank; as numbers those of `numbers`, if all of them are.
 
         Raises
         ------
         LogError
             If the library finds other rows than there are.
         """
-        schema = {f"c{k}": pl.String for k in range(self.names)}
         if not self.text or not columns:
             return {k: pl.Series(f"c{k}", [], dtype=pl.String) for k in columns}
         try:
-            frame = pl.read_csv(
-                self.text,
-                has_header=False,
-                schema=schema,
-                columns=sorted(set(columns)),
-                separator=self.separator,
-                quote_char='"' if self.separator != _JOIN and b'"' in self.text else None,
-            )
+            frame = self._split(columns, numbers)
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            if numbers:  # a cell that is none, as likely as not: what it is, its text tells
+                return self.cells(columns, where=where)
             reason = str(error).splitlines()[0]
             raise LogError(f"cannot be split into cells ({reason})", where=where, hint="check its quotes") from error
         if frame.height != len(self.lines):
             what = f"{frame.height} rows in {len(self.lines)} lines"
             raise LogError(what, where=where, expected="one row per line", hint="check its quotes")
         return {k: frame[f"c{k}"] for k in columns}
+
+    def _split(self, columns: Sequence[int], numbers: Collection[int]) -> pl.DataFrame:
+        return pl.read_csv(
+            self.text,
+            has_header=False,
+            schema={f"c{k}": pl.Float64 if k in numbers else pl.String for k in range(self.names)},
+            columns=sorted(set(columns)),
+            separator=self.separator,
+            quote_char='"' if self.separator != _JOIN and b'"' in self.text else None,
+        )
 
 
 def find_rows(data: bytes, layout: Layout) -> Rows:
@@ -163,17 +168,18 @@ def _regular(body: bytes, layout: Layout) -> int | None:
     """Number of lines if each has exactly the separators of a whole row and none is a comment."""
     if not body:
         return 0
-    separator, per_line = layout.separator.encode(), layout.width - 1
-    lines = body.count(b"\n") + 1
-    if body.count(separator) != lines * per_line or layout.width > len(layout.columns):
+    separator = layout.separator.encode()
+    if layout.width > len(layout.columns):
         return None
-    octets = np.frombuffer(body, dtype=np.uint8)
-    ends = np.append(np.flatnonzero(octets == ord("\n")), len(octets))
-    signs = np.flatnonzero(octets == ord(separator)).reshape(lines, per_line)
-    if (signs[:, -1] > ends).any() or (signs[1:, 0] < ends[:-1]).any():
-        return None
-    firsts = octets[np.append(0, ends[:-1] + 1)]
-    return None if np.isin(firsts, np.frombuffer(b"#%!/", dtype=np.uint8)).any() else lines
+    signs = body.translate(None, _ALL.translate(None, separator + b"\n" + _COMMENT)) + b"\n"
+    comments = [sign for sign in _COMMENT if sign in signs and sign != separator[0]]
+    if comments:
+        if body[0] in comments or any(b"\n%c" % sign in body for sign in comments):
+            return None
+        signs = signs.translate(None, bytes(comments))
+    row = separator * (layout.width - 1) + b"\n"
+    lines, rest = divmod(len(signs), len(row))
+    return lines if not rest and signs == row * lines else None
 
 
 def _is_quoted_plainly(rows: Rows) -> bool:
