@@ -208,7 +208,8 @@ class MdfReader:
     def _guard(self, what: str) -> Iterator[None]:
         """Turn whatever a damaged file makes asammdf raise into a `LogError`."""
         try:
-            yield
+            with np.errstate(all="ignore"):  # numbers of a damaged file may be any; what is no number is counted
+                yield
         except LogError:
             raise
         except Exception as error:
@@ -287,6 +288,56 @@ class MdfReader:
                 is_sorted = group.data_location != 0
                 channel_group.cycles_nr = held // size if size and is_sorted else 0
                 self._inner.virtual_groups[index].cycles_nr = channel_group.cycles_nr
+        kinds: dict[int, list[Any]] = defaultdict(list)
+        for group in self._inner.groups:
+            kinds[int(group.data_group.address)].append(group)
+        for groups in kinds.values():
+            if any(int(g.channel_group.address) in self._survey.recount for g in groups):
+                self._count_unsorted(groups)
+
+    def _count_unsorted(self, groups: Sequence[Any]) -> None:
+        """Tell what was not sorted of an unfinished file's records: asammdf stops at a record of no known kind."""
+        there = max(self._survey.inflated.get(int(g.channel_group.address), 0) for g in groups)
+        zeros = max(self._survey.zeros.get(int(g.channel_group.address), 0) for g in groups)
+        count, taken, longest = 0, 0, 1
+        for group in groups:
+            about = group.channel_group
+            own = int(group.data_group.record_id_len)
+            if about.flags & _GROUP_VLSD:
+                n, size = self._values_of(about)
+                longest = max(longest, own + size // max(n, 1))
+            else:
+                n = int(about.cycles_nr)
+                record = int(about.samples_byte_nr) + int(about.invalidation_bytes_nr)
+                size, longest = n * record, max(longest, own + record)
+            count, taken = count + n, taken + n * own + size
+        lost = there - taken - zeros
+        if lost <= 0:
+            return
+        if lost < longest:
+            self._faults.lost_samples += 1
+            self._faults.notes.append("the last record is incomplete, and left out")
+        else:
+            about_lost = max(1, round(lost * count / taken)) if taken else lost // longest
+            self._faults.truncated = True
+            self._faults.lost_samples += about_lost
+            self._faults.notes.append(
+                f"{lost} of {there} bytes of records, about {about_lost} records, are lost: what precedes them is a "
+                "record of no known kind"
+            )
+
+    def _values_of(self, about: Any) -> tuple[int, int]:
+        """Number of values of variable length in a group that holds nothing else, and what they take. [bytes]"""
+        owner = self._inner._cn_data_map.get(about.address)
+        if owner is None:
+            return 0, 0
+        blocks = self._inner.groups[owner[0]].signal_data[owner[1]] or ()
+        data = self._inner._load_signal_data(group=self._inner.groups[owner[0]], index=owner[1]) if blocks else b""
+        n = at = 0
+        while at + 4 <= len(data):
+            at += 4 + int.from_bytes(data[at : at + 4], "little")
+            n += 1
+        return n, len(data)
 
     def _start(self) -> tuple[int, bool]:
         """Start time in ns and whether it is a real one; loggers without a clock write 1970 or 1980."""
@@ -610,6 +661,10 @@ class MdfReader:
         frames = self._payloads(set(by_code))
         found: dict[str, Channel] = {}
         for code, infos in by_code.items():
+            if code not in frames:  # none of them has a time
+                no_t, no_x = np.zeros(0, dtype=np.int64), np.zeros(0)
+                found |= {i.path: Channel(i, no_t, no_x, self._absolute) for i in infos}
+                continue
             t_ns, data, length = frames[code]
             short: list[tuple[ChannelInfo, int]] = []
             for info in infos:
@@ -624,7 +679,7 @@ class MdfReader:
 
     def _tell_short(self, short: Sequence[tuple[ChannelInfo, int]]) -> None:
         """Count the frames of one message that are too short for some of its signals; told in one line."""
-        self._faults.lost_samples += sum(n for _, n in short)
+        self._faults.lost_samples += max((n for _, n in short), default=0)
         if len(short) == 1:
             info, n = short[0]
             need = BitField.of(info.key.message.get_signal_by_name(info.key.name)).needed

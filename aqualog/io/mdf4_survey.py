@@ -36,6 +36,7 @@ _CG_FORMS = ((104, 6), (112, 7))
 _CN_FORMS = {160: 8, 168: 9}
 _PLAIN = (b"DT", b"DV", b"SD", b"DI", b"RD", b"RV", b"RI")
 _CG_VLSD, _CG_REMOTE_MASTER = 0x1, 0x8
+_ZEROS_AT_ONCE = 1 << 20
 _CN_INVALIDATION = 0x3
 _CN_SOME_INVALID = 0x2
 _VIRTUAL = (3, 6)  # types of channels without bytes in the record
@@ -62,10 +63,13 @@ class _Block(NamedTuple):
 
 @dataclass(slots=True)
 class _Records:
-    """A chain of data blocks: what it takes inflated, its largest deflated block [bytes], and what is missing of it."""
+    """A chain of data blocks: what it takes inflated, its largest deflated block, the zeros at the end of a file that
+    was still being written [bytes], and what is missing.
+    """
 
     inflated: int = 0
     largest: int = 0
+    zeros: int = 0
     broken: BlockError | None = None
 
 
@@ -510,13 +514,31 @@ class _Walk(Walk):
             if self._unfinished & _COUNTERS:
                 if id_size:
                     self._found.recount.add(group.block.at)
-                self._found.patch(group.block.data + 8, "<Q", there + bool(id_size))
+                    self._found.zeros[group.block.at] = chain.zeros
+                    there += 1
+                elif group.record:
+                    there = self._written(chain, group)
+                self._found.patch(group.block.data + 8, "<Q", there)
             elif not there and group.cycles and group.record + id_size:
                 self._found.patch(group.block.data + 8, "<Q", 0)
                 if chain.broken is None:
                     broken = BlockError("CG", group.block.at, f"tells of {group.cycles} records and there are none")
                     self._found.lost("a group", broken)
                 self._found.lost_samples += group.cycles
+
+    def _written(self, chain: _Records, group: _Group) -> int:
+        """Number of whole records of an unfinished file. A logger that reserves room has zeros behind the last one."""
+        zeros = chain.zeros if chain.zeros >= group.record else 0
+        there, rest = divmod(chain.inflated - zeros, group.record)
+        if rest and zeros and there:
+            # what is zero in the record before as well is no room that was never written
+            begin = self._size - zeros - rest
+            if not any(self._data[begin - group.record + rest : begin]):
+                return there + 1
+        if rest > chain.zeros - zeros and chain.broken is None:
+            self._found.lost_samples += 1
+            self._found.remark(f"the last record of the group at byte {group.block.at} is incomplete, and left out")
+        return there
 
     def _bounded(self, chain: _Records, most: int) -> None:
         if chain.largest > most:
@@ -640,6 +662,19 @@ class _Walk(Walk):
             out.broken = BlockError(mark.decode(), at, why, is_cut=True)
             length = _HEAD + left
         out.inflated += length - _HEAD
+        if self._unfinished and at + length == self._size:
+            out.zeros = self._zeros(at + _HEAD)
+
+    def _zeros(self, begin: int) -> int:
+        """Zero bytes at the end of the file, of those from a place on."""
+        end = self._size
+        while end > begin:
+            block = bytes(self._data[max(begin, end - _ZEROS_AT_ONCE) : end])
+            left = len(block.rstrip(b"\0"))
+            end -= len(block) - left
+            if left:
+                break
+        return self._size - end
 
     def _open_end(self, at: int, length: int) -> int:
         """Length of a block that was still being written: to the next block, or to the end of the file."""

@@ -52,6 +52,7 @@ class Survey:
     `patches`: bytes in place of the file's own, by address. `refused`: why a channel is left out, by the address of its
     block. `recount`: groups whose number of records is only known when their records have been sorted, by address.
     `inferred`: groups whose records were told from their channels, by address; their time must go up to be believed.
+    `zeros`: what such a file ends in behind the records of these groups. [bytes]
     `inflated`: what the records of a group take when they are inflated, by address of the group. [bytes]
     """
 
@@ -59,6 +60,7 @@ class Survey:
     patches: dict[int, bytes] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
     recount: set[int] = field(default_factory=set)
+    zeros: dict[int, int] = field(default_factory=dict)
     inferred: set[int] = field(default_factory=set)
     inflated: dict[int, int] = field(default_factory=dict)
     unsorted: int = 0

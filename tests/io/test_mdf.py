@@ -599,9 +599,11 @@ class TestRealDrives:
             assert 0 < n < 0.05 * len(sound[name].values)
             np.testing.assert_array_equal(channel.values, sound[name].values[:n])
         assert len([n for n in faults.notes if "shorter than" in n]) == len({n.split(".")[0] for n in channels})
-        assert faults.lost_samples == sum(len(c.values) for c in sound.values()) - sum(
-            len(c.values) for c in channels.values()
-        )
+        lost: dict[str, int] = {}
+        for name, channel in sound.items():  # frames, whatever the number of signals in them
+            missing = len(channel.values) - len(channels[name].values)
+            lost[name.split(".")[0]] = max(missing, lost.get(name.split(".")[0], 0))
+        assert faults.lost_samples == sum(lost.values())
 
     def test_many_groups(self):
         path = REAL / "canedge" / "00000001-63BEF5CD.MF4"

@@ -79,6 +79,39 @@ def test_an_unfinished_file_is_read_without_a_copy_of_it(tmp_path, monkeypatch, 
     assert (tmp_path / "a.mf4").read_bytes() == make()
 
 
+@pytest.mark.parametrize(
+    ("tail", "left", "lost"),
+    [(b"", 200, 0), (bytes(240), 200, 0), (bytes(10), 200, 0), (b"\1" * 7, 200, 1), (b"\1" * 12 + bytes(252), 200, 1)],
+)
+def test_what_an_unfinished_file_ends_in(tmp_path, tail, left, lost):
+    """Room that the logger has reserved is no record, and a record that was begun is none yet."""
+    found, faults = read_bytes(tmp_path, streamed(unfinished=5) + tail)
+    np.testing.assert_array_equal(found["group0.x"], X[:left])
+    assert faults.lost_samples == lost
+    assert ("the last record of the group at byte" in " ".join(faults.notes)) == bool(lost)
+
+
+@pytest.mark.parametrize(
+    ("damaged", "left", "lost", "note"),
+    [
+        (lambda b: b + bytes(300), (100, 50), 0, ""),
+        (lambda b: b[:-7], (100, 49), 1, "the last record is incomplete"),
+        (
+            lambda b: b[:-1000] + bytes(500) + b[-500:],
+            (74, 36),
+            40,
+            "993 of 3750 bytes of records, about 40 records, are",
+        ),
+    ],
+)
+def test_records_of_several_kinds_that_an_unfinished_file_loses_are_told(tmp_path, damaged, left, lost, note):
+    """asammdf sorts them up to one of no known kind, and drops the rest without a word."""
+    found, faults = read_bytes(tmp_path, damaged(unsorted(unfinished=5)))
+    assert (len(found["group0.x"]), len(found["group1.x"])) == left
+    assert faults.lost_samples == lost
+    assert note in " ".join(faults.notes)
+
+
 def test_an_unfinished_list_of_blocks_is_completed(tmp_path):
     """Blocks that lie behind the list and are not in it yet."""
     b = Blocks(unfinished=1 | 16)
@@ -390,6 +423,25 @@ def test_frames_that_were_never_written_are_counted_and_are_no_frames(tmp_path):
     whole = [k for k in range(n) if k % 3 == 0]
     np.testing.assert_array_equal(sound.values, whole)
     np.testing.assert_array_equal(left.values, [k for k in whole if not 20 <= k < 35])
+
+
+def test_frames_of_which_none_has_a_time_are_no_samples(tmp_path):
+    frames = CanFrames(np.arange(1, 5) * 10**7, [256] * 4, [False] * 4, [bytes(8)] * 4, [1] * 4)
+    write_frames_mf4(tmp_path / "packed.mf4", frames, 1_700_000_000 * 10**9, "")
+    with asammdf.MDF(tmp_path / "packed.mf4") as packed:
+        size = int(packed.groups[0].channel_group.samples_byte_nr)
+        at = int(packed.groups[0].channels[packed.masters_db[0]].byte_offset)
+        packed.save(tmp_path / "f.mf4", compression=0)
+    data = (tmp_path / "f.mf4").read_bytes()
+    begin = find(data, b"DT") + 24 + at
+    for k in range(4):
+        data = numbers_at(data, begin + k * size, "<d", np.nan)
+    (tmp_path / "f.mf4").write_bytes(data)
+    (tmp_path / "a.dbc").write_bytes(b'VERSION ""\n\nBU_: E\n\nBO_ 256 M: 8 E\n SG_ S : 0|8@1+ (1,0) [0|0] "" E\n')
+    with MdfReader(tmp_path / "f.mf4", ReadOptions(dbc=(tmp_path / "a.dbc",))) as r:
+        (channel,) = r.read(r.channels())
+        assert channel.t_ns.size == channel.values.size == 0
+        assert r.faults.lost_samples == 4
 
 
 def test_a_data_block_listed_again_and_again_is_read_once(tmp_path):
