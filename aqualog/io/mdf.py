@@ -314,12 +314,12 @@ class MdfReader:
         lost = there - taken - zeros
         if lost <= 0:
             return
+        self._faults.truncated = True
         if lost < longest:
             self._faults.lost_samples += 1
             self._faults.notes.append("the last record is incomplete, and left out")
         else:
             about_lost = max(1, round(lost * count / taken)) if taken else lost // longest
-            self._faults.truncated = True
             self._faults.lost_samples += about_lost
             self._faults.notes.append(
                 f"{lost} of {there} bytes of records, about {about_lost} records, are lost: what precedes them is a "

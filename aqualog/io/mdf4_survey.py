@@ -536,6 +536,7 @@ class _Walk(Walk):
             if not any(self._data[begin - group.record + rest : begin]):
                 return there + 1
         if rest > chain.zeros - zeros and chain.broken is None:
+            self._found.truncated = True
             self._found.lost_samples += 1
             self._found.remark(f"the last record of the group at byte {group.block.at} is incomplete, and left out")
         return there

@@ -102,7 +102,7 @@ def read_index(path: Path) -> Index | None:
         footer, _ = decode(file.read(length))
     try:
         return _index(footer, end)
-    except (AttributeError, KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError, UnicodeDecodeError) as error:
         raise MalformedError("its index lacks what an index must have") from error
 
 
@@ -167,7 +167,7 @@ def page_fault(path: Path, index: Index, group: Group, columns: Iterable[str]) -
                 return f'it has no column "{name}"'
             try:
                 _check_chunk(handle, index, group, chunk)
-            except (MalformedError, AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+            except (MalformedError, AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
                 reason = str(error) if isinstance(error, MalformedError) else "a page's header lacks what it must have"
                 return f'column "{name}": {reason}'
         return ""

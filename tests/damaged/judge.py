@@ -14,7 +14,17 @@ from aqualog.types import FileFaults
 from tests.damaged.damage import Damage
 
 # Formats whose samples stand behind no checksum: that one of them is another number cannot be seen.
-UNCHECKED = ("MF4", "MDF 3", "ROS 1 bag", "ROS 2 database", "CSV", "CSV, UTF-16, comma", "Parquet, plain")
+UNCHECKED = (
+    "MF4",
+    "MF4 unfinished",
+    "MDF 3",
+    "ROS 1 bag",
+    "ROS 2 database",
+    "CSV",
+    "CSV, UTF-16, comma",
+    "Parquet, plain",
+)
+USUAL = "file was not finalised by the logger; this was made up for while reading"  # no word of a damage
 CODES = (0, 1, 3, 4)
 
 Samples = dict[str, tuple[np.ndarray, np.ndarray]]
@@ -91,7 +101,7 @@ def look(path: Path) -> Seen:
         samples, faults = samples_of(path)
     except AqualogError as error:
         return Seen(code, last or str(error), True, {})
-    told = faults.truncated or faults.lost_samples > 0 or bool(faults.notes) or code == 3
+    told = faults.truncated or faults.lost_samples > 0 or any(n != USUAL for n in faults.notes) or code == 3
     return Seen(code, last, told, samples, None if faults.truncated else faults.lost_samples)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.notation import SYMBOLS
+from tests.mdf_by_hand import Blocks
 
 T = np.arange(400) * 0.01  # [s]
 T_NS = np.rint(T * 1e9).astype(np.int64)
@@ -29,6 +30,32 @@ def mf4(folder: Path, compression: int) -> Path:
 
     path = folder / f"mf4_{compression}.mf4"
     write_mf4(path, [MdfGroup("signals", T, WITH_META)], START_NS, "", compression=compression)
+    return path
+
+
+def mf4_unfinished(folder: Path) -> Path:
+    """As a logger leaves it that has lost its power: two kinds of records in turns, none of them counted."""
+    b = Blocks(unfinished=1 | 4)
+    b.header()
+    groups = {1: ("omega_fl", "omega_fr", "omega_rl", "omega_rr"), 2: ("v_x", "a_x", "yaw_rate")}
+    for number, names in reversed(groups.items()):
+        for k, name in enumerate(("t", *names)):
+            following = f"{number}{names[k]}" if k < len(names) else None
+            b.text(f"{number}{name}_name", name)
+            if name != "t":
+                b.text(f"{name}_unit", SYMBOLS[name].unit)
+                b.conversion(f"{name}_cc", 1, numbers=(0.0, 1.0), unit=f"{name}_unit")
+            about = {"kind": 2, "sync": 1} if name == "t" else {"conversion": f"{name}_cc"}
+            b.channel(f"{number}{name}", following, 8 * k, text=f"{number}{name}_name", **about)
+        behind = "cg2" if number == 1 else None
+        b.channel_group(f"cg{number}", f"{number}t", 0, 8 + 8 * len(names), record_id=number, following=behind)
+    b.group("dg0", None, "cg1", "data", 1)
+    rows = {number: np.column_stack([T, *(SIGNALS[n] for n in names)]) for number, names in groups.items()}
+    b.add("data", "DT", [], b"".join(bytes([i]) + rows[i][k].tobytes() for k in range(len(T)) for i in groups))
+    data = bytearray(b.bytes())
+    data[b.at["data"] + 8 : b.at["data"] + 16] = (24).to_bytes(8, "little")
+    path = folder / "unfinished.mf4"
+    path.write_bytes(data)
     return path
 
 
@@ -145,6 +172,7 @@ FORMATS: dict[str, Callable[[Path], Path]] = {
     "MF4": lambda p: mf4(p, 0),
     "MF4 deflated": lambda p: mf4(p, 1),
     "MF4 transposed": lambda p: mf4(p, 2),
+    "MF4 unfinished": mf4_unfinished,
     "MDF 3": mdf3,
     "MCAP JSON": lambda p: mcap_json(p, "NONE"),
     "MCAP JSON, zstd": lambda p: mcap_json(p, "ZSTD"),

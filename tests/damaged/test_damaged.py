@@ -1,5 +1,7 @@
 """One damage of each kind, and a bomb, in every format; `python -m tests.damaged` looks at many more."""
 
+from dataclasses import replace
+
 import pytest
 
 from tests.damaged.damage import DAMAGES, bombs
@@ -14,7 +16,7 @@ ONE_EACH = [d for d in DAMAGES if NUMBERS.get(d.fault, 0) == d.number]
 def test_a_damaged_log_is_told_of_or_refused(tmp_path, name):
     source = FORMATS[name](tmp_path)
     sound, faults = samples_of(source)
-    assert faults == type(faults)()
+    assert replace(faults, unfinalised=False, notes=()) == type(faults)()
     data = source.read_bytes()
     for damage in [*ONE_EACH, bombs(name)[1]]:
         path = tmp_path / damage.fault.replace(" ", "_") / source.name
