@@ -57,7 +57,7 @@ class CsvReader:
         self._stamps: Stamps | None = None
         self._counted: set[int] = set()
         self._drift = DriftWatch()
-        self._lost: dict[tuple[int, str], tuple[int, int]] = {}
+        self._lost: dict[tuple[int, tuple[str, str]], tuple[int, int]] = {}
         self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
         self._layout = find_layout(self._data, where=str(path), told=self._told)
@@ -164,7 +164,7 @@ class CsvReader:
         samples = numbers(cells[info.key], self._layout.columns[info.key].style)
         keep = stamps.valid & ~samples.blank
         if info.key not in self._counted:
-            self._count_lost(samples.unreadable & keep, rows, info.key, f'column "{info.path}": {{}} not a number')
+            self._count_lost(samples.unreadable & keep, rows, info.key, (f'column "{info.path}": ', " not a number"))
         if keep.all():  # nearly always: all channels have one time
             return Channel(info, stamps.t_ns, samples.values, stamps.absolute)
         return Channel(info, stamps.t_ns[keep], samples.values[keep], stamps.absolute)
@@ -205,8 +205,8 @@ class CsvReader:
             self._faults.drifts = [drift]
             self._note(drift_note(drift))
 
-    def _no_time(self, column: Column) -> str:
-        return f'time column "{column.name}": {{}} without a time, the row is left out'
+    def _no_time(self, column: Column) -> tuple[str, str]:
+        return f'time column "{column.name}": ', " without a time, the row is left out"
 
     def _as_stamps(self, column: Column, cells: pl.Series, day: pl.Series | None) -> Stamps:
         if column.kind in ("stamp", "clock"):
@@ -224,17 +224,17 @@ class CsvReader:
             self._note_rows(self._rows.faults, len(self._rows.lines))
         return self._rows
 
-    def _count_lost(self, bad: BoolArray, rows: Rows, column: int, text: str) -> None:
-        """Cells of a column that are lost, by what is told of them."""
+    def _count_lost(self, bad: BoolArray, rows: Rows, column: int, text: tuple[str, str]) -> None:
+        """Cells of a column that are lost, by what is told before and behind their number."""
         if bad.any():
             count, first = self._lost.get((column, text), (0, int(rows.lines[bad][0])))
             self._lost[column, text] = count + int(bad.sum()), first
 
     def _tell_lost(self) -> None:
-        for (_, text), (count, first) in sorted(self._lost.items()):
+        for (_, (before, behind_it)), (count, first) in sorted(self._lost.items()):
             self._faults.lost_samples += count
             cells = f"{count} cell{'s' if count > 1 else ''}"
-            self._note(f"{text.format(cells)} (first at line {first})")
+            self._note(f"{before}{cells}{behind_it} (first at line {first})")
         self._lost = {}
 
     def _note_rows(self, faults: RowFaults, count: int) -> None:

@@ -417,7 +417,7 @@ class MdfReader:
             damage = self._survey.refused.get(int(channel.address))
             reason = damage or self._refusal(channel)
             if not _fits(group, channel, version4=self._version4):
-                reason = "it lies outside the record"
+                reason = damage = "it lies outside the record"
             if reason is not None:
                 self._faults.notes.append(f"channel {prefix}.{name} is left out: {reason}")
                 self._faults.lost_samples += int(group.channel_group.cycles_nr) if damage else 0
