@@ -7,10 +7,11 @@ import multiprocessing
 import os
 import signal
 import time
+import traceback
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection, wait
+from pickle import PicklingError
 from threading import Thread, current_thread, main_thread
 from typing import Any, NamedTuple, TypeVar
 
@@ -63,25 +64,18 @@ def work_on(
         Processes, >= 1; no more than `most_processes` are made. They are spawned: a fork would copy the threads of
         polars and numba.
     record : callable
-        Called here with name and result as each is done; the result is `Crashed` if the process ended. An item that
-        was merely in work beside one that crashed is done again, alone.
+        Called here with name and result as each is done; the result is `Crashed` if the process ended, and
+        ended once more with the item alone in a new one.
     limits : Limits
         An item that takes longer ends its process; one that wants more memory gets a MemoryError. Without `seconds`,
         reading a log has the time that `aqualog.io.limits` gives it.
 
     An interrupt lets the items in work finish and records them before it is raised.
     """
-    left = dict(tasks)
-    suspects = _round(left, work, min(jobs, len(left), most_processes()), record, limits) if left else []
-    while suspects:
-        # one of them has taken the pool down; each gets a process of its own, which tells which
-        name = suspects.pop(0)
-        began = time.monotonic()
-        if name in left and _round({name: left[name]}, work, 1, lambda n, r: _taken(left, record, n, r), limits):
-            left.pop(name)
-            record(name, Crashed(time.monotonic() - began))
-    if left and len(left) < len(tasks):
-        work_on(left, work, jobs=jobs, record=record, limits=limits)
+    # what has ended a process is tried again when all others are done: the process may have been ended for what earlier
+    # items had left in it, or for what others took beside it
+    for name in _round(tasks, work, min(jobs, len(tasks), most_processes()), record, limits):
+        _round({name: tasks[name]}, work, 1, record, limits)
 
 
 def most_processes() -> int:
@@ -89,61 +83,141 @@ def most_processes() -> int:
     return _PER_CORE * (os.cpu_count() or 1)
 
 
-def _taken(left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None], name: Name, result: Any) -> None:
-    left.pop(name, None)
-    record(name, result)
+class _Raised(NamedTuple):
+    """What an item's work has raised, on its way here."""
+
+    error: BaseException
+
+
+class _Seat:
+    """A process, and the item that it works on: one at a time, so that it is known which one has ended it."""
+
+    def __init__(self, begin: tuple[Limits, ReadLimits]) -> None:
+        self.pipe, self._theirs = multiprocessing.Pipe()
+        self.is_new = True
+        self._process = multiprocessing.get_context("spawn").Process(target=_serve, args=(self._theirs, *begin))
+        self._began = 0.0
+
+    def start(self) -> None:
+        """Start the process."""
+        with _no_interrupt():
+            self._process.start()
+            self._theirs.close()  # the process has its own; when that is closed, it has ended
+
+    def give(self, work: Callable[..., Any], task: tuple[Any, ...]) -> None:
+        """Let it begin an item."""
+        self._began = time.monotonic()
+        with suppress(BrokenPipeError, ConnectionResetError):  # it has ended since the last: `take` says so
+            self.pipe.send((work, task))
+
+    def take(self) -> Any:
+        """The result of the item, if there is one; `Crashed` if the process has ended."""
+        try:
+            with _no_interrupt():
+                result = self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            return Crashed(time.monotonic() - self._began)
+        self.is_new = False
+        return result
+
+    def end(self) -> None:
+        """Let the process go; `wait_for_end` waits for it."""
+        self.pipe.close()
+        self._theirs.close()
+
+    def wait_for_end(self) -> None:
+        """Wait until it has gone, if it was there."""
+        if self._process.pid is not None:
+            self._process.join()
+
+
+def _serve(pipe: Connection, limits: Limits, read_limits: ReadLimits) -> None:
+    """Work on what comes through the pipe, until that is closed."""
+    begin_worker(limits, read_limits)
+    while True:
+        try:
+            work, task = pipe.recv()
+        except EOFError:
+            return
+        try:
+            result = within(limits.seconds, work, *task)
+        except BaseException as error:
+            error.add_note(traceback.format_exc())
+            result = _Raised(error)
+        try:
+            pipe.send(result)
+        except (AttributeError, TypeError, ValueError, PicklingError) as error:
+            pipe.send(_Raised(TypeError(f"{type(result).__name__} cannot be sent: {error}")))
+        del work, task, result  # nothing of it is held while there is nothing to do
 
 
 def _round(
-    left: dict[Name, tuple[Any, ...]],
+    tasks: Mapping[Name, tuple[Any, ...]],
     work: Callable[..., Any],
     jobs: int,
     record: Callable[[Name, Any], None],
     limits: Limits,
 ) -> list[Name]:
-    """Work until all is done or the pool breaks; what is done leaves `left`. Returns those that were in work then."""
-    todo = iter(list(left.items()))
-    pending: dict[Future[Any], Name] = {}
-    spawn = multiprocessing.get_context("spawn")
+    """Work on all; what was alone in a new process and ended it is recorded as that. Returns others that ended one."""
     begin = (limits, limits_from(os.environ))
-    with ProcessPoolExecutor(jobs, spawn, initializer=begin_worker, initargs=begin) as pool:
-        try:
-            # few in the queue: when a pool breaks, only those that it held are in doubt
-            for name, task in todo:
-                with _no_interrupt():
-                    pending[pool.submit(within, limits.seconds, work, *task)] = name
-                if len(pending) >= 2 * jobs:
-                    broken = _collect(pending, left, record)
-                    if broken:
-                        return broken
-            while pending:
-                broken = _collect(pending, left, record)
-                if broken:
-                    return broken
-        except BrokenProcessPool:
-            return [name for name in pending.values() if name in left]
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            for future, name in pending.items():
-                if future.done() and not future.cancelled() and future.exception() is None:
-                    _taken(left, record, name, future.result())
-            raise
-    return []
-
-
-def _collect(
-    pending: dict[Future[Any], Name], left: dict[Name, tuple[Any, ...]], record: Callable[[Name, Any], None]
-) -> list[Name]:
-    """Wait for one or more results; if the pool has broken, the names that were in it."""
-    ready, _ = wait(pending, return_when=FIRST_COMPLETED)
+    todo = iter(tasks.items())
     in_doubt: list[Name] = []
-    for future in ready:
-        name = pending.pop(future)
-        if isinstance(future.exception(), BrokenProcessPool):
+    seats: list[_Seat] = []
+    free: list[_Seat] = []
+    busy: dict[Any, tuple[_Seat, Name]] = {}
+
+    def seat_more() -> None:
+        seats.append(_Seat(begin))
+        seats[-1].start()
+        free.append(seats[-1])
+
+    def take(pipe: Any) -> None:
+        seat, name = busy.pop(pipe)
+        is_alone = jobs == 1 and seat.is_new
+        result = seat.take()
+        if isinstance(result, _Raised):
+            raise result.error
+        if isinstance(result, Crashed) and not is_alone:
             in_doubt.append(name)
         else:
-            _taken(left, record, name, future.result())
-    return [*in_doubt, *pending.values()] if in_doubt else []
+            record(name, result)
+        if isinstance(result, Crashed):
+            seat.end()
+            seat.wait_for_end()
+            seats.remove(seat)
+        else:
+            free.append(seat)
+
+    try:
+        while len(seats) < jobs:  # all, before the first waits for what it is given
+            seat_more()
+        for name, task in todo:
+            if not free and len(busy) < jobs:
+                seat_more()
+            with _no_interrupt():
+                seat = free.pop(0)
+                busy[seat.pipe] = seat, name
+                seat.give(work, task)
+            while not free and len(busy) == jobs:
+                for pipe in wait(list(busy)):
+                    take(pipe)
+        while busy:
+            for pipe in wait(list(busy)):
+                take(pipe)
+    except BaseException:
+        while busy:
+            for pipe in wait(list(busy)):
+                seat, name = busy.pop(pipe)
+                result = seat.take()
+                if not isinstance(result, Crashed | _Raised):
+                    record(name, result)
+        raise
+    finally:
+        for seat in seats:
+            seat.end()
+        for seat in seats:
+            seat.wait_for_end()
+    return in_doubt
 
 
 @contextmanager
@@ -153,19 +227,25 @@ def _no_interrupt() -> Iterator[None]:
     A process started within inherits that, and is not torn from its imports by one; nor is what it reads from here cut
     off, which the mask alone does not ensure: a thread of a library may take the signal for the main thread.
     """
-    if not hasattr(signal, "pthread_sigmask") or current_thread() is not main_thread():
+    if current_thread() is not main_thread():
         yield
         return
     came: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    asked = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+    handlers = {n: h for n in asked if callable(h := signal.getsignal(n))}
+    for number in handlers:
+        signal.signal(number, lambda number, _: came.append(number))
+    can_mask = hasattr(signal, "pthread_sigmask")
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]) if can_mask else set()
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, handler)
-        if came:
-            signal.raise_signal(signal.SIGINT)
+        if can_mask:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 def within(seconds: float | None, work: Callable[..., Any], *task: Any) -> Any:
