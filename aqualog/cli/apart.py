@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 if TYPE_CHECKING:
+    from aqualog.cli.aside import Aside
     from aqualog.cli.board import Board
     from aqualog.io.in_hand import InHand
     from aqualog.io.limits import ReadLimits
@@ -85,6 +86,7 @@ class _End(NamedTuple):
 
 def _worker(limits: ReadLimits, *, debug: bool) -> Board:
     """Returns in the worker only."""
+    from aqualog.cli.aside import Aside
     from aqualog.cli.board import Board
     from aqualog.cli.scratch import Scratch
 
@@ -99,14 +101,19 @@ def _worker(limits: ReadLimits, *, debug: bool) -> Board:
             stream.flush()
         board.clear()
         scratch.make()
+        aside = None if debug else Aside()
         me = os.getpid()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, waited)
         worker = os.fork()
         if worker == 0:
-            _begin(me, limits, board, refused, debug=debug)
+            _begin(me, limits, board, refused, aside)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
             return board
-        end = _watch(worker, board, waited)
+        if aside is not None:
+            aside.watch()
+        end = _watch(worker, board, waited, aside)
+        if aside is not None:
+            aside.end()
         scratch.remove()
         _clear_away(end.held)
         if end.is_interrupted:
@@ -121,8 +128,8 @@ def _worker(limits: ReadLimits, *, debug: bool) -> Board:
         refused[path] = why
 
 
-def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str], *, debug: bool) -> None:
-    """Set the worker up."""
+def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str], aside: Aside | None) -> None:
+    """Set the worker up; without `aside` all that libraries say is told as it comes."""
     import resource
 
     from aqualog.io.in_hand import bound_memory, watched_by
@@ -132,12 +139,13 @@ def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str
     resource.setrlimit(resource.RLIMIT_CORE, (0, hard))  # as large as the memory, and with the log in it
     if most := limits.memory_here():
         bound_memory(most)
-    if debug:
+    if aside is None:
         import faulthandler
 
         faulthandler.enable()
     else:
-        os.environ["RUST_BACKTRACE"] = "0"  # a hundred lines of it would hide the one that says which log it was
+        os.environ["RUST_BACKTRACE"] = "0"
+        aside.begin()
     watched_by(board.tell, limits, refused)
 
 
@@ -153,7 +161,7 @@ def _die_with(parent: int) -> None:
         os._exit(_FAILED)
 
 
-def _watch(worker: int, board: Board, waited: set[signal.Signals]) -> _End:
+def _watch(worker: int, board: Board, waited: set[signal.Signals], aside: Aside | None) -> _End:
     """Wait for the worker, pass signals on, end one that hangs."""
     interrupts, asked = 0, -math.inf
     step, spent, too_long = -1, 0.0, 0.0
@@ -165,6 +173,8 @@ def _watch(worker: int, board: Board, waited: set[signal.Signals]) -> _End:
         # a tick that lasted long was a machine asleep, or a job that was stopped
         tick, then = min(now - then, 4.0 * _TICK_S), now
         done, status, _ = os.wait4(worker, os.WNOHANG)
+        if aside is not None:
+            aside.pass_on()
         held = board.read()
         if done or now - killed > _DEAD_S:
             code = os.waitstatus_to_exitcode(status) if done else -signal.SIGKILL

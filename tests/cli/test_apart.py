@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from aqualog.cli.aside import Lines
 from aqualog.cli.board import Board
 from aqualog.errors import AqualogError, ConfigError, LogError
 from aqualog.io import in_hand
@@ -20,7 +21,7 @@ from aqualog.workers import Crashed, Limits, work_on
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "sigtimedwait"), reason="commands work in one process here")
 
-HOSTILE = """
+HOSTILE = '''
 import collections, ctypes, itertools, os, sys, tempfile, time
 from pathlib import Path
 import aqualog.io.open_log as opening
@@ -44,7 +45,20 @@ def consume(path):
 ACTS = {
     "crash": crash, "leave": lambda p: os._exit(0), "hang": consume, "sleep": lambda p: time.sleep(60), "spin": consume,
     "memory": lambda p: [bytearray(50_000_000) for _ in range(10**6)], "write": write,
+    "panic": lambda p: os.write(2, PANIC.encode()),
 }
+PANIC = r"""a library's warning
+
+thread '<unnamed>' (28) panicked at crates/polars/column.rs:301:37:
+assertion `left == right` failed
+  left: 5
+ right: 6
+note: run with `RUST_BACKTRACE=1` environment variable to display a backtrace
+
+thread 'polars-1' panicked at crates/polars/column.rs:1:1:
+called `Option::unwrap()` on a `None` value
+
+its last word"""
 
 def bad(path, options):
     act = ACTS.get(path.stem)
@@ -55,7 +69,7 @@ def bad(path, options):
     return csv(path, options)
 
 opening._READERS["csv"] = bad
-"""
+'''
 LOOK = """
 import json
 from typing import Annotated
@@ -106,6 +120,31 @@ def started(folder, *arguments, code=LOOK, **limits):
 def ended(process, within=30.0):
     out, err = process.communicate(timeout=within)
     return process.returncode, out, [line for line in err.splitlines() if not line.startswith("READY")]
+
+
+def test_a_library_is_heard_but_not_its_panics(folder):
+    (folder / "panic.csv").write_text("t [s],v_x [m/s]\n0,1\n1,2\n")
+    assert ended(started(folder, "panic.csv")) == (0, '["csv"]', ["a library's warning", "", "its last word"])
+    code, _, told = ended(started(folder, "inspect", "panic.csv", "--debug", code=REAL))
+    assert code == 0
+    assert any("panicked" in line for line in told)
+
+
+def test_lines_of_panics_are_known_as_they_come():
+    lines = Lines()
+    text = [
+        b"one",
+        b"",
+        b"",
+        b"two",
+        b"",
+        b"thread 'a' panicked at b.rs:1:2:",
+        b"what",
+        b"  left: 1",
+        b"three",
+        b" four",
+    ]
+    assert [kept for line in text for kept in lines.kept([line])] == [b"one", b"", b"", b"two", b"three", b" four"]
 
 
 LINES = {
