@@ -12,7 +12,7 @@ from typing import Protocol
 
 from aqualog.errors import ConfigError
 
-__all__ = ["Address", "Place", "address_of", "is_orphan", "is_url", "place_of", "temporary_name"]
+__all__ = ["Address", "Place", "address_of", "is_of_process", "is_orphan", "is_url", "place_of", "temporary_name"]
 
 Address = Path | str
 """A folder, or the URL of something that fsspec knows."""
@@ -116,6 +116,11 @@ def address_of(text: Address) -> Address:
 def is_url(text: str) -> bool:
     """Whether a text is the address of a place behind a URL."""
     return bool(_URL.fullmatch(text))
+
+
+def is_of_process(address: Address) -> bool:
+    """Whether a place is in the memory of whoever asks for it."""
+    return str(address).lower().startswith("memory:")
 
 
 def place_of(address: Address) -> Place:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from aqualog.io.in_hand import InHand
     from aqualog.io.limits import ReadLimits
 
-__all__ = ["apart", "ask"]
+__all__ = ["apart", "ask", "is_command"]
 
 _TICK_S = 0.25
 _GRACE_S = 1.2  # after an interrupt, for a reader to come back to Python
@@ -36,12 +36,18 @@ _DEAD_S = 5.0  # a process that a dead disk holds cannot be killed, and is not w
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 
 _asked = False
+_is_command = False
 
 
 def ask() -> None:
     """Let the command that this process was started for work apart."""
-    global _asked
-    _asked = True
+    global _asked, _is_command
+    _asked = _is_command = True
+
+
+def is_command() -> bool:
+    """Whether this process was started for one command, and ends with it."""
+    return _is_command
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aqualog.cli.apart import is_command
 from aqualog.cli.console import Console, clean_line, told_if_interrupted
 from aqualog.cli.evaluate_inputs import is_campaign
 from aqualog.cli.files import expand, list_files, refuse_existing
@@ -65,11 +66,15 @@ def store_of(configured: Configured, given: Address | None) -> Address:
     Raises
     ------
     ConfigError
-        For logs without a campaign file, which have no place of their own.
+        For logs without a campaign file, which have no place of their own, and for a place that goes with this process.
     """
     if given is not None:
-        from aqualog.campaign.place import address_of
+        from aqualog.campaign.place import address_of, is_of_process
 
+        if is_command() and is_of_process(given):
+            raise ConfigError(
+                "is in the memory of this command and would end with it", where=str(given), expected="a folder or a URL"
+            )
         return address_of(given)
     if configured.campaign.path.suffix.lower() != ".toml":
         raise ConfigError("logs without a campaign file have no place for results", expected="--store DIR")

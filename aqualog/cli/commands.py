@@ -91,7 +91,34 @@ class Commands(TyperGroup):
         name = args[0]
         if name in COMMANDS:
             self.commands[name] = _made(name, COMMANDS[name])
+            _refuse_empty(self.commands[name], args[1:])
         return super().resolve_command(ctx, args)
+
+
+_PLACES = ("FILE", "DIR", "PATH", "LOG", "CAMPAIGN.toml")
+
+
+def _refuse_empty(command: Any, args: list[str]) -> None:
+    """Stop where a file or folder has no name: later it would be taken for the folder in which the user happens to be.
+
+    `args` are what stands behind the command.
+    """
+    if args and (below := getattr(command, "commands", {}).get(args[0])) is not None:
+        _refuse_empty(below, args[1:])
+        return
+    options = {o: p for p in command.params for o in p.opts if o.startswith("-") and not getattr(p, "is_flag", False)}
+    before = ""
+    for arg in args:
+        name, is_joined, value = arg.partition("=")
+        is_given = bool(is_joined) and name in options
+        option = options.get(name if is_given else before)
+        is_empty = not (value if is_given else arg).strip()
+        if is_empty and (option is None or option.metavar in _PLACES):
+            what = "a name" if option is None else name if is_given else before
+            expected = "a file or folder" if option is None else "a folder" if option.metavar == "DIR" else "a file"
+            sys.stderr.write(f"error: {what} is empty; expected {expected}. Try: check the shell's variables\n")
+            raise typer.Exit(2)
+        before = "" if is_given or before in options else arg
 
 
 @contextmanager

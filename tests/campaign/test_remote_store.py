@@ -26,6 +26,7 @@ from aqualog.campaign.place import address_of, place_of
 from aqualog.campaign.place_local import Folder
 from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store
+from aqualog.cli import apart
 from aqualog.cli.main import app
 from aqualog.errors import ConfigError, LogError
 
@@ -241,6 +242,14 @@ def test_memory_is_of_one_process(plain):
     result = run("batch", plain[0], "-o", "memory://bucket/alone", "--limit-s", "60")
     assert result.exit_code == 2
     assert "is in the memory of one process" in result.stderr
+
+
+def test_memory_that_ends_with_the_command_is_refused(plain, monkeypatch):
+    monkeypatch.setattr(apart, "_is_command", True)
+    for command in (("batch", "-o"), ("bin-slipslope", "--store"), ("plan", "--store")):
+        result = run(command[0], plain[0], command[1], "Memory://bucket/gone")
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert "Memory://bucket/gone: is in the memory of this command and would end with it" in result.stderr
 
 
 def test_nothing_half_written_where_the_move_fails(plain, tmp_path):

@@ -104,6 +104,32 @@ def test_files_of_a_folder_that_is_one_log(folder):
         refuse_existing([folder / "labels" / "a.csv"], force=True, sources=[folder / "labels"])
 
 
+@pytest.mark.parametrize(
+    ("args", "named"),
+    [
+        (("detect", "a.csv", "-o", ""), "-o"),
+        (("detect", "a.csv", "--write", " "), "--write"),
+        (("detect", "a.csv", "--out="), "--out"),
+        (("convert", "-o", "", "a.csv"), "-o"),
+        (("batch", "a.csv", "--vehicle", "", "-o", "s"), "--vehicle"),
+        (("campaign", "init", "logs", "-o", ""), "-o"),
+        (("campaign", "init", ""), "a name"),
+    ],
+)
+def test_an_empty_result_is_not_the_folder_one_is_in(folder, args, named):
+    before = sorted(folder.rglob("*"))
+    result = CliRunner().invoke(app, args)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error: {named} is empty; expected a f")
+    assert result.stderr.count("\n") == 1
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_an_empty_text_is_no_name(folder):
+    result = CliRunner().invoke(app, ["detect", "a.csv", "--configuration", "", "--vehicle", "none.toml"])
+    assert "none.toml: vehicle file not found" in result.stderr
+
+
 @pytest.mark.parametrize("command", ["detect", "batch", "inspect"])
 def test_an_empty_name_is_not_the_folder_one_is_in(folder, command):
     result = CliRunner().invoke(
