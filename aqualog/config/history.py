@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from aqualog.config.toml_file import DEEPEST
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
 from aqualog.errors import ConfigError
 from aqualog.io.whole import write_text
@@ -44,7 +45,9 @@ def load_history(path: Path) -> History:
         raise ConfigError(f"is larger than {MAX_BYTES // 10**6} MB", where=str(path), hint="a history per car")
     try:
         document = json.loads(path.read_bytes())
-    except (ValueError, RecursionError) as error:
+    except RecursionError as error:
+        raise ConfigError(f"is nested deeper than {DEEPEST} levels", where=str(path)) from error
+    except ValueError as error:
         raise ConfigError(f"is no JSON ({str(error)[:100]})", where=str(path)) from error
     return history_from_json(document, where=str(path))
 

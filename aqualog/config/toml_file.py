@@ -13,14 +13,15 @@ from typing import Any
 from aqualog.errors import ConfigError
 from aqualog.io.small_file import read_small
 
-__all__ = ["Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]
+__all__ = ["DEEPEST", "Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]
 
 LARGEST = 16 * 2**20  # [byte]
-_DEEPEST = 100  # parts of a dotted key; tomllib takes time with their square
+DEEPEST = 100  # levels of tables and lists that any file needs
+_MOST_PARTS = 100  # parts of a dotted key; tomllib takes time with their square
 _MOST_TOLD = 20  # faults of a file; each is looked for in the whole text
 _LONGEST_KEY = 60  # characters of an unknown key that are shown
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
-_DEEP = re.compile(rf"""(?:^|[\[{{,])[ \t]*+{_PART}(?:\.[ \t]*+{_PART}){{{_DEEPEST}}}""", re.MULTILINE)
+_DEEP = re.compile(rf"""(?:^|[\[{{,])[ \t]*+{_PART}(?:\.[ \t]*+{_PART}){{{_MOST_PARTS}}}""", re.MULTILINE)
 _HEADER = re.compile(r"""^\s*\[\[?\s*["']?([A-Za-z_][\w.-]*)["']?\s*\]\]?\s*(#.*)?$""")
 
 
@@ -49,13 +50,15 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
     except UnicodeDecodeError as error:
         raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a TOML file") from error
     if _DEEP.search(text):
-        raise ConfigError(f"{what} has a key of more than {_DEEPEST} parts", where=str(path), expected="a TOML file")
+        raise ConfigError(f"{what} has a key of more than {_MOST_PARTS} parts", where=str(path))
     try:
         document = tomllib.loads(text)
         if _has_endless_number(document):
             raise ValueError("an integer beyond 64 bits")
         return document, text
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, lists of thousands of levels
+    except RecursionError as error:  # at some hundred levels, as it happens
+        raise ConfigError(f"{what} is nested deeper than {DEEPEST} levels", where=str(path)) from error
+    except ValueError as error:  # also numbers of thousands of digits
         raise ConfigError(f"{what} is not valid TOML: {error}", where=str(path)) from error
 
 

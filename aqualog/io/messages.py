@@ -487,6 +487,8 @@ _ABSENT = (TypeError, KeyError, IndexError, AttributeError, ValueError, Overflow
 
 
 def _brief(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "they are nested deeper than 100 levels"
     return (str(error).splitlines() or [""])[0][:120] or type(error).__name__
 
 

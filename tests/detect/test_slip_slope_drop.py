@@ -173,6 +173,14 @@ def test_a_file_that_is_no_history(tmp_path, text):
         load_history(path)
 
 
+def test_a_history_of_endless_brackets_is_told_in_our_words(tmp_path):
+    path = tmp_path / "h.json"
+    path.write_text("[" * 100_000)
+    with pytest.raises(ConfigError) as caught:
+        load_history(path)
+    assert caught.value.line() == f"{path}: is nested deeper than 100 levels"
+
+
 def test_a_drive_that_is_looked_at_again_counts_once():
     first = History().with_periods("c", "left", [Period(31.0, 30.0, 30.0, "a"), Period(33.0, 32.0, 30.0, "b")])
     summary = SlopeSummary("left", None, 30.0, 1.0, 30.0, None, 0.0, 0, {}, {}, periods=((29.5, 29.0, 30.0),))

@@ -249,3 +249,12 @@ def test_a_number_beyond_all_bounds_is_told_with_the_bounds(tmp_path, value):
     assert "is outside 200 ... 60000 kg" in told
     assert "not a number" not in told
     assert "mass = nan is not a number" in vehicle_faults(tmp_path, "mass = nan\n")
+
+
+@pytest.mark.parametrize("text", ["mass = " + "[" * 5000, "mass = " + "{a = " * 5000 + "1" + "}" * 5000])
+def test_endless_brackets_are_told_in_our_words(tmp_path, text):
+    path = tmp_path / "car.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_vehicle(path)
+    assert caught.value.line() == f"{path}: vehicle file is nested deeper than 100 levels"
