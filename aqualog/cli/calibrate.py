@@ -133,7 +133,8 @@ def _calibrate(
     if result is None:
         return int(ExitCode.NOTHING_USABLE)
     drives = [(name, paths) for name, paths in drives if name in loaded]
-    notes = tuple(_of(name, paths, n) for name, paths in drives for n in loaded[name].quality.notes)
+    changes = setup.changes()
+    notes = (*(_of(name, paths, n) for name, paths in drives for n in loaded[name].quality.notes), *changes)
     if out_name is not None:
         from aqualog.cli.files import write_text
         from aqualog.config.vehicle_edit import calibrated_toml
@@ -157,7 +158,7 @@ def _calibrate(
     for path in targets:
         setup.console.note(f"written: {path}")
     lossy = any(s.quality.truncated or s.quality.lost_in_files for s in loaded.values())
-    is_partial = lossy or failed or len(result.drives) < len(drives)
+    is_partial = lossy or failed or changes or len(result.drives) < len(drives)
     return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)
 
 

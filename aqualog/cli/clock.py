@@ -106,7 +106,7 @@ def _align(
     if len(paths) < 2:
         raise ConfigError("align compares files", expected="a reference and at least one source")
     names = _named(named, [p.name for p in paths])
-    with console.steps() as steps, DriveLog(paths, read_options(signal_map, dbc)) as log:
+    with console.steps() as steps, setup.reading(), DriveLog(paths, read_options(signal_map, dbc)) as log:
         steps("reading")
         channels = log.read(log.channels())
         carriers = [
@@ -136,9 +136,12 @@ def _align(
     for file, fit in fits.items():
         if isinstance(fit, AqualogError):
             sys.stderr.write(f"error: {clean_line(file)}: {clean_line(fit.line())}\n")
+    changes = setup.changes()
+    for text in changes:
+        console.note(text)
     if not good:
         return int(ExitCode.NOTHING_USABLE)
-    return int(ExitCode.PARTIAL) if len(good) < len(fits) else int(ExitCode.DONE)
+    return int(ExitCode.PARTIAL) if len(good) < len(fits) or changes else int(ExitCode.DONE)
 
 
 def _named(pairs: list[str], files: list[str]) -> dict[str, str]:

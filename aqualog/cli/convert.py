@@ -89,7 +89,7 @@ def _convert(
         progress=progress, vehicle_file=vehicle_file,
     )  # fmt: skip
     console, paths = setup.console, setup.paths
-    with console.steps() as steps:
+    with console.steps() as steps, setup.reading():
         import numpy as np
 
         from aqualog.align.load import load_signals
@@ -98,6 +98,7 @@ def _convert(
         loaded = load_signals(
             paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps
         )
+        changes = setup.changes()
         steps("writing")
         t_ns = np.arange(loaded.frame.height, dtype=np.int64) * loaded.dt_ns
         groups = signal_groups(loaded)
@@ -105,8 +106,8 @@ def _convert(
             out,
             lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=loaded.start_ns, decimal_comma=decimal_comma),
         )
-    for text in loaded.quality.notes:
+    for text in (*loaded.quality.notes, *changes):
         console.note(text)
     console.note(f"{len(loaded.symbols)} signals, {t_ns.size} samples at {1e9 / loaded.dt_ns:g} Hz are in {out}")
-    lost = loaded.quality.truncated or loaded.quality.lost_in_files
+    lost = loaded.quality.truncated or loaded.quality.lost_in_files or changes
     return int(ExitCode.PARTIAL) if lost else int(ExitCode.DONE)

@@ -186,7 +186,7 @@ def _detect(
         from aqualog.config.model import load_model
 
         model = load_model(model_file)
-    with console.steps() as steps:
+    with console.steps() as steps, setup.reading():
         from aqualog.align.load_long import LoadedLong, load_drive
 
         options = (("--write", write), ("--model", model), ("--history", history_file))
@@ -211,7 +211,8 @@ def _detect(
             result, told = _whole(
                 drive, vehicle, model, settings, memory, key, console, samples=out is not None or write is not None
             )
-        result = replace(result, notes=(*told, *result.notes))
+        changes = setup.changes()
+        result = replace(result, notes=(*told, *result.notes, *changes))
         loaded = result.signals
         terms = _model_document(model)
         name = ", ".join(str(p) for p in paths)
@@ -237,7 +238,7 @@ def _detect(
         console.note(text)
     if out is not None:
         console.note(f"results are in {out}: {', '.join(_RESULTS)}")
-    return _exit_code(result, fail_on_event=fail_on_event)
+    return _exit_code(result, fail_on_event=fail_on_event, has_changed=bool(changes))
 
 
 def _whole(
@@ -384,10 +385,11 @@ def _print(result: DriveResult, name: str, model: Any, *, as_json: bool) -> None
     sys.stdout.write(clean(event_table(result)))
 
 
-def _exit_code(result: DriveResult, *, fail_on_event: bool) -> int:
+def _exit_code(result: DriveResult, *, fail_on_event: bool, has_changed: bool) -> int:
     from aqualog.errors import ExitCode
 
     quality = result.signals.quality
     if fail_on_event and result.events:
         return int(ExitCode.GATE_TRIPPED)
-    return int(ExitCode.PARTIAL) if quality.truncated or quality.lost_in_files else int(ExitCode.DONE)
+    lossy = quality.truncated or quality.lost_in_files or has_changed
+    return int(ExitCode.PARTIAL) if lossy else int(ExitCode.DONE)

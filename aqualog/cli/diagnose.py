@@ -196,9 +196,10 @@ def _diagnose(
     if result is None:
         return int(ExitCode.NOTHING_USABLE)
     paths = [str(p) for n, files in drives if n in given.loaded for p in files]
-    tell(result, targets, paths, [*repeated, *given.notes], setup.vehicle.name, console)
+    changes = setup.changes()
+    tell(result, targets, paths, [*repeated, *given.notes, *changes], setup.vehicle.name, console)
     asked = [n for n, _ in drives if n in given.loaded]
-    is_partial = given.failed or given.is_lossy or len(result.drives) < len(asked)
+    is_partial = given.failed or given.is_lossy or changes or len(result.drives) < len(asked)
     return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)
 
 

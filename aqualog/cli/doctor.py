@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from aqualog.cli.options import Dbc, Debug, Json, Logs, Progress, Quiet, Signals, Vehicle, Verbose
 
-__all__ = ["doctor"]
+if TYPE_CHECKING:
+    from aqualog.doctor.records import Examination
+    from aqualog.errors import ExitCode
+
+__all__ = ["doctor", "exit_code"]
 
 
 def doctor(
@@ -26,8 +31,8 @@ def doctor(
 
     Every file is read to its end: damage, time stamps that jump, samples that are no numbers, codes, signals that stand
     still; then the drive as `detect` would see it: units, ranges, sensors that contradict each other, and which
-    detectors lack what. Nothing is written. Exit codes: 0 nothing lost, 3 something lost, 1 a file cannot be read,
-    4 no signal that aqualog knows.
+    detectors lack what. Nothing is written. Exit codes: 0 nothing lost, 3 something lost or a file of several cannot be
+    read, 4 nothing lost but no signal that aqualog knows, or no samples at all, 1 nothing can be read.
 
     \b
     Examples:
@@ -68,14 +73,23 @@ def _doctor(
         logs, map_file=map_file, dbc=dbc, targets=[], force=False, quiet=quiet, verbose=verbose,
         progress=progress, vehicle_file=vehicle_file,
     )  # fmt: skip
-    with setup.console.steps() as steps:
+    with setup.console.steps() as steps, setup.reading():
         found = examine(setup.paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, report=steps)
     if as_json:
         sys.stdout.write(json.dumps(examination_document(found), indent=1) + "\n")
     else:
         sys.stdout.write(clean(examination_text(found)))
-    if any(f.level == "unreadable" for f in found.findings):
-        return 1
+    return int(exit_code(found))
+
+
+def exit_code(found: Examination) -> ExitCode:
+    """What was lost of something counts more than that there is no signal in the rest, as with `inspect`."""
+    from aqualog.errors import ExitCode
+
+    if found.is_unreadable:
+        return ExitCode.FAILED
+    if found.has_loss and any(f.samples for f in found.files):
+        return ExitCode.PARTIAL
     if any(f.kind == "no_signals" for f in found.findings):
-        return 4
-    return 3 if found.has_loss else 0
+        return ExitCode.NOTHING_USABLE
+    return ExitCode.PARTIAL if found.has_loss else ExitCode.DONE

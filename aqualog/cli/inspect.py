@@ -101,7 +101,7 @@ def _inspect(
         verbose=verbose, progress=progress,
     )  # fmt: skip
     console, paths = setup.console, setup.paths
-    with console.steps() as steps, DriveLog(paths, read_options(setup.signal_map, dbc)) as log:
+    with console.steps() as steps, setup.reading(), DriveLog(paths, read_options(setup.signal_map, dbc)) as log:
         steps("reading")
         channels = list(log.read(log.channels()).values())
         formats, faults = log.formats, log.faults
@@ -112,6 +112,8 @@ def _inspect(
         proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
     told = [(p.name, n) for p, f in zip(paths, faults, strict=True) for n in f.notes]
     notes = [*(n if n.startswith(f"{name}: ") else f"{name}: {n}" for name, n in told), *find_mounting(found)]
+    changes = setup.changes()
+    notes += changes
     if write_map is not None:
         _write_map(write_map, proposals, paths, setup.signal_map)
     if as_json:
@@ -120,7 +122,7 @@ def _inspect(
         _print(paths, formats, channels, found, proposals, notes)
     if write_map is not None:
         console.note(f"proposed map with {len(proposals)} signals is in {write_map}: check it before you use it")
-    damaged = any(f.truncated or f.lost_samples for f in faults)
+    damaged = changes or any(f.truncated or f.lost_samples for f in faults)
     return 3 if damaged else (0 if found else 4)
 
 

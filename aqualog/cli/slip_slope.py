@@ -132,7 +132,7 @@ def _slip_slope(
     console, paths, vehicle = setup.console, setup.paths, setup.vehicle
     name = ", ".join(str(p) for p in paths)
     title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
-    with console.steps() as steps:
+    with console.steps() as steps, setup.reading():
         from aqualog.align.load import load_signals
         from aqualog.detect.slip_slope.direct import slip_slopes
 
@@ -140,17 +140,19 @@ def _slip_slope(
             paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps, cache=setup.cache
         )
         console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
+        changes = setup.changes()
+        notes = (*loaded.quality.notes, *changes)
         steps("estimating")
         result = slip_slopes(loaded, vehicle, method=method, traction=traction, mu_max=mu_max, delay=delay)
         steps("writing")
         if out is not None:
-            _write_results(result, out, name, title, loaded.quality.notes)
-    _print(result, name, loaded.quality.notes, as_json=as_json)
-    for text in (*loaded.quality.notes, *result.notes):
+            _write_results(result, out, name, title, notes)
+    _print(result, name, notes, as_json=as_json)
+    for text in (*notes, *result.notes):
         console.note(text)
     if out is not None:
         console.note(f"results are in {out}: {', '.join(_RESULTS)}")
-    lossy = loaded.quality.truncated or loaded.quality.lost_in_files
+    lossy = loaded.quality.truncated or loaded.quality.lost_in_files or changes
     return int(ExitCode.PARTIAL) if lossy else int(ExitCode.DONE)
 
 

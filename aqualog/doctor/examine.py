@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from aqualog.align.carrier import Carrier
@@ -16,6 +17,7 @@ from aqualog.doctor.records import Examination, FileState, Finding
 from aqualog.errors import AqualogError
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
+from aqualog.io.content import changed_files, state_of
 from aqualog.io.open_log import open_log
 from aqualog.types import Channel, FileFaults
 from aqualog.vehicle import Vehicle
@@ -49,8 +51,26 @@ def examine(
     report : callable
         Told what is being done.
 
-    A file that cannot be read is a finding and no error, as is a drive without signals.
+    A file that cannot be read is a finding and no error, as is a drive without signals, and a file that changes.
     """
+    before = state_of(paths)
+    found = _examined(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, report=report)
+    advice = "look at it again when it stays as it is"
+    changed = [
+        Finding("lost", "changed", Path(name).name, "", "changed while it was read", advice)
+        for name in changed_files(paths, before)
+    ]
+    return replace(found, findings=(*found.findings, *changed))
+
+
+def _examined(
+    paths: Sequence[Path],
+    *,
+    vehicle: Vehicle,
+    signal_map: SignalMap,
+    dbc: Sequence[Path],
+    report: Callable[[str], None],
+) -> Examination:
     files, findings = [], []
     speeds: list[Carrier] = []
     for path in paths:

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Contents", "Remembered", "Seen", "change_since", "hash_of", "sources_stamp"]
+__all__ = ["Contents", "Remembered", "Seen", "change_since", "changed_files", "hash_of", "sources_stamp", "state_of"]
 
 Seen = tuple[tuple[str, int, int], ...]
 """Files with size and time of change."""
@@ -89,6 +89,27 @@ def change_since(paths: Sequence[Path], seen: Seen) -> str:
         return ""
     name = min(set(now) ^ set(seen), default=(", ".join(map(str, paths)),))[0]
     return f"{name}: changed while it was read. Try: run the batch again"
+
+
+def state_of(paths: Iterable[Path]) -> Seen:
+    """The files behind `paths` as they are now, without reading them; what is no file, or not there, has no state."""
+    found = []
+    for file in (f for p in paths for f in _files(p)):
+        try:
+            state = file.stat()
+        except OSError:
+            continue
+        if stat.S_ISREG(state.st_mode):
+            found.append((str(file), state.st_size, state.st_mtime_ns))
+    return tuple(found)
+
+
+def changed_files(paths: Iterable[Path], before: Seen) -> tuple[str, ...]:
+    """Files that are not as `state_of` found them before: written to, replaced or gone.
+
+    New ones in a folder are none: results may lie there, and a recording that begins another part has written to one.
+    """
+    return tuple(sorted(name for name, _, _ in set(before) - set(state_of(paths))))
 
 
 @cache

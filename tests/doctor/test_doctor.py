@@ -10,9 +10,12 @@ from conftest import ROOT
 from aqualog.align.freezes import longest_stop
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap, SourceClock
+from aqualog.cli.doctor import exit_code
 from aqualog.cli.main import app
 from aqualog.config.vehicle import load_vehicle
+from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
+from aqualog.doctor.records import Examination, FileState, Finding
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
@@ -211,3 +214,46 @@ def test_unknown_names_say_what_to_try(tmp_path, capsys):
         app(["doctor", str(path)])
     assert leave.value.code == 4
     assert "--write-map" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("texts", "code"),
+    [
+        ({"a.csv": "t [s],temp [degC]\n0,1\n1,2\n2,3\n"}, 4),
+        ({"a.csv": "t [s],temp [degC]\n0,1\n1,2\n2,3\n3"}, 3),
+        ({"a.csv": "t [s],v_x [m/s]\n0,1\n1,2\n2,3\n", "b.csv": ""}, 3),
+        ({"a.csv": "", "b.csv": ""}, 1),
+    ],
+    ids=["no signal", "a loss and no signal", "one of two", "none of two"],
+)
+def test_exit_codes_of_what_is_of_little_use(texts, code, tmp_path, capsys):
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(SystemExit) as leave:
+        app(["doctor", *(str(tmp_path / n) for n in texts), "--json"])
+    assert leave.value.code == code, capsys.readouterr().out
+    document = json.loads(capsys.readouterr().out)
+    assert document["healthy"] is (code == 4)
+
+
+def test_a_loss_of_which_nothing_is_left_is_nothing_usable():
+    lost = Finding("lost", "truncated", "a.mcap", "", "is cut off")
+    none = Finding("doubt", "no_signals", "", "", "holds no channel")
+    assert exit_code(Examination((FileState("a.mcap", "mcap", 100),), (lost, none))) == 4
+    assert exit_code(Examination((FileState("a.mcap", "mcap", 100, 1, 7),), (lost, none))) == 3
+
+
+def test_a_log_that_changes_while_it_is_looked_at_is_a_loss(tmp_path, monkeypatch):
+    path = tmp_path / "a.csv"
+    path.write_text(table(drive()))
+    real = examination.load_signals
+
+    def grows(paths, **kw):
+        with path.open("a") as file:
+            file.write("30.0,1,1,1\n")
+        return real(paths, **kw)
+
+    monkeypatch.setattr(examination, "load_signals", grows)
+    found = examine([path], vehicle=CAR, signal_map=SignalMap())
+    assert [(f.kind, f.file) for f in found.findings if f.kind == "changed"] == [("changed", "a.csv")]
+    assert found.has_loss
