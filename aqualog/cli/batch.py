@@ -10,7 +10,20 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from aqualog.cli.options import CarOfLogs, Dbc, Debug, Force, Inputs, Jobs, Json, Progress, Quiet, Signals, Verbose
+from aqualog.cli.options import (
+    CarOfLogs,
+    Dbc,
+    Debug,
+    Force,
+    Inputs,
+    Jobs,
+    Json,
+    Progress,
+    Quiet,
+    Signals,
+    Thresholds,
+    Verbose,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome
@@ -37,9 +50,7 @@ def batch(
     vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
-    thresholds: Annotated[
-        Path | None, typer.Option("--thresholds", help="Thresholds file; default: built in.", metavar="FILE")
-    ] = None,
+    thresholds: Thresholds = None,
     jobs: Jobs = None,
     limit_s: Annotated[
         float | None,

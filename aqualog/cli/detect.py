@@ -21,6 +21,7 @@ from aqualog.cli.options import (
     Quiet,
     Rate,
     Signals,
+    Thresholds,
     Vehicle,
     Verbose,
 )  # fmt: skip
@@ -80,14 +81,7 @@ def detect(
             metavar="RULE",
         ),
     ] = "robust",
-    thresholds: Annotated[
-        Path | None,
-        typer.Option(
-            "--thresholds",
-            help="Thresholds of the detectors (TOML), as `aqualog evaluate --tune` writes them.",
-            metavar="FILE",
-        ),
-    ] = None,
+    thresholds: Thresholds = None,
     model: Annotated[
         Path | None,
         typer.Option(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Signals, Vehicle, Verbose
+from aqualog.cli.options import Dbc, Debug, Force, Inputs, Json, Progress, Quiet, Signals, Thresholds, Vehicle, Verbose
 
 if TYPE_CHECKING:
     from aqualog.cli.console import Console
@@ -23,14 +23,7 @@ __all__ = ["evaluate"]
 
 
 def evaluate(
-    inputs: Annotated[
-        list[str],
-        typer.Argument(
-            help="A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
-            metavar="CAMPAIGN.toml|LOG...",
-            show_default=False,
-        ),
-    ],
+    inputs: Inputs,
     vehicle: Vehicle = None,
     signals: Signals = None,
     dbc: Dbc = None,
@@ -49,9 +42,7 @@ def evaluate(
     ] = "",
     rivals: Annotated[bool, typer.Option("--rivals", help="Also the methods of the prior art.")] = False,
     roc: Annotated[bool, typer.Option("--roc", help="Also at thresholds from a quarter to four times.")] = False,
-    thresholds: Annotated[
-        Path | None, typer.Option("--thresholds", help="Thresholds file; default: built in.", metavar="FILE")
-    ] = None,
+    thresholds: Thresholds = None,
     tune: Annotated[
         Path | None,
         typer.Option(

@@ -9,7 +9,7 @@ import typer
 
 __all__ = [
     "Cache", "CarOfLogs", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate",
-    "Signals", "StoreOption", "Vehicle", "Verbose",
+    "Signals", "StoreOption", "Thresholds", "Vehicle", "Verbose",
 ]  # fmt: skip
 
 Logs = Annotated[
@@ -70,6 +70,14 @@ StoreOption = Annotated[
         metavar="DIR",
     ),
 ]  # fmt: skip
+Thresholds = Annotated[
+    Path | None,
+    typer.Option(
+        "--thresholds",
+        help="Thresholds of the detectors (TOML), as `aqualog evaluate --tune` writes them; default: built in.",
+        metavar="FILE",
+    ),
+]
 Jobs = Annotated[
     int | None, typer.Option("--jobs", help="Logs at a time; default one per core.", min=1, max=1024, metavar="N")
 ]

@@ -23,6 +23,7 @@ from aqualog.cli.options import (
     Quiet,
     Signals,
     StoreOption,
+    Thresholds,
     Verbose,
 )  # fmt: skip
 
@@ -55,9 +56,7 @@ def plan(
     vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
-    thresholds: Annotated[
-        Path | None, typer.Option("--thresholds", help="Thresholds file; default: built in.", metavar="FILE")
-    ] = None,
+    thresholds: Thresholds = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
