@@ -113,9 +113,8 @@ class _Seat:
     def take(self) -> Any:
         """The result of the item, if there is one; `Crashed` if the process has ended."""
         try:
-            with _no_interrupt():
-                result = self.pipe.recv()
-        except (EOFError, ConnectionResetError):
+            result = self.pipe.recv()
+        except (EOFError, OSError):  # at its end, or in the middle of what it said
             return Crashed(time.monotonic() - self._began)
         self.is_new = False
         return result
@@ -137,7 +136,7 @@ def _serve(pipe: Connection, limits: Limits, read_limits: ReadLimits) -> None:
     while True:
         try:
             work, task = pipe.recv()
-        except EOFError:
+        except (EOFError, OSError):
             return
         try:
             result = within(limits.seconds, work, *task)
@@ -146,6 +145,8 @@ def _serve(pipe: Connection, limits: Limits, read_limits: ReadLimits) -> None:
             result = _Raised(error)
         try:
             pipe.send(result)
+        except OSError:  # nobody waits for it any more
+            return
         except (AttributeError, TypeError, ValueError, PicklingError) as error:
             pipe.send(_Raised(TypeError(f"{type(result).__name__} cannot be sent: {error}")))
         del work, task, result  # nothing of it is held while there is nothing to do
@@ -172,15 +173,16 @@ def _round(
         free.append(seats[-1])
 
     def take(pipe: Any) -> None:
-        seat, name = busy.pop(pipe)
-        is_alone = jobs == 1 and seat.is_new
-        result = seat.take()
-        if isinstance(result, _Raised):
-            raise result.error
-        if isinstance(result, Crashed) and not is_alone:
-            in_doubt.append(name)
-        else:
-            record(name, result)
+        with _no_interrupt():  # what has come is recorded
+            seat, name = busy.pop(pipe)
+            is_alone = jobs == 1 and seat.is_new
+            result = seat.take()
+            if isinstance(result, _Raised):
+                raise result.error
+            if isinstance(result, Crashed) and not is_alone:
+                in_doubt.append(name)
+            else:
+                record(name, result)
         if isinstance(result, Crashed):
             seat.end()
             seat.wait_for_end()
@@ -207,10 +209,11 @@ def _round(
     except BaseException:
         while busy:
             for pipe in wait(list(busy)):
-                seat, name = busy.pop(pipe)
-                result = seat.take()
-                if not isinstance(result, Crashed | _Raised):
-                    record(name, result)
+                with _no_interrupt():
+                    seat, name = busy.pop(pipe)
+                    result = seat.take()
+                    if not isinstance(result, Crashed | _Raised):
+                        record(name, result)
         raise
     finally:
         for seat in seats:
