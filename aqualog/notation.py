@@ -43,8 +43,8 @@ def _wheels(stem: str, unit: str, meaning: str, low: float, high: float) -> list
 
 _ALL = [
     Symbol("v_x", "m/s", "longitudinal velocity from a reference (GNSS, optical)", -30.0, 150.0),
-    Symbol("a_x", "m/s^2", "ESC accelerometer, forward: specific force, holds g sin(theta) on a grade", -50.0, 50.0),
-    Symbol("a_y", "m/s^2", "ESC accelerometer, left", -50.0, 50.0),
+    Symbol("a_x", "m/s^2", "ESC accelerometer, forward: specific force, holds g sin(theta) on a grade", -20.0, 20.0),
+    Symbol("a_y", "m/s^2", "ESC accelerometer, left", -25.0, 25.0),
     Symbol("yaw_rate", "rad/s", "yaw rate, left turn positive", -6.0, 6.0),
     Symbol("steer_angle", "rad", "mean road-wheel angle, left positive", -1.2, 1.2),
     *_wheels("omega", "rad/s", "wheel speed, forward positive", -50.0, 600.0),

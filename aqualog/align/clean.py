@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.align.freezes import freeze_note, in_freezes, watch_of
-from aqualog.align.glitches import sensor_glitches
+from aqualog.align.glitches import Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import median_period_ns
 from aqualog.align.shared import OfLast
@@ -109,16 +109,19 @@ def clean_channel(
     if not unit and is_explicit:
         notes.append(f"{where} has no unit; taken as {symbol.unit}")
     keep, is_out = own.keep, own.is_out
-    if name.startswith("omega_") and keep.any():
-        glitch = np.zeros(keep.size, dtype=bool)
-        glitch[keep] = sensor_glitches(t_ns[keep], own.values[keep], r_e=vehicle.r_e(name[-2:]))
+    r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+    rule = glitches_of(name, r_e)
+    glitch = np.zeros(keep.size, dtype=np.bool_)
+    if rule is not None and keep.any():
+        glitch[keep] = rule.find(t_ns[keep], own.values[keep])
         if glitch.any():
-            notes.append(glitch_note(where, int(glitch.sum()), int(t_ns[np.argmax(glitch)] - t_ns[0])))
-            keep, is_out = keep & ~glitch, is_out | glitch
+            notes.append(glitch_note(where, rule, int(glitch.sum()), int(t_ns[np.argmax(glitch)] - t_ns[0])))
+            keep = keep & ~glitch
     if is_out.any():
-        first = float(own.values[np.argmax(is_out)])
-        notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, first))
-    frozen, watch = 0, watch_of(name, vehicle.r_e(name[-2:]) if name.startswith("omega_") else None)
+        k = int(np.argmax(is_out))
+        after_ns = int(t_ns[k] - t_ns[0])
+        notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, float(own.values[k]), after_ns))
+    frozen, watch = 0, watch_of(name, r_e)
     if watch is not None:
         watch.push(t_ns[keep], own.values[keep])
         if freezes := watch.finish():
@@ -135,7 +138,7 @@ def clean_channel(
         rate_hz=1e9 / period if period else 0.0,
         samples=int(channel.values.size),
         not_finite=int(own.is_bad.sum()),
-        out_of_range=int(is_out.sum()),
+        out_of_range=int((is_out | glitch).sum()),
         invalid_code=int(own.is_code.sum()),
         frozen=frozen,
         faults=faults,
@@ -174,19 +177,16 @@ def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
     return found
 
 
-def glitch_note(where: str, count: int, after_ns: int) -> str:
-    """What was left out because no wheel can have turned so."""
-    return (
-        f"{where}: {count} samples (first at {float(after_ns) * 1e-9:.2f} s) step faster than a wheel can; sensor "
-        "dropouts or spikes, left out"
-    )
+def glitch_note(where: str, rule: Glitches, count: int, after_ns: int) -> str:
+    """What was left out because no car can have done so."""
+    return f"{where}: {count} samples (first at {float(after_ns) * 1e-9:.2f} s) {rule.what}"
 
 
-def out_note(where: str, symbol: Symbol, count: int, of: int, first: float) -> str:
+def out_note(where: str, symbol: Symbol, count: int, of: int, first: float, after_ns: int) -> str:
     """What was left out because the signal cannot be so large or small."""
     return (
         f"{where}: {count} of {of} samples outside {symbol.low:g} ... {symbol.high:g} "
-        f"{symbol.unit} (first: {first:.6g}) are left out"
+        f"{symbol.unit} (first: {first:.6g} at {float(after_ns) * 1e-9:.2f} s) are left out"
     )
 
 

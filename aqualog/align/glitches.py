@@ -1,17 +1,44 @@
-"""Samples that no wheel can have turned: dropouts and spikes of a wheel speed sensor."""
+"""Samples that no car can have made: dropouts and spikes of a wheel speed sensor, spikes of an accelerometer."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["RETURN_NS", "RIM_LIMIT", "is_leap", "sensor_glitches"]
+__all__ = ["RETURN_NS", "RIM_LIMIT", "Glitches", "glitches_of", "is_leap", "sensor_glitches", "spikes"]
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
 _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
 RETURN_NS = 1_000_000_000
 _STANDS = 10  # samples of one value, at least, that are no slow signal's
+# of accelerations: five measured cars step by 9.5 m/s^2 from sample to sample at most (a phone's, 100 Hz), else by 4.3
+_JERK = 50.0  # [m/s^3]
+_STEP = 12.0  # [m/s^2]
+_BACK = 4.0  # [m/s^2] by which what follows a spike differs from what came before, at most
+_SPIKE_NS = 150_000_000  # longest spike; a blow is over in less, and a car that brakes takes longer
+
+
+class Glitches(NamedTuple):
+    """How the glitches of a signal are found, from stamps (n,) [ns] and samples (n,), and what is said of them."""
+
+    find: Callable[[TimeArray, FloatArray], BoolArray]
+    what: str
+
+
+def glitches_of(name: str, r_e: float | None) -> Glitches | None:
+    """The glitches of a signal, with the effective radius [m] of a wheel; None for signals that may leap."""
+    if name.startswith("omega_") and r_e is not None:
+        return Glitches(
+            partial(sensor_glitches, r_e=r_e), "step faster than a wheel can; sensor dropouts or spikes, left out"
+        )
+    if name in ("a_x", "a_y"):
+        return Glitches(spikes, "leap from what is before and behind them as no car can; spikes, left out")
+    return None
 
 
 def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
@@ -59,6 +86,39 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
             glitch[i + 1 : end] = True
             done = end
     return glitch
+
+
+def spikes(t_ns: TimeArray, a: FloatArray) -> BoolArray:
+    """Which samples of an acceleration are not the car's.
+
+    Parameters
+    ----------
+    t_ns : int64 array (n,)
+        Strictly increasing stamps.
+    a : array (n,)
+        Finite samples. [m/s^2]
+
+    Returns
+    -------
+    bool array (n,)
+        From a step that no car makes (12 m/s^2 at once) to the step back to where it was, within 150 ms.
+    """
+    spike = np.zeros(a.size, dtype=np.bool_)
+    if a.size < 3:
+        return spike
+    jumps = np.flatnonzero(np.abs(np.diff(a)) > _JERK * np.diff(t_ns) * 1e-9 + _STEP)
+    done = -1
+    for position, i in enumerate(jumps.tolist()):
+        if i < done:
+            continue
+        for j in jumps[position + 1 :].tolist():
+            if t_ns[j] - t_ns[i] > _SPIKE_NS:
+                break
+            if abs(a[j + 1] - a[i]) <= _BACK:
+                spike[i + 1 : j + 1] = True
+                done = j + 1
+                break
+    return spike
 
 
 def is_leap(dt_ns: TimeArray, dv: FloatArray) -> BoolArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from aqualog.align.clean import BURST, Clean, Span, corrected, glitch_note, judged, mean_of_steps, out_note, symbol_of
 from aqualog.align.freezes import Freeze, freeze_note, in_freezes, watch_of
-from aqualog.align.glitches import RETURN_NS, sensor_glitches
+from aqualog.align.glitches import RETURN_NS, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.timebase import DAY_NS
@@ -109,9 +109,10 @@ class PieceCleaner:
             if self._is_explicit:
                 raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
             raise
-        self._r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+        r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+        self._rule = glitches_of(name, r_e)
         self._freezes = freezes or ()
-        self._watch = watch_of(name, self._r_e) if freezes is None else None
+        self._watch = watch_of(name, r_e) if freezes is None else None
         # counts
         self._frozen = 0
         self._samples = self._duplicates = self._bad = self._code = self._out = self._glitches = self._repaired = 0
@@ -125,7 +126,7 @@ class PieceCleaner:
         # what is held back
         self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES  # the last sample: one with the same stamp may follow
         self._last_ns: int | None = None  # of the stamps let through
-        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # a second in which a wheel's jump may turn back
+        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # a second in which a jump may turn back
         self._done = 0  # of these, let through already
         self._dead: float | None = None  # the value at which a sensor stands since a step that no wheel can make
 
@@ -152,7 +153,7 @@ class PieceCleaner:
         """The samples that were held back."""
         t, x = self._settled(self._held_t, self._held_raw)
         self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES
-        if self._r_e is None:
+        if self._rule is None:
             return t, x
         rest_t, rest_x = self._without_glitches(_NO_TIMES, _NO_VALUES, is_last=True)
         return np.concatenate([t, rest_t]), np.concatenate([x, rest_x])
@@ -176,7 +177,7 @@ class PieceCleaner:
             self._first_out = int(t[k]), float(own.values[k])
         keep = own.keep
         t, x = t[keep], own.values[keep]
-        return self._let_through(t, x) if self._r_e is None else self._without_glitches(t, x, is_last=False)
+        return self._let_through(t, x) if self._rule is None else self._without_glitches(t, x, is_last=False)
 
     def _let_through(self, t: TimeArray, x: FloatArray) -> tuple[TimeArray, FloatArray]:
         if self._watch is not None:
@@ -193,7 +194,7 @@ class PieceCleaner:
         return t, x
 
     def _without_glitches(self, t: TimeArray, x: FloatArray, *, is_last: bool) -> tuple[TimeArray, FloatArray]:
-        """Wheel speeds whose next second is known, less those that no wheel can have turned."""
+        """Samples whose next second is known, less those that no car can have made."""
         if self._dead is not None:
             moving = np.flatnonzero(x != self._dead)
             dead = int(moving[0]) if moving.size else x.size
@@ -221,12 +222,12 @@ class PieceCleaner:
         return found
 
     def _judged_glitches(self, t: TimeArray, x: FloatArray) -> BoolArray:
-        assert self._r_e is not None
+        assert self._rule is not None
         if self._used_count + self._frozen + self._glitches + t.size - self._done < 3:
             return np.zeros(t.size, dtype=bool)
         # a rest of two samples is part of a long signal: it goes on to the left as it began
         t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([x[:1], x[:1], x])
-        return sensor_glitches(t, x, r_e=self._r_e)[2:]
+        return self._rule.find(t, x)[2:]
 
     def _found(self, t: TimeArray, x: FloatArray) -> None:
         if t.size == 0:
@@ -234,8 +235,6 @@ class PieceCleaner:
         self._glitches += t.size
         if self._first_glitch_ns is None:
             self._first_glitch_ns = int(t[0])
-            if self._first_out is None or self._first_out[0] > t[0]:
-                self._first_out = int(t[0]), float(x[0])
 
     def frozen(self) -> tuple[Freeze, ...]:
         """Where the signal is frozen; complete after `finish`."""
@@ -249,13 +248,14 @@ class PieceCleaner:
         notes = []
         if not self.unit and self._is_explicit:
             notes.append(f"{self._where} has no unit; taken as {self.symbol.unit}")
-        if self._first_glitch_ns is not None:
-            notes.append(glitch_note(self._where, self._glitches, self._first_glitch_ns - (self._first_ns or 0)))
-        out = self._out + self._glitches
+        begin = self._first_ns or 0
+        if self._rule is not None and self._first_glitch_ns is not None:
+            notes.append(glitch_note(self._where, self._rule, self._glitches, self._first_glitch_ns - begin))
         if self._first_out is not None:
-            notes.append(out_note(self._where, self.symbol, out, self._repaired, self._first_out[1]))
+            at, value = self._first_out
+            notes.append(out_note(self._where, self.symbol, self._out, self._repaired, value, at - begin))
         if self._freezes:
-            notes.append(freeze_note(self._where, self._frozen, self._first_ns or 0, self._freezes))
+            notes.append(freeze_note(self._where, self._frozen, begin, self._freezes))
         faults = TimeFaults(duplicates=self._duplicates, pauses=sum(s > 10 * period for s in self._pauses))
         origin = Origin(
             symbol=self.name,
@@ -265,7 +265,7 @@ class PieceCleaner:
             rate_hz=1e9 / period if period else 0.0,
             samples=self._samples,
             not_finite=self._bad,
-            out_of_range=out,
+            out_of_range=self._out + self._glitches,
             invalid_code=self._code,
             frozen=self._frozen,
             faults=faults,

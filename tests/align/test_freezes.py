@@ -166,3 +166,20 @@ def test_a_wheel_that_starts_by_itself_was_awake(pieces):
     assert found(t, x, "omega_fl", pieces) == ((t[0] - 1, t[499]),)
     x[500:600] *= np.linspace(0.0, 1.0, 100)
     assert found(t, x, "omega_fl", pieces) == ()
+
+
+@pytest.mark.parametrize(("height", "samples"), [(20.0, 9), (-40.0, 5), (30.0, 20)])
+def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples):
+    channels, car = lane_and_braking()
+    sound = detected(channels, car)
+    t, x = channels["a_x"]
+    x = x.copy()
+    for at_s in (4, 26):
+        start = int(np.searchsorted(t, t[0] + at_s * S))
+        x[start : start + samples] += height
+    channels["a_x"] = t, x
+    result = detected(channels, car)
+    key = [(e.detector, e.wheel, e.severity) for e in result.events]
+    assert key == [(e.detector, e.wheel, e.severity) for e in sound.events]
+    assert result.signals.origins["a_x"].out_of_range == 2 * samples
+    assert any("a_x" in n and "(first" in n and "left out" in n for n in result.signals.quality.notes)

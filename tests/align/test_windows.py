@@ -143,6 +143,17 @@ def test_many_short_dropouts_of_a_wheel(seed):
     same([channel("omega_fl", np.arange(3000) * 0.01, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_many_spikes_of_an_acceleration(seed):
+    rng = np.random.default_rng(seed)
+    x = rng.normal(0.0, 1.0, 3000)
+    for a in np.cumsum(rng.integers(3, 60, 80)):
+        x[a : a + rng.integers(1, 20)] += rng.choice([14.0, -17.0, 25.0])
+    signals = [*wheels(3000), channel("a_x", np.arange(3000) * 0.01, x, "m/s^2")]
+    whole = same(signals, size=int(rng.choice([1, 5, 40])), seed=seed)
+    assert len([n for n in whole.quality.notes if "a_x" in n]) == 2
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_codes_that_stand_for_seconds_and_wheels_that_wake_up_late(seed):
     rng = np.random.default_rng(seed)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aqualog.align.glitches import sensor_glitches
+from aqualog.align.glitches import sensor_glitches, spikes
 
 R_E = 0.317
 T = (np.arange(3000) * 10_000_000).astype(np.int64)
@@ -56,3 +56,30 @@ def test_a_step_to_a_value_that_lives_stays():
     x = wheel()
     x[1000:] += 60.0 / R_E
     assert not sensor_glitches(T, x, r_e=R_E).any()
+
+
+def deceleration():
+    """A car that brakes with 11 m/s^2 within 0.1 s, for 1 s, on a rough road."""
+    ramp = np.interp(np.arange(T.size), [0, 500, 510, 610, 620, 3000], [0, 0, -11, -11, 0, 0])
+    return ramp + np.random.default_rng(1).normal(0, 1.0, T.size)
+
+
+@pytest.mark.parametrize("length", [1, 5, 9])
+@pytest.mark.parametrize("height", [18.0, -18.0, 35.0])
+@pytest.mark.parametrize("at", [1000, 560])
+def test_spikes_of_an_acceleration(at, height, length):
+    a = deceleration()
+    a[at : at + length] += height
+    assert np.flatnonzero(spikes(T, a)).tolist() == list(range(at, at + length))
+
+
+def test_what_a_car_does_is_no_spike():
+    a = deceleration()
+    assert not spikes(T, a).any()
+    a[1000:1020] += 18.0  # 0.2 s: nobody knows
+    assert not spikes(T, a).any()
+    a[2000:] += 18.0  # nothing leads back
+    assert not spikes(T, a).any()
+    assert not spikes(T[:2], a[:2]).any()
+    slow = np.tile([0.0, -11.0], 150)  # 10 Hz: from nothing to full braking in a sample
+    assert not spikes((np.arange(300) * 100_000_000).astype(np.int64), slow).any()
