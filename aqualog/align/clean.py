@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import freeze_note, in_freezes, watch_of
+from aqualog.align.freezes import freeze_note, in_freezes, watch_of, while_moving
 from aqualog.align.glitches import Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import median_period_ns
 from aqualog.align.shared import OfLast
+from aqualog.align.standing import StandWatch, Stretch
 from aqualog.align.timebase import ClockRepair
 from aqualog.errors import ConfigError, SignalError
 from aqualog.notation import ACCEPTED, SYMBOLS, Symbol
@@ -88,8 +89,14 @@ def clean_channel(
     vehicle: Vehicle,
     stamps: Stamps,
     notes: list[str],
+    *,
+    standing: Callable[[], Sequence[Stretch]] = tuple,
+    stands: StandWatch | None = None,
 ) -> Clean | None:
-    """Bad samples out, SI, stamps repaired; None (with a note) for a channel without a map whose unit is unknown."""
+    """Bad samples out, SI, stamps repaired; None (with a note) for a channel without a map whose unit is unknown.
+
+    `standing` is asked when the car stands if a torque stays the same for long; `stands` is shown the samples.
+    """
     symbol = symbol_of(name)
     info = channel.info
     where = f"{info.file}:{info.path}"
@@ -121,10 +128,15 @@ def clean_channel(
         k = int(np.argmax(is_out))
         after_ns = int(t_ns[k] - t_ns[0])
         notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, float(own.values[k]), after_ns))
+    if stands is not None:
+        stands.push(t_ns[keep], own.values[keep])
     frozen, watch = 0, watch_of(name, r_e)
     if watch is not None:
         watch.push(t_ns[keep], own.values[keep])
-        if freezes := watch.finish():
+        freezes = watch.finish()
+        if freezes and name.startswith("torque_"):
+            freezes = while_moving(freezes, standing())
+        if freezes:
             repeats = keep & in_freezes(t_ns, freezes)
             frozen = int(repeats.sum())
             notes.append(freeze_note(where, frozen, int(t_ns[0]), freezes))

@@ -2,20 +2,26 @@
 
 A speed or a torque that is measured never stays the same to the last digit for long: on five measured cars the longest
 such stretch of a moving wheel is 0.9 s, of a torque 18 s. Only signals are judged whose own noise shows elsewhere, so
-that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel and
-a torque of zero may stay as they are for ever. A wheel whose first value stays until a step that no wheel can make was
-not measured until then: control units send zeros or a code before their sensors are awake. Of a channel of any other
-kind only one stop that is unlike all else in it is worth a look.
+that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel, a
+torque of zero, and any torque while the car stands may stay as they are for ever. A wheel whose first value stays until
+a step that no wheel can make was not measured until then: control units send zeros or a code before their sensors are
+awake. Of a channel of any other kind only one stop that is unlike all else in it is worth a look.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from aqualog.align.glitches import is_leap
+from aqualog.align.standing import Stretch, is_standing, standing_ns
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["Freeze", "FreezeWatch", "freeze_note", "in_freezes", "longest_stop", "watch_of"]
+__all__ = [
+    "Freeze", "FreezeWatch", "Stop", "freeze_note", "in_freezes", "longest_stop", "watch_of", "while_moving",
+]  # fmt: skip
 
 Freeze = tuple[int, int]
 """Stamps of the last sample that counts and of the last that repeats it. [ns]"""
@@ -34,6 +40,21 @@ _TIMES_USUAL = 20.0
 _LEAST_MOVING = 100  # changes, to know a channel by
 _LIVELY = 0.2  # of the samples differ from the one before: such a signal does not stand still by itself
 _SLOW = 0.02  # of the time outside
+_CREEP_S = 1.0  # [s] a stop of which the car moves for less is one at rest
+_AT_REST = (3, 1.0)  # more stops of so many seconds at the same value: where the signal rests (a pedal, an idle torque)
+
+
+class Stop(NamedTuple):
+    """A stretch in which a channel stands still: how long, from when on [s], at what value.
+
+    `moving_s` of it the car moves, as far as is known; `share` of the samples outside differ from the one before.
+    """
+
+    length_s: float
+    from_s: float
+    value: float
+    moving_s: float
+    share: float
 
 
 def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
@@ -134,30 +155,51 @@ class FreezeWatch:
         return tuple((start, end) for start, end in found if end - start >= _TIMES_LONGER * between)
 
 
-def longest_stop(t_ns: TimeArray, values: FloatArray) -> tuple[float, float, float]:
-    """Longest time that any channel (n,) stands still as nowhere else: how long [s], from when [s], at what value.
+def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch] = ()) -> Stop | None:
+    """Longest time that any channel (n,) stands still as nowhere else; None if there is none.
 
-    0.0, 0.0, NaN if there is none. For channels of which nobody knows what they are: the watch would take a pedal that
-    is let go for a dead one. A signal with noise hardly ever repeats itself; one that is coarse or slow does all
-    the time, and a car at rest stands at zero: both are let be. So the stop must be one of a value other than zero, of
-    at least 10 s, and next to nothing of the time outside it (and stops half as long) may lie in stops that are a
-    twentieth as long.
+    What stays the same while the car stands (`standing`) is no stop. For channels of which nobody knows what they are:
+    the watch would take a pedal that is let go for a dead one. A signal with noise hardly ever repeats itself; one that
+    is coarse or slow does all the time, and a car at rest stands at zero: both are let be. So the stop must be one of a
+    value other than zero, of at least 10 s, and next to nothing of the time outside it (and stops half as long) may lie
+    in stops that are a twentieth as long. A value at which the signal stands again and again is where it rests.
     """
-    same = (values[1:] == values[:-1]) & (np.diff(t_ns) > 0) & (values[1:] != 0.0)
+    steps_ns = np.diff(t_ns)
+    is_moving = ~is_standing(t_ns, standing)
+    moved_ns = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(np.where(is_moving, steps_ns, 0))])
+    same = (values[1:] == values[:-1]) & (steps_ns > 0) & (values[1:] != 0.0)
     begin, end = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8))).reshape(-1, 2).T
-    lengths_s = (t_ns[end] - t_ns[begin]) * 1e-9
-    longest = float(lengths_s.max(initial=0.0))
-    if longest < _STOP_S:
-        return 0.0, 0.0, np.nan
+    moving_s = (moved_ns[end] - moved_ns[begin]) * 1e-9
+    lengths_s = np.where((moving_s >= _CREEP_S) | (len(standing) == 0), (t_ns[end] - t_ns[begin]) * 1e-9, 0.0)
+    at = values[begin]
+    candidates = [k for k in np.flatnonzero(moving_s >= _STOP_S).tolist() if not _is_rest(at[k], at, lengths_s)]
+    if not candidates:
+        return None
+    k = max(candidates, key=lambda i: lengths_s[i])
+    longest = float(lengths_s[k])
     stops = lengths_s >= longest / 2.0
     rest_s = float(t_ns[-1] - t_ns[0]) * 1e-9 - float(lengths_s[stops].sum())
     slow_s = float(lengths_s[~stops & (lengths_s >= longest / _TIMES_USUAL)].sum())
-    is_set = values[1:] != 0.0
-    moving, steps = int((is_set & ~same).sum()), int(is_set.sum() - (end - begin)[stops].sum())
-    if slow_s > _SLOW * rest_s or moving < max(_LEAST_MOVING, _LIVELY * steps):
-        return 0.0, 0.0, np.nan
-    k = int(np.argmax(lengths_s))
-    return longest, float(t_ns[begin[k]] - t_ns[0]) * 1e-9, float(values[begin[k]])
+    is_judged = (values[1:] != 0.0) & is_moving
+    for i in np.flatnonzero(stops).tolist():
+        is_judged[begin[i] : end[i]] = False
+    changes, steps = int((is_judged & ~same).sum()), int(is_judged.sum())
+    if slow_s > _SLOW * rest_s or changes < max(_LEAST_MOVING, _LIVELY * steps):
+        return None
+    first, last = int(t_ns[begin[k]]), int(t_ns[end[k]])
+    return Stop((last - first) * 1e-9, (first - int(t_ns[0])) * 1e-9, float(at[k]), float(moving_s[k]), changes / steps)
+
+
+def _is_rest(value: float, at: FloatArray, lengths_s: FloatArray) -> bool:
+    """Whether a signal that stands still for `lengths_s` (m,) [s] at the values `at` (m,) rests at this one."""
+    more, least_s = _AT_REST
+    return int(((at == value) & (lengths_s >= least_s)).sum()) > more
+
+
+def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch]) -> tuple[Freeze, ...]:
+    """Those of a torque's freezes that last long enough without the time in which the car stands."""
+    least_ns = round(_TORQUE[0] * 1e9)
+    return tuple((a, b) for a, b in freezes if b - a - standing_ns(a, b, standing) >= least_ns)
 
 
 def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:

@@ -14,6 +14,7 @@ from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.resample import placed
 from aqualog.align.shared import OfLast
+from aqualog.align.standing import SPEEDS, Stretch, stand_watch_of
 from aqualog.errors import SignalError
 from aqualog.notation import SYMBOLS
 from aqualog.types import Channel, FileFaults, Origin, Signals
@@ -56,10 +57,22 @@ def build_signals(
     """
     notes: list[str] = []
     stamps = Stamps()
+
+    def standing() -> tuple[Stretch, ...]:
+        """When the car stands, by the best speed there is."""
+        for name in SPEEDS:
+            watch = stand_watch_of(name, vehicle.r_e(name[-2:]) if name != "v_x" else None)
+            if watch is not None and name in mapped:
+                clean = clean_channel(name, *mapped[name], signal_map, vehicle, stamps, [], stands=watch)
+                if clean is not None and clean.origin.samples:
+                    return watch.finish()
+        return ()
+
     cleaned = [
         c
         for symbol, (entry, channel) in mapped.items()
-        if (c := clean_channel(symbol, entry, channel, signal_map, vehicle, stamps, notes)) is not None
+        if (c := clean_channel(symbol, entry, channel, signal_map, vehicle, stamps, notes, standing=standing))
+        is not None
     ]
     cleaned = [c for c in cleaned if c.span.samples > 0]
     if not cleaned:

@@ -15,11 +15,12 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean
-from aqualog.align.freezes import Freeze
+from aqualog.align.freezes import Freeze, while_moving
 from aqualog.align.grid import Grid, columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.pieces import NotInPiecesError, PieceCleaner
 from aqualog.align.quality import missing_notes, quality_of
+from aqualog.align.standing import SPEEDS
 from aqualog.errors import SignalError
 from aqualog.io.base import Part
 from aqualog.notation import SYMBOLS
@@ -162,7 +163,11 @@ def long_drive(
     notes: list[str] = []
     cleaners = _cleaners(found, signal_map, vehicle, None, notes)
     clocks = _gone_through(cleaners, found, parts, tell)
-    freezes = {name: cleaner.frozen() for name, cleaner in cleaners.items()}
+    standing = next((cleaners[n].standing() for n in SPEEDS if n in clocks), ())
+    freezes = {
+        name: while_moving(cleaner.frozen(), standing) if name.startswith("torque_") else cleaner.frozen()
+        for name, cleaner in cleaners.items()
+    }
     if any(freezes.values()):  # rare: sample times and counts are those without what is frozen
         cleaners = _cleaners(found, signal_map, vehicle, freezes)
         _gone_through(cleaners, found, parts, tell)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from aqualog.align.freezes import longest_stop
 from aqualog.align.overview import ChannelOverview
+from aqualog.align.standing import Stretch
 from aqualog.doctor.records import Finding, Level
 from aqualog.types import Channel, TimeFaults
 
@@ -28,7 +29,9 @@ _TIMES: dict[str, tuple[Level, str, str]] = {
 }  # fmt: skip
 
 
-def channel_findings(found: Sequence[ChannelOverview], channels: Sequence[Channel]) -> Iterator[Finding]:
+def channel_findings(
+    found: Sequence[ChannelOverview], channels: Sequence[Channel], standing: Sequence[Stretch] = ()
+) -> Iterator[Finding]:
     """Findings of all channels of a drive.
 
     Parameters
@@ -36,6 +39,8 @@ def channel_findings(found: Sequence[ChannelOverview], channels: Sequence[Channe
     found : sequence of ChannelOverview
     channels : sequence of Channel
         In the same order.
+    standing : sequence of Stretch
+        When the car stands: what does not change there is no dead sensor.
 
     Channels of one file share their clock: a fault of the stamps that several have alike is told once, of the first.
     """
@@ -49,10 +54,10 @@ def channel_findings(found: Sequence[ChannelOverview], channels: Sequence[Channe
                 if kind == "duplicates" and count <= _HABIT * own.samples:
                     level = "mended"
                 yield Finding(level, kind, own.file, own.path, f"{count} {what}", advice, count, own.samples)
-        yield from _of_values(own, channel)
+        yield from _of_values(own, channel, standing)
 
 
-def _of_values(own: ChannelOverview, channel: Channel) -> Iterator[Finding]:
+def _of_values(own: ChannelOverview, channel: Channel, standing: Sequence[Stretch]) -> Iterator[Finding]:
     if own.samples == 0:
         yield Finding("doubt", "empty", own.file, own.path, "has no sample")
         return
@@ -62,7 +67,11 @@ def _of_values(own: ChannelOverview, channel: Channel) -> Iterator[Finding]:
     if own.remark and own.remark not in ("constant", "no value"):
         what, _, advice = own.remark.partition(": ")
         yield Finding("doubt", "code", own.file, own.path, what, advice)
-    seconds, at_s, value = longest_stop(channel.t_ns, channel.values)
-    if seconds:
-        what = f"stands at {value:g} for {seconds:.0f} s (from {at_s:.0f} s), though it changes all the time elsewhere"
-        yield Finding("doubt", "frozen", own.file, own.path, what, "do not believe what rests on it there")
+    stop = longest_stop(channel.t_ns, channel.values, standing)
+    if stop is not None:
+        part = f", {stop.moving_s:.0f} s of it while the car moves" if stop.length_s - stop.moving_s >= 1.0 else ""
+        what = (
+            f"stands at {stop.value:g} for {stop.length_s:.0f} s (from {stop.from_s:.0f} s){part}; elsewhere it "
+            f"changes in {100.0 * stop.share:.0f} % of the samples"
+        )
+        yield Finding("doubt", "frozen", own.file, own.path, what, "look there before you believe what rests on it")

@@ -14,7 +14,7 @@ from aqualog.errors import FitError, SignalError
 from aqualog.types import Channel
 from aqualog.vehicle import Vehicle
 
-__all__ = ["clock_findings", "speed_of"]
+__all__ = ["clock_findings", "on_clock", "speed_of"]
 
 _LEAST_SHIFT_S = 0.01  # a sample time of 100 Hz
 _SENSOR_S = 0.3  # by which a speed of GNSS comes late without a fault of its clock
@@ -22,12 +22,17 @@ _MAX_OFFSET_S = 10.0
 
 
 def speed_of(channels: Sequence[Channel], *, signal_map: SignalMap, vehicle: Vehicle) -> Carrier | None:
-    """The speed in the channels of one file, on the clock that the map gives it; None if it carries none."""
+    """The speed in the channels of one file, by its own clock; None if it carries none."""
     try:
         found = find_carrier(channels, quantity="speed", signal_map=signal_map, vehicle=vehicle)
     except SignalError:
         return None
-    return replace(found, t_ns=corrected(found.t_ns, signal_map, found.file)) if found.t_ns.size else None
+    return found if found.t_ns.size else None
+
+
+def on_clock(speed: Carrier, signal_map: SignalMap) -> Carrier:
+    """A speed on the clock that the map gives its file."""
+    return replace(speed, t_ns=corrected(speed.t_ns, signal_map, speed.file))
 
 
 def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:

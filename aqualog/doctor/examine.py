@@ -10,16 +10,17 @@ from aqualog.align.carrier import Carrier
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
+from aqualog.align.standing import StandWatch, Stretch
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
-from aqualog.doctor.clocks import clock_findings, speed_of
+from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
 from aqualog.doctor.records import Examination, FileState, Finding
 from aqualog.errors import AqualogError
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.content import changed_files, state_of
 from aqualog.io.open_log import open_log
-from aqualog.types import Channel, FileFaults
+from aqualog.types import FileFaults
 from aqualog.vehicle import Vehicle
 
 __all__ = ["examine"]
@@ -75,11 +76,10 @@ def _examined(
     speeds: list[Carrier] = []
     for path in paths:
         report(f"reading {path.name}")
-        state, own, channels = _file(path, read_options(signal_map, dbc))
+        state, own, speed = _file(path, read_options(signal_map, dbc), signal_map=signal_map, vehicle=vehicle)
         files.append(state)
         findings += own
-        speed = speed_of(channels, signal_map=signal_map, vehicle=vehicle) if len(paths) > 1 and channels else None
-        speeds += [speed] if speed is not None else []
+        speeds += [on_clock(speed, signal_map)] if speed is not None else []
     if any(f.level == "unreadable" for f in findings):
         return Examination(tuple(files), tuple(findings))
     report("looking at the drive")
@@ -99,8 +99,10 @@ def _examined(
     return Examination(tuple(files), tuple(findings), tuple(d for d in _DETECTORS if d not in lacking), missing)
 
 
-def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding], list[Channel]]:
-    """State of one file, what is wrong with it, and its channels."""
+def _file(
+    path: Path, options: ReadOptions, *, signal_map: SignalMap, vehicle: Vehicle
+) -> tuple[FileState, list[Finding], Carrier | None]:
+    """State of one file, what is wrong with it, and the speed that it carries."""
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
@@ -110,17 +112,26 @@ def _file(path: Path, options: ReadOptions) -> tuple[FileState, list[Finding], l
         # the line names the file itself
         what = error.what + (f"; expected {error.expected}" if error.expected else "")
         unreadable = Finding("unreadable", "unreadable", path.name, "", what, error.hint)
-        return FileState(path.name, "", size), [unreadable], []
+        return FileState(path.name, "", size), [unreadable], None
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
+    speed = speed_of(channels, signal_map=signal_map, vehicle=vehicle) if channels else None
     samples = sum(c.values.size for c in channels)
     state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
-    findings = [*_of_file(path.name, kind, faults), *channel_findings(found, channels)]
+    findings = [*_of_file(path.name, kind, faults), *channel_findings(found, channels, _standing(speed))]
     findings += [Finding("doubt", "mounting", path.name, "", text) for text in find_mounting(found)]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
-    return state, findings, channels
+    return state, findings, speed
+
+
+def _standing(speed: Carrier | None) -> tuple[Stretch, ...]:
+    """When the car stands; not known in a file without a speed."""
+    watch = StandWatch()
+    if speed is not None:
+        watch.push(speed.t_ns, speed.x)
+    return watch.finish()
 
 
 def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:

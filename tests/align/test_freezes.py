@@ -8,6 +8,7 @@ import pytest
 
 from aqualog.align.freezes import FreezeWatch, in_freezes, watch_of
 from aqualog.align.mapping import Entry, SignalMap
+from aqualog.align.standing import StandWatch, is_standing
 from aqualog.align.table import build_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.stream import detect_drive
@@ -183,3 +184,44 @@ def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples):
     assert key == [(e.detector, e.wheel, e.severity) for e in sound.events]
     assert result.signals.origins["a_x"].out_of_range == 2 * samples
     assert any("a_x" in n and "(first" in n and "left out" in n for n in result.signals.quality.notes)
+
+
+def stop_and_go(name, is_standing):
+    """Two minutes at a light at which a torque stays the same; or the torque alone stays."""
+    rng = np.random.default_rng(7)
+    t = np.arange(40_000) * 0.01
+    v = 20.0 * (np.interp(t, [0, 90, 100, 220, 230, 400], [1, 1, 0, 0, 1, 1]) if is_standing else np.ones(t.size))
+    t_ns = np.round(t * S).astype(np.int64)
+    noisy = np.where(v > 0.0, v + 0.02 * rng.standard_normal(t.size), 0.0)
+    torque = np.where((t > 101) & (t < 219), 14.5, np.round(100.0 + 30.0 * rng.standard_normal(t.size), 1))
+    return {
+        name: (t_ns, noisy / (1.0 if name == "v_x" else 0.3)),
+        "omega_rr": (t_ns, 66.0 + 0.1 * rng.standard_normal(t.size)),  # told by nothing but itself
+        "torque_r": (t_ns, torque),
+    }
+
+
+@pytest.mark.parametrize("is_standing", [True, False])
+@pytest.mark.parametrize("name", ["v_x", "omega_fl"])
+def test_a_torque_that_stays_while_the_car_stands(name, is_standing):
+    from test_windows import channel, same
+
+    units = {"torque_r": "N*m", "v_x": "m/s"}
+    channels = [channel(n, t * 1e-9, x, units.get(n, "rad/s")) for n, (t, x) in stop_and_go(name, is_standing).items()]
+    whole = same(channels, size=3000, rows=9000)  # as a whole and in pieces
+    assert (whole.quality.frozen_samples == 0) is is_standing
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 500])
+def test_when_a_car_stands(pieces):
+    t = (np.arange(1000) * S // 10).astype(np.int64)
+    v = np.interp(np.arange(1000), [0, 100, 110, 300, 310, 950, 960, 999], [0, 0, 9, 9, 0, 0, 9, 9]).astype(float)
+    v[500:600] = 30.0  # no car does that: neither what is before nor what is behind it is believed
+    t[350:] += 5 * S
+    watch = StandWatch()
+    for part in np.array_split(np.arange(t.size), pieces):
+        watch.push(t[part], v[part])
+    assert watch.finish() == ((t[0], t[100]), (t[310], t[349]))
+    assert is_standing(t, watch.finish()).sum() == 100 + 39
+    assert not is_standing(t[:1], watch.finish()).size
+    assert StandWatch().finish() == ()

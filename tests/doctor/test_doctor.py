@@ -174,9 +174,9 @@ def test_a_channel_that_is_no_signal_is_worth_a_look(tmp_path):
     assert "for 14 s (from 5 s)" in found["doubt", "frozen"].what
 
 
-def stop_of(values):
+def stop_of(values, standing=()):
     t_ns = np.arange(len(values), dtype=np.int64) * 10**8
-    return longest_stop(t_ns, np.asarray(values, dtype=float))
+    return longest_stop(t_ns, np.asarray(values, dtype=float), [(a * 10**9, b * 10**9) for a, b in standing])
 
 
 def test_a_coarse_signal_and_a_car_at_rest_are_not_frozen():
@@ -186,12 +186,47 @@ def test_a_coarse_signal_and_a_car_at_rest_are_not_frozen():
     stuck = np.where((np.arange(3000) >= 1000) & (np.arange(3000) < 2000), 1.5, noise)
     slow = np.where((np.arange(3000) // 20) % 2 == 0, 3.0 + np.arange(3000) // 40, noise)  # stops of 2 s all the time
     slow[1000:1150] = 7.5
-    assert stop_of(slow)[0] == 0.0
-    assert stop_of(coarse)[0] == 0.0
-    assert stop_of(at_rest)[0] == 0.0
-    assert stop_of(stuck) == pytest.approx((99.9, 100.0, 1.5))
-    assert stop_of([])[0] == 0.0
-    assert stop_of([1.0])[0] == 0.0
+    assert stop_of(slow) is None
+    assert stop_of(coarse) is None
+    assert stop_of(at_rest) is None
+    assert stop_of(stuck) == pytest.approx((99.9, 100.0, 1.5, 99.9, 1.0))
+    assert stop_of([]) is None
+    assert stop_of([1.0]) is None
+
+
+def test_what_rests_while_the_car_stands_is_not_frozen():
+    noise = np.random.default_rng(0).normal(size=3000)
+    creep = np.where((np.arange(3000) >= 1000) & (np.arange(3000) < 1300), 7.5, noise)
+    assert stop_of(creep).length_s == pytest.approx(29.9)
+    assert stop_of(creep, [(98, 131)]) is None
+    assert stop_of(creep, [(10, 20), (98, 128)]) is None  # it drives off with it
+    assert stop_of(creep, [(115, 131)])[3:] == pytest.approx((15.0, 1.0))
+    dead = np.where((np.arange(3000) >= 2000) & (np.arange(3000) < 2200), 1.5, creep)  # behind a longer rest
+    assert stop_of(dead, [(98, 131)])[:3] == pytest.approx((19.9, 200.0, 1.5))
+
+
+def test_a_value_to_which_a_signal_comes_back_is_where_it_rests():
+    noise = np.random.default_rng(0).normal(size=30_000)
+    noise[1000:1300] = 2.0
+    assert stop_of(noise) is not None
+    for at in (5000, 9000, 13_000):
+        noise[at : at + 30] = 2.0
+    assert stop_of(noise) is None
+
+
+@pytest.mark.parametrize("is_standing", [True, False])
+def test_a_torque_of_a_car_that_stands(is_standing, tmp_path):
+    x = drive(6000)
+    torque = 50.0 + np.random.default_rng(2).normal(0.0, 5.0, 6000)
+    torque[2000:4000] = 7.5
+    if is_standing:
+        x[:, 1:] *= np.interp(np.arange(6000), [0, 1500, 2000, 4000, 4500, 6000], [1, 1, 0, 0, 1, 1])[:, None]
+    header = "t [s],omega_fl [rad/s],omega_fr [rad/s],v_x [m/s],Motor Torque"
+    found, _ = kinds(tmp_path, table(np.column_stack([x, torque]), header=header))
+    assert (("doubt", "frozen") in found) is not is_standing
+    if not is_standing:
+        told = found["doubt", "frozen"].what
+        assert told == "stands at 7.5 for 20 s (from 20 s); elsewhere it changes in 100 % of the samples"
 
 
 @pytest.mark.parametrize(("keep", "code"), [(1.0, 0), (0.5, 3), (0.0, 1)], ids=["sound", "cut in half", "empty"])
