@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +85,10 @@ class TimeFaults:
     """Faults of one source's time stamps, classified and counted.
 
     `drifts` are clocks in its file that run apart, `strays` samples that have a stamp from elsewhere and are left out.
+    `first_s` has, for each kind that has a place, where the first one is, from the source's first sample. [s]
     """
+
+    KINDS: ClassVar[tuple[str, ...]] = ("duplicates", "back_steps", "resets", "wraps", "pauses", "drifts", "strays")
 
     duplicates: int = 0
     back_steps: int = 0
@@ -94,9 +97,23 @@ class TimeFaults:
     pauses: int = 0
     drifts: int = 0
     strays: int = 0
+    first_s: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __add__(self, other: TimeFaults) -> TimeFaults:
-        return TimeFaults(*(getattr(self, n) + getattr(other, n) for n in TimeFaults.__slots__))
+        return self._joined(other, lambda a, b: a + b)
+
+    def worse(self, other: TimeFaults) -> TimeFaults:
+        """Of each kind the greater count and the earlier place."""
+        return self._joined(other, max)
+
+    def _joined(self, other: TimeFaults, count: Callable[[int, int], int]) -> TimeFaults:
+        first = {n: min(f[n] for f in (self.first_s, other.first_s) if n in f)
+                 for n in TimeFaults.KINDS if n in self.first_s or n in other.first_s}  # fmt: skip
+        return TimeFaults(*(count(getattr(self, n), getattr(other, n)) for n in TimeFaults.KINDS), first_s=first)
+
+    def place(self, kind: str) -> str:
+        """Where the first of a kind is, for a sentence; empty if it has no place."""
+        return f" (first at {self.first_s[kind]:.2f} s)" if kind in self.first_s else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,7 +118,8 @@ class PieceCleaner:
         # counts
         self._frozen = 0
         self._samples = self._duplicates = self._bad = self._code = self._out = self._glitches = self._repaired = 0
-        self._pauses: list[int] = []
+        self._pauses: list[tuple[int, int]] = []  # how long, and after which stamp [ns]
+        self._first_duplicate_ns: int | None = None
         self._first_ns: int | None = None
         self._first_glitch_ns: int | None = None
         self._first_out: tuple[int, float] | None = None
@@ -149,6 +150,8 @@ class PieceCleaner:
             raise NotInPiecesError(f"{self._where}: time stamps that leap")
         same = steps == 0
         self._duplicates += int(same.sum())
+        if self._first_duplicate_ns is None and same.any():
+            self._first_duplicate_ns = int(t[np.argmax(same)])
         return self._settled(t[:-1][~same], raw[:-1][~same])
 
     def finish(self) -> tuple[TimeArray, FloatArray]:
@@ -168,7 +171,8 @@ class PieceCleaner:
         steps = np.diff(t) if self._last_ns is None else np.diff(t, prepend=self._last_ns)
         self._last_ns = int(t[-1])
         self._all.add(steps)
-        self._pauses += steps[steps > _SECOND].tolist()
+        is_long = steps > _SECOND
+        self._pauses += zip(steps[is_long].tolist(), (t[t.size - steps.size :] - steps)[is_long].tolist(), strict=True)
         self._repaired += t.size
         own = judged(self.symbol, self._entry, raw, self.unit, self._vehicle, self._where)
         self._bad += int(own.is_bad.sum())
@@ -264,7 +268,10 @@ class PieceCleaner:
             notes.append(out_note(self._where, self.symbol, self._out, self._repaired, value, at - begin))
         if self._freezes:
             notes.append(freeze_note(self._where, self._frozen, begin, self._freezes))
-        faults = TimeFaults(duplicates=self._duplicates, pauses=sum(s > 10 * period for s in self._pauses))
+        pauses = [at for step, at in self._pauses if step > 10 * period]
+        places = {"duplicates": self._first_duplicate_ns, "pauses": pauses[0] if pauses else None}
+        first_s = {kind: (at - begin) * 1e-9 for kind, at in places.items() if at is not None}
+        faults = TimeFaults(duplicates=self._duplicates, pauses=len(pauses), first_s=first_s)
         origin = Origin(
             symbol=self.name,
             channel=self.info.path,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from aqualog.align.clean import Clean
 from aqualog.align.resample import gap_limit_ns
@@ -42,7 +42,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     by_file: dict[str, TimeFaults] = {}
     for clean in cleaned:  # the channels of one file mostly share their stamps: the worst one speaks for the file
         seen, new = by_file.get(clean.origin.file, TimeFaults()), clean.origin.faults
-        by_file[clean.origin.file] = TimeFaults(*(max(getattr(seen, n), getattr(new, n)) for n in TimeFaults.__slots__))
+        by_file[clean.origin.file] = seen.worse(new)
     faults = sum(by_file.values(), TimeFaults(drifts=sum(len(f.drifts) for f in file_faults)))
     own = sum(
         c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
@@ -53,7 +53,8 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     # a doubled or stray stamp here and there is a logger's habit; many are samples lost to a wrong clock
     is_lossy = any(n > 0.01 * samples for n, samples in left_out)
     lost = sum(f.lost_samples for f in file_faults) + (max(n for n, _ in left_out) if is_lossy else 0)
-    notes = [*(_time_note(file, faults) for file, faults in by_file.items() if faults != TimeFaults()), *notes]
+    on_time = [_time_note(file, faults) for file, faults in by_file.items() if faults != TimeFaults()]
+    told = [*(n for f in file_faults for n in f.notes), *on_time, *_reset_notes(by_file), *notes]
     return Quality(
         dropped_samples=own + lost,
         lost_in_files=lost,
@@ -62,7 +63,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
         truncated=any(f.truncated for f in file_faults),
         unfinalised=any(f.unfinalised for f in file_faults),
         faults=faults,
-        notes=tuple(dict.fromkeys([*(n for f in file_faults for n in f.notes), *notes])),
+        notes=tuple(dict.fromkeys(told)),
     )
 
 
@@ -75,5 +76,19 @@ def _time_note(file: str, faults: TimeFaults) -> str:
         "pauses": "pauses",
         "strays": "from elsewhere, left out",
     }
-    counts = ", ".join(f"{getattr(faults, n)} {word}" for n, word in words.items() if getattr(faults, n))
+    counts = ", ".join(
+        f"{getattr(faults, n)} {word}{faults.place(n)}" for n, word in words.items() if getattr(faults, n)
+    )
     return f"{file}: time stamps: {counts}"
+
+
+def _reset_notes(by_file: Mapping[str, TimeFaults]) -> list[str]:
+    """Files whose clock began anew, beside others whose clock went on: only they are moved."""
+    went_on = [file for file, faults in by_file.items() if not faults.resets]
+    return [
+        f"{file}: its clock begins anew{faults.place('resets')}, that of {_listed(went_on)} does not: what follows is "
+        "put 1 s behind what came before, as if it had been off for so long, and may be out of step with the other "
+        "files (`aqualog align` compares them; else cut the file there)"
+        for file, faults in by_file.items()
+        if faults.resets and went_on
+    ]

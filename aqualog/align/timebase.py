@@ -70,35 +70,54 @@ class ClockRepair:
             return t_ns.copy(), order, TimeFaults()
         steps = np.diff(t_ns)
         period = _median_period(steps)
-        fixed, wraps, resets, strays = t_ns, 0, 0, 0
+        fixed, strays = t_ns, 0
+        wraps: list[int] = []
+        resets: list[int] = []
+        first: dict[str, int] = {}  # stamps
         if (steps < -_SECOND).any() or (steps > DAY_NS).any():
-            order = np.flatnonzero(~_is_stray(t_ns, steps, period))
+            is_stray = _is_stray(t_ns, steps, period)
+            order = np.flatnonzero(~is_stray)
             strays = n - order.size
             fixed = t_ns[order]
             fixed, wraps, resets = self._large_steps(fixed, np.diff(fixed), period)
             steps = np.diff(fixed)
+            if strays:  # behind the last sample before it
+                first["strays"] = int(fixed[max(int(np.argmax(is_stray)) - 1, 0)])
+            first |= {kind: int(fixed[at[0]]) for kind, at in (("resets", resets), ("wraps", wraps)) if at}
+        begins = fixed[resets]
         back_steps = int((steps < 0).sum())
         again = 0
         if back_steps:
+            first["back_steps"] = int(fixed[np.argmax(steps < 0)])
             is_again = _is_again(fixed, steps, period)
             again = int(is_again.sum())
+            if again:
+                first["duplicates"] = int(fixed[np.argmax(is_again)])
             fixed, order = fixed[~is_again], order[~is_again]
             by_time = np.argsort(fixed, kind="stable")
             fixed, order = fixed[by_time], order[by_time]
             steps = np.diff(fixed)
         duplicates = again + int((steps == 0).sum())
         if duplicates > again:
+            first["duplicates"] = min(int(fixed[np.argmax(steps == 0)]), first.get("duplicates", int(fixed[-1])))
             last = np.append(steps != 0, True)
             fixed, order = fixed[last], order[last]
             steps = np.diff(fixed)
-        pauses = int((steps > max(10 * period, _SECOND)).sum())
+        is_pause = (steps > max(10 * period, _SECOND)) & ~np.isin(fixed[:-1], begins)
+        if is_pause.any():
+            first["pauses"] = int(fixed[np.argmax(is_pause)])
+        begin = int(fixed[0])
+        places = {kind: (at - begin) * 1e-9 for kind, at in first.items()}
         return fixed.copy(), order, TimeFaults(
-            duplicates, back_steps, resets, wraps, max(pauses - resets, 0), strays=strays
+            duplicates, back_steps, len(resets), len(wraps), int(is_pause.sum()), strays=strays, first_s=places
         )  # fmt: skip
 
-    def _large_steps(self, t_ns: TimeArray, steps: TimeArray, period: int) -> tuple[TimeArray, int, int]:
+    def _large_steps(self, t_ns: TimeArray, steps: TimeArray, period: int) -> tuple[TimeArray, list[int], list[int]]:
+        """Stamps (n,) without them, and the samples before wraps and before resets."""
         shift = np.zeros(t_ns.size, dtype=np.int64)
-        wraps = resets = begin = 0
+        wraps: list[int] = []
+        resets: list[int] = []
+        begin = 0
         for i in np.flatnonzero(steps < -_SECOND):
             if _is_doubled(t_ns, begin, int(i)):  # nothing to shift: what comes after goes on where it stopped
                 continue
@@ -106,15 +125,16 @@ class ClockRepair:
             wrap = _wrap_of(int(-steps[i]) + period, period)
             if wrap is not None:
                 shift[i + 1 :] += wrap
-                wraps += 1
+                wraps.append(int(i))
                 continue
             own = int(-steps[i]) + _SECOND
-            if resets < len(self._shifts) and abs(self._shifts[resets] - own) < 2 * _SECOND:
-                own = self._shifts[resets]
-            elif resets == len(self._shifts):
+            known = len(resets)
+            if known < len(self._shifts) and abs(self._shifts[known] - own) < 2 * _SECOND:
+                own = self._shifts[known]
+            elif known == len(self._shifts):
                 self._shifts.append(own)
             shift[i + 1 :] += own
-            resets += 1
+            resets.append(int(i))
         return t_ns + shift, wraps, resets
 
 

@@ -131,7 +131,7 @@ def _about(result: DriveResult, vehicle: Vehicle, thinning: Thinning, samples: p
             "truncated": quality.truncated,
             "unfinalised": quality.unfinalised,
             "lost_in_files": quality.lost_in_files,
-            **{n: getattr(quality.faults, n) for n in type(quality.faults).__slots__},
+            **{n: getattr(quality.faults, n) for n in type(quality.faults).KINDS},
         },
         "notes": [*quality.notes, *result.notes],
     }  # fmt: skip

@@ -179,7 +179,7 @@ def _row(o: ChannelOverview, by_channel: dict[str, str]) -> tuple[str, ...]:
 
 
 def _faults(o: ChannelOverview) -> str:
-    counts = {n.replace("_", "-"): getattr(o.faults, n) for n in type(o.faults).__slots__ if n != "pauses"}
+    counts = {n.replace("_", "-"): getattr(o.faults, n) for n in type(o.faults).KINDS if n != "pauses"}
     counts["not finite"] = o.not_finite
     text = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
     return ", ".join(t for t in (text, o.remark) if t) or "-"

@@ -46,14 +46,17 @@ def channel_findings(
     """
     told: set[tuple[str, str, int]] = set()
     for own, channel in zip(found, channels, strict=True):
-        for kind in TimeFaults.__slots__:
+        for kind in TimeFaults.KINDS:
             count = getattr(own.faults, kind)
             if count and (own.file, kind, count) not in told:
                 told.add((own.file, kind, count))
                 level, what, advice = _TIMES[kind]
                 if kind == "duplicates" and count <= _HABIT * own.samples:
                     level = "mended"
-                yield Finding(level, kind, own.file, own.path, f"{count} {what}", advice, count, own.samples)
+                fault, _, rule = what.partition("; ")
+                told_as = f"{count} {fault}{own.faults.place(kind)}; {rule}"
+                first_s = own.faults.first_s.get(kind)
+                yield Finding(level, kind, own.file, own.path, told_as, advice, count, own.samples, first_s)
         yield from _of_values(own, channel, standing)
 
 

@@ -14,7 +14,10 @@ undone; `doubt`: nothing is lost, but somebody should look."""
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong. `count` of `of` samples (0, 0: does not apply); `channel` empty for the whole file."""
+    """One thing that is wrong. `count` of `of` samples (0, 0: does not apply); `channel` empty for the whole file.
+
+    `first_s`: where the first of a fault of time stamps is, from the channel's first sample. [s]
+    """
 
     level: Level
     kind: str
@@ -24,6 +27,7 @@ class Finding:
     advice: str = ""
     count: int = 0
     of: int = 0
+    first_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,8 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
             "truncated": quality.truncated,
             "unfinalised": quality.unfinalised,
             "frozen_samples": quality.frozen_samples,
-            **{n: getattr(quality.faults, n) for n in type(quality.faults).__slots__},
+            **{n: getattr(quality.faults, n) for n in type(quality.faults).KINDS},
+            "first_s": {n: _number(s) for n, s in quality.faults.first_s.items()},
             "notes": [*quality.notes, *result.notes],
         },
     }

@@ -172,7 +172,21 @@ def test_many_doubled_stamps_are_a_loss_and_a_note():
     c = channel("omega_fl", np.full(1000, 90.0), "rad/s")
     s = build(Channel(c.info, np.sort(np.tile(c.t_ns[:500], 2)), c.values, absolute=False))
     assert s.quality.lost_in_files == 500
-    assert any("500 doubled" in n for n in s.quality.notes)
+    assert any("500 doubled (first at 0.00 s)" in n for n in s.quality.notes)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_clock_that_begins_anew_in_one_file_of_several_is_told(both):
+    own = [channel("omega_fl", np.ones(5000), "rad/s"), channel("a_x", np.ones(5000), "m/s^2", file="b.csv")]
+    for c in own[: 1 + both]:
+        c.t_ns[3000:] -= c.t_ns[3000]
+    s = build(*own)
+    told = [n for n in s.quality.notes if "begins anew" in n]
+    assert len(told) == (not both)
+    if told:
+        name = own[0].info.file
+        assert told[0].startswith(f"{name}: its clock begins anew (first at 29.99 s), that of b.csv does not: what")
+    assert not [n for n in build(own[0]).quality.notes if "begins anew" in n]  # alone it is out of step with nothing
 
 
 def test_sensor_dropouts_are_left_out_and_noted():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from aqualog.align.timebase import ClockRepair
+from aqualog.types import TimeFaults
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -26,7 +27,8 @@ def test_clean_stamps_stay():
     fixed, order, faults = repair(t)
     assert (fixed == t).all()
     assert (order == np.arange(t.size)).all()
-    assert not any(getattr(faults, n) for n in faults.__slots__)
+    assert not any(getattr(faults, n) for n in faults.KINDS)
+    assert faults.first_s == {}
 
 
 def test_duplicates_keep_the_later_sample():
@@ -201,3 +203,38 @@ def test_the_joint_of_a_doubled_block_may_be_of_two_halves():
 )
 def test_a_drive_with_the_stamps_of_another_is_a_reset(t, resets):
     assert repair(t)[2].resets == resets
+
+
+def test_faults_tell_where_the_first_of_them_is():
+    t = steady(20_000, start=7 * S)
+    t[5000] = t[4999]  # at 49.99 s
+    t[6000] = t[5999]
+    t[[7000, 7001]] = t[[7001, 7000]]  # behind 70.01 s
+    t[9000:] += 5 * S  # behind 89.99 s
+    t[12_000:12_010] -= 500 * S  # behind 119.99 s, and 5 s later
+    t[15_000:] -= 60 * S  # a wrap of the minute behind 149.99 s, and 5 s later
+    t[18_000:] -= 110 * S  # a reset 30 s later
+    _, _, faults = repair(t)
+    assert [getattr(faults, n) for n in faults.KINDS] == [2, 1, 1, 1, 1, 0, 10]
+    expected = {
+        "duplicates": 49.99, "back_steps": 70.01, "resets": 184.99, "wraps": 154.99, "pauses": 89.99, "strays": 124.99,
+    }  # fmt: skip
+    assert faults.first_s == pytest.approx(expected)
+
+
+def test_first_faults_of_sources_together():
+    a, b = TimeFaults(duplicates=2, first_s={"duplicates": 3.0}), TimeFaults(1, 1, first_s={"duplicates": 2.0})
+    assert a + b == TimeFaults(3, 1, first_s={"duplicates": 2.0})
+    assert a.worse(b) == TimeFaults(2, 1, first_s={"duplicates": 2.0})
+    assert (a.place("duplicates"), a.place("wraps")) == (" (first at 3.00 s)", "")
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_the_first_pause_is_not_a_reset(again):
+    t = np.concatenate([steady(3000), steady(3000)])
+    clock = ClockRepair()
+    clock.repair(np.concatenate([steady(3000), steady(3000)]) + (t >= 20 * S) * S * again)
+    t[4000:] += 7 * S
+    _, _, faults = clock.repair(t)
+    assert (faults.resets, faults.pauses) == (1, 1)
+    assert faults.first_s == pytest.approx({"resets": 29.99, "pauses": 40.98 + again})
