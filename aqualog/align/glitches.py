@@ -10,11 +10,16 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["RETURN_NS", "RIM_LIMIT", "Glitches", "glitches_of", "is_leap", "sensor_glitches", "spikes"]
+__all__ = ["KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "glitches_of", "is_leap", "sensor_glitches", "spikes"]
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
 _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
 RETURN_NS = 1_000_000_000
+_AHEAD_NS = 500_000_000  # behind a leap, by which its stamps are judged
+KNOWN_NS = RETURN_NS + _AHEAD_NS
+"""How much must be known behind a sample to judge it."""
+_BURST = 0.3  # of the usual sample time: stamps that are closer came from a buffer
+_LATE_NS = 200_000_000  # by which stamps of a burst may be off
 _STANDS = 10  # samples of one value, at least, that are no slow signal's
 # of accelerations: five measured cars step by 9.5 m/s^2 from sample to sample at most (a phone's, 100 Hz), else by 4.3
 _JERK = 50.0  # [m/s^3]
@@ -58,20 +63,22 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
     bool array (n,)
         From a step faster than `RIM_LIMIT` to the step back within 1 s; and, where nothing leads back, as long as the
         signal stands at exactly zero (a dead sensor) or, for 1 s or more, at any one value (a code for "no value").
+        A leap between values that live is none if its stamps are of a burst, or of samples of which others are lost.
     """
     glitch = np.zeros(omega.size, dtype=bool)
     if omega.size < 3:
         return glitch
     v = omega * r_e
-    jumps = np.flatnonzero(is_leap(np.diff(t_ns), np.diff(v)))
+    leaps = np.flatnonzero(is_leap(np.diff(t_ns), np.diff(v)))
+    jumps = [i for i in leaps.tolist() if not _is_of_the_stamps(t_ns, v, i)]
     done = -1
-    for position, i in enumerate(jumps.tolist()):
+    for position, i in enumerate(jumps):
         if i < done:
             continue
         back = next(
             (
                 j
-                for j in jumps[position + 1 :].tolist()
+                for j in jumps[position + 1 :]
                 if t_ns[j] - t_ns[i] <= RETURN_NS
                 and abs(v[j + 1] - v[i]) <= RIM_LIMIT * 0.25 * float(t_ns[j + 1] - t_ns[i]) * 1e-9 + _SLACK
             ),
@@ -124,6 +131,23 @@ def spikes(t_ns: TimeArray, a: FloatArray) -> BoolArray:
 def is_leap(dt_ns: TimeArray, dv: FloatArray) -> BoolArray:
     """Which steps (n,) of a wheel's speed [m/s at the rim] no wheel can make in their time [ns]."""
     return np.abs(dv) > RIM_LIMIT * dt_ns * 1e-9 + _SLACK
+
+
+def _is_of_the_stamps(t_ns: TimeArray, v: FloatArray, i: int) -> bool:
+    """Whether the leap behind sample `i` is one of the stamps and not of the wheel.
+
+    A buffer that is read late gives its samples stamps that are too close; of doubled stamps the last sample counts, so
+    that it is as much too early as the hole behind it is long. A wheel under ABS leaps in such a time by itself. What
+    stands at one value, or at zero, on a side of the leap is a dropout all the same.
+    """
+    if v[i] == 0.0 or v[i + 1] == 0.0 or (i and v[i - 1] == v[i]) or (i + 2 < v.size and v[i + 2] == v[i + 1]):
+        return False
+    ahead = np.diff(t_ns[i + 1 : int(np.searchsorted(t_ns, t_ns[i + 1] + _AHEAD_NS)) + 1])
+    if not ahead.size:
+        return False
+    own = int(t_ns[i + 1] - t_ns[i])
+    late = _LATE_NS if own < _BURST * float(np.median(ahead)) else min(int(ahead[0]), _LATE_NS)
+    return late > 1.5 * own and not bool(is_leap(np.array([own + late]), v[i + 1 : i + 2] - v[i])[0])
 
 
 def _is_code(t_ns: TimeArray, omega: FloatArray, start: int) -> bool:

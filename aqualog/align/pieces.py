@@ -12,7 +12,7 @@ import numpy as np
 
 from aqualog.align.clean import BURST, Clean, Span, corrected, glitch_note, judged, mean_of_steps, out_note, symbol_of
 from aqualog.align.freezes import Freeze, freeze_note, in_freezes, watch_of
-from aqualog.align.glitches import RETURN_NS, glitches_of
+from aqualog.align.glitches import KNOWN_NS, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.standing import Stretch, stand_watch_of
@@ -129,7 +129,7 @@ class PieceCleaner:
         # what is held back
         self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES  # the last sample: one with the same stamp may follow
         self._last_ns: int | None = None  # of the stamps let through
-        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # a second in which a jump may turn back
+        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES  # the time in which a jump may turn back
         self._done = 0  # of these, let through already
         self._dead: float | None = None  # the value at which a sensor stands since a step that no wheel can make
 
@@ -215,17 +215,17 @@ class PieceCleaner:
         if t.size == 0:
             return t, x
         glitch = self._judged_glitches(t, x)
-        # a jump is judged once all within a second behind it is known
-        certain = t.size if is_last else int(np.searchsorted(t, t[-1] - RETURN_NS, side="left"))
+        # a jump is judged once what may lead back, and the stamps behind that, are known
+        certain = t.size if is_last else int(np.searchsorted(t, t[-1] - KNOWN_NS, side="left"))
         if not is_last and glitch[-1] and _dead_since(glitch, x) < certain:
             self._dead, certain = float(x[-1]), t.size
-        while 0 < certain < t.size and glitch[certain - 1 : certain + 1].any():
-            certain -= 1  # neither in a glitch nor at its end
+        while 0 < certain < t.size and glitch[max(certain - 2, 0) : certain + 1].any():
+            certain -= 1  # neither in a glitch nor at its end, nor behind that
         new = slice(self._done, max(certain, self._done))
         out = ~glitch[new]
         self._found(t[new][~out], x[new][~out])
         found = self._let_through(t[new][out], x[new][out])
-        start = max(new.stop - 1, 0)  # the sample before is what the next one is compared with
+        start = max(new.stop - 2, 0)  # the samples before are what the next one is compared with
         self._wait_t, self._wait_x, self._done = t[start:].copy(), x[start:].copy(), new.stop - start
         return found
 
@@ -233,8 +233,8 @@ class PieceCleaner:
         assert self._rule is not None
         if self._used_count + self._frozen + self._glitches + t.size - self._done < 3:
             return np.zeros(t.size, dtype=bool)
-        # a rest of two samples is part of a long signal: it goes on to the left as it began
-        t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([x[:1], x[:1], x])
+        # a rest of two samples is part of a long signal: something is to the left of it
+        t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([[np.nan, np.nan], x])
         return self._rule.find(t, x)[2:]
 
     def _found(self, t: TimeArray, x: FloatArray) -> None:

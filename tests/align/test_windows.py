@@ -143,6 +143,22 @@ def test_many_short_dropouts_of_a_wheel(seed):
     same([channel("omega_fl", np.arange(3000) * 0.01, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_bursts_of_stamps_while_a_wheel_locks(seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(3000) * 0.01
+    x = 80.0 - np.abs((np.arange(3000) % 40) - 20) * rng.uniform(1.0, 4.0) + rng.normal(0, 0.01, 3000)
+    for k in np.cumsum(rng.integers(15, 60, 60)):
+        m = int(rng.integers(2, 14))
+        if rng.random() < 0.5:
+            t[k : k + m] = t[k + m] - 1e-4 * np.arange(m, 0, -1)
+        else:
+            t[k : k + m] = t[k]
+        if rng.random() < 0.2:
+            x[k + 2 : k + 2 + m] = rng.choice([0.0, 300.0, 20.0])
+    same([channel("omega_fl", t, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_many_spikes_of_an_acceleration(seed):
     rng = np.random.default_rng(seed)
@@ -151,7 +167,7 @@ def test_many_spikes_of_an_acceleration(seed):
         x[a : a + rng.integers(1, 20)] += rng.choice([14.0, -17.0, 25.0])
     signals = [*wheels(3000), channel("a_x", np.arange(3000) * 0.01, x, "m/s^2")]
     whole = same(signals, size=int(rng.choice([1, 5, 40])), seed=seed)
-    assert len([n for n in whole.quality.notes if "a_x" in n]) == 2
+    assert len([n for n in whole.quality.notes if "a_x" in n]) >= 2
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -83,3 +83,45 @@ def test_what_a_car_does_is_no_spike():
     assert not spikes(T[:2], a[:2]).any()
     slow = np.tile([0.0, -11.0], 150)  # 10 Hz: from nothing to full braking in a sample
     assert not spikes((np.arange(300) * 100_000_000).astype(np.int64), slow).any()
+
+
+def locking(seed):
+    """A wheel under ABS for 4 s: cycles of 0.15 to 0.5 s, down with 60 to 150 m/s^2."""
+    rng = np.random.default_rng(seed)
+    t = T * 1e-9
+    car = np.interp(t, [0, 10, 14, 30], [30, 30, 14, 30])
+    rim, at = car + rng.normal(0, 0.01, t.size), 10.0
+    while at < 13.5:
+        depth = rng.uniform(0.3, 0.95) * np.interp(at, t, car)
+        low, end = at + depth / np.array([1.0, 0.5]) / rng.uniform(60, 150)
+        rim -= np.interp(t, [at, low, end], [0, depth, 0])
+        at = end + rng.uniform(0.05, 0.2)
+    return rim / R_E, rng
+
+
+@pytest.mark.parametrize("length", [5, 10])
+@pytest.mark.parametrize("kind", ["late", "doubled"])
+@pytest.mark.parametrize("seed", range(4))
+def test_bursts_of_stamps_do_not_hide_a_wheel_under_abs(seed, kind, length):
+    x, rng = locking(seed)
+    assert not sensor_glitches(T, x, r_e=R_E).any()
+    t, keep = T.copy(), np.ones(T.size, dtype=bool)
+    for k in 1000 + 60 * np.arange(6) + rng.integers(0, 40, 6):
+        if kind == "late":
+            t[k : k + length] = t[k + length] - 100_000 * np.arange(length, 0, -1)
+        else:  # all have the first one's stamp, and the last one counts
+            t[k + length - 1] = t[k]
+            keep[k : k + length - 1] = False
+    assert not sensor_glitches(t[keep], x[keep], r_e=R_E).any()
+
+
+@pytest.mark.parametrize("level", [0.0, 300.0])
+def test_dropouts_among_bursts_are_still_left_out(level):
+    x, t = wheel(), T.copy()
+    for k in range(0, 2900, 50):
+        t[k : k + 10] = t[k + 10] - 100_000 * np.arange(10, 0, -1)
+    for k in (503, 1007, 1511):
+        x[k : k + 12] = level
+    assert np.flatnonzero(sensor_glitches(t, x, r_e=R_E)).tolist() == [
+        k + i for k in (503, 1007, 1511) for i in range(12)
+    ]
