@@ -11,7 +11,6 @@ import traceback
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
-from pickle import PicklingError
 from threading import Thread, current_thread, main_thread
 from typing import Any, NamedTuple, TypeVar
 
@@ -147,7 +146,7 @@ def _serve(pipe: Connection, limits: Limits, read_limits: ReadLimits) -> None:
             pipe.send(result)
         except OSError:  # nobody waits for it any more
             return
-        except (AttributeError, TypeError, ValueError, PicklingError) as error:
+        except Exception as error:  # what cannot be sent raises one of many
             pipe.send(_Raised(TypeError(f"{type(result).__name__} cannot be sent: {error}")))
         del work, task, result  # nothing of it is held while there is nothing to do
 
@@ -198,8 +197,8 @@ def _round(
                 seat_more()
             with _no_interrupt():
                 seat = free.pop(0)
-                busy[seat.pipe] = seat, name
                 seat.give(work, task)
+                busy[seat.pipe] = seat, name
             while not free and len(busy) == jobs:
                 for pipe in wait(list(busy)):
                     take(pipe)
