@@ -34,6 +34,7 @@ from aqualog.io.mdf4_survey import survey4
 from aqualog.io.mdf_blocks import Raw, let_go, raw_columns, raw_pieces
 from aqualog.io.mdf_conversion import formula_text, is_text_only, physical, refusal
 from aqualog.io.mdf_harness import disarm_asammdf
+from aqualog.io.mdf_salvage import damaged_blocks
 from aqualog.io.mdf_survey import Survey, mapped
 from aqualog.io.memory import bytes_text, free_memory
 from aqualog.io.patched_file import PatchedFile
@@ -128,12 +129,18 @@ class MdfReader:
         self._mdf: Any = None
         self._patched: PatchedFile | None = None
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
+        self._survey = Survey(0)
+        self._damaged: frozenset[int] = frozenset()
         self._channels: tuple[ChannelInfo, ...] = ()
         try:
             dbc = load_dbc(options.dbc) if options.dbc else None
-            with self._guard("cannot be read as MDF"):
-                self._open()
-                self._channels = _unique(self._listed(dbc))
+            try:
+                self._describe(dbc)
+            except LogError as error:
+                self._find_damaged(error)
+                self._faults, self._survey = FaultLog(), Survey(0)
+                self._describe(dbc)
+                self._check_left(error)
             self._list_attachments()
         except BaseException:
             self.close()
@@ -146,6 +153,15 @@ class MdfReader:
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         """Decode these channels; each group of records is gone through once."""
         wanted = list(wanted)
+        before = replace(self._faults, notes=[*self._faults.notes])
+        try:
+            return self._decoded(wanted)
+        except LogError as error:
+            self._faults = before
+            self._go_on_without_damaged(error)
+            return self._decoded(wanted)
+
+    def _decoded(self, wanted: Sequence[ChannelInfo]) -> list[Channel]:
         with self._guard("cannot be decoded"):
             found = self._read_measured([w for w in wanted if isinstance(w.key, _Measured)])
             found |= self._read_signals([w for w in wanted if isinstance(w.key, _Signal)])
@@ -164,10 +180,17 @@ class MdfReader:
 
     def _pieces(self, group: int, infos: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
         n = n_bad = 0
-        pieces = self._in_pieces(group, [i.key.index for i in infos])
+        indexes = [i.key.index for i in infos]
+        opened, pieces = self._inner, self._in_pieces(group, indexes)
         while True:
-            with self._guard("cannot be decoded"):
-                piece = next(pieces, None)
+            try:
+                with self._guard("cannot be decoded"):
+                    piece = next(pieces, None)
+            except LogError as error:
+                if opened is self._inner:  # else another group's pieces have found it
+                    self._go_on_without_damaged(error)
+                opened, pieces = self._inner, _behind(self._in_pieces(group, indexes), n)
+                continue
             if piece is None:
                 break
             t, columns = piece
@@ -219,13 +242,39 @@ class MdfReader:
             reason = f"{what} ({why})"
             raise LogError(reason, where=str(self._path), hint="check it with the logger's own tool") from error
 
+    def _describe(self, dbc: Dbc | None) -> None:
+        with self._guard("cannot be read as MDF"):
+            self._open()
+            self._channels = _unique(self._listed(dbc))
+
+    def _find_damaged(self, error: LogError) -> None:
+        """Look for packed blocks that are why the file cannot be read; raises the error if there are none."""
+        if self._damaged or not self._survey.deflated:
+            raise error
+        self._damaged = damaged_blocks(self._path, self._survey.deflated)
+        if not self._damaged:
+            raise error
+
+    def _go_on_without_damaged(self, error: LogError) -> None:
+        """Open the file anew without damaged blocks and what follows them; raises the error if that is no help."""
+        self._find_damaged(error)
+        with self._guard("cannot be decoded"):
+            self._open()
+        self._check_left(error)
+
+    def _check_left(self, error: LogError) -> None:
+        if not any(int(group.channel_group.cycles_nr) for group in self._inner.groups):
+            raise error
+
     def _open(self) -> None:
+        self.close()
         if self._path.suffix.lower() in _ARCHIVES:
             raise LogError("is named as an archive", where=str(self._path), hint="unpack or rename it to .mf4")
         with mapped(self._path) as data:
             self._version4 = bytes(data[8:10]) >= b"4."
-            self._survey = (survey4 if self._version4 else survey3)(data, self._path)
-        self._tell(self._survey)
+            survey = survey4(data, self._path, self._damaged) if self._version4 else survey3(data, self._path)
+        before, self._survey = self._survey, survey
+        self._tell(survey, before)
         self._scratch = tempfile.TemporaryDirectory(prefix="aqualog-", ignore_cleanup_errors=True)
         self._check_space()
         source: Any = str(self._path)
@@ -242,11 +291,12 @@ class MdfReader:
         let_go(self._inner)
         self._start_ns, self._absolute = self._start()
 
-    def _tell(self, survey: Survey) -> None:
+    def _tell(self, survey: Survey, before: Survey) -> None:
+        """Tell what a walk has found beyond one before."""
         self._faults.truncated |= survey.truncated
         self._faults.unfinalised = survey.finalised
-        self._faults.lost_samples += survey.lost_samples
-        self._faults.notes += survey.notes
+        self._faults.lost_samples += survey.lost_samples - before.lost_samples
+        self._faults.notes += [note for note in survey.notes if note not in before.notes]
 
     def _list_attachments(self) -> None:
         names = self._survey.attachments
@@ -292,7 +342,7 @@ class MdfReader:
         for group in self._inner.groups:
             kinds[int(group.data_group.address)].append(group)
         for groups in kinds.values():
-            if any(int(g.channel_group.address) in self._survey.recount for g in groups):
+            if not self._channels and any(int(g.channel_group.address) in self._survey.recount for g in groups):
                 self._count_unsorted(groups)
 
     def _count_unsorted(self, groups: Sequence[Any]) -> None:
@@ -528,10 +578,7 @@ class MdfReader:
         if done == int(self._inner.groups[group].channel_group.cycles_nr):
             return
         self._mdf.configure(read_fragment_size=_FRAGMENT)
-        for t, columns in self._fragments(group, indexes):
-            new = slice(min(done, len(t)), None)
-            done -= min(done, len(t))
-            yield t[new], {i: x[new] for i, x in columns.items()}
+        yield from _behind(self._fragments(group, indexes), done)
 
     def _raw(self, group: int, index: int, fragment: Any) -> tuple[_Array, _Array | None]:
         raw, invalid = self._inner.get(
@@ -890,6 +937,16 @@ def _merged(parts: Sequence[tuple[TimeArray, _Array, _Array]]) -> tuple[TimeArra
         order = np.argsort(t_ns, kind="stable")
         return t_ns[order], data[order], length[order]
     return t_ns, data, length
+
+
+def _behind(
+    pieces: Iterator[tuple[_Array, dict[int, _Array]]], records: int
+) -> Iterator[tuple[_Array, dict[int, _Array]]]:
+    """Pieces without the first so many records."""
+    for t, columns in pieces:
+        new = slice(min(records, len(t)), None)
+        records -= min(records, len(t))
+        yield t[new], {i: x[new] for i, x in columns.items()}
 
 
 def _joined(parts: Sequence[_Array]) -> _Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -88,7 +89,7 @@ class _Group(NamedTuple):
         return 0 if self.flags & _CG_VLSD else self.data_bytes + self.invalidation_bytes
 
 
-def survey4(data: Any, path: Path) -> Survey:
+def survey4(data: Any, path: Path, damaged: Collection[int] = ()) -> Survey:
     """Walk through a file.
 
     Parameters
@@ -97,18 +98,21 @@ def survey4(data: Any, path: Path) -> Survey:
         The file's content.
     path : Path
         For errors.
+    damaged : collection of int
+        Addresses of deflated blocks that are known not to inflate: their records end before them.
 
     Raises
     ------
     LogError
         If nothing of the file can be read, or a block would not fit into any memory.
     """
-    return _Walk(data, path).run()
+    return _Walk(data, path, frozenset(damaged)).run()
 
 
 class _Walk(Walk):
-    def __init__(self, data: Any, path: Path) -> None:
+    def __init__(self, data: Any, path: Path, damaged: frozenset[int]) -> None:
         super().__init__(data, path)
+        self._damaged = damaged
         self._texts: dict[int, int] = {}
         self._text_bytes = 0
         self._unfinished = 0
@@ -692,5 +696,8 @@ class _Walk(Walk):
             raise BlockError("DZ", at, f"is damaged, it has {length} bytes for {stored} of data of type {kind}")
         if at + 48 + stored > self._size:
             raise BlockError("DZ", at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
+        if at in self._damaged:
+            raise BlockError("DZ", at, "is damaged, or not of the size that it tells of")
+        self._found.deflated.append(at)
         out.inflated += inflated
         out.largest = max(out.largest, inflated)

@@ -17,7 +17,7 @@ from asammdf.blocks import mdf_v3, mdf_v4, utils, v2_v3_blocks, v4_blocks
 
 from aqualog.io.mdf_blocks import inflated
 
-__all__ = ["disarm_asammdf"]
+__all__ = ["disarm_asammdf", "unpacked"]
 
 _PLAIN, _LZ4, _ZSTD = (0,), (3, 4), (5, 6)  # asammdf's kinds of blocks; the others are deflated
 _SAMPLE = 512  # [bytes] of a text that its encoding is told from; asammdf would take all of it, which takes minutes
@@ -59,6 +59,17 @@ def _inflated(kind: int, data: bytes) -> bytes | bytearray:
     size = kind.size if isinstance(kind, _Kind) else None
     if size is None:
         raise ValueError("a data block without a size")
+    return unpacked(kind, data, size)
+
+
+def unpacked(kind: int, data: bytes, size: int) -> bytes | bytearray:
+    """Content of a block of one of asammdf's kinds, which is to have so many bytes; not yet turned round.
+
+    Raises
+    ------
+    Exception
+        Whatever its library raises if it is damaged; ValueError if it has another size.
+    """
     if kind in _PLAIN:
         return data
     out: bytes | bytearray

@@ -53,6 +53,7 @@ class Survey:
     block. `recount`: groups whose number of records is only known when their records have been sorted, by address.
     `inferred`: groups whose records were told from their channels, by address; their time must go up to be believed.
     `zeros`: what such a file ends in behind the records of these groups. [bytes]
+    `deflated`: addresses of deflated blocks of data.
     `inflated`: what the records of a group take when they are inflated, by address of the group. [bytes]
     """
 
@@ -63,6 +64,7 @@ class Survey:
     zeros: dict[int, int] = field(default_factory=dict)
     inferred: set[int] = field(default_factory=set)
     inflated: dict[int, int] = field(default_factory=dict)
+    deflated: list[int] = field(default_factory=list)
     unsorted: int = 0
     notes: list[str] = field(default_factory=list)
     truncated: bool = False

@@ -175,6 +175,54 @@ def test_deflated_blocks_before_a_cut_are_kept(tmp_path, lost):
     assert "DZ block" in faults.notes[0]
 
 
+@pytest.mark.parametrize("pieces", [False, True])
+@pytest.mark.parametrize("which", [0, 1, 2, 3])
+def test_what_precedes_a_damaged_block_is_kept(tmp_path, monkeypatch, which, pieces):
+    data = bytearray(streamed(compressed=True))
+    at = find(data, b"DZ", which)
+    data[at + 48 + 100] ^= 4
+    if which == 0:  # nothing is left
+        assert "a compressed block is damaged" in refused(tmp_path, bytes(data))
+        return
+    (tmp_path / "a.mf4").write_bytes(data)
+    if not pieces:
+        found, faults = read(tmp_path / "a.mf4")
+        x = found["group0.x"]
+    else:
+        monkeypatch.setattr(reader, "_PIECE", 25)
+        monkeypatch.setattr(reader, "_FRAGMENT", 500)
+        with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
+            (part,) = r.parts([c for c in r.channels() if c.path == "group0.x"])
+            x = np.concatenate([c.values for piece in part.pieces for c in piece])
+            faults = r.faults
+    np.testing.assert_array_equal(x, X[: 50 * which])
+    assert faults.truncated
+    assert faults.lost_samples == 200 - 50 * which
+    assert f"its DZ block at byte {at} is damaged" in " ".join(faults.notes)
+
+
+def test_frames_that_precede_a_damaged_block_are_kept(tmp_path):
+    """Their ids are read when the file is opened."""
+    n = 200_000
+    frames = CanFrames(
+        np.arange(1, n + 1) * 10**6, np.arange(n) % 3 + 256, np.zeros(n, bool), [b"12345678"] * n, np.ones(n)
+    )
+    write_frames_mf4(tmp_path / "f.mf4", frames, 1_700_000_000 * 10**9, "")
+    data = bytearray((tmp_path / "f.mf4").read_bytes())
+    blocks = [i for i in range(len(data) - 4) if data[i : i + 4] == b"##DZ"]
+    assert len(blocks) > 2
+    data[blocks[1] + 48 + 20] ^= 1
+    (tmp_path / "f.mf4").write_bytes(data)
+    (tmp_path / "a.dbc").write_bytes(b'VERSION ""\n\nBU_: E\n\nBO_ 256 M: 8 E\n SG_ S : 0|8@1+ (1,0) [0|0] "" E\n')
+    with MdfReader(tmp_path / "f.mf4", ReadOptions(dbc=(tmp_path / "a.dbc",))) as r:
+        (channel,) = r.read(r.channels())
+        left = n - r.faults.lost_samples
+        assert 0 < left < n
+        assert channel.t_ns.size == -(-left // 3)
+        assert set(channel.values) == {ord("1")}
+        assert "is cut" in " ".join(r.faults.notes)
+
+
 def test_a_cut_through_records_of_several_kinds(tmp_path):
     found, faults = read_bytes(tmp_path, unsorted()[:-1000])
     whole, _ = read_bytes(tmp_path, unsorted())
