@@ -26,6 +26,7 @@ _LARGEST_TEXT = 1 << 24
 _MOST_TEXT = 1 << 28  # [bytes] of all texts together, as often as they are linked
 _LONGEST_RECORD = 1 << 30
 _MOST_CYCLES = 1 << 40
+_MOST_PACKED = 100_000  # records, of a byte at least, that a byte of a file may stand for, however well it is packed
 _DEEPEST = 16  # conversions in conversions, channels in channels
 _MOST_CONVERSIONS = 10_000  # that one channel leads to
 _MOST_ELEMENTS = 1_000_000  # of an array
@@ -510,7 +511,7 @@ class _Walk(Walk):
             self._found.unsorted += chain.inflated
         for group in plain:
             there = chain.inflated // max(group.record + id_size, 1)
-            if group.cycles > _MOST_CYCLES:
+            if group.cycles > min(_MOST_CYCLES, _MOST_PACKED * self._size):
                 self._found.patch(group.block.data + 8, "<Q", there)
                 broken = BlockError("CG", group.block.at, f"tells of {group.cycles:.1e} records")
                 self._found.lost("the number of records of a group", broken)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from aqualog.io.mdf_harness import unpacked
 __all__ = ["damaged_blocks"]
 
 _HEAD = struct.Struct("<26xB5xQQ")  # of a DZ block: how it is packed, its size unpacked and packed [bytes]
-_KINDS = (1, 1, 5, 5, 3, 3)  # asammdf's number for each way of packing; that a block is transposed makes no difference
+_DEFLATED = (0, 1)
+_KINDS = {2: 5, 3: 5, 4: 3, 5: 3}  # asammdf's numbers for the other ways; that it is transposed makes no difference
+_PIECE = 1 << 20  # [bytes]
 
 
 def damaged_blocks(path: Path, addresses: Iterable[int]) -> frozenset[int]:
@@ -35,7 +38,22 @@ def damaged_blocks(path: Path, addresses: Iterable[int]) -> frozenset[int]:
             packing, size, stored = _HEAD.unpack(file.read(_HEAD.size))
             data = file.read(stored)
             try:
-                unpacked(_KINDS[packing], data, size)
+                if packing not in _DEFLATED:
+                    unpacked(_KINDS[packing], data, size)
+                elif _inflates_to(data) != size:
+                    found.add(at)
             except Exception:  # what its library raises is of no one kind
                 found.add(at)
     return frozenset(found)
+
+
+def _inflates_to(data: bytes) -> int:
+    """Size of deflated data, a piece at a time: what a block tells of itself may be far more than there is. [bytes]"""
+    inflater, size = zlib.decompressobj(), 0
+    while not inflater.eof:
+        piece = inflater.decompress(data, _PIECE)
+        data = inflater.unconsumed_tail
+        if not piece and not data:
+            return -1  # its end is missing
+        size += len(piece)
+    return size
