@@ -1,4 +1,4 @@
-"""Samples that no car can have made: dropouts and spikes of a wheel speed sensor, spikes of an accelerometer."""
+"""Samples that no car can have made: dropouts of a speed, spikes of a wheel, of what the car or its steering does."""
 
 from __future__ import annotations
 
@@ -10,22 +10,48 @@ import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "glitches_of", "is_leap", "sensor_glitches", "spikes"]
+__all__ = [
+    "KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "Leap", "glitches_of", "is_leap", "lost_speed", "sensor_glitches",
+    "spikes",
+]  # fmt: skip
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
 _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
 RETURN_NS = 1_000_000_000
 _AHEAD_NS = 500_000_000  # behind a leap, by which its stamps are judged
 KNOWN_NS = RETURN_NS + _AHEAD_NS
-"""How much must be known behind a sample to judge it."""
+"""How much must be known behind a sample to judge it; before it two samples."""
 _BURST = 0.3  # of the usual sample time: stamps that are closer came from a buffer
 _LATE_NS = 200_000_000  # by which stamps of a burst may be off
 _STANDS = 10  # samples of one value, at least, that are no slow signal's
-# of accelerations: five measured cars step by 9.5 m/s^2 from sample to sample at most (a phone's, 100 Hz), else by 4.3
-_JERK = 50.0  # [m/s^3]
-_STEP = 12.0  # [m/s^2]
-_BACK = 4.0  # [m/s^2] by which what follows a spike differs from what came before, at most
 _SPIKE_NS = 150_000_000  # longest spike; a blow is over in less, and a car that brakes takes longer
+_STOPPING = 20.0  # [m/s^2] a speed that falls to zero faster is lost, and no car that stops
+_STANDS_BELOW = 2.0  # [m/s] speeds that receivers and control units may tell as zero
+
+
+class Leap(NamedTuple):
+    """What no car does: a change by more than `step` + `rate` [1/s] x sample time, if it comes `back` as near as that.
+
+    In the signal's unit.
+    """
+
+    rate: float
+    step: float
+    back: float
+
+
+# five measured cars step by 9.5 m/s^2 from sample to sample at most (a phone's, 100 Hz), else by 4.3
+_ACCELERATION = Leap(50.0, 12.0, 4.0)
+# a car on a race track: 5.6 rad/s^2; 9.2 rad/s at the steering wheel
+_YAW = Leap(20.0, 0.4, 0.2)
+_STEERING = Leap(3.0, 0.1, 0.05)
+_LEAPS = {
+    "a_x": _ACCELERATION,
+    "a_y": _ACCELERATION,
+    "yaw_rate": _YAW,
+    "steer_angle": _STEERING,
+    "steering_wheel_angle": Leap(*(15.0 * x for x in _STEERING)),
+}
 
 
 class Glitches(NamedTuple):
@@ -41,8 +67,11 @@ def glitches_of(name: str, r_e: float | None) -> Glitches | None:
         return Glitches(
             partial(sensor_glitches, r_e=r_e), "step faster than a wheel can; sensor dropouts or spikes, left out"
         )
-    if name in ("a_x", "a_y"):
-        return Glitches(spikes, "leap from what is before and behind them as no car can; spikes, left out")
+    if name in _LEAPS:
+        find = partial(spikes, leap=_LEAPS[name])
+        return Glitches(find, "leap from what is before and behind them as no car can; spikes, left out")
+    if name == "v_x":
+        return Glitches(lost_speed, "are zero at once, as no car stops; dropouts, left out")
     return None
 
 
@@ -95,25 +124,27 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
     return glitch
 
 
-def spikes(t_ns: TimeArray, a: FloatArray) -> BoolArray:
-    """Which samples of an acceleration are not the car's.
+def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> BoolArray:
+    """Which samples of an acceleration, a yaw rate or a steering angle are not the car's.
 
     Parameters
     ----------
     t_ns : int64 array (n,)
         Strictly increasing stamps.
-    a : array (n,)
-        Finite samples. [m/s^2]
+    x : array (n,)
+        Finite samples.
+    leap : Leap
+        What no car does, in the unit of `x`; default that of an acceleration. [m/s^2]
 
     Returns
     -------
     bool array (n,)
-        From a step that no car makes (12 m/s^2 at once) to the step back to where it was, within 150 ms.
+        From a step that no car makes to the step back to where it was, within 150 ms.
     """
-    spike = np.zeros(a.size, dtype=np.bool_)
-    if a.size < 3:
+    spike = np.zeros(x.size, dtype=np.bool_)
+    if x.size < 3:
         return spike
-    jumps = np.flatnonzero(np.abs(np.diff(a)) > _JERK * np.diff(t_ns) * 1e-9 + _STEP)
+    jumps = np.flatnonzero(np.abs(np.diff(x)) > leap.rate * np.diff(t_ns) * 1e-9 + leap.step)
     done = -1
     for position, i in enumerate(jumps.tolist()):
         if i < done:
@@ -121,11 +152,38 @@ def spikes(t_ns: TimeArray, a: FloatArray) -> BoolArray:
         for j in jumps[position + 1 :].tolist():
             if t_ns[j] - t_ns[i] > _SPIKE_NS:
                 break
-            if abs(a[j + 1] - a[i]) <= _BACK:
+            if abs(x[j + 1] - x[i]) <= leap.back:
                 spike[i + 1 : j + 1] = True
                 done = j + 1
                 break
     return spike
+
+
+def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
+    """Which samples of a reference speed are zero because it was lost.
+
+    Parameters
+    ----------
+    t_ns : int64 array (n,)
+        Strictly increasing stamps.
+    v : array (n,)
+        Finite samples. [m/s]
+
+    Returns
+    -------
+    bool array (n,)
+        Stretches of exactly zero, into which it falls faster than a car stops. A value that stood before that is held
+        on a finer grid: how fast it falls is not known, and it is believed.
+    """
+    lost = np.zeros(v.size, dtype=np.bool_)
+    if v.size < 2:
+        return lost
+    is_live = np.append(True, v[1:-1] != v[:-2])
+    falls = (v[1:] == 0.0) & is_live & (np.abs(v[:-1]) > _STOPPING * np.diff(t_ns) * 1e-9 + _STANDS_BELOW)
+    ends = np.append(np.flatnonzero(v != 0.0), v.size)
+    for i in np.flatnonzero(falls).tolist():
+        lost[i + 1 : ends[np.searchsorted(ends, i + 1)]] = True
+    return lost
 
 
 def is_leap(dt_ns: TimeArray, dv: FloatArray) -> BoolArray:

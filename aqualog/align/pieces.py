@@ -15,7 +15,7 @@ from aqualog.align.freezes import Freeze, freeze_note, in_freezes, watch_of
 from aqualog.align.glitches import KNOWN_NS, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
-from aqualog.align.standing import Stretch, stand_watch_of
+from aqualog.align.standing import stand_watch_of
 from aqualog.align.timebase import DAY_NS
 from aqualog.errors import ConfigError, SignalError
 from aqualog.types import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
@@ -114,7 +114,8 @@ class PieceCleaner:
         self._rule = glitches_of(name, r_e)
         self._freezes = freezes or ()
         self._watch = watch_of(name, r_e) if freezes is None else None
-        self._stands = stand_watch_of(name, r_e) if freezes is None else None
+        # when the car stands by this signal, if it is a speed; complete after `finish` of the first pass
+        self.stands = stand_watch_of(name, r_e) if freezes is None else None
         # counts
         self._frozen = 0
         self._samples = self._duplicates = self._bad = self._code = self._out = self._glitches = self._repaired = 0
@@ -188,8 +189,8 @@ class PieceCleaner:
     def _let_through(self, t: TimeArray, x: FloatArray) -> tuple[TimeArray, FloatArray]:
         if self._watch is not None:
             self._watch.push(t, x)
-        if self._stands is not None:
-            self._stands.push(t, x)
+        if self.stands is not None:
+            self.stands.push(t, x)
         if self._freezes:
             repeats = in_freezes(t, self._freezes)
             self._frozen += int(repeats.sum())
@@ -247,10 +248,6 @@ class PieceCleaner:
     def frozen(self) -> tuple[Freeze, ...]:
         """Where the signal is frozen; complete after `finish`."""
         return self._freezes if self._watch is None else self._watch.finish()
-
-    def standing(self) -> tuple[Stretch, ...]:
-        """When the car stands by this signal, if it is a speed; complete after `finish` of the first pass."""
-        return () if self._stands is None else self._stands.finish()
 
     def cleaned(self) -> tuple[Clean, list[str]]:
         """The signal without its samples, and the notes on it; complete after `finish`."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from aqualog.types import BoolArray, FloatArray, TimeArray
 
-__all__ = ["SPEEDS", "StandWatch", "Stretch", "is_standing", "stand_watch_of", "standing_ns"]
+__all__ = ["SPEEDS", "StandWatch", "Stretch", "is_standing", "stand_watch_of", "standing_by", "standing_ns"]
 
 Stretch = tuple[int, int]
 """First and last stamp. [ns]"""
@@ -28,13 +28,17 @@ def stand_watch_of(name: str, r_e: float | None) -> StandWatch | None:
 
 
 class StandWatch:
-    """Goes through the samples of one speed, in any pieces. `scale` makes them m/s."""
+    """Goes through the samples of one speed, in any pieces. `scale` makes them m/s.
+
+    `has_moved` tells whether a sample so far was one of a car that does not stand.
+    """
 
     def __init__(self, scale: float = 1.0) -> None:
         self._scale = scale
         self._last: tuple[int, float] | None = None
         self._since: int | None = None  # the stretch that is open
         self._is_sound = True  # it was reached as a car stops
+        self.has_moved = False
         self._found: list[Stretch] = []
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
@@ -46,6 +50,7 @@ class StandWatch:
         dt = np.diff(t_ns, prepend=t_last)
         is_sound = np.abs(np.diff(v, prepend=v_last)) <= _STOPPING * dt * 1e-9 + _SLACK
         stands = v <= _STANDING
+        self.has_moved |= not bool(stands.all())
         before = np.append(self._since is not None, stands[:-1])
         for k in np.flatnonzero((stands != before) | (dt > _GAP_NS)).tolist():
             if before[k]:
@@ -66,6 +71,16 @@ class StandWatch:
         if self._since is None or not self._is_sound or self._last is None:
             return tuple(self._found)
         return (*self._found, (self._since, self._last[0]))
+
+
+def standing_by(watches: Iterable[StandWatch]) -> tuple[Stretch, ...]:
+    """When the car stands by the first speed that moves at all, the best one first: one that never does may be dead."""
+    found: tuple[Stretch, ...] = ()
+    for watch in watches:
+        if watch.has_moved:
+            return watch.finish()
+        found = found or watch.finish()
+    return found
 
 
 def is_standing(t_ns: TimeArray, stretches: Sequence[Stretch]) -> BoolArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.resample import placed
 from aqualog.align.shared import OfLast
-from aqualog.align.standing import SPEEDS, Stretch, stand_watch_of
+from aqualog.align.standing import SPEEDS, StandWatch, Stretch, stand_watch_of, standing_by
 from aqualog.errors import SignalError
 from aqualog.notation import SYMBOLS
 from aqualog.types import Channel, FileFaults, Origin, Signals
@@ -58,15 +58,18 @@ def build_signals(
     notes: list[str] = []
     stamps = Stamps()
 
-    def standing() -> tuple[Stretch, ...]:
-        """When the car stands, by the best speed there is."""
+    def watched() -> Iterator[StandWatch]:
+        """The speeds that there are, gone through one by one as they are asked for."""
         for name in SPEEDS:
             watch = stand_watch_of(name, vehicle.r_e(name[-2:]) if name != "v_x" else None)
             if watch is not None and name in mapped:
                 clean = clean_channel(name, *mapped[name], signal_map, vehicle, stamps, [], stands=watch)
                 if clean is not None and clean.origin.samples:
-                    return watch.finish()
-        return ()
+                    yield watch
+
+    def standing() -> tuple[Stretch, ...]:
+        """When the car stands, by the best speed there is."""
+        return standing_by(watched())
 
     cleaned = [
         c

@@ -20,7 +20,7 @@ from aqualog.align.grid import Grid, columns_of, common_clock, frame_of, grid_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.pieces import NotInPiecesError, PieceCleaner
 from aqualog.align.quality import missing_notes, quality_of
-from aqualog.align.standing import SPEEDS
+from aqualog.align.standing import SPEEDS, standing_by
 from aqualog.errors import SignalError
 from aqualog.io.base import Part
 from aqualog.notation import SYMBOLS
@@ -163,7 +163,7 @@ def long_drive(
     notes: list[str] = []
     cleaners = _cleaners(found, signal_map, vehicle, None, notes)
     clocks = _gone_through(cleaners, found, parts, tell)
-    standing = next((cleaners[n].standing() for n in SPEEDS if n in clocks), ())
+    standing = standing_by(w for n in SPEEDS if n in clocks and (w := cleaners[n].stands) is not None)
     freezes = {
         name: while_moving(cleaner.frozen(), standing) if name.startswith("torque_") else cleaner.frozen()
         for name, cleaner in cleaners.items()

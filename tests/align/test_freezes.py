@@ -212,6 +212,21 @@ def test_a_torque_that_stays_while_the_car_stands(name, is_standing):
     assert (whole.quality.frozen_samples == 0) is is_standing
 
 
+@pytest.mark.parametrize("is_parked", [True, False])
+def test_a_speed_that_is_always_zero_is_no_car_that_stands(is_parked):
+    """Unless no speed moves at all."""
+    from test_windows import channel, same
+
+    signals = stop_and_go("v_x", False)
+    for dead in ("v_x", "omega_rr") if is_parked else ("v_x",):
+        signals[dead] = signals[dead][0], np.zeros(signals[dead][0].size)
+    units = {"torque_r": "N*m", "v_x": "m/s"}
+    whole = same(
+        [channel(n, t * 1e-9, x, units.get(n, "rad/s")) for n, (t, x) in signals.items()], size=3000, rows=9000
+    )
+    assert (whole.quality.frozen_samples == 0) is is_parked
+
+
 @pytest.mark.parametrize("pieces", [1, 3, 500])
 def test_when_a_car_stands(pieces):
     t = (np.arange(1000) * S // 10).astype(np.int64)

@@ -159,6 +159,27 @@ def test_bursts_of_stamps_while_a_wheel_locks(seed):
     same([channel("omega_fl", t, x, "rad/s")], size=int(rng.choice([1, 5, 40])), seed=seed)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_speed_that_is_lost_and_spikes_of_yaw_rate_and_steering(seed):
+    rng = np.random.default_rng(seed)
+    n, t = 3000, np.arange(3000) * 0.01
+    v = 25.0 + np.sin(0.2 * t) + 0.02 * rng.standard_normal(n)
+    yaw, steer = (k * np.sin(t) + 0.001 * rng.standard_normal(n) for k in (0.3, 0.05))
+    for a in rng.integers(0, n, 12):
+        v[a : a + rng.choice([1, 3, 90, 300])] = 0.0
+        yaw[a : a + rng.integers(1, 20)] += rng.choice([0.5, 2.0, -3.0])
+        steer[a : a + rng.integers(1, 20)] += rng.choice([0.12, 0.3, -0.5])
+    if seed == 3:
+        v[rng.integers(n // 2, n) :] = 0.0
+    signals = [
+        *wheels(n), channel("v_x", t, v, "m/s"), channel("yaw_rate", t, yaw, "rad/s"),
+        channel("steer_angle", t, steer, "rad"),
+    ]  # fmt: skip
+    whole = same(signals, size=int(rng.choice([1, 5, 40])), rows=int(rng.choice([13, 500])), seed=seed)
+    assert whole.origins["v_x"].out_of_range == (v == 0.0).sum()
+    assert len([note for note in whole.quality.notes if "as no car" in note]) == 3
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_many_spikes_of_an_acceleration(seed):
     rng = np.random.default_rng(seed)

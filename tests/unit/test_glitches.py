@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aqualog.align.glitches import sensor_glitches, spikes
+from aqualog.align.glitches import glitches_of, lost_speed, sensor_glitches, spikes
 
 R_E = 0.317
 T = (np.arange(3000) * 10_000_000).astype(np.int64)
@@ -125,3 +125,37 @@ def test_dropouts_among_bursts_are_still_left_out(level):
     assert np.flatnonzero(sensor_glitches(t, x, r_e=R_E)).tolist() == [
         k + i for k in (503, 1007, 1511) for i in range(12)
     ]
+
+
+def test_a_speed_that_is_zero_at_once_is_lost():
+    rng = np.random.default_rng(2)
+    v = 25.0 + 0.05 * rng.standard_normal(T.size)
+    for a, b in ((500, 501), (900, 1400), (2900, 3000)):
+        v[a:b] = 0.0
+    assert np.flatnonzero(lost_speed(T, v)).tolist() == [500, *range(900, 1400), *range(2900, 3000)]
+
+
+def test_a_car_that_stops_has_not_lost_its_speed():
+    t = np.arange(T.size) * 0.01
+    v = np.maximum(np.interp(t, [0, 10, 12, 20, 23, 30], [22, 22, 0, 0, 30, 30]), 0.0)  # 11 m/s^2
+    v[v < 1.5] = 0.0  # what a receiver takes for standing
+    assert not lost_speed(T, v).any()
+    for step in (10, 100):  # 10 Hz, 1 Hz: each at its own stamps, and held on a grid of 100 Hz
+        assert not lost_speed(T[::step], v[::step]).any()
+        assert not lost_speed(T, v[np.arange(T.size) // step * step]).any()
+    assert not lost_speed(T[:1], v[:1]).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitude", "hertz", "height"),
+    [("yaw_rate", 1.0, 1.0, 1.0), ("steer_angle", 0.3, 0.7, -0.3), ("steering_wheel_angle", 4.5, 0.7, 4.5)],
+)
+def test_spikes_of_yaw_rate_and_steering(name, amplitude, hertz, height):
+    """A car that skids and a driver who catches it (20 rad/s at the wheel) are none."""
+    x = amplitude * np.sin(2.0 * np.pi * hertz * np.minimum(T * 1e-9, 10.0))
+    rule = glitches_of(name, None)
+    assert rule is not None
+    assert not rule.find(T, x).any()
+    for a, b in ((1200, 1201), (1500, 1512)):
+        x[a:b] += height
+    assert np.flatnonzero(rule.find(T, x)).tolist() == [1200, *range(1500, 1512)]
