@@ -45,12 +45,13 @@ _ACCELERATION = Leap(50.0, 12.0, 4.0)
 # a car on a race track: 5.6 rad/s^2; 9.2 rad/s at the steering wheel
 _YAW = Leap(20.0, 0.4, 0.2)
 _STEERING = Leap(3.0, 0.1, 0.05)
+_RATIO = 15.0  # of steering wheel to road wheels, about
 _LEAPS = {
     "a_x": _ACCELERATION,
     "a_y": _ACCELERATION,
     "yaw_rate": _YAW,
     "steer_angle": _STEERING,
-    "steering_wheel_angle": Leap(*(15.0 * x for x in _STEERING)),
+    "steering_wheel_angle": Leap(*(_RATIO * x for x in _STEERING)),
 }
 
 
