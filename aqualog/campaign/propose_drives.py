@@ -94,15 +94,21 @@ def scan(
             continue
         try:
             with open_log(path, options) as log:
-                channels = tuple(log.channels())
+                channels, notes = tuple(log.channels()), log.faults.notes
         except AqualogError as error:
             bad.append((name, error.what))
             continue
         if channels:
             logs.append(LogFile(path, name, channels))
         else:
-            bad.append((name, "no channel in it; raw CAN frames need --dbc"))
+            bad.append((name, _without_channel(path.name, notes)))
     return Found(tuple(logs), tuple(bad), tuple(labels))
+
+
+def _without_channel(name: str, notes: Sequence[str]) -> str:
+    """Why a log has no channel: raw frames that no database decodes tell of themselves."""
+    frames = next((n.removeprefix(f"{name}: ") for n in notes if "raw CAN frames" in n), "")
+    return f"no channel in it; {frames}" if frames else "no channel in it"
 
 
 def _walk(folder: Path) -> list[Path]:

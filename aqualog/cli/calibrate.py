@@ -11,6 +11,7 @@ import typer
 
 from aqualog.cli.options import (
     Cache,
+    CarNeeded,
     Dbc,
     Debug,
     Force,
@@ -19,7 +20,6 @@ from aqualog.cli.options import (
     Quiet,
     Rate,
     Signals,
-    Vehicle,
     Verbose,
 )  # fmt: skip
 
@@ -42,7 +42,7 @@ def calibrate(
             show_default=False,
         ),
     ],
-    vehicle: Vehicle = None,
+    vehicle: CarNeeded = None,
     signals: Signals = None,
     dbc: Dbc = None,
     out: Annotated[

@@ -11,7 +11,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.options import Dbc, Debug, Force, Inputs, Json, Progress, Quiet, Signals, Thresholds, Vehicle, Verbose
+from aqualog.cli.options import (
+    CarOfLogs,
+    Dbc,
+    Debug,
+    Force,
+    Inputs,
+    Json,
+    Progress,
+    Quiet,
+    Signals,
+    Thresholds,
+    Verbose,
+)
 
 if TYPE_CHECKING:
     from aqualog.cli.console import Console
@@ -24,7 +36,7 @@ __all__ = ["evaluate"]
 
 def evaluate(
     inputs: Inputs,
-    vehicle: Vehicle = None,
+    vehicle: CarOfLogs = None,
     signals: Signals = None,
     dbc: Dbc = None,
     labels: Annotated[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.options import Debug, Force, Jobs, Json, Progress, Quiet, StoreOption, Verbose
+from aqualog.cli.options import Dbc, Debug, Force, Jobs, Json, Progress, Quiet, StoreOption, Verbose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +24,7 @@ __all__ = ["figures"]
 
 _ALL_ON_ONE = "figures.html"
 _FORMATS = ("html", "csv", "png", "svg")
+_WHOLE = 10_000  # characters: no sentence of a finding is longer
 
 
 def figures(
@@ -41,6 +42,7 @@ def figures(
         typer.Option("--campaign", help="Make them from the runs of this campaign.", metavar="CAMPAIGN.toml"),
     ] = None,
     store: StoreOption = None,
+    dbc: Dbc = None,
     formats: Annotated[
         str, typer.Option("--format", help="Any of html,csv,png,svg; pictures need the extra images.", metavar="LIST")
     ] = "html,csv",
@@ -75,8 +77,8 @@ def figures(
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
         code = _figures(
-            numbers, out, campaign=campaign, store=store, formats=_formats(formats), jobs=jobs, as_json=as_json,
-            force=force, console=console,
+            numbers, out, campaign=campaign, store=store, dbc=dbc or [], formats=_formats(formats), jobs=jobs,
+            as_json=as_json, force=force, console=console,
         )  # fmt: skip
     raise typer.Exit(code)
 
@@ -97,6 +99,7 @@ def _figures(
     *,
     campaign: Path | None,
     store: str | None,
+    dbc: Sequence[Path],
     formats: Sequence[str],
     jobs: int | None,
     as_json: bool,
@@ -112,7 +115,9 @@ def _figures(
     numbers = _to_make(asked, chosen(asked), campaign is not None, console)
     if store is not None and campaign is None:
         raise ConfigError("--store without --campaign", expected="--campaign campaign.toml")
-    configured = None if campaign is None else _opened(campaign)
+    if dbc and campaign is None:
+        raise ConfigError("--dbc without --campaign", expected="--campaign campaign.toml")
+    configured = None if campaign is None else _opened(campaign, dbc)
     _refuse(numbers, out, formats, configured, force=force)
     evidence, code = (None, 0) if configured is None else _evidence(configured, store, jobs, console)
     with Pictures() if set(formats) & set(FORMATS) else nullcontext() as pictures:
@@ -157,13 +162,13 @@ def _refuse(
     refuse_existing(paths, force=force, sources=() if configured is None else files_of(configured))
 
 
-def _opened(campaign: Path) -> Configured:
+def _opened(campaign: Path, dbc: Sequence[Path]) -> Configured:
     from aqualog.cli.campaign_results import opened
     from aqualog.errors import ConfigError
 
     if campaign.suffix.lower() != ".toml":
         raise ConfigError("is no campaign file", where=str(campaign), expected="--campaign campaign.toml")
-    return opened([str(campaign)])
+    return opened([str(campaign)], dbc=dbc)
 
 
 def _evidence(configured: Configured, store: str | None, jobs: int | None, console: Console) -> tuple[Evidence, int]:
@@ -253,7 +258,7 @@ def _print(made: list[Figure], not_made: dict[str, str], files: list[str], *, as
     from aqualog.report.text import table
 
     # whole where it is kept or passed on, one line each where it is looked at
-    width = 100 if sys.stdout.isatty() else 10_000
+    width = 100 if sys.stdout.isatty() else _WHOLE
     found = [(f, c) for f in made for c in f.findings]
     has_values = any(c.ci95 is not None for _, c in found)
     rows = [
@@ -268,7 +273,7 @@ def _print(made: list[Figure], not_made: dict[str, str], files: list[str], *, as
     ]
     if rows:
         head = ("claim", "figure", "verdict", *(("value, 95 %",) if has_values else ()), "found")
-        sys.stdout.write(table(head, rows) + "\n")
+        sys.stdout.write(table(head, rows, most=_WHOLE) + "\n")
 
 
 def _value(c: Finding) -> str:

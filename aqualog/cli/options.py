@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 __all__ = [
-    "Cache", "CarOfLogs", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet", "Rate",
-    "Signals", "StoreOption", "Thresholds", "Vehicle", "Verbose",
+    "Cache", "CarNeeded", "CarOfLogs", "Dbc", "Debug", "Force", "Inputs", "Jobs", "Json", "Logs", "Progress", "Quiet",
+    "Rate", "Signals", "StoreOption", "Thresholds", "Vehicle", "Verbose",
 ]  # fmt: skip
 
 Logs = Annotated[
@@ -21,6 +21,10 @@ Logs = Annotated[
 Vehicle = Annotated[
     Path | None,
     typer.Option("--vehicle", help="Vehicle file (TOML). Without it a default car is taken.", metavar="FILE"),
+]
+CarNeeded = Annotated[
+    Path | None,
+    typer.Option("--vehicle", help="Vehicle file (TOML): must be given.", metavar="FILE"),
 ]
 CarOfLogs = Annotated[
     Path | None,

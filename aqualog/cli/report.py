@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aqualog.cli.bin_slipslope import BinWidth, By, Robust, split
-from aqualog.cli.options import Debug, Force, Jobs, Progress, Quiet, StoreOption, Verbose
+from aqualog.cli.options import Dbc, Debug, Force, Jobs, Progress, Quiet, StoreOption, Verbose
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import Configured
@@ -32,6 +32,7 @@ def report(
     width: BinWidth = 10.0,
     robust: Robust = False,
     store: StoreOption = None,
+    dbc: Dbc = None,
     jobs: Jobs = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -50,12 +51,13 @@ def report(
       aqualog report campaign.toml
       aqualog report campaign.toml -o report --by tyre,pressure,depth,manoeuvre
       aqualog report campaign.toml --robust --bin-width 5 --store results
+      aqualog report can_campaign.toml --dbc car.dbc
     """
     from aqualog.cli.console import Console, guarded
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        code = _report(campaign, out, by, width, store, jobs, robust=robust, force=force, console=console)
+        code = _report(campaign, out, by, width, store, dbc or [], jobs, robust=robust, force=force, console=console)
     if code:
         raise typer.Exit(code)
 
@@ -66,6 +68,7 @@ def _report(
     by: str,
     width: float,
     store: str | None,
+    dbc: list[Path],
     jobs: int | None,
     *,
     robust: bool,
@@ -83,7 +86,7 @@ def _report(
             hint=f"aqualog detect {name} -o DIR for the page of one drive",
         )  # fmt: skip
     began = time.monotonic()
-    configured = opened([name])
+    configured = opened([name], dbc=dbc)
     folder = out if out is not None else configured.campaign.path.with_suffix(".report")
     check_folder(folder, force=force)
     _check_sources(configured, folder)

@@ -11,6 +11,7 @@ import typer
 
 from aqualog.cli.options import (
     Cache,
+    CarNeeded,
     Dbc,
     Debug,
     Force,
@@ -20,7 +21,6 @@ from aqualog.cli.options import (
     Quiet,
     Rate,
     Signals,
-    Vehicle,
     Verbose,
 )  # fmt: skip
 
@@ -34,7 +34,7 @@ _RESULTS = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
 
 def slip_slope(
     logs: Logs,
-    vehicle: Vehicle = None,
+    vehicle: CarNeeded = None,
     signals: Signals = None,
     dbc: Dbc = None,
     out: Annotated[

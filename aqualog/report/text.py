@@ -105,9 +105,9 @@ def _evidence(event: Event) -> str:
     return ", ".join(parts)
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns padded to their widest cell; numbers to the right. A cell is one line, of CELL characters at most."""
-    header, *rows = ([cut(str(c), CELL) for c in r] for r in (header, *rows))
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], most: int = CELL) -> str:
+    """Columns padded to their widest cell; numbers to the right. A cell is one line, of `most` characters at most."""
+    header, *rows = ([cut(str(c), most) for c in r] for r in (header, *rows))
     widths = [max(len(r[i]) for r in (header, *rows)) for i in range(len(header))]
     return "\n".join("  ".join(_pad(c, w) for c, w in zip(r, widths, strict=True)).rstrip() for r in (header, *rows))
 

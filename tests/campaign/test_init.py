@@ -16,13 +16,16 @@ from aqualog.campaign.propose_drives import drive_name, group_drives, is_run_tab
 from aqualog.campaign.propose_names import read_names
 from aqualog.campaign.store import MARK
 from aqualog.cli.campaign import campaign_app
+from aqualog.cli.main import app
 from aqualog.config.campaign import load_campaign
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
+from aqualog.io.write_mdf import CanMessage, write_can_mf4
 
 SAMPLE = ROOT / "sample_logs" / "lane_drive.mf4"
 CAR = ROOT / "sample_logs" / "vehicle.toml"
+WHEELS_OF = ("FL", "FR", "RL", "RR")
 LOADED = ("loaded_monday.parquet", "loaded_friday.parquet")
 
 
@@ -381,10 +384,32 @@ def test_real_logs(real_logs, tmp_path):
     folder = real_logs / "canedge"
     result = run(folder, "-o", out, "--force")
     assert result.exit_code == 2
-    assert "raw CAN frames need --dbc" in result.output
+    assert "raw CAN frames with 11 ids on buses 1, 2; give --dbc FILE to decode them" in result.output
     result = run(folder, "-o", out, "--force", "--dbc", folder / "canmod-gps.dbc")
     assert load_signal_map(tmp_path / "map.toml").entries["v_x"].channel == ("gnss_speed.Speed",)
     assert f"report {out} --dbc" in result.output
+    assert "0 ids (0 frames) are in canmod-gps.dbc" in result.output  # the third log is of another bus
+
+
+def test_the_step_told_next_works_for_raw_can_frames(tmp_path):
+    dbc = tmp_path / "car.dbc"
+    speeds = "".join(f' SG_ WHEEL_{w} : {16 * k}|16@1+ (0.01,0) [0|0] "km/h" ECU\n' for k, w in enumerate(WHEELS_OF))
+    dbc.write_text(f'VERSION ""\n\nBU_: ECU\n\nBO_ 100 Wheels: 8 ECU\n{speeds}')
+    (tmp_path / "logs").mkdir()
+    found = CanMessage("Wheels", T, {f"WHEEL_{w}": 3.6 * SPEED + 0.01 * k for k, w in enumerate(WHEELS_OF)})
+    write_can_mf4(tmp_path / "logs" / "drive.mf4", dbc, [found], 1_700_000_000 * 10**9, "")
+    result = run(tmp_path / "logs", "-o", tmp_path / "campaign.toml", "--dbc", dbc)
+    assert result.exit_code == 0, result.output
+    step = next(line for line in result.output.splitlines() if "aqualog report" in line)
+    words = step.split("aqualog ")[1].replace("-o report", f"-o {tmp_path / 'report'}").split()
+    done = CliRunner().invoke(app, [*words, "--jobs", "1"])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "report" / "index.html").is_file()
+    figure = ["figures", "2.1", "-o", str(tmp_path / "f"), "--campaign", words[1], "--dbc", str(dbc), "--jobs", "1"]
+    assert CliRunner().invoke(app, figure).exit_code == 0
+    lone = CliRunner().invoke(app, ["figures", "2.1", "-o", str(tmp_path / "g"), "--dbc", str(dbc)])
+    assert lone.exit_code == 2
+    assert "--dbc without --campaign" in lone.output
 
 
 def test_folders_with_odd_names_and_links(tmp_path):

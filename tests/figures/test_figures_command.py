@@ -78,3 +78,10 @@ def test_help_has_examples():
     text = run("--help").stdout
     assert "aqualog figures 3.6 -o figures" in text
     assert "figure_3_06.html" in text
+
+
+def test_sentences_are_whole_where_nobody_looks_at_a_terminal(tmp_path):
+    done = run("2.24", "-o", tmp_path / "f")
+    assert done.exit_code == 0, done.output
+    assert "criterion 4 alone gives no warning, which is" in done.output
+    assert "… #" not in done.output
