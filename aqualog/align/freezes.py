@@ -167,7 +167,9 @@ def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch
     steps_ns = np.diff(t_ns)
     is_moving = ~is_standing(t_ns, standing)
     moved_ns = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(np.where(is_moving, steps_ns, 0))])
-    same = (values[1:] == values[:-1]) & (steps_ns > 0) & (values[1:] != 0.0)
+    # over a pause, or to a stamp from elsewhere, nobody has seen it stand
+    longest_ns = max(_GAP_NS, 10.0 * float(np.median(steps_ns[steps_ns > 0]))) if (steps_ns > 0).any() else _GAP_NS
+    same = (values[1:] == values[:-1]) & (steps_ns > 0) & (steps_ns <= longest_ns) & (values[1:] != 0.0)
     begin, end = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8))).reshape(-1, 2).T
     moving_s = (moved_ns[end] - moved_ns[begin]) * 1e-9
     lengths_s = np.where((moving_s >= _CREEP_S) | (len(standing) == 0), (t_ns[end] - t_ns[begin]) * 1e-9, 0.0)

@@ -128,15 +128,16 @@ def find_channels(
     SignalError
         If there is none, or the map names one that is not there.
     """
-    notes = [n for f in log.faults for n in f.notes if f.truncated or "CAN frames" in n]
+    channels = log.channels()  # first: what is damaged is told then
+    notes = [n for f in log.faults for n in f.notes if f.truncated or f.lost_samples or "CAN frames" in n]
     try:
-        found = {s: hit for s, hit in resolve(log.channels(), signal_map).items() if wanted(s)}
+        found = {s: hit for s, hit in resolve(channels, signal_map).items() if wanted(s)}
     except SignalError as error:
         if not notes:
             raise
         raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
     if not found:
-        count = len(log.channels())
+        count = len(channels)
         # where there is none, whatever was left out is the reason
         raise _nothing_mapped(log.paths, count, notes if notes or count else [n for f in log.faults for n in f.notes])
     return found

@@ -103,14 +103,14 @@ def _inspect(
     console, paths = setup.console, setup.paths
     with console.steps() as steps, setup.reading(), DriveLog(paths, read_options(setup.signal_map, dbc)) as log:
         steps("reading")
-        channels = list(log.read(log.channels()).values())
+        channels, lost = log.read_sound()
         formats, faults = log.formats, log.faults
         steps("looking at the channels")
         origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
         found = [overview(c, origin_ns=origin) for c in channels]
         rotated = rotated_channels(found)
         proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
-    told = [(p.name, n) for p, f in zip(paths, faults, strict=True) for n in f.notes]
+    told = [*lost, *((p.name, n) for p, f in zip(paths, faults, strict=True) for n in f.notes)]
     notes = [*(n if n.startswith(f"{name}: ") else f"{name}: {n}" for name, n in told), *find_mounting(found)]
     changes = setup.changes()
     notes += changes
@@ -122,7 +122,7 @@ def _inspect(
         _print(paths, formats, channels, found, proposals, notes)
     if write_map is not None:
         console.note(f"proposed map with {len(proposals)} signals is in {write_map}: check it before you use it")
-    damaged = changes or any(f.truncated or f.lost_samples for f in faults)
+    damaged = changes or lost or any(f.truncated or f.lost_samples for f in faults)
     return 3 if damaged else (0 if found else 4)
 
 

@@ -20,6 +20,7 @@ from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.content import changed_files, state_of
 from aqualog.io.open_log import open_log
+from aqualog.io.sound import read_sound
 from aqualog.types import FileFaults
 from aqualog.vehicle import Vehicle
 
@@ -106,7 +107,7 @@ def _file(
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
-            channels = reader.read(reader.channels())
+            channels, lost = read_sound(reader, list(reader.channels()))
             kind, faults = reader.format, reader.faults
     except AqualogError as error:
         # the line names the file itself
@@ -119,8 +120,12 @@ def _file(
     speed = speed_of(channels, signal_map=signal_map, vehicle=vehicle) if channels else None
     samples = sum(c.values.size for c in channels)
     state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
-    findings = [*_of_file(path.name, kind, faults), *channel_findings(found, channels, _standing(speed))]
-    findings += [Finding("doubt", "mounting", path.name, "", text) for text in find_mounting(found)]
+    advice = "copy the file again: the copy may be damaged"
+    findings = [Finding("lost", "lost_group", path.name, "", what, advice) for what in lost]
+    findings += [*_of_file(path.name, kind, faults), *channel_findings(found, channels, _standing(speed))]
+    findings += [
+        Finding("doubt", "mounting", path.name, "", text.removeprefix(f"{path.name}:")) for text in find_mounting(found)
+    ]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
     return state, findings, speed

@@ -70,7 +70,7 @@ class McapSource:
         self._chunks: tuple[int, ...] = ()  # by the summary
         self._indexed = False
         self._unproven = False  # something without a checksum of its own has been read
-        self.unassigned = 0
+        self.unassigned = 0  # messages that belong to no stream
         self.unfinalised = False
         self._allowance = Allowance()
         _check_magic(path)
@@ -92,6 +92,7 @@ class McapSource:
             return None
         try:
             if not samples:
+                self.unassigned += count
                 raise UndecodableError("none of its messages can be read")
             schema = self._schemas.get(channel.schema_id)
             if schema is None and channel.schema_id:

@@ -13,6 +13,7 @@ from aqualog.io.base import Part, Reader, ReadOptions, part_of
 from aqualog.io.csv_format import format_of
 from aqualog.io.in_hand import reading
 from aqualog.io.sniff import sniff
+from aqualog.io.sound import read_sound
 from aqualog.types import Channel, ChannelInfo, FileFaults
 
 __all__ = ["DriveLog", "open_log"]
@@ -163,6 +164,22 @@ class DriveLog:
             if own:
                 result |= {(c.info.file, c.info.path): c for c in reader.read(own)}
         return result
+
+    def read_sound(self) -> tuple[list[Channel], list[tuple[str, str]]]:
+        """All channels that can be decoded, and (file, what) of each group of records that cannot.
+
+        Raises
+        ------
+        LogError
+            If nothing of a file can be decoded.
+        """
+        channels: list[Channel] = []
+        lost: list[tuple[str, str]] = []
+        for path, reader in zip(self.paths, self._readers, strict=True):
+            own, told = read_sound(reader, list(reader.channels()))
+            channels += own
+            lost += [(path.name, what) for what in told]
+        return channels, lost
 
     def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
         """The same piece by piece, for logs that are longer than memory; a reader that cannot gives one piece."""

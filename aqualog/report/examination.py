@@ -8,10 +8,11 @@ from typing import Any
 from aqualog import __version__
 from aqualog.doctor.records import Examination, Finding
 from aqualog.report.names import cut
-from aqualog.report.text import CELL, NOTE
+from aqualog.report.text import CELL, NOTE, lacking
 
 __all__ = ["examination_document", "examination_text"]
 
+_MAP = "`aqualog inspect LOG --write-map map.toml` proposes which channel is which signal; then --signals map.toml"
 _HEADS = {
     "unreadable": "cannot be read",
     "lost": "lost or not used",
@@ -37,9 +38,13 @@ def examination_text(found: Examination) -> str:
         lines += ["", "nothing is wrong with it"]
     if found.ready:
         lines += ["", f"detectors that can work: {', '.join(found.ready)}"]
-    lacks = [f"  {name}: missing {', '.join(signals)}" for name, signals in found.missing if signals]
-    if lacks:
-        lines += ["", "not, or in part only:", *lacks]
+    lacks = [(name, signals) for name, signals in found.missing if signals]
+    if lacks and not found.ready:
+        lines += ["", "no detector can work", f"    try: {_MAP}"]
+    none = [f"  {name}: missing {lacking(signals)}" for name, signals in lacks if name not in found.ready]
+    part = [f"  {name}: without {lacking(signals)}" for name, signals in lacks if name in found.ready]
+    for head, block in (("not judged:", none), ("judged in part:", part)):
+        lines += ["", head, *block] if block else []
     return "\n".join(lines) + "\n"
 
 

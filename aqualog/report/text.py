@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from aqualog.report.names import cut
 from aqualog.types import DriveResult, Event, SlopeSummary
 
-__all__ = ["CELL", "NOTE", "event_table", "table"]
+__all__ = ["CELL", "NOTE", "event_table", "lacking", "table"]
 
 CELL = 200  # characters of a table's cell
 NOTE = 1000  # characters of a sentence that names what a log holds
@@ -27,7 +27,7 @@ def event_table(result: DriveResult) -> str:
     judged = [u for u in result.unavailable if u.missing]
     if judged:
         lines.append("\nnot judged:")
-        lines += [f"  {u.detector}: {_lack(u.missing)}" for u in judged]
+        lines += [f"  {u.detector}: missing {lacking(u.missing)}" for u in judged]
     if result.limited:
         lines.append("\njudged in part:")
         lines += [f"  {u.detector}: without {', '.join(u.missing)}" for u in result.limited]
@@ -54,12 +54,12 @@ def _slope(summary: SlopeSummary) -> str:
     return f"{name}: {summary.slope:.1f} +- {summary.slope_sd:.1f}{dry}; {', '.join(shares)} of the time"
 
 
-def _lack(missing: Sequence[str]) -> str:
-    signals = list(missing)
-    text = ", ".join(signals)
+def lacking(missing: Sequence[str]) -> str:
+    """Signals that a detector lacks, with what may stand in their place."""
+    text = ", ".join(missing)
     for axle in "fr":  # an axle's torque will do
         text = text.replace(f"torque_{axle}l, torque_{axle}r", f"torque_{axle}l, torque_{axle}r (or torque_{axle})")
-    return f"missing {text}"
+    return text
 
 
 def _row(event: Event) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
 from aqualog.doctor.records import Examination, FileState, Finding
+from aqualog.io.write_mdf import MdfGroup, write_mf4
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
@@ -228,6 +229,66 @@ def test_a_torque_of_a_car_that_stands(is_standing, tmp_path):
     if not is_standing:
         told = found["doubt", "frozen"].what
         assert told == "stands at 7.5 for 20 s (from 20 s); elsewhere it changes in 100 % of the samples"
+
+
+def test_nobody_saw_a_signal_stand_over_a_pause_or_at_a_stamp_from_elsewhere():
+    values = np.random.default_rng(2).normal(7.0, 1.0, 600)
+    values[300] = values[299]
+    t_ns = np.arange(600, dtype=np.int64) * 10**8
+    t_ns[300:] += 60 * 10**9
+    assert longest_stop(t_ns, values) is None
+    slow = np.arange(600, dtype=np.int64) * 2 * 10**9  # a slow channel has no pause between its samples
+    values[300:310] = 7.5
+    stop = longest_stop(slow, values)
+    assert stop is not None
+    assert stop.length_s == pytest.approx(18.0)
+
+
+def test_a_damaged_group_of_an_mdf_costs_that_group_only(tmp_path, capsys):
+    t = np.arange(2000) * 0.01
+    rng = np.random.default_rng(3)
+    omega = {f"omega_{w}": ("rad/s", "", 60.0 + rng.normal(0.0, 0.1, t.size)) for w in ("fl", "fr", "rl", "rr")}
+    other = {f"other_{k}": ("-", "", rng.normal(0.0, 1.0, t.size)) for k in range(4)}
+    path = tmp_path / "drive.mf4"
+    write_mf4(path, [MdfGroup("wheels", t, omega), MdfGroup("more", t, other)], None, "")
+    data = bytearray(path.read_bytes())
+    where = [m.start() for m in re.finditer(b"##DZ", data)][-1]
+    data[where + 200 : where + 300] = bytes(100)
+    path.write_bytes(data)
+    found = examine([path], vehicle=CAR, signal_map=SignalMap())
+    (lost,) = (f for f in found.findings if f.kind == "lost_group")
+    assert lost.level == "lost"
+    assert lost.what.startswith("more.other_0, more.other_1, more.other_2 and 1 more: cannot be decoded")
+    assert found.files[0].channels == 4
+    assert "spin_down" in found.ready
+    for command in ("doctor", "inspect"):
+        with pytest.raises(SystemExit) as leave:
+            app([command, str(path)])
+        assert leave.value.code == 3
+        out = capsys.readouterr().out
+        assert "more.other_2 and 1 more: cannot be decoded" in out
+        assert "omega_rr" in out or command == "doctor"
+
+
+def test_what_no_detector_can_work_with_says_what_to_try(tmp_path, capsys):
+    path = tmp_path / "x.csv"
+    path.write_text(table(drive()[:, [0, 3]], header="t [s],v_x [m/s]"))
+    with pytest.raises(SystemExit):
+        app(["doctor", str(path)])
+    out = capsys.readouterr().out
+    assert "no detector can work\n    try: `aqualog inspect LOG --write-map map.toml`" in out
+    assert "resistance: missing torque_rl, torque_rr (or torque_r), " in out
+
+
+def test_a_mounting_names_its_file_once(tmp_path, capsys):
+    path = tmp_path / "imu.csv"
+    n = np.arange(300)
+    rows = np.column_stack([n * 0.01, 9.8 + 0.01 * np.sin(n), np.sin(n), np.cos(n)])
+    path.write_text(table(rows, header="t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]"))
+    with pytest.raises(SystemExit):
+        app(["doctor", str(path)])
+    (line,) = (x for x in capsys.readouterr().out.splitlines() if "gravity is on x" in x)
+    assert line.count("imu.csv") == 1
 
 
 @pytest.mark.parametrize(("keep", "code"), [(1.0, 0), (0.5, 3), (0.0, 1)], ids=["sound", "cut in half", "empty"])

@@ -20,7 +20,9 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from aqualog.errors import LogError
+from aqualog.align.load import load_signals
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.errors import LogError, SignalError
 from aqualog.io import mcap_records
 from aqualog.io.base import ReadOptions
 from aqualog.io.mcap import McapReader, McapSource
@@ -28,6 +30,7 @@ from aqualog.io.mcap_scan import scanned
 from aqualog.io.unpack import FREE, Allowance, DamagedError
 from aqualog.io.write_mcap import McapTopic, write_mcap
 from aqualog.types import Channel
+from aqualog.vehicle import Vehicle
 
 LONGEST = 1 << 24
 T0 = 1_700_000_000 * 10**9
@@ -359,6 +362,19 @@ def test_flipped_chunk_costs_that_chunk_only(tmp_path, with_summary):
     assert np.all(np.diff(v) > 0)
     assert reader.faults.lost_samples == 2000 - v.size
     assert any("damaged chunk" in note for note in reader.faults.notes)
+
+
+def test_a_topic_of_which_nothing_can_be_read_is_a_loss_and_the_reason(tmp_path):
+    path = write_json(tmp_path / "a.mcap", numbered(50), chunk_size=100_000)
+    ((start, length),) = chunk_offsets(path)
+    raw = bytearray(path.read_bytes())
+    raw[start + length - 40] ^= 0x55
+    path.write_bytes(raw)
+    channels, reader = read_all(path)
+    assert not channels
+    assert reader.faults.lost_samples == 50
+    with pytest.raises(SignalError, match="none of its messages can be read"):
+        load_signals([path], vehicle=Vehicle(), signal_map=SignalMap({"v_x": Entry("v_x", ("/car.v",))}))
 
 
 def test_random_flips_never_crash_nor_alter_values(tmp_path):
