@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,10 @@ from aqualog.cli.options import (
     Vehicle,
     Verbose,
 )  # fmt: skip
+
+if TYPE_CHECKING:
+    from aqualog.types import Signals as SignalTable
+    from aqualog.vehicle import Vehicle as VehicleRecord
 
 __all__ = ["convert"]
 
@@ -106,8 +110,25 @@ def _convert(
             out,
             lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=loaded.start_ns, decimal_comma=decimal_comma),
         )
-    for text in (*loaded.quality.notes, *changes):
+    assumed = _of_default_car(loaded, setup.vehicle) if vehicle_file is None else []
+    for text in (*assumed, *loaded.quality.notes, *changes):
         console.note(text)
     console.note(f"{len(loaded.symbols)} signals, {t_ns.size} samples at {1e9 / loaded.dt_ns:g} Hz are in {out}")
     lost = loaded.quality.truncated or loaded.quality.lost_in_files or changes
     return int(ExitCode.PARTIAL) if lost else int(ExitCode.DONE)
+
+
+def _of_default_car(signals: SignalTable, vehicle: VehicleRecord) -> list[str]:
+    """What is told where nobody has named the car: radii stand in the numbers that are written, and not beside them."""
+    from aqualog.units import parse_unit
+
+    is_speed = [
+        parse_unit(o.unit, where=o.file).dimension == "speed"
+        for s, o in signals.origins.items()
+        if s.startswith("omega_") and o.unit
+    ]
+    if not any(is_speed):
+        return []
+    front, rear = vehicle.r_e("fl"), vehicle.r_e("rl")
+    radii = f"{front:g} m" if front == rear else f"{front:g} and {rear:g} m"
+    return [f"no --vehicle: wheel speeds in km/h or m/s became rad/s with a default car's radius of {radii}"]

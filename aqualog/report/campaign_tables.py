@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from aqualog.campaign.bins import Group
+from aqualog.campaign.bins import Group, Plan
 from aqualog.campaign.full_speed import FullSpeed
 from aqualog.campaign.regress import Interval
 from aqualog.campaign.resistance import MeanRow, ResistanceTable
@@ -24,7 +24,7 @@ _WAYS = {
     "minor_spin_down": "minor spin-downs",
     "spin_down": "full spin-downs",
 }
-_NOTHING = "no samples on such a road, or on or off the water is not known"
+_UNKNOWN = "on or off the water is not known"
 
 
 def slope_text(
@@ -43,7 +43,9 @@ def slope_text(
         "Slope of the regression of F_x/F_z over slip within mu (5 to 95 % of the traction driven), a chord: C_s/F_z\n"
         "at no slip is more. Model slope: its chord over the same mu. Contact: L of the brush with such a chord.\n"
         "Lost: share of 1/slope that noise of the traction would have taken, given back",
-        table(header, [_slope_cells(r, slopes.plan.keys) for r in slopes.rows]) if slopes.rows else _NOTHING,
+        table(header, [_slope_cells(r, slopes.plan.keys) for r in slopes.rows])
+        if slopes.rows
+        else _nothing(slopes.plan, slopes.left_out),
         _reasons([(_where(r.group, r.wheel, r.road, r.low_kmh, r.high_kmh), r.reason) for r in slopes.rows]),
         *_dry_block(slopes),
         "\n".join(_delay_line(d.vehicle, d.value, d.ci, d.reason) for d in slopes.delays),
@@ -75,11 +77,22 @@ def resistance_text(found: ResistanceTable) -> str:
              _told(r.value, 3), _ends(r.ci, 3), _told(r.scatter, 3)) for r in found.rows]  # fmt: skip
     blocks = [
         f"Resistance measure (2.9){less}",
-        table(header, rows) if rows else _NOTHING,
+        table(header, rows) if rows else _nothing(found.plan, found.left_out),
         _reasons([(_where(r.group, "", r.road, r.low_kmh, r.high_kmh), r.reason) for r in found.rows]),
         _left_out(found.left_out),
     ]
     return "\n\n".join(b for b in blocks if b) + "\n"
+
+
+def _nothing(plan: Plan, left_out: Mapping[str, int]) -> str:
+    """Why a table has no row, and what to try."""
+    if any(_UNKNOWN in reason for reason in left_out):
+        return (
+            f"no samples: {_UNKNOWN}\n"
+            "try: water_depth_mm = 0 for dry runs; lane_start_s and lane_end_s, labels or on_water for wet ones"
+        )
+    other = sorted({"wet", "dry"} - set(plan.roads))
+    return f"no samples on {' or '.join(plan.roads)} road" + (f"\ntry: --road {other[0]}" if other else "")
 
 
 def _dry_block(slopes: SlopeTable) -> list[str]:

@@ -106,6 +106,17 @@ def test_convert(tmp_path, suffix):
     assert wheel["high"] == pytest.approx(89.4, abs=1.0)  # 102 km/h at 0.317 m
 
 
+def test_convert_tells_of_the_radius_that_nobody_gave(tmp_path):
+    rows = "\n".join(f"{0.01 * k:.2f},{80.0 + 0.01 * k:.2f},{250.0 + 0.01 * k:.2f}" for k in range(300))
+    (tmp_path / "d.csv").write_text(f"t [s],omega_fl [km/h],omega_fr [rad/s]\n{rows}\n")
+    told = run("convert", tmp_path / "d.csv", "-o", tmp_path / "a.csv")
+    assert told.returncode == 0, told.stderr
+    assert "became rad/s with a default car's radius of 0.317 m" in told.stderr
+    named = run("convert", tmp_path / "d.csv", "-o", tmp_path / "b.csv", "--vehicle", CAR)
+    assert named.returncode == 0, named.stderr
+    assert "default car" not in named.stderr
+
+
 def test_convert_with_decimal_comma(tmp_path):
     path = tmp_path / "c.csv"
     assert run("convert", MF4, "-o", path, "--decimal-comma").returncode == 0
