@@ -11,7 +11,7 @@ from aqualog.align.table import build_signals
 from aqualog.errors import SignalError
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.types import ChannelInfo, Signals
+from aqualog.types import ChannelInfo, FileFaults, Signals
 from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["find_channels", "kept", "load_signals", "read_options", "read_signals"]
 
 _Read = TypeVar("_Read")
+_NAMED = 3  # files in a note
 
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
@@ -111,11 +112,22 @@ def read_signals(
     """The table of channels that `find_channels` has found in an open log."""
     report(f"reading {len(found)} channels")
     channels = log.read(info for _, info in found.values())
-    faults = log.faults
+    faults = [*log.faults, *idle_files(log, found)]
     log.close()
     report("aligning")
     mapped = {s: (entry, channels[info.file, info.path]) for s, (entry, info) in found.items()}
     return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)
+
+
+def idle_files(log: DriveLog, found: Mapping[str, tuple[Entry, ChannelInfo]]) -> list[FileFaults]:
+    """A note on files of a drive that none of its signals is in: none, or one for all of them."""
+    used = {info.file for _, info in found.values()}
+    idle = [path.name for path in log.paths if path.name not in used]
+    if not idle:
+        return []
+    names = ", ".join(idle[:_NAMED]) + (f" and {len(idle) - _NAMED} more" if len(idle) > _NAMED else "")
+    give = "gives" if len(idle) == 1 else "give"
+    return [FileFaults(notes=(f"{names} {give} none of the signals (`aqualog inspect` lists what is in a log)",))]
 
 
 def find_channels(

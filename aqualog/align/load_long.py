@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from aqualog.align.load import find_channels, kept, read_options, read_signals
+from aqualog.align.load import find_channels, idle_files, kept, read_options, read_signals
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
 from aqualog.io.base import Part, ReadOptions
@@ -108,4 +108,4 @@ def _in_windows(
         report(f"going through the signals, {100 * done // total} %")
 
     drive = long_drive(found, parts, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, tell=tell)
-    return LoadedLong(drive, tuple(log.faults), opened)
+    return LoadedLong(drive, (*log.faults, *idle_files(log, found)), opened)

@@ -63,6 +63,7 @@ class CsvReader:
         self._layout = find_layout(self._data, where=str(path), told=self._told)
         ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
         self._count = max(0, ends - self._layout.first_line + 1)
+        self._size = len(self._data)
         self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
         self._refuse_two_times(options)
         if self._time.note:
@@ -245,6 +246,12 @@ class CsvReader:
             is_habit = len(faults.short) > max(1, _HABIT * count)
             self._faults.lost_samples += 0 if is_habit else len(faults.short)
             self._note(_lines(faults.short, "has fewer cells than the header; the missing ones are blank"))
+        if faults.empty:
+            lines, nul = [line for line, _ in faults.empty], sum(n for _, n in faults.empty)
+            rows = round(nul * self._count / max(self._size - nul, 1))  # as would have had room there
+            self._faults.lost_samples += rows
+            what = f"holds {nul} NUL bytes, as what was never written does: about {rows} rows are missing"
+            self._note(_lines(lines, what))
         if faults.comments:
             self._note(_lines(faults.comments, "is a comment among the data and is left out"))
         if faults.cut_line:

@@ -27,7 +27,8 @@ _ALL, _COMMENT = bytes(range(256)), b"#%!/"
 class RowFaults:
     """Lines, counted from 1, that are not as the header says; `cut_line` is the last one if the file ends inside it.
 
-    `doubtful_line` is the last one if it is whole, but may have lost the end of its last number.
+    `doubtful_line` is the last one if it is whole, but may have lost the end of its last number. `empty` are lines with
+    NUL bytes in them, as a page of a file that was never written has, each with their number.
     """
 
     short: tuple[int, ...] = ()
@@ -35,11 +36,12 @@ class RowFaults:
     comments: tuple[int, ...] = ()
     cut_line: int = 0
     doubtful_line: int = 0
+    empty: tuple[tuple[int, int], ...] = ()
 
     def __add__(self, other: RowFaults) -> RowFaults:
         return RowFaults(
             self.short + other.short, self.long + other.long, self.comments + other.comments,
-            self.cut_line or other.cut_line, self.doubtful_line or other.doubtful_line,
+            self.cut_line or other.cut_line, self.doubtful_line or other.doubtful_line, self.empty + other.empty,
         )  # fmt: skip
 
 
@@ -108,7 +110,7 @@ def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Ro
     Nearly all files are regular: every line has the separators of a whole row. Only such a file is given to the library
     as it is, which drops the cells of longer rows and fills up shorter ones without a word.
     """
-    lines = _regular(body, layout)
+    lines = None if b"\0" in body else _regular(body, layout)
     if lines is not None:
         numbers = first_line + np.arange(lines, dtype=np.int64)
         doubtful = int(numbers[-1]) if is_cut and lines and _ends_short(body, layout.separator) else 0
@@ -208,8 +210,11 @@ def _irregular(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) ->
     names = len(layout.columns)
     kept: list[list[str]] = []
     lines: list[int] = []
-    short, long, comments = [], [], []
+    short, long, comments, empty = [], [], [], []
+    has_nul = b"\0" in body
     for line, text in enumerate(body.decode("utf-8").split("\n"), start=first_line):
+        if has_nul and (count := text.count("\0")):
+            empty.append((line, count))
         cells = _split(text, layout.separator)
         if not any(cells):
             continue
@@ -226,7 +231,7 @@ def _irregular(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) ->
     if cut:
         kept[-1] = kept[-1][:-1]  # it may be half a number
     joined = "\n".join(_JOIN.join(c + [""] * (names - len(c))) for c in kept).encode()
-    faults = RowFaults(tuple(short), tuple(long), tuple(comments), cut)
+    faults = RowFaults(tuple(short), tuple(long), tuple(comments), cut, empty=tuple(empty))
     return Rows(joined, _JOIN, names, np.array(lines, dtype=np.int64), faults)
 
 

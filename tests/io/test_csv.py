@@ -961,3 +961,17 @@ def test_a_last_number_that_may_be_cut_is_told(tmp_path, end, told):
         assert v.values.size == 61
         assert any("line 62 may be cut" in n for n in reader.faults.notes) is told
         assert not reader.faults.truncated
+
+
+@pytest.mark.parametrize("where", ["between", "inside", "same cell", "end"])
+def test_a_page_that_was_never_written_is_rows_that_are_missing(read, where):
+    rows = [f"{k * 0.01:.2f},{k % 7:.3f},{k % 5:.3f}\n" for k in range(400)]
+    data = "t [s],v_x [m/s],a_x [m/s^2]\n" + "".join(rows)
+    begin = {"between": data.index(rows[100]), "inside": data.index(rows[100]) + 7, "same cell": data.index(rows[100]) + 6,
+             "end": len(data)}[where]  # fmt: skip
+    end = {"between": data.index(rows[140]), "inside": data.index(rows[140]) + 12,
+           "same cell": data.index(rows[140]) + 6, "end": len(data)}[where]  # fmt: skip
+    found = read((data[:begin] + "\0" * (end - begin) + data[end:]).encode() + bytes(676 * (where == "end")))
+    assert len(found["v_x"]) == 400 if where == "end" else len(found["v_x"]) <= 361
+    assert abs(found.faults.lost_samples - 40) <= 3
+    assert "NUL bytes, as what was never written does: about 4" in " ".join(found.faults.notes)
