@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["apart", "ask", "is_command"]
 
 _TICK_S = 0.25
+_SOON_S = 0.005  # a library that says much waits until there is room for it
 _GRACE_S = 1.2  # after an interrupt, for a reader to come back to Python
 _MOST_REFUSED = 20  # each costs another beginning
 _SWITCH = "AQUALOG_LIMITS"
@@ -173,14 +174,14 @@ def _watch(worker: int, board: Board, waited: set[signal.Signals], aside: Aside 
     step, spent, too_long = -1, 0.0, 0.0
     killed = math.inf
     then = time.monotonic()
+    is_loud = False
     while True:
-        told = signal.sigtimedwait(waited, _TICK_S)
+        told = signal.sigtimedwait(waited, _SOON_S if is_loud else _TICK_S)
         now = time.monotonic()
         # a tick that lasted long was a machine asleep, or a job that was stopped
         tick, then = min(now - then, 4.0 * _TICK_S), now
         done, status, _ = os.wait4(worker, os.WNOHANG)
-        if aside is not None:
-            aside.pass_on()
+        is_loud = aside is not None and aside.pass_on()
         held = board.read()
         if done or now - killed > _DEAD_S:
             code = os.waitstatus_to_exitcode(status) if done else -signal.SIGKILL

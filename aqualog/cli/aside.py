@@ -8,9 +8,12 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
+from aqualog.cli.streams import Told
+
 __all__ = ["Aside", "Lines"]
 
 _PANIC = re.compile(rb"thread '.*'(?: \(\d+\))? panicked at ")
+_AT_ONCE = 1 << 20  # [bytes]; who writes without end must not keep the one that watches
 _MORE = re.compile(rb"[ \t]+\S|note: run with `RUST_BACKTRACE|stack backtrace:")
 
 
@@ -35,7 +38,7 @@ class Aside:
         if self._read < 0:
             return
         os.close(self._read)
-        sys.stderr = os.fdopen(os.dup(2), "w", buffering=1, encoding=sys.stderr.encoding, errors="replace")
+        sys.stderr = Told.on(os.dup(2), sys.stderr.encoding)
         os.dup2(self._write, 2)
         os.close(self._write)
 
@@ -44,19 +47,23 @@ class Aside:
         if self._read >= 0:
             os.close(self._write)
 
-    def pass_on(self) -> None:
-        """Pass on what has come so far, in whole lines."""
-        came = b""
+    def pass_on(self) -> bool:
+        """Pass on what has come so far, in whole lines, but for endless ones. Whether there was any."""
+        came = bytearray()
         with suppress(OSError):  # there is nothing, for now
-            while self._read >= 0 and (data := os.read(self._read, 65536)):
+            while self._read >= 0 and len(came) < _AT_ONCE and (data := os.read(self._read, 65536)):
                 came += data
         if came:
             *lines, self._rest = (self._rest + came).split(b"\n")
             _tell(b"".join(line + b"\n" for line in self._lines.kept(lines)))
+        if len(self._rest) > _AT_ONCE:
+            _tell(b"".join(self._lines.kept([self._rest])))
+            self._rest = b""
+        return bool(came)
 
     def end(self) -> None:
         """The same for the last time: the worker has ended."""
-        self.pass_on()
+        self.pass_on()  # a pipe holds less than is read at once
         _tell(b"\n".join(self._lines.kept([self._rest] if self._rest else [])))
         with suppress(OSError):
             os.close(self._read)

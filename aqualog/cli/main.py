@@ -15,6 +15,7 @@ from aqualog import __version__
 from aqualog.cli.apart import ask
 from aqualog.cli.commands import Commands
 from aqualog.cli.start import interrupted
+from aqualog.cli.streams import ready
 
 __all__ = ["app", "run"]
 
@@ -48,6 +49,7 @@ def run() -> None:
 
     A request to end is an interrupt as Ctrl-C is: it leaves by the usual way, so that no half-written file stays.
     """
+    ready()
     # a process of one command: modules are no garbage to look for again and again, least of all at its end
     gc.set_threshold(10_000)
     atexit.register(gc.freeze)

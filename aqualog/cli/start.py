@@ -6,11 +6,14 @@ import os
 import sys
 from typing import NoReturn
 
+from aqualog.cli.streams import ready
+
 __all__ = ["interrupted", "run"]
 
 
 def run() -> None:
     """Entry point of the installed command."""
+    ready()
     try:
         from aqualog.cli.main import run as begin
     except KeyboardInterrupt:

@@ -130,6 +130,16 @@ def test_a_library_is_heard_but_not_its_panics(folder):
     assert any("panicked" in line for line in told)
 
 
+@pytest.mark.parametrize("text", [b"x" * 99 + b"\n", b"y" * 100], ids=["lines", "endless"])
+def test_a_library_that_says_much_does_not_wait_for_the_one_that_watches(folder, text):
+    """Nearly what a pipe holds, again and again: looked at four times a second that takes 20 s."""
+    (folder / "much.csv").write_text("t [s],v_x [m/s]\n0,1\n1,2\n")
+    much = f"ACTS['much'] = lambda p: [(os.write(2, {text!r} * 600), time.sleep(0.01)) for _ in range(80)]\n"
+    code, _, told = ended(started(folder, "much.csv", code=much + LOOK), within=10.0)
+    assert code == 0
+    assert sum(len(line) for line in told) == len(text.rstrip()) * 600 * 80
+
+
 def test_lines_of_panics_are_known_as_they_come():
     lines = Lines()
     text = [

@@ -153,3 +153,43 @@ def test_a_campaign_that_goes_on_removes_what_a_killed_one_left(tmp_path, monkey
     monkeypatch.setattr(campaign, "_work", work)
     campaign.simulate_campaign(name, tmp_path / "campaign", jobs=1, force=False, report=lambda *_: None)
     assert [p.name[:7] for p in logs.iterdir()] == [".other-"]
+
+
+TELLING = """
+import os, sys
+from aqualog.cli import main
+import typer
+from aqualog.cli.console import Console, guarded
+app = typer.Typer()
+@app.command()
+def work(directory: str, count: int):
+    with guarded(debug=False):
+        for _ in range(count):
+            Console().note("of a log")
+        file = os.open(directory + "/result", os.O_WRONLY | os.O_CREAT)
+        os.write(2, b"a library's warning\\n")
+        os.write(file, b"done")
+        sys.stdout.write("told")
+    raise typer.Exit(3)
+main.app = app
+main.run()
+"""
+
+
+@pytest.mark.parametrize("streams", ["2>&-", ">&-", ">&- 2>&-", "<&- >&- 2>&-", "2>/dev/full", "2> >(exec 0<&-)"])
+def test_streams_that_are_closed_or_full_cost_no_work(tmp_path, streams):
+    command = [sys.executable, "-c", TELLING, str(tmp_path), "3000"]
+    done = subprocess.run(["bash", "-c", f'"$@" {streams}', "bash", *command], capture_output=True, timeout=60)
+    assert done.returncode == 3
+    assert (tmp_path / "result").read_bytes() == b"done"
+    assert done.stdout == (b"" if " >&-" in f" {streams}" else b"told")
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("streams", [">&-", ">&- 2>&-", "2>/dev/full"])
+def test_what_is_told_before_a_command_begins_may_have_nowhere_to_go(streams):
+    command = [sys.executable, "-c", "from aqualog.cli.start import run; run()"]
+    for argument, code in (("--version", 0), ("--nothing", 2)):
+        done = subprocess.run(["bash", "-c", f'"$@" {streams}', "bash", *command, argument], capture_output=True)
+        assert done.returncode == code
+        assert b"Traceback" not in done.stderr
