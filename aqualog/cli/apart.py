@@ -174,14 +174,15 @@ def _watch(worker: int, board: Board, waited: set[signal.Signals], aside: Aside 
     step, spent, too_long = -1, 0.0, 0.0
     killed = math.inf
     then = time.monotonic()
-    is_loud = False
+    heard = -math.inf
     while True:
-        told = signal.sigtimedwait(waited, _SOON_S if is_loud else _TICK_S)
+        told = signal.sigtimedwait(waited, _SOON_S if then - heard < _TICK_S else _TICK_S)
         now = time.monotonic()
         # a tick that lasted long was a machine asleep, or a job that was stopped
         tick, then = min(now - then, 4.0 * _TICK_S), now
         done, status, _ = os.wait4(worker, os.WNOHANG)
-        is_loud = aside is not None and aside.pass_on()
+        if aside is not None and aside.pass_on():
+            heard = now
         held = board.read()
         if done or now - killed > _DEAD_S:
             code = os.waitstatus_to_exitcode(status) if done else -signal.SIGKILL
