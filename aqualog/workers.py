@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from threading import Thread, current_thread, main_thread
 from typing import Any, NamedTuple, TypeVar
@@ -99,6 +100,9 @@ class _Seat:
 
     def start(self) -> None:
         """Start the process."""
+        if hasattr(signal, "pthread_sigmask"):
+            # it is started by the first process else, and lets interrupts in that were to wait
+            resource_tracker.ensure_running()
         with _no_interrupt():
             self._process.start()
             self._theirs.close()  # the process has its own; when that is closed, it has ended
