@@ -226,7 +226,9 @@ class CsvReader:
         return self._rows
 
     def _count_lost(self, bad: BoolArray, rows: Rows, column: int, text: tuple[str, str]) -> None:
-        """Cells of a column that are lost, by what is told before and behind their number."""
+        """Cells that are lost, by what is told before and behind their number; a time of a blank row is none."""
+        if column < 0:
+            bad = bad & ~rows.blank(bad)
         if bad.any():
             count, first = self._lost.get((column, text), (0, int(rows.lines[bad][0])))
             self._lost[column, text] = count + int(bad.sum()), first

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aqualog.errors import LogError
 from aqualog.io.csv_dialect import Layout, is_comment, split_line
 from aqualog.io.text_file import TextFile
+from aqualog.types import BoolArray
 
 __all__ = ["RowFaults", "Rows", "behind", "bodies", "find_rows", "rows_of"]
 
@@ -76,6 +77,16 @@ class Rows:
             what = f"{frame.height} rows in {len(self.lines)} lines"
             raise LogError(what, where=where, expected="one row per line", hint="check its quotes")
         return {k: frame[f"c{k}"] for k in columns}
+
+    def blank(self, which: BoolArray) -> BoolArray:
+        """Those of some rows (n,) that hold nothing but separators, as spreadsheets leave them behind a table."""
+        found = np.zeros(len(self.lines), dtype=np.bool_)
+        if which.any():
+            lines = self.text.split(b"\n")
+            separator = self.separator.encode()
+            for k in np.flatnonzero(which):
+                found[k] = not lines[k].replace(separator, b"").strip()
+        return found
 
     def _split(self, columns: Sequence[int], numbers: Collection[int]) -> pl.DataFrame:
         return pl.read_csv(

@@ -975,3 +975,16 @@ def test_a_page_that_was_never_written_is_rows_that_are_missing(read, where):
     assert len(found["v_x"]) == 400 if where == "end" else len(found["v_x"]) <= 361
     assert abs(found.faults.lost_samples - 40) <= 3
     assert "NUL bytes, as what was never written does: about 4" in " ".join(found.faults.notes)
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_rows_of_separators_alone_are_no_loss(read, long):
+    """Spreadsheets leave them behind a table; another row being wrong makes no difference."""
+    rows = [f"{k / 100:.2f},{k}" for k in range(60)]
+    rows[30] = ",30"
+    rows += [","] * 20
+    if long:
+        rows[10] = "0.1,1,2"
+    log = read("t [s],v\n" + "\n".join(rows) + "\n")
+    assert len(log["v"]) == 59 - long
+    assert log.faults.lost_samples == 1 + long
