@@ -41,7 +41,7 @@ def test_listing_imports_no_command():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(done.stdout.split("LOADED")[1].split()) == {
-        f"aqualog.cli.{m}" for m in ("main", "commands", "apart", "start")
+        f"aqualog.cli.{m}" for m in ("main", "commands", "apart", "start", "streams")
     }
 
 
