@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -108,9 +108,8 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
         back = next(
             (
                 j
-                for j in jumps[position + 1 :]
-                if t_ns[j] - t_ns[i] <= RETURN_NS
-                and abs(v[j + 1] - v[i]) <= RIM_LIMIT * 0.25 * float(t_ns[j + 1] - t_ns[i]) * 1e-9 + _SLACK
+                for j in _soon_after(jumps, position, t_ns, RETURN_NS)
+                if abs(v[j + 1] - v[i]) <= RIM_LIMIT * 0.25 * float(t_ns[j + 1] - t_ns[i]) * 1e-9 + _SLACK
             ),
             None,
         )
@@ -145,19 +144,25 @@ def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> Boo
     spike = np.zeros(x.size, dtype=np.bool_)
     if x.size < 3:
         return spike
-    jumps = np.flatnonzero(np.abs(np.diff(x)) > leap.rate * np.diff(t_ns) * 1e-9 + leap.step)
+    jumps = np.flatnonzero(np.abs(np.diff(x)) > leap.rate * np.diff(t_ns) * 1e-9 + leap.step).tolist()
     done = -1
-    for position, i in enumerate(jumps.tolist()):
+    for position, i in enumerate(jumps):
         if i < done:
             continue
-        for j in jumps[position + 1 :].tolist():
-            if t_ns[j] - t_ns[i] > _SPIKE_NS:
-                break
+        for j in _soon_after(jumps, position, t_ns, _SPIKE_NS):
             if abs(x[j + 1] - x[i]) <= leap.back:
                 spike[i + 1 : j + 1] = True
                 done = j + 1
                 break
     return spike
+
+
+def _soon_after(jumps: Sequence[int], position: int, t_ns: TimeArray, span_ns: int) -> Iterator[int]:
+    """The jumps behind one of them, up to so much later: of a sensor that shakes all the time there are very many."""
+    for k in range(position + 1, len(jumps)):
+        if t_ns[jumps[k]] - t_ns[jumps[position]] > span_ns:
+            return
+        yield jumps[k]
 
 
 def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:

@@ -1,3 +1,6 @@
+import time
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -159,3 +162,17 @@ def test_spikes_of_yaw_rate_and_steering(name, amplitude, hertz, height):
     for a, b in ((1200, 1201), (1500, 1512)):
         x[a:b] += height
     assert np.flatnonzero(rule.find(T, x)).tolist() == [1200, *range(1500, 1512)]
+
+
+@pytest.mark.parametrize("find", [spikes, partial(sensor_glitches, r_e=0.3)])
+def test_a_sensor_that_shakes_for_long_takes_no_longer_per_sample(find):
+    """Each leap was held against all that follow: an hour took minutes."""
+    t_ns = np.arange(80_000) * 10**7
+    x = np.abs(np.random.default_rng(1).normal(0.0, 40.0, t_ns.size).cumsum()) + 5.0
+
+    def cost(n):
+        begin = time.process_time()
+        find(t_ns[:n], x[:n])
+        return time.process_time() - begin
+
+    assert min(cost(80_000) for _ in range(2)) < 10.0 * max(min(cost(20_000) for _ in range(2)), 0.02)
