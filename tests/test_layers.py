@@ -13,7 +13,7 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
     "errors", "places", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "workers", "align", "features", "calibrate",
-    "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "figures", "reproduce", "config", "cli",
+    "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "figures", "reproduce", "config", "book", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
@@ -33,7 +33,9 @@ def imports(path: Path):
 
 def modules():
     return [
-        p for p in sorted(PACKAGE.rglob("*.py")) if p.name not in ("__init__.py", "__main__.py") or p.parent != PACKAGE
+        p
+        for p in sorted(PACKAGE.rglob("*.py"))
+        if p.name != "__main__.py" and (p.name != "__init__.py" or p.parent != PACKAGE)
     ]
 
 
@@ -75,6 +77,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "cache",
                 "plan",
                 "doctor",
+                "help",
             )
         ),
     ],

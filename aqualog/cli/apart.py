@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from aqualog.io.in_hand import InHand
     from aqualog.io.limits import ReadLimits
 
-__all__ = ["apart", "ask", "is_command"]
+__all__ = ["apart", "ask", "here", "is_command"]
 
 _TICK_S = 0.25
 _SOON_S = 0.005  # a library that says much waits until there is room for it
@@ -44,6 +44,12 @@ def ask() -> None:
     """Let the command that this process was started for work apart."""
     global _asked, _is_command
     _asked = _is_command = True
+
+
+def here() -> None:
+    """Let the command work in this process: it reads no log."""
+    global _asked
+    _asked = False
 
 
 def is_command() -> bool:

@@ -66,6 +66,9 @@ COMMANDS = {
     "reproduce": Command("Reproduce the thesis: simulate its campaign, run everything, and judge each of its claims."),
     "cache": Command("Show or empty the folder in which aligned signals are kept.", runs_bare=True),
     "campaign": Command("Campaign files: many drives in known configurations.", function="campaign_app"),
+    "help": Command(
+        "Show the documents: topics, one page, or the pages that hold a word.", function="help_pages", runs_bare=True
+    ),
 }
 
 
