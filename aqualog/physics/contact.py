@@ -1,7 +1,8 @@
 """The remaining dry contact of a tyre on water, and what it leaves of friction, stiffness and symmetry.
 
 L = (a + b) / 2a is the share of the contact length that still touches the road, with the half length a and the front
-edge b of the dry contact (thesis Fig. 2.1; audit E1: a is HALF the length). L = 1 on dry road, 0 at full aquaplaning.
+edge b of the dry contact (Fig. 2.1 of [fichtinger2024]; E1: a is HALF the length). L = 1 on dry road, 0 at full
+aquaplaning.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def remaining_share(b: FloatArray, a: FloatArray) -> FloatArray:
     L : array
         0 at b = -a (full aquaplaning), 1 at b = a (dry). [-]
 
-    Thesis: Fig. 2.1 (E1).
+    Thesis [fichtinger2024]: Fig. 2.1 (E1).
     """
     return 0.5 * (a + b) / a
 
@@ -54,7 +55,7 @@ def friction_ratio(L: FloatArray) -> FloatArray:
     ratio : like L
         0 at full aquaplaning, 1 on dry road. [-]
 
-    Thesis: Eq. (2.1), the integral of a parabolic pressure over the remaining contact.
+    Thesis [fichtinger2024]: Eq. (2.1), the integral of a parabolic pressure over the remaining contact.
     """
     L = np.minimum(np.maximum(L, 0.0), 1.0)
     return L * L * (3.0 - 2.0 * L)
@@ -65,7 +66,7 @@ def slip_stiffness_ratio(L: FloatArray) -> FloatArray:
 
     `L` as in `friction_ratio`; falls before the friction does for every 0 < L < 1.
 
-    Thesis: Eq. (2.2); L = 1 is Eq. (3.12) (E1).
+    Thesis [fichtinger2024]: Eq. (2.2); L = 1 is Eq. (3.12) (E1).
     """
     L = np.minimum(np.maximum(L, 0.0), 1.0)
     return L * L
@@ -91,12 +92,18 @@ def lost_contact(v: FloatArray, v_full: FloatArray, *, exponent: float) -> Float
 
     An assumption in shape: published curves of contact length over speed fall slowly first and steeply near full
     aquaplaning; no coefficients were found.
+
+    Source: an assumption. Such curves were measured with tyre sensors (thesis [37]; [niskanen2014]), but no numbers
+    were at hand.
     """
     return np.minimum((np.abs(v) / v_full) ** exponent, 1.0)
 
 
 def contact_share(v: FloatArray, v_full: FloatArray, *, exponent: float) -> FloatArray:
-    """Remaining share of the contact length at a speed, L = 1 - (v / v_full)^n; see `lost_contact`."""
+    """Remaining share of the contact length at a speed, L = 1 - (v / v_full)^n; see `lost_contact`.
+
+    Source: an assumption, as for `lost_contact`.
+    """
     return 1.0 - lost_contact(v, v_full, exponent=exponent)
 
 
@@ -120,7 +127,7 @@ def contact_half_length(F_z: FloatArray, *, p: float, a_ref: float, F_z_ref: flo
         [m]
 
     The patch carries the load by about the inflation pressure (area ~ F_z / p) and grows mainly in length; the square
-    root is what measured patches show (MF6.1: QRA1, QRA2). Limits: no load, no patch.
+    root is what measured patches show (MF6.1 [besselink2010]: QRA1, QRA2). Limits: no load, no patch.
     """
     return a_ref * np.sqrt(np.maximum(F_z, 0.0) / F_z_ref * p_ref / p)
 
@@ -149,6 +156,8 @@ def load_shift(L: FloatArray, a: FloatArray, *, peak: float) -> FloatArray:
     Limits: L = 1 gives 0; L = 0 gives a (2 peak - 1); even pressure at full aquaplaning shifts nothing. For
     little lost contact l it is (6 peak - 2) l^3 a: early partial aquaplaning is hardly felt. Below peak = 1/3 it would
     be negative.
+
+    Source: derived from the parabola of Eq. (2.1) [fichtinger2024].
     """
     L = np.minimum(np.maximum(L, 0.0), 1.0)
     b = 2.0 * L - 1.0

@@ -1,4 +1,4 @@
-"""Differential slip and traction: the slip slope without the vehicle's speed (thesis 3.2).
+"""Differential slip and traction: the slip slope without the vehicle's speed (section 3.2 of [fichtinger2024]).
 
 `i` is the axle (or wheel) that an equation is formulated at, `j` the opposite one; both on one side of the car, or the
 means of both axles.
@@ -39,7 +39,7 @@ def differential_slip(v_i: FloatArray, v_j: FloatArray) -> FloatArray:
     Equal to s_i - rho s_j with the slips of (3.13), whatever the vehicle's speed; with j rolling freely it is the slip
     of i.
 
-    Thesis: Eq. (3.15), (3.16).
+    Thesis [fichtinger2024]: Eq. (3.15), (3.16).
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(v_i > V_MIN, (v_i - v_j) / v_i, np.nan)
@@ -48,7 +48,7 @@ def differential_slip(v_i: FloatArray, v_j: FloatArray) -> FloatArray:
 def speed_ratio(v_i: FloatArray, v_j: FloatArray) -> FloatArray:
     """rho = r_j omega_j / (r_i omega_i), near 1; NaN where axle i runs slower than 1 m/s. As `differential_slip`.
 
-    Thesis: Eq. (3.15).
+    Thesis [fichtinger2024]: Eq. (3.15).
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(v_i > V_MIN, v_j / v_i, np.nan)
@@ -57,7 +57,7 @@ def speed_ratio(v_i: FloatArray, v_j: FloatArray) -> FloatArray:
 def slope_ratio(slope_f: FloatArray, slope_r: FloatArray) -> FloatArray:
     """lambda = C_r / C_f, ratio of the slip slopes C_s / F_z of rear and front axle. [-]
 
-    Thesis: Eq. (3.17).
+    Thesis [fichtinger2024]: Eq. (3.17).
     """
     return slope_r / slope_f
 
@@ -65,7 +65,7 @@ def slope_ratio(slope_f: FloatArray, slope_r: FloatArray) -> FloatArray:
 def beta_of_ratio(ratio: float, *, front: bool) -> float:
     """Ratio parameter beta of the filter: 1 / lambda formulated at the front axle, lambda at the rear one. [-]
 
-    Thesis: Eq. (3.21). In both cases the slope of axle i over that of axle j.
+    Thesis [fichtinger2024]: Eq. (3.21). In both cases the slope of axle i over that of axle j.
     """
     return 1.0 / ratio if front else ratio
 
@@ -87,7 +87,7 @@ def differential_traction(mu_i: FloatArray, mu_j: FloatArray, *, rho: FloatArray
     mu_delta : array (n,)
         Zero where both axles slip alike: there nothing can be told about the slope (C95). [-]
 
-    Thesis: the bracket of Eq. (3.18), (3.19).
+    Thesis [fichtinger2024]: the bracket of Eq. (3.18), (3.19).
     """
     return mu_i - beta * rho * mu_j
 
@@ -108,8 +108,8 @@ def predicted_differential_slip(
     -------
     s_delta : array (n,)
 
-    Thesis: Eq. (3.20); the offset is that of s = mu / C + delta. Printed with (3.14), mu = C (s + delta), its sign
-    would be the other one (E8).
+    Thesis [fichtinger2024]: Eq. (3.20); the offset is that of s = mu / C + delta. Printed with (3.14), mu = C (s +
+    delta), its sign would be the other one (E8).
     """
     return (mu_i - beta * rho_mu_j) * inverse_slope + offset
 
@@ -119,7 +119,7 @@ def jacobian(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Derivatives of `predicted_differential_slip` by 1 / C_i, beta and the offset.
 
-    Thesis: needed for the filter of Eq. (3.20) to (3.22), not printed.
+    Thesis [fichtinger2024]: needed for the filter of Eq. (3.20) to (3.22), not printed.
     """
     return mu_i - beta * rho_mu_j, -rho_mu_j * inverse_slope, 1.0 + 0.0 * mu_i
 
@@ -127,6 +127,6 @@ def jacobian(
 def linear_slip(mu: FloatArray, *, slope: FloatArray, offset: FloatArray) -> FloatArray:
     """Slip of a linear tyre, mu / C + delta. [-]
 
-    Thesis: Eq. (3.14), with the sign of the offset as in its reference [15] (E8).
+    Thesis [fichtinger2024]: Eq. (3.14), with the sign of the offset as in its reference [15], [gustafsson1997] (E8).
     """
     return mu / slope + offset

@@ -1,7 +1,7 @@
 """Speed of full aquaplaning: published formulas under their names, and the one that the simulator uses.
 
 The published ones are given in their authors' units inside and in SI outside. Those marked "as commonly quoted" were
-not checked against the original report.
+not checked against the original report. Sources in square brackets are keys of `docs/sources.toml`.
 """
 
 from __future__ import annotations
@@ -44,8 +44,12 @@ def horne_speed(p: FloatArray) -> FloatArray:
     v : array
         [m/s]
 
-    Valid for flooded roads, water deeper than the grooves; confirmed for passenger-car tyres by Maleska et al., Veh.
-    Syst. Dyn. 59(3), 2021. W. B. Horne, NASA TM-85652: 180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h.
+    180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water deeper than the grooves.
+
+    Source: Horne and Dreher, NASA TN D-2056, 1963 [horne1963]; repeated by T. J. Yager, NASA TM-85652, 1983 (K)
+    [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation. They apply Horne's equation for truck
+    tyres to passenger-car tyres. That one holds the aspect ratio of the footprint too, v = 7.95 sqrt(p / FAR) mph with
+    p in psi and FAR = width / length (K) [horne1986].
     """
     return 9.0 * np.sqrt(p / PSI) * KNOT
 
@@ -54,6 +58,8 @@ def horne_spin_up_speed(p: FloatArray) -> FloatArray:
     """Speed below which a wheel that stands still spins up again on a flooded road, v = 7.7 sqrt(p) kn, p in psi.
 
     As `horne_speed`; the ratio of both, `SPIN_UP_RATIO`, is the hysteresis of the recovery.
+
+    Source: [yager1983].
     """
     return 7.7 * np.sqrt(p / PSI) * KNOT
 
@@ -71,7 +77,9 @@ def pavdrn_speed(h_w: FloatArray) -> FloatArray:
     v : array
         [m/s]
 
-    For the ASTM E524 tyre at 165 kPa and 4800 N. As commonly quoted. 0.6, 1.3, 2.0 mm give 111, 91, 81 km/h.
+    For the ASTM E524 tyre [astm1988] at 165 kPa and 4800 N. 0.6, 1.3, 2.0 mm give 111, 91, 81 km/h.
+
+    Source: as commonly quoted (K) from [anderson1998].
     """
     return 26.04 * (h_w / INCH) ** -0.259 * MPH
 
@@ -99,8 +107,10 @@ def gallaway_speed(
     v : array
         [m/s]
 
-    P in psi, TD in 1/32 inch, A = max(10.409 / h^0.06 + 3.507, (28.952 / h^0.06 - 7.817) MTD^0.14), inch. As commonly
-    quoted; 220 kPa, 1.6 mm of tread and 0.78 mm of texture give 93 to 85 km/h for 0.6 to 2 mm.
+    P in psi, TD in 1/32 inch, A = max(10.409 / h^0.06 + 3.507, (28.952 / h^0.06 - 7.817) MTD^0.14), inch. 220 kPa,
+    1.6 mm of tread and 0.78 mm of texture give 93 to 85 km/h for 0.6 to 2 mm.
+
+    Source: as commonly quoted (K) from [gallaway1979].
     """
     film = (h_w / INCH) ** 0.06
     A = np.maximum(10.409 / film + 3.507, (28.952 / film - 7.817) * (texture_depth / INCH) ** 0.14)
@@ -125,7 +135,9 @@ def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
     v : array
         [m/s]
 
-    W in N, p in kPa, h in mm. As commonly quoted. Source of the exponent of load in `full_aquaplaning_speed`.
+    W in N, p in kPa, h in mm. The exponent of load in `full_aquaplaning_speed` comes from here.
+
+    Source: as commonly quoted (K) from [gunaratne2012].
     """
     return F_z**0.2 * np.sqrt(p * 1e-3) * (0.82 / (h_w * 1e3) ** 0.06 + 0.49) * KMH
 
@@ -149,7 +161,9 @@ def gengenbach_speed(h_w: FloatArray, F_z: FloatArray, *, width: float, lift_coe
     v : array
         [m/s]
 
-    A momentum balance: v ~ 1 / sqrt(h). As commonly quoted.
+    A momentum balance: v ~ 1 / sqrt(h).
+
+    Source: as commonly quoted (K) from [gengenbach1968].
     """
     return 508.0 * np.sqrt(F_z / 9.80665 / (width * 1e3 * h_w * 1e3 * lift_coefficient)) * KMH
 
@@ -170,6 +184,9 @@ def depth_factor(h_w: FloatArray | float, *, h_bulk: float) -> FloatArray | floa
         1 for thin films, which the road's texture and the tread's edges break; ~ h^(-1/2) for deep water
         (`gengenbach_speed`, a momentum balance). Between 0.6 and 2 mm with h_bulk = 2 mm it falls by 14 %,
         Gallaway's by 9 %, PAVDRN's by 27 %. [-]
+
+    Source: derived, between [gallaway1979] and [anderson1998] for thin films; the limit for deep water is that of
+    [gengenbach1968].
     """
     ratio = h_w / h_bulk
     return (1.0 + ratio * ratio) ** -0.25
@@ -219,6 +236,9 @@ def full_aquaplaning_speed(
     chi^(-1/n), where chi = (h - capacity) / h_onset within 0 ... 1 is the share of a complete wedge. Limits: v_anchor
     at the anchor; grows with p and F_z, falls with h; h <= capacity, no aquaplaning (Gengenbach: treaded tyres none
     below 2 mm).
+
+    Source: derived. The exponent of pressure is that of [horne1963], that of load that of [gunaratne2012]; the anchor
+    is a pass of [fichtinger2024], C16; treaded tyres below 2 mm: [gengenbach1968], as [gallaway1979] quotes it.
     """
     wedge = np.minimum(np.maximum((h_w - tread_capacity) / h_onset, 0.0), 1.0)
     depth = depth_factor(h_w, h_bulk=h_bulk) / depth_factor(h_anchor, h_bulk=h_bulk)

@@ -14,6 +14,8 @@ def yaw_inertia(*, mass: float, l_f: float, l_r: float) -> float:
 
     Mass [kg], axle distances from the centre of mass [m]. Passenger cars lie within about 10 % of it (K). With it a
     force at the front axle leaves the rear one alone.
+
+    Source: general knowledge (K).
     """
     return mass * l_f * l_r
 
@@ -44,9 +46,9 @@ def front_axle_lateral_force(
     right (1 kN of difference over 1.5 m of track is 0.3 kN), F_x sin(delta) of steered driven wheels, aligning
     moments (below 2 %). Limits: steady cornering gives the static share l_r / l of m a_y.
 
-    Thesis: section 2.4 takes lateral forces from a two-wheel model (no number). Departure: that model would take them
-    from steering and side-slip angles and cornering stiffness; here the balance of forces tells them, so that no
-    stiffness need be known. Lost lateral force shows in the acceleration then, not in the residual.
+    Thesis [fichtinger2024]: section 2.4 takes lateral forces from a two-wheel model (no number). Departure: that model
+    would take them from steering and side-slip angles and cornering stiffness; here the balance of forces tells them,
+    so that no stiffness need be known. Lost lateral force shows in the acceleration then, not in the residual.
     """
     wheelbase = l_f + l_r
     return (mass * l_r * a_y + inertia * yaw_acceleration) / wheelbase
@@ -69,6 +71,8 @@ def split_by_load(F_axle: FloatArray, F_z_left: FloatArray, F_z_right: FloatArra
 
     Equal side-slip angles and a cornering stiffness proportional to the load: exact for the simulator's tyre without
     load sensitivity; a real tyre stiffens less than its load grows, so the outer wheel gets some per cent too much.
+
+    Source: section 2.4 of [fichtinger2024] (C59).
     """
     total = F_z_left + F_z_right
     share = np.where(total > 0.0, F_z_left / np.where(total > 0.0, total, 1.0), 0.5)
@@ -81,5 +85,7 @@ def outward(F_left: FloatArray, F_right: FloatArray) -> tuple[FloatArray, FloatA
 
     A left wheel's is its force to the left, a right wheel's that to the right; in a left turn the left wheel's is
     positive (inwards of the curve is outwards of the car there), the right one's negative.
+
+    Source: derived; axes of ISO 8855 [iso2011].
     """
     return F_left, -F_right

@@ -14,7 +14,10 @@ G = 9.80665  # [m/s^2]
 def loads_of_wheels(
     a_x: FloatArray, a_y: FloatArray, *, mass: float, l_f: float, l_r: float, h_cg: float, track: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Quasi-static loads of fl, fr, rl, rr; see `wheel_loads`, which stacks them."""
+    """Quasi-static loads of fl, fr, rl, rr; see `wheel_loads`, which stacks them.
+
+    Source: as `wheel_loads`.
+    """
     l = l_f + l_r  # noqa: E741 - the field's symbol of the wheelbase
     axle_f = mass * (G * l_r - a_x * h_cg) / l
     axle_r = mass * (G * l_f + a_x * h_cg) / l
@@ -50,6 +53,9 @@ def wheel_loads(
 
     Limits: a = 0 splits m g by l_r : l_f and left = right; the sum is m g, also where a wheel lifts. A left turn
     (a_y > 0) loads the right wheels. The lateral transfer is split by the static axle loads. Small grades: cos = 1.
+
+    Source: derived, a quasi-static balance; for two axles it is that of Eq. (3.31) to (3.33) [fichtinger2024], without
+    the loop of E15.
     """
     loads: FloatArray = np.array(loads_of_wheels(a_x, a_y, mass=mass, l_f=l_f, l_r=l_r, h_cg=h_cg, track=track))
     return loads
@@ -64,5 +70,7 @@ def centre_shift(mass: float, l_f: float, delta_mass: float, x: float) -> float:
         Of the car before: mass [kg] and distance of its centre from the front axle [m].
     delta_mass, x : float
         What is added [kg], and where, from the front axle rearwards [m].
+
+    Source: derived.
     """
     return delta_mass * (x - l_f) / (mass + delta_mass)

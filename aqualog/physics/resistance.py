@@ -26,12 +26,17 @@ def air_drag(v: FloatArray, *, drag_area: float, air_density: float) -> FloatArr
     -------
     F : array (n,)
         Against the motion, positive; negative where a tail wind is faster than the car. [N]
+
+    Source: Eq. (2.10) [fichtinger2024].
     """
     return 0.5 * drag_area * air_density * v * np.abs(v)
 
 
 def rolling_resistance_force(F_z: FloatArray, *, r_w: float) -> FloatArray:
-    """Rolling resistance r_w F_z. [N] Load [N], coefficient [-]; against the motion, positive."""
+    """Rolling resistance r_w F_z. [N] Load [N], coefficient [-]; against the motion, positive.
+
+    Source: Eq. (2.10) [fichtinger2024].
+    """
     return r_w * F_z
 
 
@@ -39,6 +44,8 @@ def grade_force(theta: FloatArray, *, mass: float) -> FloatArray:
     """Downhill force of a grade, m g sin(theta). [N]
 
     Uphill positive, against the motion; theta in rad, a grade of 5 % is 0.05. An accelerometer does not feel it (E2).
+
+    Source: derived.
     """
     return mass * G * np.sin(theta)
 
@@ -47,6 +54,8 @@ def cornering_drag(a_y: FloatArray, *, mass: float, coefficient: float) -> Float
     """Extra resistance of cornering beyond what the two-track model has, coefficient m a_y^2. [N]
 
     `coefficient` [s^2/m]; scrub and toe make it; against the motion.
+
+    Source: general knowledge (K).
     """
     return coefficient * mass * a_y * a_y
 
@@ -87,8 +96,10 @@ def nominal_acceleration(
         Forward positive. A grade is absent on purpose: it is absent from the accelerometer's specific force too, so
         that it cancels in the difference (E2). [m/s^2]
 
-    Thesis: Eq. (2.10), with the part of the torque that spins the wheels taken off (E5): without it a wheel that
-    spins up by 100 rad/s^2 looks like 0.23 m/s^2 of resistance.
+    Thesis [fichtinger2024]: Eq. (2.10), with the part of the torque that spins the wheels taken off (E5): without it a
+    wheel that spins up by 100 rad/s^2 looks like 0.23 m/s^2 of resistance.
+
+    The lever of the torque is r_l as printed. With r_e it would agree with rolling resistance and power (E24).
     """
     traction = (torque - inertia[:, None] * omega_dot) / r_l[:, None]
     rolling = rolling_resistance_force(F_z, r_w=r_w)

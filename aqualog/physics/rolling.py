@@ -26,6 +26,8 @@ def effective_radius(r_e: FloatArray, v: FloatArray, *, growth: float) -> FloatA
     -------
     r_e : array
         [m]
+
+    Source: MF6.1 [besselink2010] for the size; the square is centrifugal force, derived.
     """
     return r_e * (1.0 + growth * v * v)
 
@@ -51,6 +53,8 @@ def mf61_rolling_resistance(v: FloatArray, F_z: FloatArray, *, p: float, p_ref: 
 
     (0.00702 + 0.001515 v/v_0 + 8.5e-5 (v/v_0)^4) (F_z/F_z0)^-0.10 (p/p_0)^-0.41, v_0 = 16.67 m/s; as a coefficient,
     so that the exponent of the load is one less than the force's 0.90.
+
+    Source: the law of [besselink2010] with the coefficients of a published set.
     """
     u = v / 16.67
     r_w: FloatArray = (0.00702 + 0.001515 * u + 8.5e-5 * u**4) * (F_z / F_z_ref) ** -0.10 * (p / p_ref) ** -0.41
@@ -61,6 +65,8 @@ def warm_up_factor(t: FloatArray, *, extra: float, time_constant: float) -> Floa
     """Rolling resistance of a cold tyre over that of a warm one, 1 + extra exp(-t / time_constant). [-]
 
     `extra` up to 0.4 in the cold (K); 10 degC cost 8 % (R117); half an hour warms a tyre through. [-], [s]
+
+    Source: UN Regulation 117 [unece2011] for 8 % per 10 K; the shape is general knowledge (K).
     """
     return 1.0 + extra * np.exp(-t / time_constant)
 
@@ -70,6 +76,8 @@ def load_factor(F_z: FloatArray, *, F_z_ref: float, sensitivity: float) -> Float
 
     A published MF6.1 set, (21.687 + 13.728 df) exp(-0.4098 df), has 0.22: 19.9, 21.2, 22.1, 22.8 at -30, -10, +10,
     +30 % load; the straight line is its tangent, 1.9 % off at -30 %. Sensitivity 0 gives 1 to the last bit. [-]
+
+    Source: the law of [besselink2010] with the coefficients of a published set.
     """
     return np.maximum(1.0 + sensitivity * (F_z / F_z_ref - 1.0), 0.1)
 
@@ -86,6 +94,8 @@ def pressure_factor(p: FloatArray, *, p_ref: float, p_nominal: float) -> FloatAr
     -------
     factor : array
         1 at p_ref; +11 % at 25 % below nominal, -7 % at 30 % above. Supports C53: less slope at high pressure. [-]
+
+    Source: the law of [besselink2010] with the coefficients of a published set.
     """
     dp = p / p_nominal - 1.0
     dp_ref = p_ref / p_nominal - 1.0

@@ -26,8 +26,8 @@ def slip_of_wheel_speed(v_w: FloatArray, v_x: FloatArray) -> FloatArray:
     s : array (n,)
         (v_w - v_x) / v_x; -1 for a locked wheel; NaN below `V_MIN`. [-]
 
-    The denominator is the vehicle speed, which stays bounded when the wheel stops; thesis 3.13 divides by the wheel
-    speed and runs to minus infinity there (E7). Both agree to first order in small slip.
+    The denominator is the vehicle speed, which stays bounded when the wheel stops; Eq. (3.13) [fichtinger2024]
+    divides by the wheel speed and runs to minus infinity there (E7). Both agree to first order in small slip.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(v_x > V_MIN, (v_w - v_x) / v_x, np.nan)
@@ -50,7 +50,7 @@ def wheel_slip(omega: FloatArray, v_x: FloatArray, r_e: float) -> FloatArray:
     s_x : array (n,)
         NaN where the rim runs slower than `V_MIN` (E7: minus infinity as the wheel stops). [-]
 
-    Thesis: Eq. (3.13).
+    Thesis [fichtinger2024]: Eq. (3.13).
     """
     v_w = omega * r_e
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -72,5 +72,7 @@ def bounded_slip(v_w: FloatArray, v_along: FloatArray) -> FloatArray:
     s_x : array
         Driving positive. Equal to (3.13) while the rim runs faster than 0.5 m/s; large and negative, not infinite, for
         a wheel that stands still in a moving car (E7), where the brush slides anyway. [-]
+
+    Source: Eq. (3.13) [fichtinger2024]; the bound is derived.
     """
     return (v_w - v_along) / np.maximum(np.abs(v_w), 0.5)

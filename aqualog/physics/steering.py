@@ -61,7 +61,7 @@ def aligning_moment(
     full contact gives -a/3 F_y; full sliding of a full contact 0; on a shortened one the remaining force acts further
     back, -a (1 - 2 L / 3) F_y, until it vanishes with L.
 
-    H. B. Pacejka, Tire and Vehicle Dynamics, chapter 3 (K), for L = 1; D for L < 1.
+    Source: chapter 3 of Pacejka [pacejka2012] (K) for L = 1; derived for L < 1.
     """
     g_x = C_x * s_x
     g_y = C_y * s_y
@@ -118,7 +118,7 @@ def kingpin_moment(
     slows the wheel down and comes back as longitudinal force. Small angles; no steer angle, no inertia of the wheel
     about the kingpin, no friction, no toe.
 
-    Thesis: section 2.4 measures what comes of it (C61-C63); geometry D.
+    Thesis [fichtinger2024]: section 2.4 measures what comes of it (C61-C63); geometry D.
     """
     sine = np.sin(geometry.inclination)
     scrub = geometry.hub_offset - r_l * sine
@@ -138,6 +138,8 @@ def steering_torque(rod_left: FloatArray, rod_right: FloatArray, *, ratio: float
     Tie-rod forces in N, compression positive, rods behind the axle; `ratio` in m. Left positive: in a left turn the
     outer, right rod is pressed and the left one pulled, and the steering is held to the left. What both front wheels
     show alike cancels. [N m]
+
+    Source: derived.
     """
     return ratio * (rod_right - rod_left)
 
@@ -167,7 +169,7 @@ def tie_rod_force(
     F : array
         Compression positive. [N]
 
-    Thesis: section 2.4 (no number): a polynomial from a multi-body simulation of the front axle.
+    Thesis [fichtinger2024]: section 2.4 (no number): a polynomial from a multi-body simulation of the front axle.
     """
     force = np.zeros_like(np.asarray(F_x, dtype=np.float64)) + sum(c0)
     for power, c in enumerate(c_y, 1):

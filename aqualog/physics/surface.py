@@ -22,6 +22,6 @@ def series_slope(slope: FloatArray, *, compliance: float) -> FloatArray:
     slope : array
         [-] Limits: compliance 0 (asphalt) leaves the tyre's own to the last bit; a soft layer rules alone.
 
-    Thesis: section 3.1 (C82).
+    Thesis [fichtinger2024]: section 3.1 (C82).
     """
     return slope / (1.0 + slope * compliance)

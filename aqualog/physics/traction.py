@@ -10,7 +10,7 @@ from aqualog.types import FloatArray
 __all__ = ["DELTA_A_WATER", "residual_traction", "traction_coefficient", "traction_of_one_axle"]
 
 
-DELTA_A_WATER = 0.2  # [m/s^2] thesis 2.2: less than that is no sign of water (snow, an offset, wind)
+DELTA_A_WATER = 0.2  # [m/s^2] thesis 2.2 (C44): less than that is no sign of water (snow, an offset, wind)
 
 
 def traction_coefficient(
@@ -36,6 +36,8 @@ def traction_coefficient(
 
     F_x = (T - I omega_dot) / r_l - r_w F_z: the thesis does not say that rolling resistance and inertia come off the
     torque of 3.14 (E13). A wheel that rolls freely at constant speed has mu = -r_w.
+
+    Source: the torque balance behind Eq. (3.14) [fichtinger2024], as E13 completes it.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         mu = (torque - inertia * omega_dot) / (r_l * F_z) - r_w
@@ -66,6 +68,8 @@ def residual_traction(mu: FloatArray, delta_a_x: FloatArray, F_z: FloatArray, *,
     the torques should have done to the vehicle and did not, bounds what the road has taken: what exceeds the threshold
     of partial aquaplaning is booked on this wheel. On snow or ice less than that is missing (its rolling resistance, an
     accelerometer's offset), and the value is that of the torque. A lower bound: the front wheels' share is in it too.
+
+    Source: derived; the limits 0.07 and 0.2 are those of [fichtinger2024] (C27, C44).
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         reduced = mu - mass * np.maximum(delta_a_x - DELTA_A_WATER, 0.0) / F_z
@@ -112,6 +116,8 @@ def traction_of_one_axle(
     `traction_coefficient`. A grade is in a_x as it is in the force (E2, E13). Holds while no brake acts. A constant
     error of the accelerometer shifts mu; an error of its scale scales it, and so does pitch: a body that tilts by
     1 deg at 1 g shows 1.7 % too much. The mass counts by the drag only, its distribution fully.
+
+    Source: derived, a balance of forces.
     """
     resisting = air_drag(v_x, drag_area=drag_area, air_density=air_density)
     resisting = resisting + rolling_resistance_force(F_z_free, r_w=r_w).sum(axis=0) + free_wheel_mass * a_kin

@@ -32,7 +32,7 @@ def brush_stiffness(c_px: FloatArray, a: FloatArray) -> FloatArray:
     C_s : array
         [N] It holds no friction: slip stiffness is a property of the tyre (C2).
 
-    Thesis: Eq. (3.12).
+    Thesis [fichtinger2024]: Eq. (3.12).
     """
     return 2.0 * c_px * a * a
 
@@ -52,6 +52,8 @@ def sliding_edge(theta: FloatArray, L: FloatArray | float) -> FloatArray:
     xi : array
         Smaller root of xi^2 - k xi + k b - 1 = 0 with k = 2 theta and b = 2 L - 1: there a bristle that entered at the
         front edge b of the dry contact is bent as far as the parabolic pressure holds it. Within -1 ... b. [-]
+
+    Source: chapter 3 of Pacejka [pacejka2012] for L = 1; derived for L < 1.
     """
     k = 2.0 * theta
     b = 2.0 * L - 1.0
@@ -66,6 +68,8 @@ def brush_parts(theta: FloatArray, L: FloatArray | float) -> tuple[FloatArray, F
     Their sum grows from 0 with the slope 3 L^2 in theta (2.2) to L^2 (3 - 2 L) (2.1); at L = 1 it is the brush's
     1 - (1 - theta)^3. Both are integrals over the remaining parabola: no pressure is put on bristles that the water has
     lifted.
+
+    Source: as `sliding_edge`; (2.1) and (2.2) are those of [fichtinger2024].
     """
     b = 2.0 * L - 1.0
     xi = sliding_edge(theta, L)
@@ -100,8 +104,9 @@ def brush_force(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
     first bristles; no load, no friction or no contact, no force. NaN in, NaN out. Rigid carcass, equal friction of
     sticking and sliding bristles.
 
-    Thesis: section 3.1; (2.1) and (2.2) are its limits at large and small slip. H. B. Pacejka, Tire and Vehicle
-    Dynamics, chapter 3.
+    Thesis [fichtinger2024]: section 3.1; (2.1) and (2.2) are its limits at large and small slip.
+
+    Source: chapter 3 of Pacejka [pacejka2012] for L = 1; derived for L < 1.
     """
     F_x, _ = brush_forces(s_x, 0.0 * s_x, F_z, mu=mu, C_x=C_s, C_y=C_s, L=L)
     return F_x
@@ -141,6 +146,8 @@ def brush_forces(
     The stiffness-weighted slip sets how far the contact slides. Sticking bristles pull along it, sliding ones against
     the sliding velocity. Limits: s_y = 0 is `brush_force`; slopes C_x L^2 and C_y L^2 at 0;
     |F| <= mu F_z L^2 (3 - 2 L),    full sliding along (s_x, s_y).
+
+    Source: chapter 3 of Pacejka [pacejka2012] for L = 1; derived for L < 1.
     """
     g_x = C_x * s_x
     g_y = C_y * s_y
@@ -157,6 +164,8 @@ def brush_slope(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
     """Local slope dF_x / ds_x of `brush_force`: C_s times the square of the sticking share of the contact. [N]
 
     C_s L^2 at no slip; 0 where the whole contact slides.
+
+    Source: derived from `brush_force`.
     """
     limit = np.maximum(mu * F_z, 1e-9)
     xi = sliding_edge(C_s * np.abs(s_x) / (3.0 * limit), L)
@@ -165,5 +174,8 @@ def brush_slope(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
 
 
 def full_sliding_slip(F_z: FloatArray, *, mu: float, C_s: float) -> FloatArray:
-    """Slip from which the whole of a full contact slides, 3 mu F_z / C_s. [-]"""
+    """Slip from which the whole of a full contact slides, 3 mu F_z / C_s. [-]
+
+    Source: chapter 3 of Pacejka [pacejka2012].
+    """
     return 3.0 * mu * F_z / C_s

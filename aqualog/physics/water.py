@@ -12,7 +12,10 @@ RHO_WATER = 1000.0  # [kg/m^3]
 
 
 def drained_share(h_w: FloatArray, *, tread_capacity: float) -> FloatArray:
-    """Share of the water that finds room in the tread's grooves, 0 ... 1. No water counts as drained. [-]"""
+    """Share of the water that finds room in the tread's grooves, 0 ... 1. No water counts as drained. [-]
+
+    Source: an assumption.
+    """
     return np.minimum(tread_capacity / np.maximum(h_w, 1e-9), 1.0)
 
 
@@ -56,6 +59,9 @@ def film_drag(
     1.3 mm (thesis Fig. 2.11), where momentum alone would double. Water in grooves stays behind at rest, so that a tread
     with 0.4 mm of capacity and a relief of 0.7 still rises by 47 % in between, one without grooves not at all.
     Limits: 0 without water or speed.
+
+    Source: a momentum balance, derived; parabolic in speed as in NASA TN D-552 [horne1960]; saturation by Fig. 2.11 of
+    [fichtinger2024] (C38).
     """
     film = np.minimum(h_w, h_film) * (1.0 - relief * drained_share(h_w, tread_capacity=tread_capacity))
     return RHO_WATER * width * film * v * v_tread
@@ -79,6 +85,9 @@ def wave_drag(h_w: FloatArray, v: FloatArray, *, width: float, h_wave: float) ->
 
     About linear in depth and parabolic in speed (NASA TN D-552); begins beyond 1.3 mm (thesis Fig. 2.11: at 2 mm the
     level and gradient rise).
+
+    Source: derived; linear in depth and parabolic in speed as in NASA TN D-552 [horne1960]; onset by Fig. 2.11 of
+    [fichtinger2024] (C38).
     """
     return RHO_WATER * width * np.maximum(h_w - h_wave, 0.0) * v * v
 
@@ -104,6 +113,8 @@ def residual_film(h_w: FloatArray, L_front: FloatArray, *, h_track: float) -> Fl
     some contact, the film does not depend on the depth (thesis 2.3 on Fig. 2.17). Only a wheel that floats clears
     nothing; the sixth power makes the passage, over the last third of the contact, smooth. Limits: L = 1 leaves
     min(h, h_track), L = 0 leaves h.
+
+    Source: an assumption in shape, after Fig. 2.17 of [fichtinger2024] (C50).
     """
     lost = 1.0 - np.minimum(np.maximum(L_front, 0.0), 1.0)
     return np.minimum(h_w, h_track) + np.maximum(h_w - h_track, 0.0) * lost**6
