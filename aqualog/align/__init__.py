@@ -1,1 +1,1 @@
-"""Channels onto one table: names, units, clocks, grid."""
+"""Align channels: signal names, units, clocks and one common grid."""

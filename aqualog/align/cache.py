@@ -1,9 +1,9 @@
-"""Aligned signals of drives kept between runs, found again by all that they depend on.
+"""Keep the aligned signals of drives between runs, under a key of all that they depend on.
 
 FOLDER/signals/STAMP-KEY-CRC.parquet   a drive; STAMP of aqualog's reading and aligning code, CRC of the file
 FOLDER/signals/contents.json           hashes of logs by size and time of change, so that a log is hashed once
 
-Nothing here is ever an error to the user: what cannot be kept is not, what is damaged is thrown away and read anew.
+The cache never raises an error to the user. It skips what it cannot keep, discards what is damaged and reads it again.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _ABANDONED_S = 3600.0  # a half-written file so old is nobody's
 
 
 class Key(NamedTuple):
-    """What a drive's signals depend on, and the state of the files for whose content it stands."""
+    """The inputs that a drive's signals depend on, and the state of the files whose content was hashed."""
 
     text: str
     paths: tuple[Path, ...]
@@ -55,7 +55,7 @@ class Key(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """One drive in the cache. `used` is when it was last asked for [s since 1970]; `fits` this version of aqualog."""
+    """One drive in the cache. `used`: last request [s since 1970]; `fits`: made by this version of aqualog."""
 
     path: Path
     size: int
@@ -64,7 +64,7 @@ class Kept(NamedTuple):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Names of the drive's files; empty if that cannot be read."""
+        """Return the names of the drive's files; empty if they cannot be read."""
         from aqualog.align.signals_file import files_of
 
         try:
@@ -74,15 +74,15 @@ class Kept(NamedTuple):
 
 
 class SignalCache:
-    """A folder of signals; it is made when the first are kept, for the user alone.
+    """A folder of signals. It is created with the first entry, for the user alone.
 
     Parameters
     ----------
     folder : Path
     limit : int
-        Most bytes of all drives; what was not asked for longest goes first.
+        Largest size of all drives together [bytes]; the entry with the oldest request is removed first.
     tell : callable
-        Told why something was not kept.
+        Called with the reason why something was not kept.
     """
 
     def __init__(self, folder: Path, *, limit: int, tell: Callable[[str], None] = lambda _: None) -> None:
@@ -93,9 +93,9 @@ class SignalCache:
     def key(
         self, paths: Sequence[Path], vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], rate_hz: float | None
     ) -> Key | None:
-        """Key of a drive; None where a file cannot be read, which the readers tell better.
+        """Return the key of a drive; None where a file cannot be read, which the readers report in more detail.
 
-        Of the vehicle only what alignment asks for counts, of paths only their names: a copied log is found, too.
+        Of the vehicle only the values that alignment uses count, of paths only the names: a copied log is found, too.
         """
         contents = Contents(self._known())
         try:
@@ -109,7 +109,7 @@ class SignalCache:
         return Key(text, (*paths, *dbc), contents.seen((*paths, *dbc)))
 
     def get(self, key: Key) -> Signals | None:
-        """Signals of a drive; None where there are none, or damaged ones."""
+        """Return the signals of a drive; None if the cache has no intact entry."""
         from aqualog.align.signals_file import from_parquet
 
         for entry in self.kept():
@@ -151,7 +151,7 @@ class SignalCache:
             self._tell_unwritable(error)
 
     def kept(self) -> list[Kept]:
-        """All drives, the one that was not asked for longest first."""
+        """List all drives, the one with the oldest request first."""
         stamp = _stamp()
         found = []
         for path, state in self._files(_ENTRY):
@@ -159,7 +159,7 @@ class SignalCache:
         return sorted(found, key=lambda k: (k.used, k.path.name))
 
     def clean(self) -> tuple[int, int]:
-        """Remove all drives and hashes, nothing else; number and bytes of the drives.
+        """Remove all drives and hashes, nothing else; return number and bytes of the drives.
 
         Raises
         ------
@@ -223,19 +223,19 @@ class SignalCache:
 
 
 def cache_folder() -> Path:
-    """Where signals are kept: $AQUALOG_CACHE, else the user's cache folder.
+    """Return the folder of the cache: $AQUALOG_CACHE, else the user's cache folder.
 
     Raises
     ------
     RuntimeError
-        If there is no home folder.
+        If the user has no home folder.
     """
     given = os.environ.get("AQUALOG_CACHE")
     return Path(given).expanduser() if given else user_cache()
 
 
 def cache_limit() -> int:
-    """Most bytes that are kept: $AQUALOG_CACHE_MB, else 2 GB.
+    """Return the largest size of the cache [bytes]: $AQUALOG_CACHE_MB, else 2 GB.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def cache_limit() -> int:
 
 @cache
 def _stamp() -> str:
-    """The code that makes signals of logs, and the libraries that it reads them with."""
+    """Return a stamp of the code that makes signals of logs, and of the libraries that it reads them with."""
     return hash_of([sources_stamp(_BEHIND), *map(_version, _LIBRARIES)])[:8]
 
 
@@ -261,12 +261,12 @@ def _version(library: str) -> str:
 
 
 def _check(data: bytes | memoryview) -> str:
-    """Parquet has no check sum of its own over numbers: a bit that flips would be a measured value."""
+    """Return a check sum: Parquet has none over numbers, so a flipped bit would pass for a measured value."""
     return f"{zlib.crc32(data):08x}"
 
 
 def _names_folder(notes: Sequence[str], paths: Sequence[Path]) -> bool:
-    """Whether a note tells where a file lies, which for a copy of it would be wrong."""
+    """Return whether a note names the place of a file, which would be wrong for a copy of it."""
     folders = {f"{p}{os.sep}" for path in paths for p in (path, path.parent)} - {f".{os.sep}"}
     return any(f in note for f in folders for note in notes)
 

@@ -1,4 +1,4 @@
-"""Which channels of a file carry a quantity that another file carries too, for comparing their clocks."""
+"""Find the channels of two files that carry the same quantity, to compare the clocks."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class Carrier:
 def find_carrier(
     channels: Sequence[Channel], *, quantity: str, signal_map: SignalMap, vehicle: Vehicle, named: str | None = None
 ) -> Carrier:
-    """The quantity in the channels of ONE file.
+    """Find the quantity in the channels of ONE file.
 
-    In this order: the channel that is named; what the signal map says; what names and units suggest. A speed is that
-    of a reference, else the mean of the wheels.
+    Order of preference: the channel that is named; the signal map; names and units. A reference speed is preferred to
+    the mean of the wheel speeds.
 
     Raises
     ------

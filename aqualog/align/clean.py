@@ -1,4 +1,4 @@
-"""Samples of one channel: into SI, bad ones out, stamps repaired and counted."""
+"""Clean the samples of one channel: convert to SI, remove bad samples, repair and count time stamps."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BURST = 5  # median sample times; longer steps are gaps and no sample time
 class Span(NamedTuple):
     """Where the usable samples of a signal lie: first and last stamp, their number, median and mean sample time. [ns]
 
-    The mean is without gaps: stamps that arrive in bursts have a median far from their rate.
+    Gaps do not enter the mean. Stamps that arrive in bursts have a median far from their rate.
     """
 
     first_ns: int
@@ -55,7 +55,7 @@ class Clean:
 
 
 class Judged(NamedTuple):
-    """Samples (n,) in SI, and which of them are not numbers, codes for a bad one, or beyond what can be."""
+    """Samples (n,) in SI, and flags for those that are not finite, that are error codes, or that are out of range."""
 
     values: FloatArray
     is_bad: BoolArray
@@ -69,7 +69,7 @@ class Judged(NamedTuple):
 
 
 class Stamps:
-    """What is known of the time stamps of a drive's files while its channels are gone through."""
+    """State of the time stamps of a drive's files while its channels are read."""
 
     def __init__(self) -> None:
         self._repairs: dict[str, ClockRepair] = {}
@@ -93,9 +93,9 @@ def clean_channel(
     standing: Callable[[], Sequence[Stretch]] = tuple,
     stands: StandWatch | None = None,
 ) -> Clean | None:
-    """Bad samples out, SI, stamps repaired; None (with a note) for a channel without a map whose unit is unknown.
+    """Clean one channel; return None (with a note) for a channel without a map whose unit is unknown.
 
-    `standing` is asked when the car stands if a torque stays the same for long; `stands` is shown the samples.
+    `standing` gives the stretches at standstill, for a torque that stays the same for long; `stands` sees the samples.
     """
     symbol = symbol_of(name)
     info = channel.info
@@ -167,7 +167,7 @@ def symbol_of(name: str) -> Symbol:
 
 
 def judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> Judged:
-    """Samples (n,) of a channel, each by itself.
+    """Convert the samples (n,) of a channel, each by itself.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Ve
 
 
 def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
-    """Which samples (n,) are one of the codes, but for rounding: of 32 bits, or of 1023 * 0.1 against 102.3."""
+    """Return which samples (n,) are error codes, up to rounding: of 32 bits, or of 1023 * 0.1 against 102.3."""
     found = np.zeros(raw.size, dtype=np.bool_)
     for code in codes:
         found |= np.isclose(raw, code, rtol=_ROUNDING, atol=0.0)
@@ -190,12 +190,12 @@ def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
 
 
 def glitch_note(where: str, rule: Glitches, count: int, after_ns: int) -> str:
-    """What was left out because no car can have done so."""
+    """Describe the samples that were left out because no car can make such a step."""
     return f"{where}: {count} samples (first at {float(after_ns) * 1e-9:.2f} s) {rule.what}"
 
 
 def out_note(where: str, symbol: Symbol, count: int, of: int, first: float, after_ns: int) -> str:
-    """What was left out because the signal cannot be so large or small."""
+    """Describe the samples that were left out because they are out of range."""
     return (
         f"{where}: {count} of {of} samples outside {symbol.low:g} ... {symbol.high:g} "
         f"{symbol.unit} (first: {first:.6g} at {float(after_ns) * 1e-9:.2f} s) are left out"
@@ -212,7 +212,7 @@ def _span(t_ns: TimeArray) -> Span:
 
 
 def mean_of_steps(total_ns: int, count: int) -> int:
-    """Mean sample time, 0 without any. [ns]"""
+    """Return the mean sample time, 0 without samples. [ns]"""
     return round(total_ns / count) if count else 0
 
 
@@ -231,7 +231,7 @@ def _to_si(symbol: Symbol, raw: FloatArray, unit: str, vehicle: Vehicle, where: 
 
 
 def corrected(t_ns: TimeArray, signal_map: SignalMap, file: str) -> TimeArray:
-    """Stamps by the clock that the map gives the file."""
+    """Return the stamps by the clock that the map gives the file."""
     clock = signal_map.clock_of(file)
     if not (clock.offset_s or clock.drift_ppm) or t_ns.size == 0:
         return t_ns

@@ -1,18 +1,18 @@
-"""Offset, drift and scale between two sources that carry the same quantity on clocks of their own.
+"""Estimate offset, drift and scale between two sources that carry the same quantity on clocks of their own.
 
 Model, with t the stamp of the other source and s the same instant on the reference's clock:
 
     x(t) = scale * x_ref(s) + bias + noise,    s = t - offset - drift * (t - t_mid)
 
-The offset is found on the smoothed rate of change, not on the level: bias, slow changes of the rolling radius and slow
-noise vanish from it, and a constant scale is a free gain there. Scale and bias are then read from the levels.
+The offset is estimated from the smoothed rates of change, not from the levels. The rate removes bias, slow changes of
+the rolling radius and slow noise; a constant scale is a free gain there. Scale and bias follow from the levels.
 Intervals come from leaving out one block of several seconds after the other (cluster jackknife, CR3), so neighbouring
-residuals may depend on each other; nothing is random.
+residuals may depend on each other. Nothing is random.
 
-An offset is all that delays one signal against the other: the clock and also the run time and the filter of a sensor.
-The two cannot be told apart from one pair of signals. Tyre slip in proportion to acceleration, k v dv/dt, looks like a
-wheel speed that is early by k v (0.05 s and more on a race track); the fit with slip takes it out where the speed
-varies enough to tell the two apart.
+The offset is the total delay of one signal against the other: of the clock, and of the run time and the filter of a
+sensor. One pair of signals cannot distinguish the two. Tyre slip in proportion to acceleration, k v dv/dt, looks like a
+wheel speed that is early by k v (0.05 s and more on a race track). The fit with slip removes it where the speed varies
+enough to distinguish slip from delay.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class ClockFit:
         95 % interval of `offset_s`. Covers noise, not the run time or filter of a sensor.
     slip_offset_s : float
         Offset if x - x_ref may also hold tyre slip k v dv/dt; NaN unless the quantity is a speed. Where its interval
-        and that of `offset_s` are apart, part of `offset_s` is slip and not time.
+        and that of `offset_s` do not overlap, part of `offset_s` is slip and not time.
     slip_offset_ci95 : (low, high)
     drift_ppm : float
         Growth of the offset in microseconds per second of the source's clock; an estimate even if not significant.
@@ -78,7 +78,7 @@ class ClockFit:
     peak : float
         Correlation of the rates of change at the best lag, -1 to 1.
     peak_limit : float
-        What `peak` had to reach to be taken for more than chance.
+        Limit that `peak` had to reach to be more than chance.
     runner_up : float
         Best correlation outside the main peak; -1 if the main peak fills the search range.
     overlap_s : float
@@ -114,11 +114,11 @@ class ClockFit:
 
     @property
     def sharpness(self) -> float:
-        """How far the peak stands above the second best, relative to the peak. 0 ambiguous, 1 and more clear."""
+        """Return how far the peak stands above the second best, relative to the peak: 0 ambiguous, 1 and more clear."""
         return (self.peak - self.runner_up) / self.peak
 
     def to_reference(self, t_ns: TimeArray) -> TimeArray:
-        """Stamps of the source on the reference's clock: t - offset - drift * (t - t_mid). int64 (n,), new array."""
+        """Return stamps (n,) on the reference's clock, a new array: t - offset - drift * (t - t_mid). int64"""
         shift = np.full(t_ns.shape, self.offset_s)
         if self.drift_significant:
             shift += self.drift_ppm * 1e-6 * ((t_ns - self.mid_ns) * 1e-9)
@@ -161,8 +161,8 @@ def estimate_clock(
     -------
     ClockFit
 
-    Valid range: drifts up to about 1000 ppm; rates of 1 Hz and more. A value that was held in the log at a higher rate
-    than it was measured looks late by half its true sample time.
+    Valid range: drifts up to about 1000 ppm; rates of 1 Hz and more. A value that is logged faster than it is measured
+    looks late by half its true sample time.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def _check_options(o: _Options) -> None:
 
 
 def _series(t_ns: TimeArray, x: FloatArray, *, where: str) -> _Series:
-    """Finite samples with strictly increasing time, in seconds from the first."""
+    """Return finite samples with strictly increasing time, in seconds from the first."""
     if t_ns.shape != x.shape or t_ns.ndim != 1:
         raise FitError(f"{t_ns.shape} stamps for {x.shape} samples", where=where, expected="two vectors of one length")
     good = np.isfinite(x)
@@ -254,7 +254,7 @@ def _series(t_ns: TimeArray, x: FloatArray, *, where: str) -> _Series:
 
 
 def _grid(ref: _Series, other: _Series, step: float, o: _Options) -> tuple[float, int]:
-    """Start and number of points of a grid on the reference's clock that holds all that any lag may pair."""
+    """Return start and number of points of a grid on the reference's clock, wide enough for every lag."""
     reach = o.max_offset_s
     ref_low, ref_high = max(ref.t[0], other.t[0] - reach), min(ref.t[-1], other.t[-1] + reach)
     low, high = max(other.t[0], ref.t[0] - reach), min(other.t[-1], ref.t[-1] + reach)
@@ -275,7 +275,7 @@ def _grid(ref: _Series, other: _Series, step: float, o: _Options) -> tuple[float
 
 
 def _thin(series: _Series, step: float) -> tuple[FloatArray, FloatArray]:
-    """Samples much faster than the grid, averaged over one step: time and value alike, so that nothing is delayed."""
+    """Average samples much faster than the grid over one step: time and value alike, so that nothing is delayed."""
     if series.period > 0.6 * step:
         return series.t, series.x
     bins = np.floor((series.t - series.t[0]) / step).astype(np.int64)
@@ -285,7 +285,7 @@ def _thin(series: _Series, step: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _smooth(series: _Series, start: float, step: float, count: int, smoothing: float) -> _Smoothed:
-    """Level and rate of change behind one symmetric filter, the same for both sources."""
+    """Return level and rate of change behind one symmetric filter, the same for both sources."""
     t, x = _thin(series, step)
     grid: FloatArray = start + step * np.arange(count, dtype=np.float64)
     centre = float(np.mean(x))
@@ -302,7 +302,7 @@ def _smooth(series: _Series, start: float, step: float, count: int, smoothing: f
 
 
 def _usable(t: FloatArray, grid: FloatArray, period: float, smoothing: float) -> BoolArray:
-    """Grid points whose filter touches neither a gap nor an end."""
+    """Return the grid points whose filter touches neither a gap nor an end."""
     reach = _REACH * smoothing
     gaps = np.flatnonzero(np.diff(t) > max(3.0 * period, smoothing))
     opens = np.concatenate([t[:1], t[gaps + 1]]) + reach
@@ -340,7 +340,7 @@ class _Peak(NamedTuple):
 
 
 def _correlation(a: _Smoothed, b: _Smoothed, lags: TimeArray) -> tuple[FloatArray, FloatArray]:
-    """Pearson correlation of a(t) with b(t + lag) over the points where both are usable, and their number."""
+    """Correlate (Pearson) a(t) with b(t + lag) over the points where both are usable; return also their number."""
     size = 1 << (a.rate.size + int(np.max(np.abs(lags)))).bit_length()
 
     def cross(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -385,7 +385,7 @@ def _search(a: _Smoothed, b: _Smoothed, step: float, o: _Options) -> _Peak:
 
 
 def _main_peak(r: FloatArray, top: int) -> tuple[int, int]:
-    """First and last lag of the main peak: down to half its height and on to the next valley."""
+    """Return first and last lag of the main peak: down to half its height and on to the next valley."""
 
     def walk(direction: int) -> int:
         i = top
@@ -399,7 +399,7 @@ def _main_peak(r: FloatArray, top: int) -> tuple[int, int]:
 
 
 def _chance_limit(a: _Smoothed, b: _Smoothed, step: float, count: float, width_s: float) -> float:
-    """Correlation that unrelated signals with these spectra reach somewhere in the range once in a thousand cases."""
+    """Return the correlation that unrelated signals with these spectra reach in the range once in a thousand cases."""
     reach = min(int(10.0 / step), a.rate.size - 1)
     lags = np.arange(-reach, reach + 1)
     own = _correlation(a, a, lags)[0] * _correlation(b, b, lags)[0]
@@ -413,7 +413,7 @@ def _chance_limit(a: _Smoothed, b: _Smoothed, step: float, count: float, width_s
 
 
 def _burstiness(source: _Smoothed, step: float) -> float:
-    """Blocks per block that counts, 1 or more: in stop and go a few pulls hold all the energy and match by chance."""
+    """Return blocks per effective block (1 or more): in stop and go a few pulls hold all energy and match by chance."""
     power = np.where(source.good, source.rate, 0.0) ** 2
     first = np.arange(0, power.size, max(round(_BLOCK_S / step), 1))
     energy, used = np.add.reduceat(power, first), np.add.reduceat(source.good.astype(np.float64), first)
@@ -437,7 +437,7 @@ def _check_peak(
         raise FitError(
             f"weak peak: {found}",
             where=where,
-            expected=f"at least {limit:.3f} for what so few changes and so wide a search can show by chance",
+            expected=f"at least {limit:.3f}: a search so wide over so few changes reaches less by chance",
             hint="a longer stretch with braking or turning, another max_offset_s, or check that both are one quantity",
         )
     if top in (0, r.size - 1) or not (enough[top - 1] and enough[top + 1]):
@@ -486,19 +486,19 @@ class _Estimate(NamedTuple):
 
 
 def _middle(a: _Smoothed, b: _Smoothed, start: float, step: float, lag: float) -> float:
-    """Middle of the common time, on the other source's clock."""
+    """Return the middle of the common time, on the other source's clock."""
     k = np.flatnonzero(b.good)
     k = k[_at(a.good.astype(np.float64), np.asarray(k - lag / step, dtype=np.float64)) > 0.999]
     return start + step * 0.5 * float(k[0] + k[-1])
 
 
 def _at(y: FloatArray, k: FloatArray) -> FloatArray:
-    """Linear interpolation at fractional grid indices, 0 outside."""
+    """Interpolate linearly at fractional grid indices; 0 outside."""
     return np.interp(k, np.arange(y.size), y, left=0.0, right=0.0)
 
 
 def _common(pair: _Pair, offset: float, drift: float) -> tuple[TimeArray, FloatArray, FloatArray]:
-    """Grid indices of the other source that have a usable partner, their times, and the partners' indices."""
+    """Return grid indices of the other source that have a usable partner, their times, and the partners' indices."""
     k = np.flatnonzero(pair.b.good)
     t: FloatArray = pair.start + pair.step * k.astype(np.float64)
     partner: FloatArray = (t - pair.start - offset - drift * (t - pair.mid)) / pair.step
@@ -537,7 +537,7 @@ def _fit_lag(pair: _Pair, start: FloatArray, terms: tuple[str, ...] = ()) -> tup
 
 
 def _fit_level(pair: _Pair, offset: float, drift: float, *, with_bias: bool) -> tuple[FloatArray, _Rows]:
-    """Scale and, on demand, bias; the rate is a column too, lest an offset pass for a bias on a ramp."""
+    """Fit scale and, on demand, bias. The rate is a column too, or an offset on a ramp would look like a bias."""
     k, t, partner = _common(pair, offset, drift)
     level = _at(pair.a.level, partner)
     constant = [np.ones(k.size)] if with_bias else []
@@ -568,10 +568,9 @@ def _solve(rows: _Rows) -> FloatArray:
 
 
 def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
-    """Standard errors from leaving out one block after the other, each by one Gauss-Newton step.
+    """Return standard errors from leaving out one block after the other, each by one Gauss-Newton step.
 
-    Degrees of freedom count the blocks by the information that they hold: one braking among quiet minutes is one
-    observation, not many.
+    The degrees of freedom count blocks by their information: one braking among quiet minutes is one observation.
     """
     if rows.t.size < 10:
         return _unknown(value)

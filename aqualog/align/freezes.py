@@ -1,11 +1,11 @@
-"""Stretches in which a sensor repeats its last value while the car drives on.
+"""Find stretches in which a sensor repeats its last value while the car drives on.
 
-A speed or a torque that is measured never stays the same to the last digit for long: on five measured cars the longest
-such stretch of a moving wheel is 0.9 s, of a torque 18 s. Only signals are judged whose own noise shows elsewhere, so
-that neither a coarse signal at constant speed nor one that was calculated is taken for a dead one; a standing wheel, a
-torque of zero, and any torque while the car stands may stay as they are for ever. A wheel whose first value stays until
-a step that no wheel can make was not measured until then: control units send zeros or a code before their sensors are
-awake. Of a channel of any other kind only one stop that is unlike all else in it is worth a look.
+A measured speed or torque never keeps its last digit for long. On five measured cars the longest such stretch of a
+moving wheel is 0.9 s, of a torque 18 s. The check judges a signal only if it shows noise elsewhere. It therefore never
+reports a coarse signal at constant speed, or one that was calculated. A standing wheel, a torque of zero, and any
+torque of a standing car may keep their value for any time. A wheel whose first value lasts until a step that no wheel
+can make was not measured before that step: control units send zeros or a code before their sensors are awake. In any
+other channel only one stop that is unlike the rest of the signal is reported.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ _AT_REST = (3, 1.0)  # more stops of so many seconds at the same value: where th
 
 
 class Stop(NamedTuple):
-    """A stretch in which a channel stands still: how long, from when on [s], at what value.
+    """A stretch in which a channel stands still: length, start [s], value.
 
-    `moving_s` of it the car moves, as far as is known; `share` of the samples outside differ from the one before.
+    `moving_s`: part of it in which the car is known to move; `share`: samples outside that differ from the one before.
     """
 
     length_s: float
@@ -58,7 +58,7 @@ class Stop(NamedTuple):
 
 
 def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
-    """The watch of a signal, with the effective radius [m] of a wheel; None for signals that may stay as they are."""
+    """Return the check for a signal (`r_e` [m] of a wheel); None for signals that may keep a value."""
     if name == "v_x":
         return FreezeWatch(*_SPEED)
     if name.startswith("omega_") and r_e is not None:
@@ -67,16 +67,16 @@ def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
 
 
 class FreezeWatch:
-    """Goes through the samples of one signal, in any pieces.
+    """Check the samples of one signal, which may arrive in pieces.
 
     Parameters
     ----------
     least_s : float
         Shortest stretch. [s]
     standing : float
-        Magnitude up to which the signal may stay the same.
+        Magnitude up to which the signal may keep its value.
     coarsest : float
-        Smallest step of a signal that is judged, at most.
+        Largest step between neighbouring levels of a signal that is judged.
     r_e : float, optional
         Effective radius of a wheel [m]: its sensor may wake up late.
     """
@@ -96,7 +96,7 @@ class FreezeWatch:
         self._long: list[Freeze] = []
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
-        """Samples (n,) at strictly increasing stamps, finite."""
+        """Take samples (n,) at strictly increasing stamps, finite."""
         if not t_ns.size:
             return
         if not self._t.size:
@@ -137,7 +137,7 @@ class FreezeWatch:
         self._smallest = min(self._smallest, float(np.abs(changes).min()))
 
     def finish(self) -> tuple[Freeze, ...]:
-        """Stretches in which the signal is frozen, in order."""
+        """List the stretches in which the signal is frozen, in order."""
         if self._asleep is None:
             return self._frozen()
         return (self._asleep, *(f for f in self._frozen() if f[0] > self._asleep[1]))
@@ -156,13 +156,13 @@ class FreezeWatch:
 
 
 def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch] = ()) -> Stop | None:
-    """Longest time that any channel (n,) stands still as nowhere else; None if there is none.
+    """Return the longest stop of a channel (n,) of unknown kind that is unlike the rest of it; None without one.
 
-    What stays the same while the car stands (`standing`) is no stop. For channels of which nobody knows what they are:
-    the watch would take a pedal that is let go for a dead one. A signal with noise hardly ever repeats itself; one that
-    is coarse or slow does all the time, and a car at rest stands at zero: both are let be. So the stop must be one of a
-    value other than zero, of at least 10 s, and next to nothing of the time outside it (and stops half as long) may lie
-    in stops that are a twentieth as long. A value at which the signal stands again and again is where it rests.
+    Time at standstill (`standing`) does not count. The check for known signals would take a released pedal for a dead
+    sensor, so this one is stricter. The stop must last at least 10 s, at a value other than zero. Stops a twentieth as
+    long must fill next to none of the time outside it (and outside stops half as long). That passes over coarse or slow
+    signals, which repeat values all the time. It also passes over a value at which the signal stands again and again:
+    there it rests.
     """
     steps_ns = np.diff(t_ns)
     is_moving = ~is_standing(t_ns, standing)
@@ -193,19 +193,19 @@ def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch
 
 
 def _is_rest(value: float, at: FloatArray, lengths_s: FloatArray) -> bool:
-    """Whether a signal that stands still for `lengths_s` (m,) [s] at the values `at` (m,) rests at this one."""
+    """Return whether a signal that stands still for `lengths_s` (m,) [s] at the values `at` (m,) rests at this one."""
     more, least_s = _AT_REST
     return int(((at == value) & (lengths_s >= least_s)).sum()) > more
 
 
 def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch]) -> tuple[Freeze, ...]:
-    """Those of a torque's freezes that last long enough without the time in which the car stands."""
+    """Return the freezes of a torque that last long enough without the time at standstill."""
     least_ns = round(_TORQUE[0] * 1e9)
     return tuple((a, b) for a, b in freezes if b - a - standing_ns(a, b, standing) >= least_ns)
 
 
 def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:
-    """Which samples (n,) repeat one before."""
+    """Return which samples (n,) repeat the one before."""
     out = np.zeros(t_ns.size, dtype=np.bool_)
     for start, end in freezes:
         out[np.searchsorted(t_ns, start, side="right") : np.searchsorted(t_ns, end, side="right")] = True
@@ -213,7 +213,7 @@ def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:
 
 
 def freeze_note(where: str, count: int, first_ns: int, freezes: tuple[Freeze, ...]) -> str:
-    """What was left out because the sensor stood still; `first_ns` is the signal's first stamp."""
+    """Describe what was left out because the sensor stood still; `first_ns` is the signal's first stamp."""
     longest, after = max(end - start for start, end in freezes), max(freezes[0][0] - first_ns, 0)
     return (
         f"{where}: {count} samples (first at {after * 1e-9:.2f} s) only repeat the one before, for up to "

@@ -1,4 +1,4 @@
-"""Samples that no car can have made: dropouts of a speed, spikes of a wheel, of what the car or its steering does."""
+"""Find samples that no car can produce: dropouts of a speed, spikes of a wheel, of the body or of the steering."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SLACK = 1.0  # [m/s] at the rim: resolution and stamps that jitter
 RETURN_NS = 1_000_000_000
 _AHEAD_NS = 500_000_000  # behind a leap, by which its stamps are judged
 KNOWN_NS = RETURN_NS + _AHEAD_NS
-"""How much must be known behind a sample to judge it; before it two samples."""
+"""Time that must be known behind a sample to judge it; before it two samples suffice."""
 _BURST = 0.3  # of the usual sample time: stamps that are closer came from a buffer
 _LATE_NS = 200_000_000  # by which stamps of a burst may be off
 _STANDS = 10  # samples of one value, at least, that are no slow signal's
@@ -30,7 +30,7 @@ _STANDS_BELOW = 2.0  # [m/s] speeds that receivers and control units may tell as
 
 
 class Leap(NamedTuple):
-    """What no car does: a change by more than `step` + `rate` [1/s] x sample time, if it comes `back` as near as that.
+    """Limits of a car: no change by more than `step` + `rate` [1/s] x sample time that comes `back` as near as that.
 
     In the signal's unit.
     """
@@ -56,14 +56,14 @@ _LEAPS = {
 
 
 class Glitches(NamedTuple):
-    """How the glitches of a signal are found, from stamps (n,) [ns] and samples (n,), and what is said of them."""
+    """How to find the glitches of a signal, from stamps (n,) [ns] and samples (n,), and the note on them."""
 
     find: Callable[[TimeArray, FloatArray], BoolArray]
     what: str
 
 
 def glitches_of(name: str, r_e: float | None) -> Glitches | None:
-    """The glitches of a signal, with the effective radius [m] of a wheel; None for signals that may leap."""
+    """Return the check for a signal, with the effective radius [m] of a wheel; None for signals that may leap."""
     if name.startswith("omega_") and r_e is not None:
         return Glitches(
             partial(sensor_glitches, r_e=r_e), "step faster than a wheel can; sensor dropouts or spikes, left out"
@@ -77,7 +77,7 @@ def glitches_of(name: str, r_e: float | None) -> Glitches | None:
 
 
 def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
-    """Which samples of a wheel speed are not the wheel's.
+    """Flag samples of a wheel speed that the wheel did not make.
 
     Parameters
     ----------
@@ -91,9 +91,9 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
     Returns
     -------
     bool array (n,)
-        From a step faster than `RIM_LIMIT` to the step back within 1 s; and, where nothing leads back, as long as the
-        signal stands at exactly zero (a dead sensor) or, for 1 s or more, at any one value (a code for "no value").
-        A leap between values that live is none if its stamps are of a burst, or of samples of which others are lost.
+        From a step faster than `RIM_LIMIT` to the step back within 1 s. Without a step back: as long as the signal
+        stands at exactly zero (a dead sensor) or, for 1 s or more, at any one value (a code for "no value"). A leap
+        between moving values does not count if its stamps are of a burst, or if neighbouring samples were lost.
     """
     glitch = np.zeros(omega.size, dtype=bool)
     if omega.size < 3:
@@ -125,7 +125,7 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
 
 
 def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> BoolArray:
-    """Which samples of an acceleration, a yaw rate or a steering angle are not the car's.
+    """Flag samples of an acceleration, a yaw rate or a steering angle that the car did not make.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> Boo
     x : array (n,)
         Finite samples.
     leap : Leap
-        What no car does, in the unit of `x`; default that of an acceleration. [m/s^2]
+        Limits of a car, in the unit of `x`; default that of an acceleration. [m/s²]
 
     Returns
     -------
@@ -158,7 +158,7 @@ def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> Boo
 
 
 def _soon_after(jumps: Sequence[int], position: int, t_ns: TimeArray, span_ns: int) -> Iterator[int]:
-    """The jumps behind one of them, up to so much later: of a sensor that shakes all the time there are very many."""
+    """Return the jumps after one of them, up to so much later: a sensor that shakes has very many."""
     for k in range(position + 1, len(jumps)):
         if t_ns[jumps[k]] - t_ns[jumps[position]] > span_ns:
             return
@@ -166,7 +166,7 @@ def _soon_after(jumps: Sequence[int], position: int, t_ns: TimeArray, span_ns: i
 
 
 def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
-    """Which samples of a reference speed are zero because it was lost.
+    """Flag samples of a reference speed that are zero because the reference was lost.
 
     Parameters
     ----------
@@ -178,8 +178,8 @@ def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
     Returns
     -------
     bool array (n,)
-        Stretches of exactly zero, into which it falls faster than a car stops. A value that stood before that is held
-        on a finer grid: how fast it falls is not known, and it is believed.
+        Stretches of exactly zero, into which it falls faster than a car stops. If the value before was constant,
+        the sensor is held on a finer grid: the rate of its fall is unknown, and the zero is kept.
     """
     lost = np.zeros(v.size, dtype=np.bool_)
     if v.size < 2:
@@ -193,15 +193,15 @@ def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
 
 
 def is_leap(dt_ns: TimeArray, dv: FloatArray) -> BoolArray:
-    """Which steps (n,) of a wheel's speed [m/s at the rim] no wheel can make in their time [ns]."""
+    """Flag steps (n,) of a wheel's speed [m/s at the rim] that no wheel can make in their time [ns]."""
     return np.abs(dv) > RIM_LIMIT * dt_ns * 1e-9 + _SLACK
 
 
 def _is_of_the_stamps(t_ns: TimeArray, v: FloatArray, i: int) -> bool:
-    """Whether the leap behind sample `i` is one of the stamps and not of the wheel.
+    """Return whether the leap behind sample `i` comes from the stamps and not from the wheel.
 
-    A buffer that is read late gives its samples stamps that are too close; of doubled stamps the last sample counts, so
-    that it is as much too early as the hole behind it is long. A wheel under ABS leaps in such a time by itself. What
+    A buffer that is read late gives its samples stamps that are too close. Of doubled stamps the last sample counts, so
+    that it is early by the length of the hole behind it. A wheel under ABS also leaps in such a time. A signal that
     stands at one value, or at zero, on a side of the leap is a dropout all the same.
     """
     if v[i] == 0.0 or v[i + 1] == 0.0 or (i and v[i - 1] == v[i]) or (i + 2 < v.size and v[i + 2] == v[i + 1]):
@@ -215,6 +215,6 @@ def _is_of_the_stamps(t_ns: TimeArray, v: FloatArray, i: int) -> bool:
 
 
 def _is_code(t_ns: TimeArray, omega: FloatArray, start: int) -> bool:
-    """Whether the signal stands at one value from a sample on until 1 s later."""
+    """Return whether the signal stands at one value from a sample on until 1 s later."""
     end = int(np.searchsorted(t_ns, t_ns[start] + RETURN_NS, side="left"))
     return end < t_ns.size and end - start >= _STANDS and bool((omega[start : end + 1] == omega[start]).all())

@@ -1,4 +1,4 @@
-"""The common grid of a drive, and one signal on it."""
+"""Build the common grid of a drive, and put one signal on it."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ class Grid(NamedTuple):
     dt_ns: int
 
     def points(self, first: int = 0, last: int | None = None) -> TimeArray:
-        """Stamps of rows from `first` to before `last`. [ns]"""
+        """Return the stamps of rows from `first` to before `last`. [ns]"""
         return self.start_ns + np.arange(first, self.rows if last is None else last, dtype=np.int64) * self.dt_ns
 
     def seconds(self, first: int = 0, last: int | None = None) -> FloatArray:
-        """The same from the first point on. [s]"""
+        """Return the same from the first point on. [s]"""
         return np.asarray((self.points(first, last) - self.start_ns) * 1e-9)
 
 
 def common_clock(channels: Sequence[Channel], signal_map: SignalMap) -> bool:
-    """Whether the drive has absolute time; refuses to join clocks that have nothing in common.
+    """Return whether the drive has absolute time; refuse to join clocks that have nothing in common.
 
-    A file whose offset the map gives has been moved onto the others' clock already.
+    A file whose offset the map gives is already on the others' clock.
     """
     free = [c for c in channels if not signal_map.joins(c.info.file)]
     kinds = {c.absolute for c in free or channels}
@@ -58,14 +58,14 @@ def common_clock(channels: Sequence[Channel], signal_map: SignalMap) -> bool:
 
 
 def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int = _MAX_ROWS) -> Grid:
-    """The grid at a rate, or else that of the wheel speeds, or else of the fastest signal.
+    """Build the grid at the rate asked for, else at that of the wheel speeds, else at that of the fastest signal.
 
     Raises
     ------
     SignalError
-        If there is no rate, or the stamps jump.
+        If no rate can be found, or the stamps jump.
     ConfigError
-        If it is the rate asked for that makes too many rows.
+        If the rate asked for makes too many rows.
     """
     dt_ns = _grid_step(cleaned, rate_hz)
     anchor_of = next((c for c in cleaned if c.symbol.name.startswith("omega_")), cleaned[0])
@@ -120,21 +120,21 @@ def onto_grid(
     dt_ns: int,
     at: Placed | None = None,
 ) -> tuple[FloatArray, bool]:
-    """A signal at points of the grid, and whether a sample was missing there.
+    """Put a signal on points of the grid; flag points where a sample was missing.
 
     Parameters
     ----------
     symbol : Symbol
     span : Span
-        Of the whole signal: what is bridged hangs on its sample time.
+        Of the whole signal: its sample time decides what is bridged.
     t_ns, x : arrays (n,)
-        Its samples, or those of a stretch with all that the points lie between.
+        Its samples, or a stretch of them that encloses the points.
     points : int64 array (m,)
         [ns]
     dt_ns : int
         Step of the grid. [ns]
     at : Placed, optional
-        Where the points lie among these stamps, if it is known.
+        Where the points lie among these stamps, if known.
     """
     is_state = symbol.kind == "state"
     gap_ns = gap_limit_ns(span.period_ns, is_state=is_state)
@@ -151,7 +151,7 @@ def onto_grid(
 
 
 def missing_samples(span: Span, grid: Grid) -> float:
-    """Share of the samples that a gapless channel of this rate would have: jittering stamps are not missing ones."""
+    """Return samples over those of a gapless channel of this rate: jittering stamps are not missing ones."""
     if span.mean_period_ns == 0:
         return 0.0
     expected = grid.rows * grid.dt_ns / span.mean_period_ns
@@ -159,12 +159,12 @@ def missing_samples(span: Span, grid: Grid) -> float:
 
 
 def frame_of(t: FloatArray, columns: dict[str, pl.Series], ordered: Sequence[str]) -> pl.DataFrame:
-    """The table: time and signals in their usual order."""
+    """Build the table: time and signals in their usual order."""
     return pl.DataFrame([pl.Series("t", t), *(columns[n].rename(n) for n in ordered)])
 
 
 def columns_of(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[str, pl.Series]]:
-    """Canonical columns of a signal: an axle torque becomes two wheels', a steering wheel angle a road-wheel angle."""
+    """Return the canonical columns of a signal: axle torque to two wheels, steering wheel angle to road-wheel angle."""
     if symbol.name in ("torque_f", "torque_r"):
         axle = symbol.name[-1]
         half = pl.Series(0.5 * y).fill_nan(None)

@@ -1,4 +1,4 @@
-"""From files to the table of signals, in one call."""
+"""Read files into the table of signals, in one call."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NAMED = 3  # files in a note
 
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
-    """What readers need to know of a signal map."""
+    """Return what readers need to know of a signal map."""
     return ReadOptions(tuple(dbc), signal_map.time_channel, signal_map.time_unit, signal_map.csv)
 
 
@@ -57,9 +57,9 @@ def load_signals(
     wanted : callable, optional
         Which symbols are of interest; default all.
     report : callable
-        Told what is being done.
+        Called with the name of each step.
     cache : SignalCache, optional
-        Asked first, and given what was read; not if only some symbols are wanted.
+        Looked up first, and given the result; not used if only some symbols are wanted.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def kept(
     report: Callable[[str], None],
     read: Callable[[], _Read],
 ) -> _Read | Signals:
-    """The signals that a cache has of a drive; else what is read, which it is given if it is a whole table."""
+    """Return the signals of a drive from the cache; else read them and keep the table if it is whole."""
     if cache is None:
         return read()
     report("looking into the cache")
@@ -109,7 +109,7 @@ def read_signals(
     rate_hz: float | None,
     report: Callable[[str], None],
 ) -> Signals:
-    """The table of channels that `find_channels` has found in an open log."""
+    """Build the table of channels that `find_channels` has found in an open log."""
     report(f"reading {len(found)} channels")
     channels = log.read(info for _, info in found.values())
     faults = [*log.faults, *idle_files(log, found)]
@@ -120,7 +120,7 @@ def read_signals(
 
 
 def idle_files(log: DriveLog, found: Mapping[str, tuple[Entry, ChannelInfo]]) -> list[FileFaults]:
-    """A note on files of a drive that none of its signals is in: none, or one for all of them."""
+    """Return a note on files of a drive that hold none of its signals: one for all of them, or no note."""
     used = {info.file for _, info in found.values()}
     idle = [path.name for path in log.paths if path.name not in used]
     if not idle:
@@ -133,12 +133,12 @@ def idle_files(log: DriveLog, found: Mapping[str, tuple[Entry, ChannelInfo]]) ->
 def find_channels(
     log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], bool] = lambda _: True
 ) -> dict[str, tuple[Entry, ChannelInfo]]:
-    """Channels of a drive that are signals, by symbol.
+    """Find the channels of a drive that are signals, by symbol.
 
     Raises
     ------
     SignalError
-        If there is none, or the map names one that is not there.
+        If no channel is a signal, or the map names one that the log does not hold.
     """
     channels = log.channels()  # first: what is damaged is told then
     notes = [n for f in log.faults for n in f.notes if f.truncated or f.lost_samples or "CAN frames" in n]
@@ -150,7 +150,7 @@ def find_channels(
         raise SignalError(f"{error.what} ({notes[0]})", where=error.where, hint=error.hint) from error
     if not found:
         count = len(channels)
-        # where there is none, whatever was left out is the reason
+        # without any signal, whatever was left out is the reason
         raise _nothing_mapped(log.paths, count, notes if notes or count else [n for f in log.faults for n in f.notes])
     return found
 

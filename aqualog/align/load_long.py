@@ -1,4 +1,4 @@
-"""From files to the windows of a drive, for logs that do not fit into memory as a whole."""
+"""Read files into the windows of a drive, for logs that do not fit into memory as a whole."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ def load_drive(
     least: int = LONG,
     cache: SignalCache | None = None,
 ) -> Signals | LoadedLong:
-    """A drive as a whole, or one that is long to be gone through in windows.
+    """Open a drive: as a whole, or window by window if it is long.
 
     Parameters
     ----------
     paths, vehicle, signal_map, dbc, rate_hz, report, cache
         As of `load_signals`.
     note : callable
-        Told why a long drive is read as a whole.
+        Called with the reason why a long drive is read as a whole.
     whole_for : str
-        What needs the whole of it, if anything does.
+        Name of the feature that needs the whole drive; empty without one.
     least : int
         Samples of all signals together from which a drive is long.
 

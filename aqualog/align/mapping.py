@@ -1,4 +1,4 @@
-"""Which channel is which signal: data, not code."""
+"""Which channel is which signal, as data and not as code."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SourceClock:
 
 @dataclass(frozen=True, slots=True)
 class SignalMap:
-    """A signal map; the empty one takes canonical names only."""
+    """A signal map; the empty map accepts canonical names only."""
 
     entries: Mapping[str, Entry] = field(default_factory=dict)
     clocks: Mapping[str, SourceClock] = field(default_factory=dict)
@@ -56,11 +56,11 @@ class SignalMap:
     csv: Mapping[str, CsvFormat] = field(default_factory=dict)
 
     def clock_of(self, file: str) -> SourceClock:
-        """The clock correction of a file, by name or glob pattern."""
+        """Return the clock correction of a file, by name or glob pattern."""
         return next((c for pattern, c in self.clocks.items() if _names(pattern, file)), SourceClock())
 
     def joins(self, file: str) -> bool:
-        """Whether the map says how this file's clock stands against the others'."""
+        """Return whether the map gives the offset of this file's clock."""
         return any(_names(pattern, file) for pattern in self.clocks)
 
 
@@ -69,12 +69,12 @@ def _names(pattern: str, file: str) -> bool:
 
 
 def channel_id(info: ChannelInfo) -> str:
-    """`file:path`, unique within a drive of several files."""
+    """Return `file:path`, unique within a drive of several files."""
     return f"{info.file}:{info.path}"
 
 
 def map_text(signal_map: SignalMap) -> str:
-    """All of a map that signals depend on, for keys. Order counts: of two patterns for one clock the first holds."""
+    """Return all of a map that signals depend on, for keys. Order counts: the first pattern that fits a clock holds."""
     entries, clocks = tuple(signal_map.entries.items()), tuple(signal_map.clocks.items())
     return repr((entries, clocks, signal_map.time_channel, signal_map.time_unit, tuple(signal_map.csv.items())))
 
@@ -129,7 +129,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
 
 
 def matching(channels: Iterable[ChannelInfo], wanted: str) -> list[ChannelInfo]:
-    """Channels that a name of the map may mean: the most specific kind of match that hits at all."""
+    """Return the channels that a name of the map may mean: the most specific kind of match with any hit."""
     listed = list(channels)
     for test in (
         lambda c: channel_id(c) == wanted,

@@ -1,4 +1,4 @@
-"""What a channel holds at a glance: rate, range, gaps, faults."""
+"""Summarise a channel: rate, range, gaps, faults."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ChannelOverview:
 
 
 def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
-    """Figures of one channel. Times count from `origin_ns`; a gap is more than five median sample times."""
+    """Summarise one channel. Times count from `origin_ns`; a gap is more than five median sample times."""
     t_ns, _, faults = ClockRepair().repair(channel.t_ns)
     finite = channel.values[np.isfinite(channel.values)]
     steps = np.diff(t_ns)
@@ -89,10 +89,10 @@ def _remark(channel: Channel, finite: FloatArray) -> str:
 
 
 def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
-    """Sentences on three-axis accelerometers whose vertical is not z.
+    """Return sentences on three-axis accelerometers whose vertical is not z.
 
-    Gravity tells how a sensor is mounted: on a car whose sensor stands upright, the mean of z is about 1 g and those of
-    x and y are small.
+    Gravity shows how a sensor is mounted. On a car whose sensor stands upright, the mean of z is about 1 g and the
+    means of x and y are small.
     """
     sentences = []
     for stem, axes in _triples(found).items():
@@ -102,16 +102,16 @@ def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
         listed = ", ".join(f"{a} {mean[a]:+.2f}" for a in "xyz")
         if down != "z":
             sentences.append(
-                f"{stem}: gravity is on {down} (mean {listed} m/s^2), so the sensor is mounted rotated; its axes are "
+                f"{stem}: gravity is on {down} (mean {listed} m/s²), so the sensor is mounted rotated; its axes are "
                 f"not the car's: {down} is vertical and carries no driving acceleration"
             )
         elif tilt > 3.0:
-            sentences.append(f"{stem}: tilted by {tilt:.0f} deg (mean {listed} m/s^2); x and y hold part of gravity")
+            sentences.append(f"{stem}: tilted by {tilt:.0f} deg (mean {listed} m/s²); x and y hold part of gravity")
     return sentences
 
 
 def rotated_channels(found: Sequence[ChannelOverview]) -> set[tuple[str, str]]:
-    """(file, path) of the accelerometer axes that are not the car's, because gravity is not on z."""
+    """Return (file, path) of the accelerometer axes that are not the car's, because gravity is not on z."""
     return {
         (axis.file, axis.path)
         for axes in _triples(found).values()
@@ -121,7 +121,7 @@ def rotated_channels(found: Sequence[ChannelOverview]) -> set[tuple[str, str]]:
 
 
 def _gravity(axes: dict[str, ChannelOverview]) -> tuple[dict[str, float], str | None, float]:
-    """Mean of each axis [m/s^2], the axis that gravity is on (None if the sum is not 1 g), tilt from it [deg]."""
+    """Return the mean of each axis [m/s²], the axis with gravity (None if the sum is not 1 g), tilt from it [deg]."""
     factor = _acceleration_factor(axes["x"].unit)
     mean = {a: axes[a].mean * factor for a in "xyz"}
     total = float(np.sqrt(sum(v * v for v in mean.values())))

@@ -1,7 +1,6 @@
-"""Samples of one signal that arrive piece by piece: the same ones are left out as if they had come in one.
+"""Clean the samples of one signal that arrive piece by piece, with the same result as in one piece.
 
-What needs the whole of a channel (stamps out of order, resets, wraps) is not done here but told by `NotInPiecesError`:
-such a log is read in one.
+Stamps out of order, resets and wraps need the whole channel. They raise `NotInPiecesError`: such a log is read at once.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ _NO_VALUES: FloatArray = np.zeros(0)
 
 
 class NotInPiecesError(Exception):
-    """The log has what only the whole of it tells."""
+    """The log can only be cleaned as a whole."""
 
 
 @dataclass(slots=True)
 class _Steps:
-    """Sample times of stamps that arrive in pieces: their median, and the mean of those that are no gaps."""
+    """Sample times of stamps that arrive in pieces: their median, and the mean without gaps."""
 
     first: list[TimeArray] = field(default_factory=list)
     kept: int = 0
@@ -66,7 +65,7 @@ class _Steps:
         self.count += steps.size
 
     def finish(self) -> tuple[int, int]:
-        """Median and mean. [ns]"""
+        """Return median and mean. [ns]"""
         if not self.late:
             self._settle()
         return self.median, mean_of_steps(self.total, self.count)
@@ -84,13 +83,12 @@ class PieceCleaner:
     signal_map : SignalMap
     vehicle : Vehicle
     freezes : tuple of Freeze, optional
-        Where the signal is known to be frozen, from `frozen` of an earlier pass; without them nothing is left out for
-        that.
+        Where the signal is frozen, from `frozen` of an earlier pass; without them no sample is left out as frozen.
 
     Raises
     ------
     SignalError, ConfigError
-        If the unit is not one of the signal: the latter where the map gives it.
+        If the unit does not fit the signal; ConfigError where the map gives the unit.
     """
 
     def __init__(
@@ -135,7 +133,7 @@ class PieceCleaner:
         self._dead: float | None = None  # the value at which a sensor stands since a step that no wheel can make
 
     def push(self, t_ns: TimeArray, raw: FloatArray, *, absolute: bool) -> tuple[TimeArray, FloatArray]:
-        """Usable samples that are now certain, in SI; the rest comes with later pieces."""
+        """Return usable samples that are now certain, in SI; the rest comes with later pieces."""
         if t_ns.size == 0:
             return _NO_TIMES, _NO_VALUES
         if self.absolute is None:
@@ -156,7 +154,7 @@ class PieceCleaner:
         return self._settled(t[:-1][~same], raw[:-1][~same])
 
     def finish(self) -> tuple[TimeArray, FloatArray]:
-        """The samples that were held back."""
+        """Return the samples that were held back."""
         t, x = self._settled(self._held_t, self._held_raw)
         self._held_t, self._held_raw = _NO_TIMES, _NO_VALUES
         if self._rule is None:
@@ -203,7 +201,7 @@ class PieceCleaner:
         return t, x
 
     def _without_glitches(self, t: TimeArray, x: FloatArray, *, is_last: bool) -> tuple[TimeArray, FloatArray]:
-        """Samples whose next second is known, less those that no car can have made."""
+        """Return samples whose next second is known, without those that no car can have made."""
         if self._dead is not None:
             moving = np.flatnonzero(x != self._dead)
             dead = int(moving[0]) if moving.size else x.size
@@ -246,11 +244,11 @@ class PieceCleaner:
             self._first_glitch_ns = int(t[0])
 
     def frozen(self) -> tuple[Freeze, ...]:
-        """Where the signal is frozen; complete after `finish`."""
+        """Return where the signal is frozen; complete after `finish`."""
         return self._freezes if self._watch is None else self._watch.finish()
 
     def cleaned(self) -> tuple[Clean, list[str]]:
-        """The signal without its samples, and the notes on it; complete after `finish`."""
+        """Return the signal without its samples, and the notes on it; complete after `finish`."""
         period, _ = self._all.finish()
         used, mean = self._used.finish()
         first, last = self._ends or (0, 0)
@@ -287,7 +285,7 @@ class PieceCleaner:
 
 
 def _dead_since(glitch: BoolArray, x: FloatArray) -> int:
-    """Where the one value begins at which the glitch at the end stands; beyond the end if it is no dead sensor."""
+    """Return where the constant value of the glitch at the end begins; beyond the end if the sensor is not dead."""
     last = np.flatnonzero(~glitch)
     start = int(last[-1]) + 1 if last.size else 0
     return start if bool((x[start:] == x[-1]).all()) else glitch.size

@@ -1,7 +1,7 @@
 """Propose a signal map for a log with names of its own.
 
-Names say which channel a signal may be, units rule out what cannot be, and the data decide among what is left: an
-accelerometer must move with the derivative of the speed, a yaw rate with the difference of the wheels.
+A name suggests which signal a channel may be, and its unit rules out wrong ones. The data decide among the rest: an
+accelerometer must follow the derivative of the speed, a yaw rate the difference of the wheel speeds.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ _RULES = (
 
 
 def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
-    """The most likely channel of each signal.
+    """Return the most likely channel of each signal.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
     Returns
     -------
     mapping symbol -> Proposal
-        Only what name and unit support; the reason says what the data said. A guess to be checked, never used silently.
+        Signals that name and unit support; the reason holds the evidence of the data. Check a proposal before use.
     """
     usable = _Named(c for c in channels if c.values.size > 1 and np.isfinite(c.values).any())
     found: dict[str, Proposal] = {}
@@ -149,7 +149,7 @@ def _keep_best(found: dict[str, Proposal], symbol: str, candidates: list[Proposa
 
 @lru_cache(maxsize=1 << 15)  # every rule asks for the words of every name, and a logger has thousands of them
 def words_of(text: str) -> tuple[str, ...]:
-    """Words of a name, lower case: `VehSpd_FL` -> veh, spd, fl."""
+    """Split a name into words, lower case: `VehSpd_FL` -> veh, spd, fl."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text)
     return tuple(w.lower() for w in re.split(r"[^A-Za-z]+", spaced) if w)
 
@@ -167,7 +167,7 @@ class _Named(list[Channel]):
 
 
 def _has(wanted: Sequence[str], words: Sequence[str]) -> bool:
-    """Whether one of the words stands in a name, by itself or (from four letters on) inside a compound."""
+    """Return whether one of the words stands in a name, by itself or (from four letters on) inside a compound."""
     return any(w in words or (len(w) >= 4 and any(w in word for word in words)) for w in wanted)
 
 
@@ -179,7 +179,7 @@ def _dimension(channel: Channel) -> str:
 
 
 def _address(channel: Channel, channels: _Named) -> str:
-    """Shortest unique name: the path where it is unique, else with the file."""
+    """Return the shortest unique name: the path where it is unique, else with the file."""
     return channel.info.path if channels.times[channel.info.path] == 1 else channel_id(channel.info)
 
 
@@ -238,7 +238,7 @@ def _candidate(rule: _Rule, channel: Channel, channels: _Named) -> Proposal | No
 
 
 def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
-    """A channel that is 0 or 1 and is called after a wet lane or the light barriers at its ends."""
+    """Propose a channel that is 0 or 1 and is named after a wet lane or the light barriers at its ends."""
     words = words_of(channel.info.name)
     named = _has(_LANE_WORDS, words) or any(w in " ".join(words) for w in _LANE_WORDS if " " in w)
     if not named or set(words) & (_NOT_A_VALUE - _LANE_FLAGS) or channel.info.unit == "%":
@@ -277,7 +277,7 @@ _LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
 
 
 def _speed(found: dict[str, Proposal], channels: _Named) -> tuple[TimeArray, FloatArray] | None:
-    """Speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
+    """Return the speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
     for symbol in ("omega_rl", "omega_fl", "v_x"):
         if symbol in found:
             channel = channels.by_address[found[symbol].entry.channel[0]]

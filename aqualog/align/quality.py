@@ -1,4 +1,4 @@
-"""What was lost on the way from the files to the grid."""
+"""Count what was lost between the files and the grid."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ NAMED = 6  # signals in one line
 
 
 def missing_notes(origins: Iterable[Origin]) -> list[str]:
-    """What has no value for much of the drive, one line for signals of one file that are alike.
+    """Return notes on signals without values for much of the drive; signals of one file that are alike share a line.
 
-    Nothing else tells of a rate that falls to less than a fifth: each step is then a gap, and no detector judges there.
+    A rate that falls to less than a fifth shows up only here: each step is then a gap, and no detector judges there.
     """
     alike: dict[tuple[str, int, int], list[str]] = {}
     for o in origins:
@@ -38,7 +38,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], notes: Sequence[str]) -> Quality:
-    """Counts and notes of a drive, from its signals' origins and what the readers lost."""
+    """Collect counts and notes of a drive, from its signals' origins and the losses that the readers report."""
     by_file: dict[str, TimeFaults] = {}
     for clean in cleaned:  # the channels of one file mostly share their stamps: the worst one speaks for the file
         seen, new = by_file.get(clean.origin.file, TimeFaults()), clean.origin.faults
@@ -83,12 +83,12 @@ def _time_note(file: str, faults: TimeFaults) -> str:
 
 
 def _reset_notes(by_file: Mapping[str, TimeFaults]) -> list[str]:
-    """Files whose clock began anew, beside others whose clock went on: only they are moved."""
+    """Return files whose clock restarts beside others whose clock goes on: only they are moved."""
     went_on = [file for file, faults in by_file.items() if not faults.resets]
     return [
-        f"{file}: its clock begins anew{faults.place('resets')}, that of {_listed(went_on)} does not: what follows is "
-        "put 1 s behind what came before, as if it had been off for so long, and may be out of step with the other "
-        "files (`aqualog align` compares them; else cut the file there)"
+        f"{file}: its clock restarts{faults.place('resets')}, that of {_listed(went_on)} does not. The part after the "
+        "restart is placed 1 s behind the part before, which assumes a pause of 1 s; it may be out of step with the "
+        "other files (`aqualog align` compares them; else cut the file there)"
         for file, faults in by_file.items()
         if faults.resets and went_on
     ]

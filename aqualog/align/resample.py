@@ -1,4 +1,4 @@
-"""One channel onto the common grid: linear or hold, never across a gap, never beyond the ends."""
+"""Put one channel on the common grid: linear or hold, never across a gap, never beyond the ends."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has t
 
 
 def median_period_ns(t_ns: TimeArray) -> int:
-    """Median sample time of the first 2^18 steps. [ns] 0 for fewer than two samples."""
+    """Return the median sample time of the first 2^18 steps. [ns] 0 for fewer than two samples."""
     return int(np.median(np.diff(t_ns[: MEDIAN_OF + 1]))) if t_ns.size > 1 else 0
 
 
 def gap_limit_ns(period_ns: int, *, is_state: bool) -> int:
-    """Longest interval across which a value may be carried, by the median sample time. [ns]
+    """Return the longest interval across which a value may be carried, by the median sample time. [ns]
 
     Five sample times for a continuous signal (at least 50 ms), ten for a state (at least 2 s): a lost frame or two is
     bridged, an outage is not.
@@ -29,7 +29,7 @@ def gap_limit_ns(period_ns: int, *, is_state: bool) -> int:
 
 
 class Placed(NamedTuple):
-    """Where the points (m,) of a grid lie among stamps (n,).
+    """Positions of the points (m,) of a grid among stamps (n,).
 
     `right` (m,): the first stamp that is not before the point, n behind the last; `exact` (m,): it is at the point;
     `between`: indices (k,) of the points with a stamp on either side, `span` (k,) the interval there [ns], and `share`
@@ -44,10 +44,10 @@ class Placed(NamedTuple):
 
 
 def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Placed:
-    """Place points of a grid among strictly increasing stamps, at least one; signals with the same stamps share it.
+    """Find the points of a grid among strictly increasing stamps, at least one; signals with the same stamps share it.
 
-    With the step [ns] of points that are even, stamps are counted by the step that they fall into; else each point is
-    searched for.
+    With the step [ns] of even points, stamps are counted by the step that they fall into; else each point is searched
+    for.
     """
     n, m = t_ns.size, grid_ns.size
     if dt_ns is not None and m:
@@ -74,7 +74,7 @@ def linear(
     period_ns: int | None = None,
     at: Placed | None = None,
 ) -> tuple[FloatArray, BoolArray]:
-    """Linear interpolation.
+    """Interpolate linearly.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ def linear(
     x : array (n,)
         Finite samples.
     grid_ns : int64 array (m,)
-        Where values are wanted.
+        Points at which values are wanted.
     gap_ns : int
         Longest interval that may be bridged.
     period_ns : int, optional
         Median sample time; default that of the stamps.
     at : Placed, optional
-        Of these stamps and points, if it is known.
+        Positions of these points among these stamps, if known.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def linear(
 
 
 def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at: Placed | None = None) -> FloatArray:
-    """Last value held, at most `gap_ns` long and not beyond the last stamp by more than that. Shapes as `linear`."""
+    """Hold the last value for at most `gap_ns`, also beyond the last stamp. Shapes as `linear`."""
     y = np.full(grid_ns.size, np.nan)
     if t_ns.size == 0:
         return y
@@ -134,7 +134,7 @@ def bin_mean(
     period_ns: int | None = None,
     at: Placed | None = None,
 ) -> tuple[FloatArray, BoolArray]:
-    """Mean of the samples within half a grid step on either side, for signals much faster than the grid.
+    """Average the samples within half a grid step on either side, for signals much faster than the grid.
 
     Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
     Returns as `linear`.

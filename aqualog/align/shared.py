@@ -1,4 +1,4 @@
-"""What the channels of one group share, their time stamps above all, is worked out once."""
+"""Work out once what the channels of one group share, above all their time stamps."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _Value = TypeVar("_Value")
 
 
 class OfLast(Generic[_Value]):
-    """A function of an array that is asked again and again with the very same one: the last answer is kept.
+    """A function of an array that is called repeatedly with the same object; the last answer is kept.
 
     Parameters
     ----------
     function : callable
-        Of one array, which nobody changes in between.
+        Function of one array, which must not change in between.
     """
 
     def __init__(self, function: Callable[[NDArray[Any]], _Value]) -> None:
@@ -26,7 +26,7 @@ class OfLast(Generic[_Value]):
         self._last: tuple[NDArray[Any], _Value] | None = None
 
     def __call__(self, array: NDArray[Any]) -> _Value:
-        """The answer for this array, from before if it is the same object."""
+        """Return the answer for this array, from before if it is the same object."""
         if self._last is None or self._last[0] is not array:
             self._last = (array, self._function(array))
         return self._last[1]

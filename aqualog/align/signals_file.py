@@ -1,4 +1,4 @@
-"""Signals as the bytes of one Parquet file, and back, the same to the bit."""
+"""Write signals as the bytes of one Parquet file, and read them back, the same to the bit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DAMAGED = (ValueError, KeyError, TypeError, OSError, pl.exceptions.PolarsError,
 
 
 def to_parquet(signals: Signals) -> io.BytesIO:
-    """The frame as Parquet; what else the record holds stands as JSON in its metadata."""
+    """Return the frame as Parquet; the rest of the record stands as JSON in its metadata."""
     records = {
         "dt_ns": signals.dt_ns,
         "start_ns": signals.start_ns,
@@ -36,12 +36,12 @@ def to_parquet(signals: Signals) -> io.BytesIO:
 
 
 def from_parquet(data: bytes) -> Signals:
-    """Signals from such bytes.
+    """Read signals from such bytes.
 
     Raises
     ------
     ValueError
-        If they are none of these.
+        If the bytes hold no signals.
     """
     try:
         records = _records(io.BytesIO(data))
@@ -55,12 +55,12 @@ def from_parquet(data: bytes) -> Signals:
 
 
 def files_of(path: Path) -> tuple[str, ...]:
-    """Names of the files that the signals in a Parquet file come from.
+    """Return the names of the files that the signals in a Parquet file come from.
 
     Raises
     ------
     ValueError
-        If it holds no signals.
+        If the file holds no signals.
     """
     try:
         return tuple(str(n) for n in _records(path)["files"])
@@ -73,5 +73,5 @@ def _records(source: Path | io.BytesIO) -> Any:
 
 
 def _plain(x: Any) -> Any:
-    """Numbers of numpy as Python's own."""
+    """Convert numbers of numpy to Python's own."""
     return x.item()

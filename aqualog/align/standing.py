@@ -1,4 +1,4 @@
-"""Stretches of time in which the car stands: what stays the same there tells nothing of its sensor."""
+"""Find stretches in which the car stands: a constant value there is no evidence of a dead sensor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Stretch = tuple[int, int]
 """First and last stamp. [ns]"""
 
 SPEEDS = ("v_x", "omega_fl", "omega_fr", "omega_rl", "omega_rr")
-"""Signals that tell whether the car stands, the best one first."""
+"""Signals that show whether the car stands, the best one first."""
 
 _STANDING = 0.5  # [m/s]
 _STOPPING = 20.0  # [m/s^2] a speed that falls to zero faster is lost, and no car that stops
@@ -23,14 +23,14 @@ _GAP_NS = 2_500_000_000  # GNSS tells its speed once a second
 
 
 def stand_watch_of(name: str, r_e: float | None) -> StandWatch | None:
-    """The watch of a speed, with the effective radius [m] of a wheel; None for signals that tell no speed."""
+    """Return the check of a speed, with the effective radius [m] of a wheel; None for signals that are no speed."""
     return StandWatch(1.0 if r_e is None else r_e) if name in SPEEDS else None
 
 
 class StandWatch:
-    """Goes through the samples of one speed, in any pieces. `scale` makes them m/s.
+    """Check the samples of one speed, in any pieces. `scale` makes them m/s.
 
-    `has_moved` tells whether a sample so far was one of a car that does not stand.
+    `has_moved`: a sample so far was of a moving car.
     """
 
     def __init__(self, scale: float = 1.0) -> None:
@@ -42,7 +42,7 @@ class StandWatch:
         self._found: list[Stretch] = []
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
-        """Samples (n,) at strictly increasing stamps, finite."""
+        """Take samples (n,) at strictly increasing stamps, finite."""
         if not t_ns.size:
             return
         v = np.abs(x) * self._scale
@@ -67,14 +67,14 @@ class StandWatch:
         self._since = None
 
     def finish(self) -> tuple[Stretch, ...]:
-        """Stretches in which the car stands, in order."""
+        """List the stretches in which the car stands, in order."""
         if self._since is None or not self._is_sound or self._last is None:
             return tuple(self._found)
         return (*self._found, (self._since, self._last[0]))
 
 
 def standing_by(watches: Iterable[StandWatch]) -> tuple[Stretch, ...]:
-    """When the car stands by the first speed that moves at all, the best one first: one that never does may be dead."""
+    """Return when the car stands, by the best speed that moves at all: one that never does may be dead."""
     found: tuple[Stretch, ...] = ()
     for watch in watches:
         if watch.has_moved:
@@ -84,7 +84,7 @@ def standing_by(watches: Iterable[StandWatch]) -> tuple[Stretch, ...]:
 
 
 def is_standing(t_ns: TimeArray, stretches: Sequence[Stretch]) -> BoolArray:
-    """Through which steps (n-1,) between stamps (n,) the car stands from begin to end."""
+    """Flag the steps (n-1,) between stamps (n,) through which the car stands from begin to end."""
     if not stretches or t_ns.size < 2:
         return np.zeros(max(t_ns.size - 1, 0), dtype=np.bool_)
     start, end = np.array(stretches, dtype=np.int64).T
@@ -93,5 +93,5 @@ def is_standing(t_ns: TimeArray, stretches: Sequence[Stretch]) -> BoolArray:
 
 
 def standing_ns(start_ns: int, end_ns: int, stretches: Sequence[Stretch]) -> int:
-    """How much of a span of time the car stands. [ns]"""
+    """Return how much of a span of time the car stands. [ns]"""
     return sum(max(min(end_ns, b) - max(start_ns, a), 0) for a, b in stretches)

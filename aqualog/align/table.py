@@ -1,4 +1,4 @@
-"""Channels of one drive onto one table."""
+"""Build one table of the channels of a drive."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def build_signals(
     stamps = Stamps()
 
     def watched() -> Iterator[StandWatch]:
-        """The speeds that there are, gone through one by one as they are asked for."""
+        """Yield the speeds of the drive one by one, each on demand."""
         for name in SPEEDS:
             watch = stand_watch_of(name, vehicle.r_e(name[-2:]) if name != "v_x" else None)
             if watch is not None and name in mapped:
@@ -68,7 +68,7 @@ def build_signals(
                     yield watch
 
     def standing() -> tuple[Stretch, ...]:
-        """When the car stands, by the best speed there is."""
+        """Return when the car stands, by the best speed of the drive."""
         return standing_by(watched())
 
     cleaned = [

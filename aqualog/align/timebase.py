@@ -1,4 +1,4 @@
-"""Time stamps of one source: classified, repaired where the fault is understood, and counted.
+"""Repair the time stamps of one source: classify faults, repair those that are understood, count all.
 
 | fault | how it looks | rule |
 |---|---|---|
@@ -35,10 +35,10 @@ _MOST_AGAIN = 20_000  # samples that are looked at
 
 
 class ClockRepair:
-    """Repairs the time vectors of one file.
+    """Repair the time vectors of one file.
 
-    Channels of one file may have vectors of their own; a reset shifts all of them by the same amount, so that they
-    stay in step. A vector that several of them share is repaired once, and so is what is given back for it.
+    Channels of one file may have vectors of their own. A reset shifts all of them by the same amount, so that they stay
+    in step. A vector that several channels share is repaired once, and they share the result.
     """
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ class ClockRepair:
         )  # fmt: skip
 
     def _large_steps(self, t_ns: TimeArray, steps: TimeArray, period: int) -> tuple[TimeArray, list[int], list[int]]:
-        """Stamps (n,) without them, and the samples before wraps and before resets."""
+        """Return stamps (n,) without them, and the samples before wraps and before resets."""
         shift = np.zeros(t_ns.size, dtype=np.int64)
         wraps: list[int] = []
         resets: list[int] = []
@@ -139,9 +139,9 @@ class ClockRepair:
 
 
 def _is_stray(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
-    """Which stamps (n,) are from elsewhere: those before and behind them belong together.
+    """Flag stamps (n,) that come from elsewhere: the stamps before and behind them belong together.
 
-    Were they taken for a reset, all that follows would be moved, in one channel of a file and not in the others.
+    Taken for a reset, such a stamp would move the rest of one channel and not that of the others.
     """
     stray = np.zeros(t_ns.size, dtype=np.bool_)
     leaps = np.abs(steps) > _SECOND
@@ -169,10 +169,10 @@ def _is_stray(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
 
 
 def _is_again(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
-    """Which stamps (n,) a clock that was set back, by up to 1 s, goes through once more.
+    """Flag stamps (n,) that a clock set back by up to 1 s passes a second time.
 
-    A late sample fills a hole among those before it; a clock that was set back has none there, and sorted its samples
-    would be those of two times in turns.
+    A late sample fills a hole among those before it. A clock that was set back leaves no hole: sorting would mix the
+    samples of two times.
     """
     again = np.zeros(t_ns.size, dtype=np.bool_)
     for k in np.flatnonzero(steps <= min((1 - _SET_BACK) * period, -1)).tolist():
@@ -187,11 +187,11 @@ def _is_again(t_ns: TimeArray, steps: TimeArray, period: int) -> BoolArray:
 
 
 def _is_doubled(t_ns: TimeArray, begin: int, last: int) -> bool:
-    """Whether behind sample `last` the block that ends there stands once more, as a disk or stick may write it.
+    """Return whether the block that ends at sample `last` follows once more, as a disk or stick may write it.
 
-    `begin` is where the clock last began: a drive that repeats all stamps since then is another drive on the same
-    clock, and stamps on an even grid prove nothing: a clock that was put back has them, too. The sample at the joint
-    may be of two halves, so that its own stamp need not come again.
+    `begin` is the last restart of the clock: a drive that repeats all stamps since then is another drive on the same
+    clock. Stamps on an even grid prove nothing, since a clock that was set back has them, too. The sample at the joint
+    may consist of two halves, so that its own stamp need not come again.
     """
     first = np.flatnonzero(t_ns[begin : last + 1] == t_ns[last + 1])
     if not first.size or first[-1] == 0:
@@ -208,10 +208,10 @@ def _median_period(steps: TimeArray) -> int:
 
 
 def _wrap_of(span: int, period: int) -> int | None:
-    """The counter length that explains a jump back, if one does within a few sample times."""
+    """Return the counter length that explains a jump back to within a few sample times; None without one."""
     tolerance = max(3 * period, 2_000_000)
     for wrap in _WRAPS_NS:
-        # a counter wraps from its very end to its very start, so a short span cannot be told from a restart
+        # a counter wraps from its very end to its very start, so a short span cannot be distinguished from a restart
         if abs(span - wrap) <= tolerance and wrap > 20 * _SECOND:
             return wrap
     return None

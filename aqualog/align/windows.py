@@ -1,9 +1,9 @@
-"""A drive that is longer than memory, window by window onto the same grid as in one go.
+"""Build a drive that is longer than memory window by window, on the same grid as in one go.
 
-The files are gone through twice: first for what only the whole of a signal tells (first and last stamp, sample times,
-counts; once more if a signal is frozen somewhere), then for the samples. A window's values are those of `build_signals`
-bit for bit: every point of the grid has the same samples around it. A log for which that cannot be promised raises
-`NotInPiecesError` before anything is given out.
+The files are read twice. The first pass finds what depends on the whole of a signal: first and last stamp, sample
+times, counts. (A frozen signal needs one pass more.) The second pass reads the samples. A window's values equal those
+of `build_signals` bit for bit: every point of the grid has the same samples around it. A log for which that cannot be
+promised raises `NotInPiecesError` before the first window.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Parts = Callable[[], Sequence[Part]]  # every call goes through the files anew
 
 @dataclass(frozen=True, slots=True)
 class LongDrive:
-    """What is known of the whole of a drive before its windows are made.
+    """A drive whose first pass is done and whose windows can be made.
 
     `cleaned`: its signals without samples; `notes` on them; `absolute`: whether the grid counts from 1970.
     """
@@ -55,17 +55,17 @@ class LongDrive:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """Canonical signals in their usual order."""
+        """Return canonical signals in their usual order."""
         names = {n for c in self.cleaned for n, _ in columns_of(c.symbol, np.zeros(0), self._vehicle)}
         return tuple(n for n in SYMBOLS if n in names)
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Files of its signals."""
+        """Return files of its signals."""
         return tuple(dict.fromkeys(c.origin.file for c in self.cleaned))
 
     def windows(self, rows: int) -> Iterator[tuple[Signals, Mapping[str, bool]]]:
-        """The drive in windows of so many rows, the last one shorter.
+        """Yield the drive in windows of so many rows, the last one shorter.
 
         Yields
         ------
@@ -107,7 +107,7 @@ class LongDrive:
         return Signals(frame, self.grid.dt_ns, start, {}, quality_of((), (), ()), ()), bridged
 
     def facts(self, missing: Mapping[str, int], bridged: frozenset[str], faults: Sequence[FileFaults]) -> Signals:
-        """Origins and quality of the whole drive, with an empty table.
+        """Return origins and quality of the whole drive, with an empty table.
 
         Parameters
         ----------
@@ -140,23 +140,23 @@ def long_drive(
     rate_hz: float | None = None,
     tell: Callable[[int], None] = lambda _: None,
 ) -> LongDrive:
-    """Go through the files once.
+    """Read the files once and plan the windows.
 
     Parameters
     ----------
     found : mapping symbol -> (entry, channel)
         As found by `resolve`.
     parts : callable
-        Gives the pieces of the channels, from the start each time it is called.
+        Returns the pieces of the channels, from the start at each call.
     signal_map, vehicle, rate_hz
         As of `build_signals`.
     tell : callable
-        Called with the samples gone through so far.
+        Called with the number of samples read so far.
 
     Raises
     ------
     NotInPiecesError
-        If only the whole of a channel would tell.
+        If a channel can only be repaired as a whole.
     SignalError, ConfigError
         As `build_signals`.
     """
@@ -188,7 +188,7 @@ def long_drive(
 def _gone_through(
     cleaners: Mapping[str, PieceCleaner], found: Found, parts: Parts, tell: Callable[[int], None]
 ) -> dict[str, Channel]:
-    """Give the cleaners all samples; channels of the signals that have any, without samples."""
+    """Pass all samples to the cleaners; return the channels with any samples, without the samples."""
     clocks: dict[str, Channel] = {}
     done = 0
     for part in parts():
@@ -224,7 +224,7 @@ def _names_of(found: Found, info: ChannelInfo) -> list[str]:
 
 
 class _Buffer:
-    """Samples of one signal that windows still need."""
+    """Samples of one signal that later windows still need."""
 
     def __init__(self, clean: Clean) -> None:
         self.symbol = clean.origin.symbol
@@ -246,14 +246,14 @@ class _Buffer:
         return self._t[0], self._x[0]
 
     def forget(self, point_ns: int) -> None:
-        """Keep what points behind this one may look at: bins begin half a step before their point."""
+        """Keep what later points may need: bins begin half a step before their point."""
         t, x = self.samples()
         start = max(int(np.searchsorted(t, point_ns, side="right")) - 1, 0)
         self._t, self._x = [t[start:].copy()], [x[start:].copy()]
 
 
 class _Source:
-    """The second pass: pieces on demand, of the part that has the signal that is furthest behind."""
+    """The second pass: read pieces on demand, of the part whose signal is furthest behind."""
 
     def __init__(self, parts: Sequence[Part], found: Found, cleaners: dict[str, PieceCleaner]) -> None:
         self._pieces = [p.pieces for p in parts]
@@ -263,7 +263,7 @@ class _Source:
         self._ended: set[int] = set()
 
     def pull(self, symbol: str, buffers: Mapping[str, _Buffer]) -> bool:
-        """One piece more of the part with this signal; False if there is none."""
+        """Read one piece more of the part with this signal; return False at its end."""
         i = next(k for k, symbols in enumerate(self._symbols) if symbol in symbols)
         if i in self._ended:
             return False
