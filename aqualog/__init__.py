@@ -1,8 +1,82 @@
 """Find aquaplaning in drive logs.
 
-Nothing heavy is imported here: `import aqualog` must stay cheap.
+    import aqualog as aq
+
+    car = aq.Vehicle.read("car.toml")
+    drive = aq.read("drive.mf4", map="map.toml")
+    result = aq.detect(drive, car)
+    result.events, result.plot(), result.save("out")
+
+Nothing heavy is imported here: each name is loaded when it is first used.
 """
 
-__all__ = ["__version__"]
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from aqualog import physics
+    from aqualog.errors import AqualogError
+    from aqualog.face.detect import Detection, detect
+    from aqualog.face.drive import Drive, read
+    from aqualog.model.term import Model
+    from aqualog.types import Signals
+    from aqualog.vehicle import Vehicle
 
 __version__ = "0.10.0"
+
+_FACE = {
+    "read": "aqualog.face.drive",
+    "detect": "aqualog.face.detect",
+    "Drive": "aqualog.face.drive",
+    "Signals": "aqualog.types",
+    "Vehicle": "aqualog.vehicle",
+    "Model": "aqualog.model.term",
+    "Detection": "aqualog.face.detect",
+    "physics": "aqualog.physics",
+    "AqualogError": "aqualog.errors",
+}
+
+__all__ = [
+    "AqualogError",
+    "Detection",
+    "Drive",
+    "Model",
+    "Signals",
+    "Vehicle",
+    "__version__",
+    "detect",
+    "physics",
+    "read",
+]
+
+
+class _Package(ModuleType):
+    """The package: a function of the face keeps its name although a folder beside it bears the same one.
+
+    The import system sets `aqualog.detect` to the folder as soon as something in it is imported.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (isinstance(value, ModuleType) and name in _FACE and value.__name__ != _FACE[name]):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name of the face."""
+    if name not in _FACE:
+        raise AttributeError(f"module 'aqualog' has no attribute {name!r}")
+    module = import_module(_FACE[name])
+    found = module if module.__name__ == f"aqualog.{name}" else getattr(module, name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 from aqualog.notation import WHEELS
@@ -92,7 +93,7 @@ def _default(path: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """One vehicle, SI. No behaviour beyond naming its wheels.
+    """One vehicle, SI.
 
     `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
     trusting a default.
@@ -124,6 +125,19 @@ class Vehicle:
     steering_torque: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     spread: Mapping[str, float] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
+
+    @classmethod
+    def read(cls, path: str | Path) -> Vehicle:
+        """Read and check a vehicle file (TOML). A key that is left out takes its default; see `KEYS`.
+
+        Raises
+        ------
+        ConfigError
+            With all faults of the file in one message.
+        """
+        from aqualog.config.vehicle import load_vehicle
+
+        return load_vehicle(Path(path))
 
     def r_e(self, wheel: str) -> float:
         """Effective rolling radius of a wheel. [m]"""

@@ -175,7 +175,7 @@ def write_table(out: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Rows of a document as CSV or Parquet, whole; intervals in two columns."""
     import polars as pl
 
-    from aqualog.cli.files import write_whole
+    from aqualog.face.paths import write_whole
     from aqualog.report.campaign_csv import safe_cell
     from aqualog.report.campaign_document import flat_rows
 

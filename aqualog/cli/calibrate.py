@@ -136,12 +136,12 @@ def _calibrate(
     changes = setup.changes()
     notes = (*(_of(name, paths, n) for name, paths in drives for n in loaded[name].quality.notes), *changes)
     if out_name is not None:
-        from aqualog.cli.files import write_text
         from aqualog.config.vehicle_edit import calibrated_toml
+        from aqualog.face.paths import write_text
 
         write_text(Path(out_name), calibrated_toml(setup.vehicle, result))
     if page_name is not None:
-        from aqualog.cli.files import write_whole
+        from aqualog.face.paths import write_whole
         from aqualog.report.calibration_page import write_calibration_page
 
         title = f"{result.vehicle_name}, {len(drives)} drives"
@@ -216,7 +216,7 @@ def _load(name: str, paths: list[Path], setup: Setup, dbc: list[Path], rate: flo
 
 def _drives(logs: list[str]) -> list[tuple[str, list[Path]]]:
     """Files by drive: a folder's belong together, those of a glob or a list do not; the same file counts once."""
-    from aqualog.cli.files import expand
+    from aqualog.face.paths import expand
 
     drives: list[tuple[str, list[Path]]] = []
     seen: set[Path] = set()

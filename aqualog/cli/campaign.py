@@ -91,9 +91,9 @@ def _init(
     progress: str,
 ) -> int:
     from aqualog.cli.console import Console
-    from aqualog.cli.files import refuse_existing, write_text
     from aqualog.config.vehicle import load_vehicle
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.paths import refuse_existing, write_text
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
     if not folder.is_dir():

@@ -233,8 +233,8 @@ def _write_map(path: Path, signal_map: Any, fits: dict[str, ClockFit]) -> None:
     from dataclasses import replace
 
     from aqualog.align.mapping import SourceClock
-    from aqualog.cli.files import write_text
     from aqualog.config.signal_map import map_text
+    from aqualog.face.paths import write_text
 
     clocks = dict(signal_map.clocks)
     for file, fit in fits.items():

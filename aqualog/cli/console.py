@@ -6,16 +6,20 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
-from typing import Any, TextIO, cast
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import typer
 
 from aqualog.cli.apart import apart
 from aqualog.errors import AqualogError, ConfigError, ExitCode
+from aqualog.face.listener import Listener
 
-__all__ = ["Console", "clean", "clean_line", "guarded", "told_if_interrupted"]
+if TYPE_CHECKING:
+    from aqualog.face.result import Result
+
+__all__ = ["Console", "Heard", "clean", "clean_line", "guarded", "told_if_interrupted"]
 
 SLOW_S = 5.0  # a first step that takes longer than this is compiling
 _LINE = 2000  # characters that anybody reads of a line
@@ -78,6 +82,16 @@ class Console:
             timer.cancel()
 
     @contextmanager
+    def hearing(self) -> Iterator[Heard]:
+        """Show what a call of the face is doing: its steps as progress, its notes as notes."""
+        with self.steps() as steps:
+            yield Heard(self, steps)
+
+    def data(self, result: Result, *, as_json: bool) -> None:
+        """Print a result on stdout: the document, or what a reader sees."""
+        sys.stdout.write(result.to_json() + "\n" if as_json else clean(result.text()))
+
+    @contextmanager
     def steps(self) -> Iterator[Steps]:
         """Progress of a piece of work: one line that renews itself on a terminal, a line a step with `plain`."""
         on_terminal = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
@@ -113,6 +127,34 @@ class Steps:
         if self.mode == "bar" and self._width:
             sys.stderr.write(f"\r{' ' * self._width}\r")
             sys.stderr.flush()
+
+
+class Heard(Listener):
+    """A call of the face on the terminal."""
+
+    def __init__(self, console: Console, steps: Steps) -> None:
+        self.console, self.steps = console, steps
+
+    def __call__(self, step: str) -> None:
+        """Show a step."""
+        self.steps(step)
+
+    def note(self, text: str) -> None:
+        """Show a note at once."""
+        self.console.note(text)
+
+    def detail(self, text: str) -> None:
+        """Show a detail, with -v."""
+        self.console.detail(text)
+
+    def failed(self, name: str, reason: str) -> None:
+        """Show an input that failed."""
+        self.steps.clear()
+        sys.stderr.write(f"error: {clean_line(reason if name in reason else f'{name}: {reason}')}\n")
+
+    def slow(self, what: str) -> AbstractContextManager[object]:
+        """Say that something is being compiled, if it takes long."""
+        return self.console.told_if_slow(what)
 
 
 @contextmanager

@@ -80,9 +80,9 @@ def _convert(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.files import write_whole
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.paths import write_whole
     from aqualog.io.write_log import check_suffix, write_log
 
     suffix = check_suffix(out)

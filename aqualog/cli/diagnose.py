@@ -162,9 +162,9 @@ def _diagnose(
     from aqualog.cli.console import clean_line, told_if_interrupted
     from aqualog.cli.diagnose_drives import check_apart, check_once, find_drives, load_drives
     from aqualog.cli.diagnose_results import tell
-    from aqualog.cli.files import expand, list_files, refuse_existing
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.paths import expand, list_files, refuse_existing
 
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: it is what the simulation believes")
@@ -262,8 +262,8 @@ def _campaign(
     """The same of a campaign's runs together, which carry what no single drive shows."""
     from aqualog.cli.campaign_results import check_targets, exit_code, opened, results
     from aqualog.cli.diagnose_results import tell
-    from aqualog.cli.files import refuse_existing
     from aqualog.errors import ConfigError
+    from aqualog.face.paths import refuse_existing
 
     if strange:
         raise ConfigError(f"{strange[0]} says nothing to a campaign", expected="what a campaign takes: --help")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aqualog.cli.files import expand
 from aqualog.errors import AqualogError, ConfigError
+from aqualog.face.paths import expand
 
 if TYPE_CHECKING:
     from aqualog.cli.console import Steps

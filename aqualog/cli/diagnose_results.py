@@ -59,11 +59,11 @@ def tell(
         extended_model=str(targets.model) if targets.model is not None else None,
     )  # fmt: skip
     if targets.model is not None:
-        from aqualog.cli.files import write_text
+        from aqualog.face.paths import write_text
 
         write_text(targets.model, _model_text(result, vehicle))
     if targets.page is not None:
-        from aqualog.cli.files import write_whole
+        from aqualog.face.paths import write_whole
         from aqualog.report.diagnosis_page import write_diagnosis_page
 
         title = ", ".join([vehicle, *result.drives[:3]]) + (" …" if len(result.drives) > 3 else "")

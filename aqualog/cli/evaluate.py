@@ -117,9 +117,9 @@ def _evaluate(
     from aqualog.campaign.records import group_keys
     from aqualog.cli.console import Console, clean, told_if_interrupted
     from aqualog.cli.evaluate_inputs import campaign_inputs, is_campaign, log_inputs
-    from aqualog.cli.files import refuse_existing
     from aqualog.errors import ExitCode
     from aqualog.evaluate.judge import ODD_LABELS
+    from aqualog.face.paths import refuse_existing
     from aqualog.report.evaluation_words import notes_of
 
     console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
@@ -199,9 +199,9 @@ def _write(
     out: Path | None,
     joint: JointCusumParams,
 ) -> None:
-    from aqualog.cli.files import write_text, write_whole
     from aqualog.config.settings import joint_text
     from aqualog.config.thresholds import thresholds_text
+    from aqualog.face.paths import write_text, write_whole
     from aqualog.report.evaluation_page import write_evaluation_page
 
     if tune_file is not None and result.tuning is not None:

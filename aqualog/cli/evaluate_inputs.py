@@ -9,7 +9,6 @@ from pathlib import Path
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.loaded import loaded
 from aqualog.campaign.records import Run
-from aqualog.cli.files import expand, list_files
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
@@ -17,6 +16,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError
 from aqualog.evaluate.drives import LogSource
 from aqualog.evaluate.labels import Label
+from aqualog.face.paths import expand, list_files
 from aqualog.vehicle import Vehicle
 
 __all__ = ["Inputs", "campaign_inputs", "is_campaign", "log_inputs"]

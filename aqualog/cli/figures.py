@@ -151,8 +151,8 @@ def _refuse(
     numbers: Sequence[str], out: Path, formats: Sequence[str], configured: Configured | None, *, force: bool
 ) -> None:
     """Before anything is computed: refuse files that are there. Pictures bear letters that are known only later."""
-    from aqualog.cli.files import refuse_existing
     from aqualog.config.configured import files_of
+    from aqualog.face.paths import refuse_existing
     from aqualog.figures.record import stem_of
 
     paths = [out / f"{stem_of(n)}.{f}" for n in numbers for f in formats]
@@ -192,7 +192,7 @@ def _make_all(
     import time
 
     from aqualog.cli.console import clean
-    from aqualog.cli.files import write_text
+    from aqualog.face.paths import write_text
     from aqualog.figures.catalogue import make
     from aqualog.figures.page import render_figures
     from aqualog.figures.selection import NotInCampaign
@@ -224,7 +224,7 @@ def _make_all(
 
 def _write(figure: Figure, out: Path, formats: Sequence[str], pictures: Pictures | None) -> list[str]:
     """Write a figure in all formats; names of the files."""
-    from aqualog.cli.files import write_text
+    from aqualog.face.paths import write_text
     from aqualog.figures.export import figure_csv
     from aqualog.figures.image import image_names
     from aqualog.figures.page import render_figures

@@ -127,8 +127,8 @@ def _inspect(
 
 
 def _write_map(path: Path, proposals: dict[str, Proposal], paths: list[Path], given: SignalMap) -> None:
-    from aqualog.cli.files import write_text
     from aqualog.config.signal_map import map_text
+    from aqualog.face.paths import write_text
 
     text = map_text(
         replace(given, entries={s: p.entry for s, p in proposals.items()}),

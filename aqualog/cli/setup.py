@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 from aqualog.align.mapping import SignalMap
 from aqualog.cli.console import Console
-from aqualog.cli.files import expand, list_files, refuse_existing
 from aqualog.config.signal_map import load_signal_map
-from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import AqualogError, LogError, SignalError
-from aqualog.io.content import Seen, changed_files, state_of
+from aqualog.face.drive import Drive
+from aqualog.face.paths import expand, list_files, refuse_existing
+from aqualog.io.content import state_of
 from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -26,44 +25,47 @@ __all__ = ["Setup", "prepare"]
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """Inputs and configuration of one run; `sources` are all files that no result may overwrite.
-
-    `cache` is None where signals are not to be kept. `before` is the state of the logs before they were opened.
-    """
+    """Inputs and configuration of one run; the sources of `drive` are all files that no result may overwrite."""
 
     console: Console
-    paths: list[Path]
-    signal_map: SignalMap
+    drive: Drive
     vehicle: Vehicle
-    sources: tuple[Path, ...]
-    cache: SignalCache | None = None
-    before: Seen = ()
+
+    @property
+    def paths(self) -> list[Path]:
+        """The logs."""
+        return list(self.drive.paths)
+
+    @property
+    def signal_map(self) -> SignalMap:
+        """Which channel is which signal."""
+        return self.drive.signal_map
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """All files that no result may overwrite."""
+        return self.drive.sources
+
+    @property
+    def cache(self) -> SignalCache | None:
+        """Where signals are kept; None if they are not."""
+        return self.drive.cache
 
     def changes(self) -> tuple[str, ...]:
-        """A note for each file of the logs that is not as it was when the command began."""
-        return tuple(
-            f"{Path(name).name}: changed while it was read; look at it again when it stays as it is"
-            for name in changed_files(self.paths, self.before)
-        )
+        """Return a note for each log that has changed since the command began."""
+        return self.drive.changes()
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """What goes wrong within may be of a log that has changed, which is said then.
+        """Report an error within as a change of the log, if the log has changed.
 
         Raises
         ------
         LogError
             In place of an error of reading.
         """
-        try:
+        with self.drive.reading():
             yield
-        except Exception as error:
-            names = changed_files(self.paths, self.before)
-            if not names or (isinstance(error, AqualogError) and not isinstance(error, LogError | SignalError)):
-                raise
-            what = error.what if isinstance(error, AqualogError) else str(error) or type(error).__name__
-            hint = "again, when it stays as it is"
-            raise LogError(f"changed while it was read ({what})", where=names[0], hint=hint) from error
 
 
 def prepare(
@@ -78,6 +80,7 @@ def prepare(
     progress: str,
     vehicle_file: Path | None = None,
     cached: bool | None = False,
+    rate_hz: float | None = None,
 ) -> Setup:
     """Check everything that can be checked before any log is opened.
 
@@ -91,6 +94,8 @@ def prepare(
         Databases; results to be written. A source is never a target.
     cached : bool, optional
         Whether signals are kept; None: if AQUALOG_CACHE is set.
+    rate_hz : float, optional
+        Rate of the time base.
 
     Raises
     ------
@@ -102,8 +107,11 @@ def prepare(
     own = (*paths, *list_files(logs), *dbc, *(p for p in (map_file, vehicle_file) if p))
     refuse_existing(targets, force=force, sources=own)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
-    vehicle = load_vehicle(vehicle_file) if vehicle_file else Vehicle()
-    return Setup(console, paths, signal_map, vehicle, own, _cache(cached, console), before)
+    vehicle = Vehicle.read(vehicle_file) if vehicle_file else Vehicle()
+    drive = Drive(
+        tuple(paths), signal_map, tuple(dbc), rate_hz, vehicle, _cache(cached, console), tuple(own), before
+    )  # fmt: skip
+    return Setup(console, drive, vehicle)
 
 
 def _cache(cached: bool | None, console: Console) -> SignalCache | None:

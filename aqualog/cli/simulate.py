@@ -116,9 +116,9 @@ def _drive(
     force: bool,
     console: Console,
 ) -> int:
-    from aqualog.cli.files import refuse_existing, write_whole
     from aqualog.config.scenario import vehicle_of
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.paths import refuse_existing, write_whole
     from aqualog.io.write_log import check_suffix
 
     suffix = check_suffix(out)

@@ -173,7 +173,7 @@ def _folder(name: str) -> Path:
 
 
 def _write_results(result: DirectResult, out: Path, name: str, title: str, notes: tuple[str, ...]) -> None:
-    from aqualog.cli.files import write_text, write_whole
+    from aqualog.face.paths import write_text, write_whole
     from aqualog.report.slope_document import slope_csv, slope_document
     from aqualog.report.slope_page import write_slope_page
 

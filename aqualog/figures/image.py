@@ -13,11 +13,11 @@ from typing import Any
 from aqualog.errors import AqualogError
 from aqualog.figures.draw import panel_figure
 from aqualog.figures.record import Figure
+from aqualog.report.theme import LIGHT, in_light
 
 __all__ = ["FORMATS", "Pictures", "browser", "image_names", "picture_of"]
 
 FORMATS = ("png", "svg")
-LIGHT = {"@ink": "#1f2933", "@muted": "#66727f", "@paper": "#ffffff"}  # those of the page
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 _PLACES = (
     "/usr/bin/chromium", "/usr/lib/chromium/chromium", "/snap/bin/chromium", "/opt/google/chrome/chrome",
@@ -49,7 +49,7 @@ def image_names(figure: Figure, suffix: str) -> list[str]:
 def picture_of(figure: Figure, index: int) -> dict[str, Any]:
     """One panel as `data` and `layout` of plotly, with its title and plain colours."""
     panel = figure.panels[index]
-    found: dict[str, Any] = _coloured(panel_figure(panel))
+    found: dict[str, Any] = in_light(panel_figure(panel))
     layout = found["layout"]
     letter = f" ({chr(ord('a') + index)})" if len(figure.panels) > 1 else ""
     layout |= {
@@ -62,14 +62,6 @@ def picture_of(figure: Figure, index: int) -> dict[str, Any]:
     }  # fmt: skip
     layout["margin"] = {**layout["margin"], "t": layout["margin"]["t"] + _TITLE_PX}
     return found
-
-
-def _coloured(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _coloured(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_coloured(v) for v in value]
-    return LIGHT.get(value, value) if isinstance(value, str) else value
 
 
 class Pictures:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from aqualog.errors import ConfigError
@@ -150,6 +151,19 @@ class Model:
     """The base simulation and the terms on top of it, in order."""
 
     terms: tuple[Term, ...] = ()
+
+    @classmethod
+    def read(cls, path: str | Path) -> Model:
+        """Read a model file (TOML), as `aqualog diagnose` writes it.
+
+        Raises
+        ------
+        ConfigError
+            With all faults of the file in one message.
+        """
+        from aqualog.config.model import load_model
+
+        return load_model(Path(path))
 
     def with_term(self, term: Term) -> Model:
         """A new model with one term more.

@@ -27,7 +27,7 @@ from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.verdict import by_importance, verdict
 from aqualog.types import DriveResult
 
-__all__ = ["render_page", "write_page"]
+__all__ = ["drive_rows", "render_page", "write_page"]
 
 MOST_ROWS = (
     500  # of events in the page's text; a browser lays a longer table out slowly, so the script fills it by pages
@@ -61,7 +61,7 @@ def render_page(result: DriveResult, *, title: str) -> str:
     """
     ranked = by_importance(result.events)
     plan = make_plan(ranked, result.signals.frame.height, result.signals.dt)
-    rows = [row for figure in _FIGURES for row in figure(result)]
+    rows = drive_rows(result)
     events = tables.event_rows(result)
     is_short = len(events) <= MOST_ROWS
     scripts = {"plotly": PLOTLY_HERE, "page": _text("page.js")}
@@ -89,6 +89,11 @@ def render_page(result: DriveResult, *, title: str) -> str:
         faults=tables.fault_rows(result),
     )  # fmt: skip
     return with_plotly(page)
+
+
+def drive_rows(result: DriveResult) -> list[Row]:
+    """The panels of a drive, from the top."""
+    return [row for figure in _FIGURES for row in figure(result)]
 
 
 def _text(name: str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = [
-    "EVENT_SHADE", "FULL_SHADE", "GRID", "INK", "MUTED", "THRESHOLD", "WATER", "WATER_SHADE", "WHEEL_COLOURS",
-    "detector_colour", "wheel_colour",
+    "EVENT_SHADE", "FULL_SHADE", "GRID", "INK", "LIGHT", "MUTED", "THRESHOLD", "WATER", "WATER_SHADE", "WHEEL_COLOURS",
+    "detector_colour", "in_light", "wheel_colour",
 ]  # fmt: skip
 
 # Okabe and Ito's palette: told apart with any common colour blindness, on white and on dark ground, and in grey print.
@@ -14,6 +16,8 @@ _DETECTOR_COLOURS = {"resistance": "#E69F00", "tie_rod": "#7F6BB3", "slip_slope_
 # Placeholders that the page's script replaces by the text colours of the light or the dark scheme.
 INK = "@ink"
 MUTED = "@muted"
+LIGHT = {INK: "#1f2933", MUTED: "#66727f", "@paper": "#ffffff"}
+"""The placeholders in the light scheme of the pages."""
 
 GRID = "rgba(128,128,128,0.22)"
 THRESHOLD = "#B2182B"
@@ -31,3 +35,12 @@ def wheel_colour(wheel: str | None) -> str:
 def detector_colour(detector: str, wheel: str | None) -> str:
     """Colour of a detector's line or lane: that of its wheel where it watches one."""
     return wheel_colour(wheel) if wheel in WHEEL_COLOURS else _DETECTOR_COLOURS.get(detector, INK)
+
+
+def in_light(figure: Any) -> Any:
+    """Return a figure, or part of one, with the colours of the light scheme in place of the placeholders."""
+    if isinstance(figure, dict):
+        return {k: in_light(v) for k, v in figure.items()}
+    if isinstance(figure, list):
+        return [in_light(v) for v in figure]
+    return LIGHT.get(figure, figure) if isinstance(figure, str) else figure

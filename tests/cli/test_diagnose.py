@@ -12,10 +12,10 @@ import typer
 from report.diagnosis_case import cases, views_of
 from typer.testing import CliRunner
 
-import aqualog.diagnose.run as engine
 from aqualog.cli.diagnose import diagnose
 from aqualog.cli.main import app as whole
 from aqualog.config.model import load_model
+from aqualog.diagnose import run as engine
 from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term

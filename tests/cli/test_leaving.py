@@ -12,13 +12,14 @@ from aqualog.model.programme import PROGRAMMES
 
 WAITING = """
 import sys, time
-import aqualog.align.load, aqualog.align.load_long, aqualog.evaluate.run
+from aqualog.align import load, load_long
+from aqualog.evaluate import run as evaluation
 def wait(*_, **__):
     sys.stderr.write("READY\\n")
     sys.stderr.flush()
     time.sleep(30)
-aqualog.align.load.load_signals = aqualog.align.load_long.load_drive = wait
-aqualog.evaluate.run.evaluate = wait
+load.load_signals = load_long.load_drive = wait
+evaluation.evaluate = wait
 from aqualog.cli.main import run
 sys.argv = ["aqualog", *sys.argv[1:]]
 run()

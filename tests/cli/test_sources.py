@@ -5,10 +5,10 @@ import os
 import pytest
 from typer.testing import CliRunner
 
-from aqualog.cli import files
-from aqualog.cli.files import expand, refuse_existing
 from aqualog.cli.main import app
 from aqualog.errors import ConfigError
+from aqualog.face import paths as files
+from aqualog.face.paths import expand, refuse_existing
 
 LABELS = "start_s,end_s,effect,wheel\n"
 

@@ -82,8 +82,8 @@ def test_stamps_out_of_order_are_read_as_a_whole(tmp_path):
 def test_table_and_page_of_the_command(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
-    from aqualog.cli import detect_long as command
     from aqualog.cli.main import app
+    from aqualog.face import detect_long as command
 
     def detect(out):
         found = CliRunner().invoke(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from aqualog.cli.files import expand
 from aqualog.errors import LogError
+from aqualog.face.paths import expand
 from aqualog.io.sniff import sniff
 
 ONE = (["a_0.mcap", "a_1.mcap"], ["a.db3"], ["a.mcap"], ["a_0.db3", "notes.txt"], ["metadata.yaml"])

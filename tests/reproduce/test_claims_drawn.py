@@ -88,8 +88,7 @@ def test_sign_of_the_speed_difference(monkeypatch):
     assert found.verdict in (REPRODUCED, DIFFERENCE)
     assert found.value < 0.1
     # a detector that is its bare sum is no better than the bare sum
-    import aqualog.detect.spin as spin
-    from aqualog.detect import cusum
+    from aqualog.detect import cusum, spin
 
     bare = lambda p, s, a, dv, v, ok: (*cusum.scan(p.cusum, cusum.initial_state(), p.sign * a)[:2], s)  # noqa: E731
     monkeypatch.setattr(spin, "scan", bare)

@@ -1,0 +1,283 @@
+"""`aq.read`: the files of one drive, and the signals in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.align.mapping import SignalMap
+from aqualog.errors import AqualogError, ConfigError, LogError, SignalError
+from aqualog.face.paths import expand, list_files
+from aqualog.face.result import PathLike
+from aqualog.io.content import Seen, changed_files, state_of
+from aqualog.types import Signals
+from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.align.cache import SignalCache
+    from aqualog.align.load_long import LoadedLong
+
+__all__ = ["Drive", "DriveLike", "drive_of", "read", "vehicle_of"]
+
+Logs = PathLike | Iterable[PathLike]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Drive:
+    """One drive: its files, how to read them, and the signals once they are asked for.
+
+    The files are decoded when the signals are needed. Wheel speeds in km/h, steering wheel angles and torques need
+    the vehicle; another vehicle reads them anew. `before` is the state of the files when the drive was named.
+    """
+
+    paths: tuple[Path, ...]
+    signal_map: SignalMap = field(default_factory=SignalMap)
+    dbc: tuple[Path, ...] = ()
+    rate_hz: float | None = None
+    vehicle: Vehicle | None = None
+    cache: SignalCache | None = None
+    sources: tuple[Path, ...] = ()
+    before: Seen = ()
+    given: Signals | None = None
+    label: str = ""
+    _loaded: dict[Any, Signals] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The files as they were named, with commas."""
+        return self.label or ", ".join(str(p) for p in self.paths)
+
+    @property
+    def title(self) -> str:
+        """The same, short."""
+        paths = self.paths
+        return self.name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
+
+    @property
+    def signals(self) -> Signals:
+        """All signals on one time base, SI; with a default car if the drive was read without a vehicle."""
+        return self.load(self.vehicle or Vehicle())
+
+    @property
+    def frame(self) -> pl.DataFrame:
+        """The signals as a table: `t` [s] and a column for each signal, SI."""
+        return self.signals.frame
+
+    def load(self, vehicle: Vehicle, *, report: Callable[[str], None] = lambda _: None) -> Signals:
+        """Read the signals with the radii, steering ratio and torque gain of a vehicle; a second call reads nothing.
+
+        Raises
+        ------
+        LogError, SignalError, ConfigError
+        """
+        if self.given is not None:
+            return self.given
+        key = _reading(vehicle)
+        if key not in self._loaded:
+            from aqualog.align.load import load_signals
+
+            self._loaded[key] = load_signals(
+                self.paths, vehicle=vehicle, signal_map=self.signal_map, dbc=self.dbc, rate_hz=self.rate_hz,
+                report=report, cache=self.cache,
+            )  # fmt: skip
+        return self._loaded[key]
+
+    def load_or_open(
+        self,
+        vehicle: Vehicle,
+        *,
+        report: Callable[[str], None] = lambda _: None,
+        note: Callable[[str], None] = lambda _: None,
+        whole_for: str = "",
+    ) -> Signals | LoadedLong:
+        """Read the signals, or open a drive that is too long for memory to go through it in windows.
+
+        `whole_for` names what needs the whole drive, if anything does; `note` hears why a long drive is read whole.
+
+        Raises
+        ------
+        LogError, SignalError, ConfigError
+        """
+        key = _reading(vehicle)
+        if self.given is not None or key in self._loaded:
+            return self.load(vehicle)
+        from aqualog.align.load_long import load_drive
+
+        found = load_drive(
+            self.paths, vehicle=vehicle, signal_map=self.signal_map, dbc=self.dbc, rate_hz=self.rate_hz,
+            report=report, cache=self.cache, note=note, whole_for=whole_for,
+        )  # fmt: skip
+        if isinstance(found, Signals):
+            self._loaded[key] = found
+        return found
+
+    def changes(self) -> tuple[str, ...]:
+        """Return a note for each file that has changed since the drive was named."""
+        return tuple(
+            f"{Path(name).name}: changed while it was read; look at it again when it stays as it is"
+            for name in changed_files(self.paths, self.before)
+        )
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Report an error within as a change of the log, if the log has changed.
+
+        Raises
+        ------
+        LogError
+            In place of an error of reading.
+        """
+        try:
+            yield
+        except Exception as error:
+            names = changed_files(self.paths, self.before)
+            if not names or (isinstance(error, AqualogError) and not isinstance(error, LogError | SignalError)):
+                raise
+            what = error.what if isinstance(error, AqualogError) else str(error) or type(error).__name__
+            hint = "again, when it stays as it is"
+            raise LogError(f"changed while it was read ({what})", where=names[0], hint=hint) from error
+
+    def plot(self) -> go.Figure:
+        """Return the signals over time, a row for each unit."""
+        from aqualog.report.figures.signals import signals_figure
+
+        return signals_figure(self.signals, self.title)
+
+    def write(self, path: PathLike, *, decimal_comma: bool = False, force: bool = False) -> Path:
+        """Write the aligned signals as one log, as `aqualog convert` does: .mf4, .mcap, .csv or .parquet.
+
+        Raises
+        ------
+        ConfigError
+            If the suffix is not known, or the file exists and `force` is not given.
+        """
+        from aqualog.face.convert import convert
+
+        return convert(self, path, decimal_comma=decimal_comma, force=force).path
+
+    def __repr__(self) -> str:
+        return "\n".join(_lines(self))
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>{self.frame._repr_html_()}"
+
+
+DriveLike = Drive | Signals | PathLike | Sequence[PathLike]
+
+
+def read(
+    logs: Logs,
+    map: PathLike | SignalMap | None = None,
+    vehicle: PathLike | Vehicle | None = None,
+    *,
+    dbc: Logs = (),
+    rate_hz: float | None = None,
+    cache: bool = False,
+) -> Drive:
+    """Name the files of one drive and how to read them.
+
+    The files must exist and the settings must be right; the samples are decoded when they are needed.
+
+    Parameters
+    ----------
+    logs : str, Path or several
+        Files of ONE drive: files, folders, globs, `@list.txt`. MDF, MCAP, ROS bag, CSV or Parquet.
+    map : str, Path or SignalMap, optional
+        Which channel is which signal. Logs with canonical names need none.
+    vehicle : str, Path or Vehicle, optional
+        For wheel speeds in km/h, steering wheel angles and torques. The vehicle of a later call counts more.
+    dbc : str, Path or several
+        CAN databases for raw frames.
+    rate_hz : float, optional
+        Rate of the time base [Hz], 0.1 to 100000; default that of the wheel speeds.
+    cache : bool
+        Keep the aligned signals for the next look at the same files.
+
+    Raises
+    ------
+    ConfigError, LogError
+
+    Examples
+    --------
+    >>> drive = aq.read("drive.mf4", map="map.toml", vehicle="car.toml")
+    >>> drive.frame.select("t", "v_x")
+    """
+    if rate_hz is not None and not 0.1 <= rate_hz <= 100_000.0:
+        raise ConfigError(f"rate_hz = {rate_hz:g}", expected="0.1 to 100000 Hz")
+    names = _names(logs)
+    paths = tuple(expand(names))
+    if not paths:
+        raise ConfigError("no log is named", expected="at least one file of a drive")
+    for path in paths:
+        if not path.exists():
+            raise LogError("no such file or folder", where=str(path), expected="a log")
+    databases = tuple(Path(n) for n in _names(dbc))
+    own = [Path(x) for x in (map, vehicle) if isinstance(x, str | Path)]
+    return Drive(
+        paths,
+        _map_of(map),
+        databases,
+        rate_hz,
+        None if vehicle is None else vehicle_of(vehicle),
+        _cache() if cache else None,
+        (*paths, *list_files(names), *databases, *own),
+        state_of(list(paths)),
+    )
+
+
+def drive_of(drive: DriveLike) -> Drive:
+    """Return the drive behind an argument: a drive, signals in memory, or files that need no map."""
+    if isinstance(drive, Drive):
+        return drive
+    if isinstance(drive, Signals):
+        return Drive((), given=drive, label=", ".join(drive.files) or "signals")
+    return read(drive)
+
+
+def vehicle_of(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -> Vehicle:
+    """Return the vehicle behind an argument; without one that of the drive, else a default car."""
+    if vehicle is None:
+        return (drive.vehicle if drive is not None else None) or Vehicle()
+    return vehicle if isinstance(vehicle, Vehicle) else Vehicle.read(vehicle)
+
+
+def with_vehicle(drive: Drive, vehicle: Vehicle) -> Drive:
+    """Return the same drive with another vehicle; signals that were read stay."""
+    return replace(drive, vehicle=vehicle)
+
+
+def _names(logs: Logs) -> list[str]:
+    return [str(logs)] if isinstance(logs, str | Path) else [str(p) for p in logs]
+
+
+def _map_of(given: PathLike | SignalMap | None) -> SignalMap:
+    if given is None or isinstance(given, SignalMap):
+        return given or SignalMap()
+    from aqualog.config.signal_map import load_signal_map
+
+    return load_signal_map(Path(given))
+
+
+def _cache() -> SignalCache:
+    from aqualog.align.cache import SignalCache, cache_folder, cache_limit
+
+    return SignalCache(cache_folder(), limit=cache_limit())
+
+
+def _reading(vehicle: Vehicle) -> tuple[float, ...]:
+    """What reading takes from a vehicle."""
+    return (vehicle.r_e_f, vehicle.r_e_r, vehicle.steering_ratio, vehicle.torque_gain)
+
+
+def _lines(drive: Drive) -> list[str]:
+    signals = drive.signals
+    rate = 1e9 / signals.step_ns
+    head = f"{drive.title}: {signals.duration_s:.1f} s at {rate:g} Hz, {len(signals.symbols)} signals"
+    return [head, f"  {', '.join(signals.symbols)}", *(f"  note: {n}" for n in signals.quality.notes[:3])]

@@ -1,0 +1,113 @@
+"""What every result of the face offers: tables, a figure, the command's document and files, and a short repr."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.face.paths import refuse_existing, write_whole
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+__all__ = ["PathLike", "Result", "Writers", "text_file"]
+
+PathLike = str | Path
+Writers = Mapping[str, Callable[[Path], None]]
+"""Names of files with what writes each to a given path."""
+
+_REPR_LINES = 8
+_REPR_WIDTH = 160
+
+
+class Result(ABC):
+    """The result of one call.
+
+    `notes` are sentences for the user. `has_loss` says whether data was lost or an input failed: the command then ends
+    with exit code 3. `sources` are the files that no result may overwrite.
+    """
+
+    notes: tuple[str, ...]
+    has_loss: bool
+    sources: tuple[Path, ...]
+
+    @property
+    @abstractmethod
+    def document(self) -> dict[str, Any]:
+        """The command's JSON document as plain Python objects."""
+
+    @property
+    @abstractmethod
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """The result as polars tables, by name; the first is the one that a notebook shows."""
+
+    @abstractmethod
+    def text(self) -> str:
+        """Return what the command prints for a reader."""
+
+    @abstractmethod
+    def headline(self) -> str:
+        """Return the answer in a few lines, without tables."""
+
+    @abstractmethod
+    def plot(self) -> go.Figure:
+        """Return the main figure, to show or to change."""
+
+    @abstractmethod
+    def files(self) -> Writers:
+        """Return the files that `save` writes, each with its writer."""
+
+    def to_json(self) -> str:
+        """Return the command's JSON document as text. Numbers that are not available are null."""
+        return json.dumps(self.document, indent=1, allow_nan=False)
+
+    def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+        """Write the files of this result into a folder, each whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+            It is made if it does not exist.
+        force : bool
+            Overwrite files of an earlier result. Sources are never overwritten.
+
+        Raises
+        ------
+        ConfigError
+            If a file exists already, or is a source of this result.
+        """
+        out, files = Path(folder), self.files()
+        refuse_existing([out / name for name in files], force=force, sources=self.sources)
+        out.mkdir(parents=True, exist_ok=True)
+        for name, write in files.items():
+            write_whole(out / name, write)
+        return tuple(out / name for name in files)
+
+    def __repr__(self) -> str:
+        lines = self.headline().rstrip("\n").split("\n")
+        shown = lines[:_REPR_LINES] + (["..."] if len(lines) > _REPR_LINES else [])
+        return "\n".join(_printable(line) for line in shown)
+
+    def _repr_html_(self) -> str:
+        table = next(iter(self.tables.values()), None)
+        html = "" if table is None or table.is_empty() else table._repr_html_()
+        return f"<pre>{escape(repr(self))}</pre>{html}"
+
+
+def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
+    """Return a writer of a text file; the text is made when it is written."""
+
+    def write(path: Path) -> None:
+        path.write_text(text(), encoding="utf-8")
+
+    return write
+
+
+def _printable(line: str) -> str:
+    shown = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
+    return shown if len(shown) <= _REPR_WIDTH else f"{shown[: _REPR_WIDTH - 1]}…"
