@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from aqualog.errors import SignalError
 
-__all__ = ["Unit", "convert", "is_unit", "parse_unit"]
+__all__ = ["Unit", "convert", "displayed_unit", "is_unit", "parse_unit"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,3 +137,18 @@ def convert(values: NDArray[np.float64], source: str, target: str, *, where: str
             hint="correct the unit or the channel in the signal map",
         )
     return (values * (a.factor / b.factor)) + (a.offset - b.offset) / b.factor
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def displayed_unit(unit: str) -> str:
+    """A unit as pages and text output show it: `m/s^2` -> `m/s²`, `N*m` -> `N·m`, `-` -> `–`.
+
+    For display only: JSON values and CSV headers keep the spelling of the contract.
+    """
+    if unit == "nats":
+        return "natural units"
+    if unit == "-":
+        return "–"
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), unit).replace("*", "·")

@@ -1,1 +1,1 @@
-"""Results into pages; no physics here."""
+"""Turns results into pages, tables and documents; computes no physics."""

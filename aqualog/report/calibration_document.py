@@ -15,16 +15,16 @@ __all__ = ["SCHEMA_VERSION", "calibration_document", "calibration_text", "drive_
 
 SCHEMA_VERSION = 1
 DRIVE_HEADER = (
-    "drive", "used s", "mass kg", "sd", "against the others kg", "offset m/s^2", "drift 1e-4 m/s^3", "torque late s",
-    "before m/s^2", "after m/s^2",
+    "drive", "used s", "mass kg", "sd", "against the others kg", "offset m/s²", "drift 1e-4 m/s³", "torque delay s",
+    "before m/s²", "after m/s²",
 )  # fmt: skip
 PARAMETER_HEADER = ("parameter", "value", "95 %", "unit", "vehicle file", "remark")
 
 
 def calibration_text(c: Calibration) -> str:
-    """Parameters, drives, polynomials, and what could not be told."""
+    """Parameters, drives and polynomials, and the parameters that could not be estimated."""
     told = [p for p in c.parameters if p.identified]
-    lines = [f"{c.vehicle_name}: {len(told)} of {len(c.parameters)} parameters told by {len(c.drives)} drives"]
+    lines = [f"{c.vehicle_name}: {len(told)} of {len(c.parameters)} parameters estimated from {len(c.drives)} drives"]
     lines.append(table(PARAMETER_HEADER, [parameter_cells(p) for p in told]))
     lines += ["", table(DRIVE_HEADER, [drive_cells(d) for d in c.drives])]
     lines += [f"  {d.name}: left out {left_out(d.left_out)}" for d in c.drives if d.left_out]
@@ -32,7 +32,7 @@ def calibration_text(c: Calibration) -> str:
         lines += ["", f"{section}: explains {fit.explained:.1%} of the variance in {fit.seconds:.0f} s"]
         lines.append(table(("coefficient", "value", "95 %"), _coefficients(fit)))
     if c.cannot_tell:
-        lines += ["", "the drives cannot tell", *(f"  {s}" for s in c.cannot_tell)]
+        lines += ["", "not determined by these drives", *(f"  {s}" for s in c.cannot_tell)]
     return "\n".join(lines) + "\n"
 
 
@@ -47,7 +47,7 @@ def drive_cells(d: DriveFit) -> tuple[str, ...]:
     difference, low, high = d.against_others
     against = f"{difference:+.0f} ({low:+.0f} ... {high:+.0f})" if math.isfinite(difference) else ""
     mass, sd = (f"{x:.0f}" if math.isfinite(x) else "" for x in (d.mass, d.mass_sd))
-    offset = f"{d.offset:+.3f} +- {1.96 * d.offset_sd:.3f}" if math.isfinite(d.offset) else ""
+    offset = f"{d.offset:+.3f} ± {1.96 * d.offset_sd:.3f}" if math.isfinite(d.offset) else ""
     return (
         d.name, f"{d.used_s:.0f}", mass, sd, against, offset, f"{1e4 * d.drift:+.1f}", f"{d.torque_lag_s:+.2f}",
         f"{d.rmse_before:.3f}", f"{d.rmse_after:.3f}",
@@ -55,7 +55,7 @@ def drive_cells(d: DriveFit) -> tuple[str, ...]:
 
 
 def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence[str] = ()) -> dict[str, Any]:
-    """The JSON document; what is no number is null."""
+    """The JSON document; NaN and infinities become null."""
     return {
         "schema_version": SCHEMA_VERSION,
         "tool_version": __version__,

@@ -18,7 +18,7 @@ from aqualog.report.wording import number, place
 
 __all__ = ["RESISTANCE_LEVEL", "WAYS", "Answer", "Number", "answers_of", "headline", "off_water", "summaries"]
 
-RESISTANCE_LEVEL = 0.2  # [m/s^2] the thesis' level of a resistance that is felt (C46)
+RESISTANCE_LEVEL = 0.2  # [m/s^2] resistance from which a driver feels it, after the thesis (C46)
 HALF = 0.5  # of the dry slip slope
 WAYS = ("slip_slope", "minor_spin_down", "spin_down")
 _WAY_NAMES = ("slip slope", "minor spin-downs", "spin-downs")
@@ -26,7 +26,7 @@ _KMH = 3.6
 
 
 class Number(NamedTuple):
-    """A speed [km/h] with its 95 % interval, the place that it is of, and what it rests on; NaN and `why` without."""
+    """A speed [km/h] with its 95 % interval and its wheel or side; without a value NaN, and `why` gives the reason."""
 
     v: float
     low: float
@@ -40,8 +40,8 @@ NOTHING = Number(math.nan, math.nan, math.nan, "", "no values")
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Of one configuration: speeds of full aquaplaning by way, where the resistance passes its level, where the slip
-    slope has fallen to half of the dry one. Of several wheels the one with the lowest speed.
+    """Speeds of one configuration: full aquaplaning by each method, resistance above its level, half of the dry slip
+    slope lost. Where several wheels have a value, the lowest speed counts.
     """
 
     group: Group
@@ -51,7 +51,7 @@ class Answer:
 
 
 class _Own(NamedTuple):
-    """What belongs to one configuration."""
+    """The speeds of one configuration."""
 
     slopes: list[Curve]
     resistance: list[Curve]
@@ -59,7 +59,7 @@ class _Own(NamedTuple):
 
 
 def answers_of(findings: Findings) -> tuple[Answer, ...]:
-    """Of all configurations that have values on water."""
+    """The speeds of all configurations that have values on water."""
     of: dict[Group, _Own] = {}
     for curve in findings.slopes:
         of.setdefault(curve.group, _Own([], [], [])).slopes.append(curve)
@@ -89,7 +89,7 @@ def _crossed(curve: Curve, level: float, *, rising: bool) -> Number:
     found = crossing(curve, level, rising=rising)
     if found is None:
         return Number(math.nan, math.nan, math.nan, curve.place, "fewer than two bins with an interval")
-    why = "" if math.isfinite(found.v_kmh) else f"not up to {found.to_kmh:.0f} km/h"
+    why = "" if math.isfinite(found.v_kmh) else f"not reached up to {found.to_kmh:.0f} km/h"
     return Number(found.v_kmh, *found.ci, curve.place, why)
 
 
@@ -111,7 +111,7 @@ def headline(data: CampaignData, findings: Findings) -> str:
 
 
 class Summary(NamedTuple):
-    """One line of the page's head: lowest and highest value as (speed, interval, configuration), and how many told."""
+    """One line of the page's head: lowest and highest value as (speed, interval, configuration), and their number."""
 
     what: str
     lowest: tuple[str, str, str]
@@ -120,7 +120,7 @@ class Summary(NamedTuple):
 
 
 def summaries(answers: Sequence[Answer]) -> list[Summary]:
-    """What was found over all configurations, kind by kind; kinds that are told nowhere say so."""
+    """Lowest and highest speed over all configurations, by kind; a kind without any value shows dashes."""
     kinds = [
         *((f"Full aquaplaning, from the {w}", [(a, a.full[i]) for a in answers]) for i, w in enumerate(_WAY_NAMES)),
         (f"Resistance reaches {RESISTANCE_LEVEL:g} m/s²", [(a, a.resistance) for a in answers]),
@@ -143,7 +143,7 @@ def _one(answer: Answer, n: Number) -> tuple[str, str, str]:
 
 
 def interval_text(n: Number) -> str:
-    """`95 % 93 … 101`, `95 % 93 and up`; no word where both ends are open."""
+    """`95 % 93 … 101`, `95 % 93 and up`; `interval open` where both ends are open."""
     low, high = (number(x, 0) if math.isfinite(x) else "" for x in (n.low, n.high))
     if low and high:
         return f"95 % {low} … {high}"
@@ -151,7 +151,7 @@ def interval_text(n: Number) -> str:
 
 
 def off_water(facts: Sequence[RunFacts | None]) -> str:
-    """Events off the water and the way driven there; empty where no lane is known."""
+    """Events off the water and the distance driven there; empty where no lane is known."""
     known = [f for f in facts if f is not None and math.isfinite(f.dry_km)]
     way = sum(f.dry_km for f in known)
     count = sum(e.off for f in known for e in f.events)

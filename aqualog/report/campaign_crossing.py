@@ -1,4 +1,4 @@
-"""At which speed a curve over bins of speed passes a level, with what its band says of that speed."""
+"""Speed at which a curve over speed bins passes a level, with the interval that its band gives."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Crossing:
 
 
 def crossing(curve: Curve, level: float, *, rising: bool) -> Crossing | None:
-    """Straight lines between the bins that have an interval; None with fewer than two of them.
+    """Interpolate linearly between the bins that have an interval; None with fewer than two of them.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ _FORMULA = re.compile(r"(?:^|(?<=[;,|\t\r\n]))(?=\s*[=+\-@＝＋－＠])|^(?=[\t
 
 
 def safe_cell(value: object) -> str:
-    """A cell that no spreadsheet takes for a formula; empty for what is no number."""
+    """A cell that no spreadsheet takes for a formula; empty for NaN and infinities."""
     if isinstance(value, float):
         return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
     text = str(value)

@@ -26,7 +26,7 @@ _ORDER = (
     "tyre", "pressure_rear_bar", "pressure_front_bar", "water_depth_mm", "water_depth_left_mm", "wear",
     "tread_depth_mm", "load_front_kg", "load_rear_kg", "manoeuvre", "vehicle",
 )  # fmt: skip
-_DROPPED = ("pressure_front_bar", "water_depth_left_mm", "tread_depth_mm")  # where they say what another key says
+_DROPPED = ("pressure_front_bar", "water_depth_left_mm", "tread_depth_mm")  # where they repeat another key
 _STATES = ("done", "failed", "to do")
 _DIGITS = 5
 
@@ -50,7 +50,7 @@ def page_data(
     -------
     dict
         Runs as columns, texts as indices into lists, so that thousands of them stay small. Numbers with five digits,
-        null for what is none.
+        null for NaN and infinities.
     """
     facets = _facets(data)
     index = {g: i for i, g in enumerate(findings.groups)}

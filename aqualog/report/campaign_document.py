@@ -20,14 +20,14 @@ __all__ = ["SCHEMA_VERSION", "flat_rows", "resistance_document", "slope_document
 SCHEMA_VERSION = 1
 
 _DEFINITIONS = {
-    "slope": "slope of the regression of F_x / F_z over slip within mu_range (5 to 95 % of the traction driven): a "
-    "chord; C_s / F_z, the tangent at no slip, is more",
+    "slope": "slope of the regression line of F_x / F_z over slip within mu_range (5 to 95 % of the traction driven). "
+    "C_s / F_z is the tangent at zero slip and is larger",
     "slope_dry": "the same off the water, all speeds together, within mu_range_dry",
-    "expected_slope": "the model's chord over mu_range",
-    "contact_ratio": "share L of the contact length whose brush has slope as its chord over mu_range, with "
-    "friction_wet and the tangent that belongs to slope_dry; sqrt(slope / slope_dry), (2.2), is its limit at small "
-    "traction; above 1 is scatter",
-    "reliable": "told, with an interval whose ends are within a factor of 3, by a line that explains more than a "
+    "expected_slope": "slope of the model's regression line over mu_range",
+    "contact_ratio": "share L of the contact length with which a brush model shows slope over mu_range. The brush "
+    "has friction_wet and the tangent that belongs to slope_dry. At small traction L approaches "
+    "sqrt(slope / slope_dry), (2.2). Values above 1 are scatter",
+    "reliable": "estimated, with an interval whose ends are within a factor of 3, by a line that explains more than a "
     "constant",
 }  # fmt: skip
 
@@ -146,11 +146,11 @@ def _bin(road: str, low: float, high: float, runs: int, samples: int, v_mean: fl
 
 
 def _number(x: float) -> float | None:
-    """A number with six digits; null for none."""
+    """A number with six digits; null for NaN and infinities."""
     return float(f"{x:.6g}") if math.isfinite(x) else None
 
 
 def _pair(ci: Interval) -> list[float | None] | None:
-    """Both ends, an open one null; null where there is no interval."""
+    """Both ends, null for an open one; null where there is no interval."""
     ends = [_number(x) for x in ci]
     return None if ends == [None, None] else ends

@@ -1,4 +1,4 @@
-"""What a campaign's page shows of regressions: curves over speed per configuration, and speeds of full aquaplaning."""
+"""Regressions on a campaign's page: curves over speed per configuration, and speeds of full aquaplaning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One bin of speed. `value` NaN where it is not told, then `reason` says why; `reliable`: `ci` is told too."""
+    """One speed bin. `value` is NaN where no estimate exists, and `reason` states why; `reliable`: `ci` exists too."""
 
     low_kmh: float
     high_kmh: float
@@ -54,8 +54,8 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """All of it. `groups`: configurations of all runs, in order; `left_out` samples by reason, per kind of regression;
-    `notes` what a reader should know of the regressions.
+    """Results of all regressions. `groups`: configurations of all runs, in order; `left_out`: samples by reason, per
+    kind of regression; `notes`: remarks on the regressions for the reader.
     """
 
     plan: Plan
@@ -77,9 +77,9 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
     plan : Plan
         Configurations and bins.
     robust : bool
-        Weights of Huber.
+        Use Huber's weights.
     report : callable
-        Told each step.
+        Called with the name of each step.
     """
     report("slip slopes")
     slopes = slip_slopes(data, plan, robust=robust)
@@ -99,7 +99,7 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
 
 
 def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
-    """Configurations of all runs, sorted: numbers, then texts, then what is not given."""
+    """Configurations of all runs, sorted: numbers, then texts, then missing values."""
     found = {group_of(info, keys) for info in data.runs}
     return tuple(sorted(found, key=lambda g: [_rank(v) for _, v in g]))
 
@@ -144,15 +144,15 @@ def _mean_point(r: MeanRow) -> Point:
 
 
 def _speed(v_mean: float, low_kmh: float, high_kmh: float) -> float:
-    """Mean speed of the bin's samples, its middle where there is none. [km/h]"""
+    """Mean speed of the bin's samples, or the middle of an empty bin. [km/h]"""
     return KMH * v_mean if math.isfinite(v_mean) else 0.5 * (low_kmh + high_kmh)
 
 
 def _delay_notes(table: SlopeTable) -> tuple[str, ...]:
     told = [
-        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms late against the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
-        f"{1e3 * d.ci[1]:+.0f} ms), taken off every slip"
+        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms later than the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
+        f"{1e3 * d.ci[1]:+.0f} ms); every slip is corrected for it"
         for d in table.delays
         if d.told
     ]
-    return (*told, *(f"{d.vehicle}: delay of v_x not told ({d.reason})" for d in table.delays if not d.told))
+    return (*told, *(f"{d.vehicle}: delay of v_x not available ({d.reason})" for d in table.delays if not d.told))

@@ -41,7 +41,7 @@ def targets_of(folder: Path, names: Sequence[str]) -> list[Path]:
 
 
 def check_folder(folder: Path, *, force: bool) -> None:
-    """Refuse a folder that holds something else.
+    """Refuse a folder that holds files of another origin.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def _mark(folder: Path, files: Sequence[str]) -> None:
 
 
 def _earlier(folder: Path) -> list[str]:
-    """Files of an earlier report, as its mark names them; nothing else is believed of it."""
+    """Files of an earlier report as its mark file lists them; the rest of the mark file is ignored."""
     try:
         files = json.loads((folder / MARK).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, KeyError, TypeError):

@@ -43,8 +43,8 @@ def value_text(key: str, value: float | str | None, *, is_alone: bool = True) ->
 
 
 def group_text(group: Group, *, without: Sequence[str] = ()) -> str:
-    """A configuration in one line; a load of 0 is not worth a word."""
-    ordered = sorted(group, key=lambda item: item[0] == "vehicle")  # tyre and pressure are what is looked for
+    """A configuration in one line, without loads of 0 kg."""
+    ordered = sorted(group, key=lambda item: item[0] == "vehicle")  # readers look for tyre and pressure first
     told = [
         value_text(k, v) for k, v in ordered if k not in without and not (k.startswith("load_") and v in (0.0, None))
     ]
@@ -52,7 +52,7 @@ def group_text(group: Group, *, without: Sequence[str] = ()) -> str:
 
 
 def file_name(index: int, name: str) -> str:
-    """Name of a run's page without its suffix: number, what is harmless of the name, and a short hash of all of it."""
+    """Name of a run's page without suffix: number, harmless characters of the run's name, short hash of the name."""
     stem = name.replace("\\", "/").rpartition("/")[2].rpartition(".")[0] or name[:200]
     plain = unicodedata.normalize("NFKD", stem[:200]).encode("ascii", "ignore").decode("ascii").lower()
     slug = re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:_STEM].strip("-")

@@ -73,10 +73,10 @@ def _text(name: str) -> str:
 
 
 def _quality_line(problems: Sequence[Problem]) -> str:
-    words = {"loss": "with data missing", "limit": "where something cannot be judged", "note": "to know"}
+    words = {"loss": "with data missing", "limit": "with limits on what can be judged", "note": "with notes"}
     counts = {w: sum(p.weight == w for p in problems) for w in words}
     told = [f"{n} {words[w]}" for w, n in counts.items() if n]
-    return f"{'; '.join(told)}; each opens to its runs" if told else "nothing to tell: no log is damaged or lacking"
+    return f"{'; '.join(told)}; each opens to its runs" if told else "no problem: all logs are there and intact"
 
 
 def _made(data: CampaignData, findings: Findings) -> list[str]:
@@ -90,19 +90,18 @@ def _made(data: CampaignData, findings: Findings) -> list[str]:
         f"aqualog {__version__}{measured}; campaign {cut(data.name)}; cars: {cut(', '.join(cars), 200) or 'none'}.",
         f"Configurations: {keys}. Runs that differ in other keys only are pooled. Speed bins of {plan.width_kmh:g} "
         "km/h.",
-        "Slip slope: slip on traction with an intercept, the slope's and the intercept's scatter from run to run in "
-        "the model, noise of the traction given back"
-        + (", Huber's weights" if findings.robust else "")
-        + "; intervals with the run, not the sample, as the unit (95 %).",
-        "Full aquaplaning: from the slip slope (slope / dry slope = L², L = 1 − (v / v_full)ⁿ); from minor spin-downs "
-        "(speed at which half of the passes have one, plus 20 km/h); from spin-downs (half of the passes). Intervals: "
-        "runs drawn anew.",
-        f"Resistance {RESISTANCE_LEVEL:g} m/s² and half of the dry slope: straight lines between the bins that have "
-        "an interval; the interval is where the ends of the band pass. Of several wheels, the one with the lowest "
-        "speed.",
+        "Slip slope: regression of slip on traction with an intercept"
+        + (" and Huber's weights" if findings.robust else "")
+        + ". Slope and intercept may differ from run to run. The bias from traction noise is corrected. "
+        "Intervals (95 %) treat the run, not the sample, as the unit.",
+        "Full aquaplaning is estimated in three ways. Slip slope: slope / dry slope = L², with contact share "
+        "L = 1 − (v / v_full)ⁿ. Minor spin-downs: speed at which half of the passes have one, plus 20 km/h. "
+        "Spin-downs: speed at which half of the passes have one. Intervals: bootstrap over runs.",
+        f"Resistance {RESISTANCE_LEVEL:g} m/s² and half of the dry slope: interpolated between bins with an interval. "
+        "The interval ends where the ends of the band cross the level. Of several wheels, the lowest speed counts.",
     ]  # fmt: skip
     for kind, reasons in findings.left_out.items():
         if reasons:
             told = ", ".join(f"{n} ({cut(why)})" for why, n in sorted(reasons.items(), key=lambda x: -x[1]))
-            lines.append(f"Samples (10 a second) left out, {kind}: {told}.")
+            lines.append(f"Samples left out (of 10 per second), {kind}: {told}.")
     return [*lines, *(cut(n, 300) for n in findings.notes)]

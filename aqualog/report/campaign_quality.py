@@ -1,4 +1,4 @@
-"""What a reader must know of a campaign's runs before trusting its numbers, grouped and counted."""
+"""Problems of a campaign's runs that limit how far its numbers can be trusted, grouped and counted."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One kind of problem. `weight`: `loss` (data or runs are missing), `limit` (something cannot be judged) or `note`;
-    `means` says what follows; `runs` are (index, what of this run).
+    `means` states the consequence; `runs` are (index, detail of this run).
     """
 
     weight: str
@@ -36,23 +36,23 @@ _Test = Callable[[RunInfo], str]
 
 
 def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
-    """All kinds that occur, losses first, then by number of runs."""
+    """All kinds of problems that occur, losses first, then by number of runs."""
     found = [
-        _all(data.runs, "loss", "without results", "they count nowhere", lambda r: "" if r.is_done else _why(r)),
+        _all(data.runs, "loss", "without results", "in no result", lambda r: "" if r.is_done else _why(r)),
         _of_done(data, "loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
         _of_done(data, "loss", "samples lost in damaged files", "", lambda r: _count(r, "lost_in_files", "lost")),
         _of_done(data, "loss", "samples dropped", "not used", lambda r: _count(r, "dropped_samples", "dropped")),
-        _of_done(data, "loss", "time jumps", "the clock of the log is not even", lambda r: _count(r, "time_jumps", "")),
+        _of_done(data, "loss", "time jumps", "the log's clock is uneven", lambda r: _count(r, "time_jumps", "")),
         _of_done(data, "loss", "clock faults", "stamps twice, back, reset, wrapped, paused, drifting", _clock),
         _of_done(
-            data, "limit", "lane not known", "neither lane times, labels, a signal on_water nor a dry run: they count "
-            "in no figure over speed", lambda r: "" if r.water_from else "no lane",
+            data, "limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded "
+            "from figures over speed", lambda r: "" if r.water_from else "no lane",
         ),
-        _of_done(data, "limit", "lane behind the log's end", "it counts as far as the log goes", _lane_beyond),
-        _of_done(data, "limit", "vehicle file does not give the drivetrain", "rear-wheel drive is taken",
+        _of_done(data, "limit", "lane behind the log's end", "used up to the end of the log", _lane_beyond),
+        _of_done(data, "limit", "vehicle file without the drivetrain", "rear-wheel drive is assumed",
                  lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
-        _of_done(data, "limit", "slip-slope drop without a dry slope", "it finds a drop only against what the drive "
-                 "itself has shown; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
+        _of_done(data, "limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope "
+                 "learnt in the drive; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
         *_unavailable(data),
         *_few(data, keys),
         *_notes(data),
@@ -62,7 +62,7 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
 
 
 def _no_dry_slope(info: RunInfo) -> str:
-    """A vehicle file without the dry slope of a driven axle: the defaults are no knowledge."""
+    """Report a vehicle file without the dry slope of a driven axle; default values do not count."""
     axles = sorted({w[0] for w in info.vehicle.driven})
     if "slip_slope_drop" in info.about["unavailable"]:
         return ""
@@ -70,7 +70,7 @@ def _no_dry_slope(info: RunInfo) -> str:
 
 
 def _lane_beyond(info: RunInfo) -> str:
-    """A lane that ends, or even begins, when the log is over: it belongs to another log, or to another clock."""
+    """Report a lane that ends or begins after the log's end; it may belong to another log or another clock."""
     lane, end = info.run.lane, info.about["duration_s"]
     if lane is None or lane[1] <= end + _LANE_SLACK_S:
         return ""
@@ -105,7 +105,7 @@ def _clock(r: RunInfo) -> str:
 
 
 def _unavailable(data: CampaignData) -> list[Problem]:
-    """One problem per detector and what it lacks."""
+    """One problem per detector, with its missing signals."""
     found: dict[tuple[str, str, str], list[tuple[int, str]]] = {}
     for r in data.done:
         for state in ("unavailable", "limited"):
@@ -131,11 +131,11 @@ def _few(data: CampaignData, keys: Sequence[str]) -> list[Problem]:
         for r in runs
     ]
     title = f"configuration with fewer than {TOO_FEW} runs"
-    return [Problem("limit", title, "values without intervals, if any", tuple(sorted(hits)))]
+    return [Problem("limit", title, "its values, if any, have no interval", tuple(sorted(hits)))]
 
 
 def _notes(data: CampaignData) -> list[Problem]:
-    """Notes of the logs; those that differ in numbers only are one kind, and the rarest kinds are put together."""
+    """Notes of the logs; notes that differ only in numbers count as one kind, and the rarest kinds are merged."""
     found: dict[str, list[tuple[int, str]]] = {}
     for r in data.done:
         for note in dict.fromkeys(map(str, r.about["notes"])):

@@ -1,4 +1,4 @@
-"""Each run of a campaign in a few numbers: its pass over the water, the dry way, events on water and off it."""
+"""Each run of a campaign in a few numbers: its pass over the water, its dry distance, events on and off water."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from aqualog.types import FloatArray
 
 __all__ = ["BEHIND_S", "EventCount", "RunFacts", "facts_of"]
 
-BEHIND_S = 1.0  # [s] behind the water in which an event still belongs to it, as `evaluate` has it
-LEAST_S = 0.5  # [s] on the lane that make a pass, as the speed of full aquaplaning has it
+BEHIND_S = 1.0  # [s] after the water in which an event still counts as on water, as in `evaluate`
+LEAST_S = 0.5  # [s] on the lane that count as a pass, as for the speed of full aquaplaning
 _KMH = 3.6
 _OFF, _ON, _UNKNOWN = "off", "on", "unknown"
 
 
 @dataclass(frozen=True, slots=True)
 class EventCount:
-    """Events of a detector at a place (wheel, side, empty: the car): on water, off it, and where that is not known."""
+    """Events of a detector at a place (wheel, side; empty: the car): on water, off water, and unknown."""
 
     detector: str
     place: str
@@ -45,7 +45,7 @@ class RunFacts:
 
 
 def facts_of(info: RunInfo, samples: RunSamples) -> RunFacts:
-    """Of one run."""
+    """The numbers of one run."""
     v = samples.array("v_x")
     step = samples.step_s
     wet = (samples.on_water == 1.0) & np.isfinite(v)
@@ -67,7 +67,7 @@ def facts_of(info: RunInfo, samples: RunSamples) -> RunFacts:
 
 
 def _where(event: Mapping[str, Any], t: FloatArray, on_water: FloatArray, *, is_known: bool) -> str:
-    """Whether an event begins on water or within a second behind it; where wheels settle counts as water."""
+    """Whether an event begins on water or within a second after it; the ends where wheels settle count as water."""
     if not is_known:
         return _UNKNOWN
     start = float(event["start_s"])

@@ -24,7 +24,7 @@ _WAYS = {
     "minor_spin_down": "minor spin-downs",
     "spin_down": "full spin-downs",
 }
-_UNKNOWN = "on or off the water is not known"
+_UNKNOWN = "whether on or off the water is not known"
 
 
 def slope_text(
@@ -40,9 +40,10 @@ def slope_text(
         "model slope", "contact", "lost %",
     )  # fmt: skip
     blocks = [
-        "Slope of the regression of F_x/F_z over slip within mu (5 to 95 % of the traction driven), a chord: C_s/F_z\n"
-        "at no slip is more. Model slope: its chord over the same mu. Contact: L of the brush with such a chord.\n"
-        "Lost: share of 1/slope that noise of the traction would have taken, given back",
+        "Slope: regression line of F_x/F_z over slip within mu (5 to 95 % of the traction driven).\n"
+        "C_s/F_z, the tangent at zero slip, is larger. Model slope: the model's line over the same mu.\n"
+        "Contact: share of the contact length with which a brush model has this slope.\n"
+        "Lost: bias of 1/slope from traction noise; it is corrected",
         table(header, [_slope_cells(r, slopes.plan.keys) for r in slopes.rows])
         if slopes.rows
         else _nothing(slopes.plan, slopes.left_out),
@@ -53,7 +54,7 @@ def slope_text(
     if speeds:
         rows = [_speed_cells(f) for f in speeds]
         header = (*keys, "wheel", "from", "event", "km/h", "95 %", "rests on")
-        blocks += ["Speed of full aquaplaning: three events, told side by side", table(header, rows)]
+        blocks += ["Speed of full aquaplaning, estimated from three kinds of events", table(header, rows)]
     if spin_ups:
         header = (*keys, "wheel", "km/h", "runs", "samples", "mu", "95 %", "without resistance")
         rows = [_spin_up_cells(u, left) for u, left in spin_ups]
@@ -72,7 +73,7 @@ def slope_text(
 def resistance_text(found: ResistanceTable) -> str:
     """Tables for a terminal."""
     less = ", less each run's own level on dry road before the lane" if found.is_relative else ""
-    header = (*_titles(found.plan.keys), "road", "km/h", "runs", "samples", "m/s^2", "95 %", "run to run")
+    header = (*_titles(found.plan.keys), "road", "km/h", "runs", "samples", "m/s²", "95 %", "run to run")
     rows = [(*_values(r.group, found.plan.keys), r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
              _told(r.value, 3), _ends(r.ci, 3), _told(r.scatter, 3)) for r in found.rows]  # fmt: skip
     blocks = [
@@ -85,7 +86,7 @@ def resistance_text(found: ResistanceTable) -> str:
 
 
 def _nothing(plan: Plan, left_out: Mapping[str, int]) -> str:
-    """Why a table has no row, and what to try."""
+    """Reason why a table has no row, and what to try."""
     if any(_UNKNOWN in reason for reason in left_out):
         return (
             f"no samples: {_UNKNOWN}\n"
@@ -137,7 +138,7 @@ def _titles(keys: Sequence[str]) -> tuple[str, ...]:
 
 
 def _values(group: Group, keys: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Values of the keys; `-` where a run does not tell one, empty where the row is of all of them."""
+    """Values of the keys; `-` where a run does not state one, empty where the row covers all values."""
     found = dict(group)
     return tuple(
         "" if k not in found else "-" if found[k] is None else f"{found[k]:g}" if isinstance(found[k], float) else
@@ -164,7 +165,7 @@ def _where(group: Group, wheel: str, road: str, low: float, high: float) -> str:
 
 
 def _reasons(rows: Sequence[tuple[str, str]]) -> str:
-    """What could not be told, by reason, so that a hundred rows of one kind are one line."""
+    """Rows without a reliable estimate, grouped by reason: a hundred rows of one kind are one line."""
     places: dict[str, list[str]] = {}
     for where, reason in rows:
         if reason:
@@ -173,7 +174,7 @@ def _reasons(rows: Sequence[tuple[str, str]]) -> str:
         return ""
     lines = [f"  {found[0]}" + (f" (and {len(found) - 1} more like it)" if len(found) > 1 else "")
              for found in places.values()]  # fmt: skip
-    return "\n".join(["not told, or not reliable:", *lines])
+    return "\n".join(["not available, or not reliable:", *lines])
 
 
 def _kind(reason: str) -> str:
@@ -182,8 +183,8 @@ def _kind(reason: str) -> str:
 
 def _delay_line(vehicle: str, value: float, ci: Interval, reason: str) -> str:
     if reason:
-        return f"{vehicle}: the delay of v_x is left open: {reason}"
-    return f"{vehicle}: v_x is late by {value:.3f} s ({_ends(ci, 3)}), taken off the slip"
+        return f"{vehicle}: the delay of v_x is not available: {reason}"
+    return f"{vehicle}: v_x is late by {value:.3f} s ({_ends(ci, 3)}), the slip is corrected for it"
 
 
 def _left_out(left_out: Mapping[str, int]) -> str:

@@ -1,4 +1,4 @@
-"""A diagnosis as the JSON document of the contract, and as text for a terminal that is made of the document alone."""
+"""A diagnosis as the JSON document of the contract, and as terminal text made from that document alone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from aqualog.diagnose.records import (
 )
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
-from aqualog.report.diagnosis_numbers import interval_text, ordinary, quantity_text
+from aqualog.report.diagnosis_numbers import interval_text, ordinary, quantity_text, unit_text
 from aqualog.report.diagnosis_words import effect_title, limit_sentences, sentences
 from aqualog.report.text import table
 
@@ -33,7 +33,7 @@ __all__ = ["SCHEMA_VERSION", "diagnosis_document", "diagnosis_text"]
 
 SCHEMA_VERSION = 1
 CRITERIA = {"interval": 0.95, "power": 0.9, "told_apart": 0.95}
-"""Level of all intervals; power at the detection limits; P(right name) from which two causes count as told apart."""
+"""Level of all intervals; power at the detection limits; P(right name) from which two causes are distinguished."""
 _MOST_LIMITS, _MOST_CONFUSED, _MOST_CHANNELS = 6, 5, 3  # in the terminal
 _CAUSE_HEADER = ("effect", "parameter", "value", "interval (95 %)", "unit")
 
@@ -47,7 +47,7 @@ def diagnosis_document(
     notes: Sequence[str],
     vehicle: str = "",
 ) -> dict[str, Any]:
-    """The JSON document; what is no number is null, floats keep 9 significant digits.
+    """The JSON document; NaN and infinities become null, floats keep 9 significant digits.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def diagnosis_document(
         Files as they were named.
     tool_version : str
     extended_model : str, optional
-        Where the extended model was written; None: nowhere.
+        File of the extended model; None if it was not written.
     notes : sequence of str
         On the files, beside those of the diagnosis.
     vehicle : str
@@ -97,20 +97,21 @@ def diagnosis_document(
 
 
 def diagnosis_text(document: Mapping[str, Any]) -> str:
-    """What the terminal prints: the verdict first, then what it rests on, in few lines."""
+    """Terminal text: the verdict first, then its basis in a few lines."""
     said = sentences(document)
     lines = [said["headline"][0]]
     if document["causes"]:
         lines += ["", table(_CAUSE_HEADER, _cause_rows(document))]
-    lines += _block("explains as well", said["alternatives"])
+    lines += _block("other explanations that fit as well", said["alternatives"])
     lines += _block("drive by drive", said["agreement"])
-    lines += _block("left over", said["unexplained"])
+    lines += _block("not explained", said["unexplained"])
     same = _first(said["causes_relations"] + said["causes_confused"], _MOST_CONFUSED)
-    lines += _block("this log cannot tell apart", same)
+    lines += _block("this log cannot distinguish", same)
     lines += _block("gain", said["score"] + _first(said["channels"], _MOST_CHANNELS) + said["consequences"])
     lines += _block("next drive", said["manoeuvre"])
-    is_result = document["verdict"] == "no_effect"  # then the limits are what was found out
-    lines += _block("would have been seen", _first(limit_sentences(document), 24 if is_result else _MOST_LIMITS))
+    is_result = document["verdict"] == "no_effect"  # then the limits are the result
+    limits = _first(limit_sentences(document), 24 if is_result else _MOST_LIMITS)
+    lines += _block("smallest effects that would have been detected", limits)
     lines += _block("test", said["test"])
     return ordinary("\n".join(lines)) + "\n"
 
@@ -125,7 +126,7 @@ def _block(title: str, lines: Sequence[str]) -> list[str]:
 
 def _cause_rows(document: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return [
-        (effect_title(c["key"]) if i == 0 else "", name.replace("_", " "), *interval_text(p), p["unit"])
+        (effect_title(c["key"]) if i == 0 else "", name.replace("_", " "), *interval_text(p), unit_text(p["unit"]))
         for c in document["causes"]
         for i, (name, p) in enumerate(c["parameters"].items())
     ]
@@ -246,7 +247,7 @@ def _significance(s: Significance) -> dict[str, Any]:
 
 def _limit(x: Limit) -> dict[str, Any]:
     effect = EFFECTS.get(x.effect)
-    # the limit is that of the first parameter, so is what is worth naming
+    # the limit and the smallest size worth naming refer to the first parameter
     smallest = x.smallest
     if math.isnan(smallest) and effect is not None and effect.parameters:
         smallest = effect.parameters[0].smallest
@@ -279,7 +280,7 @@ def _units(d: Diagnosis) -> dict[str, str]:
 
 
 def _is_confused(c: Confusion) -> bool:
-    """Whether it is told in words; a log has thousands of sets that it tells apart."""
+    """Whether a sentence reports it; a log distinguishes thousands of other sets."""
     return bool(c.relation) or not c.p_correct >= CRITERIA["told_apart"]
 
 
@@ -317,7 +318,7 @@ def _model(model: Model) -> list[dict[str, Any]]:
 
 
 def _p_correct(separation: float) -> float | None:
-    """P(right name) = Phi(sqrt(lambda) / 2) of two causes that are lambda apart."""
+    """P(right name) = Phi(sqrt(lambda) / 2) of two causes at the distance lambda."""
     if not math.isfinite(separation) or separation < 0.0:
         return None
     return _number(NormalDist().cdf(0.5 * math.sqrt(separation)))

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis made of its JSON document: gain by channel, what can be told apart, what is not explained."""
+"""Figures of a diagnosis from its JSON document: gain by channel, causes distinguished, unexplained remainder."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _MOST_EFFECTS, _MOST_WITH_TEXT = 36, 24
 
 
 def plots(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Figures by the id of their place on the page; those that have nothing to show are left out."""
+    """Figures by the id of their place on the page; empty figures are left out."""
     found = {"gain-bars": gain_bars(document), "isolability": isolability(document)}
     found |= {f"remainder-{i}": remainder(r, document) for i, r in enumerate(document["unexplained"])}
     return {name: figure for name, figure in found.items() if figure is not None}
 
 
 def gain_bars(document: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Error of each channel after, relative to that before, one step ahead and running free; None without gain."""
+    """Error of each channel after relative to before, for the next sample and in free simulation; None without gain."""
     rows: list[tuple[str, float, str, str]] = []
     for name, c in by_change(document):
-        for kind, words in (("rmse", "one step"), ("free", "free")):
+        for kind, words in (("rmse", "next sample"), ("free", "free simulation")):
             before, after = c[f"{kind}_before"], c[f"{kind}_after"]
             if before and after is not None:
                 title = f"{plot_text(channel_title(name), 40)}, {words}"
@@ -57,7 +57,7 @@ def gain_bars(document: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def isolability(document: Mapping[str, Any]) -> dict[str, Any] | None:
-    """P(right name) of each pair of effects before the residual was looked at; None without a pair."""
+    """P(right name) of each pair of effects, before the residual is used; None without a pair."""
     names, rows = document["isolability_pairs"]["effects"], document["isolability_pairs"]["p_correct"]
     if not names:
         return None
@@ -86,7 +86,7 @@ def isolability(document: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def remainder(r: Mapping[str, Any], document: Mapping[str, Any]) -> dict[str, Any] | None:
-    """What is left of a channel over the one or two coordinates that it depends on; None without points."""
+    """Unexplained part of a channel over the one or two coordinates that it depends on; None without points."""
     if not r["f"] or not r["depends_on"]:
         return None
     unit = plot_text(unit_text(document["channel_units"].get(r["channel"], "")))
@@ -120,7 +120,7 @@ def remainder(r: Mapping[str, Any], document: Mapping[str, Any]) -> dict[str, An
     }  # fmt: skip
     line = {
         "type": "scatter", "mode": "lines", "x": [x[i] for i in order], "y": [r["f"][i] for i in order],
-        "line": {"color": AFTER, "width": 2}, "name": "what is left", "hovertemplate": "%{y:.4g}<extra></extra>",
+        "line": {"color": AFTER, "width": 2}, "name": "not explained", "hovertemplate": "%{y:.4g}<extra></extra>",
     }  # fmt: skip
     figure = layout(title, labels[0], axis(unit), height=330)
     figure["font"] |= {"color": INK}

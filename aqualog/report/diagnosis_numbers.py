@@ -13,15 +13,14 @@ __all__ = ["interval_text", "measured", "ordinary", "percent", "quantity_text", 
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _ORDINARY = {
-    "−": "-", "…": "...", "→": "->", "²": "^2", "³": "^3", "·10": "e", "≈": "~", "≤": "<=", "≥": ">=", "–": "-",
-    "N·m": "N m",
+    "−": "-", "…": "...", "→": "->", "·10": "e", "≈": "~", "≤": "<=", "≥": ">=", "–": "-",
 }  # fmt: skip
 _SMALL, _LARGE = 1e-3, 1e6  # beyond, a power of ten
 
 
 def unit_text(unit: str) -> str:
-    """Unit with real exponents: `s^2/m^2` -> `s²/m²`."""
-    return pretty_unit(unit).replace("^2", "²").replace("^3", "³").replace("*", "·")
+    """Unit as pages and text show it: `s^2/m^2` -> `s²/m²`."""
+    return pretty_unit(unit)
 
 
 def interval_text(p: Mapping[str, Any]) -> tuple[str, str]:
@@ -30,7 +29,7 @@ def interval_text(p: Mapping[str, Any]) -> tuple[str, str]:
     if value is None:
         return "", ""
     if low is None or high is None:
-        return short(value), "not told"
+        return short(value), "not available"
     half = 0.5 * abs(high - low)
     return _rounded(value, half, value), f"{_rounded(low, half, value)} … {_rounded(high, half, value)}"
 
@@ -43,7 +42,7 @@ def measured(x: float | None, unit: str) -> str:
 
 
 def quantity_text(x: float, unit: str) -> str:
-    """As `measured`, in the spelling of the contract (`14 kg`, `0.02 m/s^2`); empty for what is no number."""
+    """As `measured`, in the spelling of the contract (`14 kg`, `0.02 m/s^2`); empty for NaN and infinities."""
     if not math.isfinite(x):
         return ""
     return f"{ordinary(short(x, 2))} {unit}".removesuffix(" -")
@@ -59,13 +58,13 @@ def percent(share: float | None) -> str:
 
 
 def ordinary(text: str) -> str:
-    """The text without typography, for terminals and files that may not have it."""
+    """Text for a terminal: plain dashes, arrows and powers of ten. `²`, `³`, `·` and `±` stay."""
     raised = {ord(s): p for s, p in zip("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789", strict=True)}
-    # powers of ten first: their 2 and 3 are no squares and cubes of a unit
+    # powers of ten first: their 2 and 3 are not squares and cubes of a unit
     text = re.sub("·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda power: "e" + power[1].translate(raised), text)
     for sign, plain in _ORDINARY.items():
         text = text.replace(sign, plain)
-    return text.translate(raised)
+    return text.translate({s: p for s, p in raised.items() if chr(s) not in "²³"})
 
 
 def short(x: float | None, digits: int = 3) -> str:
@@ -79,7 +78,8 @@ def short(x: float | None, digits: int = 3) -> str:
     decimals = max(0, digits - 1 - power)
     if not _SMALL <= abs(x) < _LARGE:
         return _signed(f"{x / 10.0**power:.{digits - 1}f}") + f"·10{str(power).translate(_SUPERSCRIPT)}"
-    rounded = float(f"{x:.{digits - 1}e}") if digits < 3 else x  # digits before the point are all told but of limits
+    # digits before the point are all shown, except for limits
+    rounded = float(f"{x:.{digits - 1}e}") if digits < 3 else x
     text = f"{rounded:.{decimals}f}"
     return _signed(text.rstrip("0").rstrip(".") if "." in text else text)
 
@@ -88,7 +88,7 @@ def _rounded(x: float, half: float, scale: float) -> str:
     """`x` with two digits of `half`; a power of ten where `scale` is small or large."""
     if not half > 0.0:
         return short(x)
-    last = math.floor(math.log10(half)) - 1  # power of the last digit told
+    last = math.floor(math.log10(half)) - 1  # power of the last digit shown
     largest = max(abs(scale), half)
     if _SMALL <= largest < _LARGE:
         return _signed(f"{x:.{max(0, -last)}f}")

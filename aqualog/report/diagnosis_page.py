@@ -1,4 +1,4 @@
-"""The page of `diagnose`: one file that needs no network. What it says follows from the JSON document alone."""
+"""The page of `diagnose`: one file that needs no network, made from the JSON document and residual samples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from aqualog.report.wording import number
 __all__ = ["render_diagnosis_page", "write_diagnosis_page"]
 
 _LOOKS = {"no_effect": "", "named": "told", "compound": "told", "cannot_tell": "partial", "unexplained": "partial"}
-_DECADES = (-1.0, 2.0)  # of a limit over what is worth naming: what the bars reach from and to
+_DECADES = (-1.0, 2.0)  # range of the bars: limit over smallest size worth naming
 
 
 def write_diagnosis_page(document: Mapping[str, Any], views: Sequence[ResidualView], path: Path, title: str) -> None:
@@ -114,7 +114,7 @@ def _limit_rows(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [
         {
             "name": effect_title(x["key"]),
-            "size": measured(x["size"], x["unit"]) if x["size"] is not None else "not shown at any size",
+            "size": measured(x["size"], x["unit"]) if x["size"] is not None else "not detectable at any size",
             "smallest": measured(x["smallest_worth_naming"], x["unit"]),
             "width": _width(x["ratio"]) if x["size"] is not None else None,
             "is_sharp": x["ratio"] is not None and x["ratio"] <= 1.0,

@@ -39,14 +39,15 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     ----------
     views : sequence of ResidualView
     explained : sequence of str
-        Channels whose error the causes take away: the coordinate that says most about the first of them is shown first.
+        Channels whose error the causes reduce. The page opens with the coordinate that matters most to the first of
+        them.
 
     Returns
     -------
     dict
         `drives` names; `coordinates` [name, axis title, drawn as a line]; `start` the first coordinate; `tables`
-        decimated coordinates, shared by the channels of a drive; `views` with `before`, `after` (None: nothing was
-        changed), `bins` by coordinate as [x, before (median, low, high), after], and `limits` of the residual's axis.
+        decimated coordinates, shared by the channels of a drive; `views` with `before`, `after` (None: the model is
+        unchanged), `bins` by coordinate as [x, before (median, low, high), after], and `limits` of the residual's axis.
     """
     drives = list(dict.fromkeys(v.drive for v in views))
     names = list(dict.fromkeys(c for v in views for c in v.coordinates))
@@ -114,7 +115,7 @@ def _edges(x: FloatArray, *, is_along: bool) -> FloatArray | None:
 
 
 def _start(views: Sequence[ResidualView], explained: Sequence[str]) -> str | None:
-    """The coordinate whose bins differ most beside the spread within them, in an explained channel; else time."""
+    """Coordinate whose bins differ most, relative to the spread within them, in an explained channel; else time."""
     names = [c for v in views for c in v.coordinates]
     channel = next((c for c in explained if any(v.channel == c for v in views)), None)
     own = next((v for v in views if v.channel == channel), None)
@@ -133,7 +134,7 @@ def _start(views: Sequence[ResidualView], explained: Sequence[str]) -> str | Non
 def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> FloatArray:
     """Median, and the ends of the middle 68 %, of `y` in bins of `x`; NaN in bins of less than 8 samples.
 
-    The median, because a single wild sample is no effect.
+    The median is used because a single outlier is not an effect.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> FloatArray:
 
 
 def _limits(both: Sequence[FloatArray]) -> list[float] | None:
-    """Axis of a residual that a single outlier does not squash, with zero in it."""
+    """Axis range of a residual that holds zero and does not stretch to single outliers."""
     values = np.concatenate([y[np.isfinite(y)] for y in both])
     if not values.size:
         return None

@@ -1,4 +1,4 @@
-"""What a diagnosis says, in sentences made of its JSON document and of nothing else."""
+"""The sentences of a diagnosis, made from its JSON document alone."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = [
     "sentences", "verdict_title",
 ]  # fmt: skip
 
-WORSE = 0.01  # rise of a channel's error that is told
+WORSE = 0.01  # rise of a channel's error that is reported
 _VERDICTS = {
-    "no_effect": "Nothing is missing",
+    "no_effect": "No effect is missing",
     "named": "One cause",
     "compound": "Several causes at once",
-    "cannot_tell": "Causes that this log cannot tell apart",
+    "cannot_tell": "Causes that this log cannot distinguish",
     "unexplained": "An effect that no known cause explains",
     "not_testable": "This log cannot be tested",
 }
@@ -48,7 +48,7 @@ COORDINATES: dict[str, tuple[str, str, float, float]] = {
     "pressure": ("tyre pressure", "bar", 1e-5, 0.0),
     "load": ("load", "kg", 1.0, 0.0),
 }
-"""What a coordinate is called, the unit it is shown in, and factor and offset to that unit."""
+"""Name of a coordinate, its unit on pages, and factor and offset to that unit."""
 
 _PLACES = {"f": "front", "r": "rear"}
 _WHEELS = ("fl", "fr", "rl", "rr")
@@ -56,7 +56,7 @@ _MOST_CONFUSED = 12
 
 
 def verdict_title(verdict: str) -> str:
-    """What kind of result it is."""
+    """The verdict in words."""
     return _VERDICTS.get(verdict, verdict.replace("_", " "))
 
 
@@ -85,8 +85,8 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
 
     `headline` holds one; `test`, `score`, `channels` (error of each, the most changed first), `gain_notes`,
     `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations`, `confused`,
-    `unexplained`, `untested`, `notes` any number. `causes_relations` and `causes_confused` are those that one of the
-    causes takes part in.
+    `unexplained`, `untested`, `notes` hold any number. `causes_relations` and `causes_confused` hold those that involve
+    one of the causes.
     """
     causes = {c["key"] for c in document["causes"]}
     confused = _confused(document)
@@ -113,7 +113,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
 
 
 def by_sharpness(document: Mapping[str, Any]) -> tuple[list[Mapping[str, Any]], list[Mapping[str, Any]]]:
-    """Limits, the sharpest beside what is worth naming first and what is not shown last.
+    """Limits in order: smallest relative to the size worth naming first, undetectable effects last.
 
     Returns
     -------
@@ -146,13 +146,13 @@ def _test(s: Mapping[str, Any] | None) -> list[str]:
     p, surrogates = s["p_value"], s["surrogates"]
     beyond = s["statistic"] is not None and s["threshold"] is not None and s["statistic"] > s["threshold"]
     said = [
-        f"{'More' if beyond else 'No more'} than noise: largest statistic {short(s['statistic'])}, "
+        f"{'More' if beyond else 'No more'} than noise: largest test value {short(s['statistic'])}, "
         f"threshold {short(s['threshold'])}, p {'≈' if p == 0.0 else '='} {short(p)}."
     ]
     asked = f"False alarm level {short(s['level'])}"
     if s["achieved_level"] is None:
-        return [*said, f"{asked}; what is achieved was not measured."]
-    of = f" in {surrogates} surrogates without effect" if surrogates else ", without surrogates"
+        return [*said, f"{asked}; the achieved level was not measured."]
+    of = f" in {surrogates} simulations with noise only" if surrogates else ", without simulated noise"
     return [*said, f"{asked}, achieved {short(s['achieved_level'])}{of}."]
 
 
@@ -171,14 +171,14 @@ def _alternative(a: Mapping[str, Any]) -> str:
 
 
 def _agreement(a: Mapping[str, Any]) -> str:
-    """Whether drives say the same of a value, each by itself, and whether what the others say predicts each better."""
+    """Whether the drives agree on a value, and whether the other drives' value improves the prediction of each."""
     values = "; ".join(
         f"{d['drive']} {value} ({interval})" for d in a["drives"] for value, interval in [interval_text(d)] if value
     )
     worse = [d["drive"] for d in a["drives"] if d["log_score_gain"] is not None and d["log_score_gain"] <= 0.0]
-    how = "the drives agree" if a["holds"] else "the drives differ" if not worse else "not borne out by every drive"
+    how = "the drives agree" if a["holds"] else "the drives differ" if not worse else "not confirmed by every drive"
     told = f" (p {short(a['p_value'])})" if a["p_value"] is not None else ""
-    left = f"; {', '.join(worse)} is predicted no better with what the others say" if worse else ""
+    left = f"; {', '.join(worse)} is not predicted better with the value of the others" if worse else ""
     unit = unit_text(a["drives"][0]["unit"])
     name = a["parameter"].replace("_", " ") + (f" [{unit}]" if unit not in ("", "–", "-") else "")
     return f"{effect_title(a['key'])}, {name}: {how}{told}: {values}{left}"
@@ -219,37 +219,36 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
         return []
     if g["in_sample"]:
         score, (low, high) = g["in_sample_log_score_gain"], g["in_sample_ci95"]
-        where = "On the diagnosed drives themselves, for none was held out,"
+        where = "On the diagnosed drives (no held-out data)"
     else:
         score, (low, high) = g["heldout_log_score_gain"], g["ci95"]
-        where = f"On what the fit has not seen ({', '.join(g['heldout'])})" if g["heldout"] else "On held-out parts"
+        where = f"On held-out drives ({', '.join(g['heldout'])})" if g["heldout"] else "On held-out parts"
     if score is None:
         return []
     interval = f" (95 %: {short(low)} … {short(high)})" if low is not None and high is not None else ""
+    unit = unit_text(g["unit"])
     if high is not None and high < 0.0:
-        return [f"{where} the log score falls by {short(-score)} {g['unit']}{interval}: the model predicts worse."]
+        return [f"{where} the log score falls by {short(-score)} {unit}{interval}: the model predicts worse."]
     if low is not None and low <= 0.0:
-        return [
-            f"{where} the log score changes by {short(score)} {g['unit']}{interval}: no gain that could be measured."
-        ]
+        return [f"{where} the log score changes by {short(score)} {unit}{interval}: no measurable gain."]
     change = "rises" if score >= 0.0 else "falls"
-    return [f"{where} the log score {change} by {short(abs(score))} {g['unit']}{interval}."]
+    return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}."]
 
 
 def _worse(document: Mapping[str, Any]) -> list[str]:
-    """Channels whose error grows, wherever they stand in the list of all."""
+    """Channels whose error grows; the full list shows only the largest changes first."""
     grown = [
         f"{channel_title(name)} +{percent(c[f'{kind}_change'])} {words}"
         for name, c in by_change(document)
-        for kind, words in (("rmse", "one step ahead"), ("free", "running free"))
+        for kind, words in (("rmse", "for the next sample"), ("free", "in free simulation"))
         if (c[f"{kind}_change"] or 0.0) > WORSE
     ]
-    return [f"Predicted worse with it: {'; '.join(grown)}."] if grown else []
+    return [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
 
 
 def _channel(name: str, c: Mapping[str, Any]) -> list[str]:
     parts = []
-    for kind, words in (("rmse", "one step ahead"), ("free", "running free")):
+    for kind, words in (("rmse", "next sample"), ("free", "free simulation")):
         before, after, change = c[f"{kind}_before"], c[f"{kind}_after"], c[f"{kind}_change"]
         if before is None or after is None:
             continue
@@ -265,7 +264,7 @@ def _consequence(c: Mapping[str, Any]) -> str:
     if c["per_100km_before"] is not None:
         parts[0] += f" ({short(c['per_100km_before'])} → {short(c['per_100km_after'])} per 100 km)"
     if c["passes"]:
-        parts.append(f"found {c['found_before']} → {c['found_after']} of {c['passes']} passes")
+        parts.append(f"detected {c['found_before']} → {c['found_after']} of {c['passes']} passes")
     if c["latency_before_s"] is not None and c["latency_after_s"] is not None:
         parts.append(f"latency {short(c['latency_before_s'])} → {short(c['latency_after_s'])} s")
     return f"{detector_name(c['detector'])}: {', '.join(parts)}."
@@ -278,7 +277,8 @@ def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
     if m["p_correct_now"] is None or m["p_correct_then"] is None or m["name"] in ("none", "sensor"):
         return said
     lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""
-    return [*said, f"The right name: now {percent(m['p_correct_now'])}, then {percent(m['p_correct_then'])}{lasting}."]
+    now, then = percent(m["p_correct_now"]), percent(m["p_correct_then"])
+    return [*said, f"Probability of the right name: {now} now, {then} after this drive{lasting}."]
 
 
 def _unexplained(r: Mapping[str, Any]) -> str:
@@ -286,9 +286,9 @@ def _unexplained(r: Mapping[str, Any]) -> str:
     said = r["sentence"] or f"{_capital(channel_title(r['channel']))} depends on {coordinates}."
     parts = [f"{percent(r['share'])} of the variance"] if r["share"] is not None else []
     parts += [f"p = {short(r['p_value'])}"] if r["p_value"] is not None else []
-    parts += [f"as well by {', '.join(coordinate_title(x) for x in r['proxies'])}"] if r["proxies"] else []
+    parts += [f"{', '.join(coordinate_title(x) for x in r['proxies'])} explains it as well"] if r["proxies"] else []
     if r["nearest"]:
-        alike = f" ({short(r['cosine'])} alike)" if r["cosine"] is not None else ""
+        alike = f" (similarity {short(r['cosine'])})" if r["cosine"] is not None else ""
         parts.append(f"nearest known effect {effect_title(r['nearest'])}{alike}")
     return f"{said} {_capital('; '.join(parts))}." if parts else said
 

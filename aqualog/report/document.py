@@ -145,7 +145,7 @@ def result_groups(result: DriveResult) -> list[LogGroup]:
 
 
 def track_name(track: Track) -> str:
-    """`minor_spin_down_fr`; where a side is judged, `slip_slope_drop_left`; never the name of a signal."""
+    """`minor_spin_down_fr`, or `slip_slope_drop_left` for a side; never the name of a signal."""
     place = track.wheel or track.side
     name = f"{track.detector}_{place}" if place else track.detector
     return f"{track.detector}_cusum_{place}" if name in SYMBOLS else name

@@ -29,7 +29,7 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
         `drives`: evaluated, `seconds`, `failed` {drive: reason};
         `thresholds` and `rivals` {detector: value} that were used;
         `detectors`: per detector `drives`, `unavailable`, recalls `full`, `partial`, `wheel_full`, `wheel_partial` (on
-        the wheels that it speaks of), `own` (labels of its name) - each `episodes`, `found`, `recall`, `ci95`,
+        the wheels that it judges), `own` (labels of its name) - each `episodes`, `found`, `recall`, `ci95`,
         `warned_before`, `latency_median_s`, `latency_95_s` (null: never) -, `false_alarms` (`count`, `hours`,
         `per_hour`, `per_hour_ci95`, `per_100km`, `per_100km_ci95`) outside water, `on_water` (events on water, contact
         above 0.7);
@@ -37,7 +37,7 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
         `confusion` {row: {detector: `episodes`, `with_event`, `events_per_hour`}};
         `situations` {manoeuvre: {detector: as in `detectors`}} and `coverage` (C78);
         `roc`: points `detector`, `factor`, `threshold`, `full`, `partial`, `per_hour`, `count`, `hours`;
-        `better_rivals`: what a rival does better; `sentences`: the same in words;
+        `better_rivals`: measures in which a rival is better; `sentences`: the same in words;
         `tuning`: null, or `rule`, `tuned_on`, `reported_on`, `unused`, `choices`, `before` (detectors with the
         thresholds as they were);
         `runs`: per drive `name`, `groups`, `seconds`, `false_alarms_s` {detector: times}, `unavailable`.

@@ -25,9 +25,10 @@ from aqualog.report.text import table
 __all__ = ["evaluation_text"]
 
 _LEGEND = (
-    "full within 0.5 s, partial within 2 s of its beginning; median and 95 % of the latency over all partial episodes, "
-    "never where more are missed; before: already on, on the same water; on water: events where the contact stays "
-    "above 0.7, neither right nor wrong"
+    "Full: detected within 0.5 s of the beginning; partial: within 2 s.\n"
+    "Median s, 95 % s: latency over all partial episodes, `never` where more episodes are missed.\n"
+    "Before: the detector was already on, on the same water.\n"
+    "On water: events with contact above 0.7, counted neither as right nor as wrong."
 )
 _HEADER = (
     "detector", "drives", "full", "partial", "median s", "95 % s", "before", "false alarms", "per h (95 %)",
@@ -36,7 +37,7 @@ _HEADER = (
 
 
 def evaluation_text(evaluation: Evaluation, *, by: Sequence[str] = ()) -> str:
-    """Tables of detectors, configurations, confusion and situations, and what they say in words."""
+    """Tables of detectors, configurations, confusion and situations, with summary sentences."""
     records = evaluation.records
     hours = sum(r.duration_s for r in records) / 3600.0
     lines = [f"{len(records)} drives, {hours:.3g} h", "", table(_HEADER, _rows(score_all(records))), _LEGEND]

@@ -1,4 +1,4 @@
-"""What an evaluation says, in sentences."""
+"""The sentences of an evaluation."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def short(x: float) -> str:
 
 
 def notes_of(records: Sequence[RunRecord]) -> list[str]:
-    """Notes of all drives; one that several share is told once, with their number."""
+    """Notes of all drives; a shared note appears once, with the number of drives."""
     drives: dict[str, list[str]] = {}
     for r in records:
         for text in r.notes:
@@ -88,7 +88,7 @@ def headline(evaluation: Evaluation) -> str:
 
 
 def verdicts(records: Sequence[RunRecord]) -> list[str]:
-    """A sentence for each joint detector: what it did, beside what is asked for."""
+    """A sentence for each joint detector: its result against the targets."""
     scores = score_all(records)
     out = []
     for name in JOINT:
@@ -96,21 +96,21 @@ def verdicts(records: Sequence[RunRecord]) -> list[str]:
         if s is None or not s.runs:
             continue
         lacks = [
-            f"{effect} {percent(r.share)} of {percent(TARGETS[effect])}"
+            f"{effect} {percent(r.share)}, target {percent(TARGETS[effect])}"
             for effect, r in (("full", s.full), ("partial", s.partial))
             if r.episodes and r.share < TARGETS[effect]
         ]
         if s.false_alarms.seconds > 0.0 and s.false_alarms.per_hour > TARGETS["per_hour"]:
-            lacks.append(f"{s.false_alarms.per_hour:.3g} false alarms per hour, asked for {TARGETS['per_hour']:g}")
-        end = "; all that is asked for"
+            lacks.append(f"{s.false_alarms.per_hour:.3g} false alarms per hour, target {TARGETS['per_hour']:g}")
+        end = "; all targets are met"
         if s.false_alarms.seconds > 0.0 and s.false_alarms.per_hour_ci95[1] > TARGETS["per_hour"]:
             most, hours = s.false_alarms.per_hour_ci95[1], 3.7 / TARGETS["per_hour"]
             end = (
-                f"; what is asked for, but so many hours bound the false alarms at {most:.2g} per hour only "
+                f"; targets met, but so few hours only show that false alarms are below {most:.2g} per hour "
                 f"({hours:.0f} h without one would show {TARGETS['per_hour']:g})"
             )
         if lacks:
-            end = f"; short of what is asked for: {', '.join(lacks)}"
+            end = f"; targets missed: {', '.join(lacks)}"
         out.append(f"{title_of(name)} {_did(s)}{end}.")
     return out
 
@@ -127,7 +127,7 @@ def _did(s: Score) -> str:
 
 
 def _merit(s: Score) -> tuple[int, float, float]:
-    """What is asked for and met, then recall, then silence."""
+    """Rank by targets met, then recall, then few false alarms."""
     shares = {effect: r.share for effect, r in (("full", s.full), ("partial", s.partial)) if r.episodes}
     met = sum(share >= TARGETS[effect] for effect, share in shares.items())
     met += s.false_alarms.per_hour <= TARGETS["per_hour"]
@@ -135,7 +135,7 @@ def _merit(s: Score) -> tuple[int, float, float]:
 
 
 def coverage_sentences(records: Sequence[RunRecord]) -> list[str]:
-    """In how many situations each detector does what is asked for (C78)."""
+    """Number of situations in which each detector meets the targets (C78)."""
     return [
         f"{title_of(c.detector)}: finds {percent(TARGETS['partial'])} of partial aquaplaning in {c.found} of "
         f"{c.of_aquaplaning} situations, quiet in {c.quiet} of {c.of_dry}"
@@ -145,12 +145,12 @@ def coverage_sentences(records: Sequence[RunRecord]) -> list[str]:
 
 
 def better_sentences(records: Sequence[RunRecord]) -> list[str]:
-    """Where a rival is better than the thesis' method, or that it is nowhere; empty without rivals."""
+    """Cases in which a rival is better than the thesis' method, or a sentence that there is no such case."""
     if not any(n in RIVALS for r in records for n in r.detectors):
         return []
     found = better_rivals(records)
     if not found:
-        return ["No rival is better than a method of the thesis that ran beside it on the same drives."]
+        return ["No rival is better than the thesis' methods on the same drives."]
     groups: dict[tuple[str, str, str], list[Better]] = {}
     for b in found:
         groups.setdefault((b.rival, b.against, b.situation), []).append(b)
@@ -163,7 +163,7 @@ def _better(key: tuple[str, str, str], some: Sequence[Better]) -> str:
     things = [
         f"{_value(b, b.rival_value)} against {_value(b, b.own_value)} {_MEASURES[b.measure]}{_sure(b)}" for b in some
     ]
-    price = ", but is worse in another measure" if some[0].at_a_price else ""
+    price = ", but worse in another measure" if some[0].at_a_price else ""
     verb = "is better" if any(b.is_sure for b in some) else "came out better, but within chance,"
     return f"{title_of(rival)} {verb} than {title_of(against)}{where}: {'; '.join(things)}{price}."
 
@@ -177,7 +177,7 @@ def _sure(b: Better) -> str:
 
 
 def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping[str, Score]) -> list[str]:
-    """What was tuned on what, and what each proposal does on the drives that it has not seen."""
+    """Drives used for tuning, and the result of each proposal on drives not used for tuning."""
     lines = [
         f"thresholds proposed on {len(tuning.tuned_on)} drives, reported on {len(tuning.reported_on)} others"
         f"{f', {len(tuning.unused)} unused' if tuning.unused else ''}: {tuning.rule}"

@@ -17,12 +17,12 @@ _HEADS = {
     "unreadable": "cannot be read",
     "lost": "lost or not used",
     "mended": "mended",
-    "doubt": "worth a look",
+    "doubt": "worth checking",
 }
 
 
 def examination_text(found: Examination) -> str:
-    """For a terminal: the files, what is wrong by weight, and which detectors can work."""
+    """Terminal text: the files, problems by weight, and the detectors that can run."""
     lines = []
     for f in found.files:
         if f.format:
@@ -35,12 +35,12 @@ def examination_text(found: Examination) -> str:
         if own:
             lines += ["", f"{head}:", *(line for x in own for line in _lines(x))]
     if not found.findings:
-        lines += ["", "nothing is wrong with it"]
+        lines += ["", "no problem found"]
     if found.ready:
-        lines += ["", f"detectors that can work: {', '.join(found.ready)}"]
+        lines += ["", f"detectors that can run: {', '.join(found.ready)}"]
     lacks = [(name, signals) for name, signals in found.missing if signals]
     if lacks and not found.ready:
-        lines += ["", "no detector can work", f"    try: {_MAP}"]
+        lines += ["", "no detector can run", f"    try: {_MAP}"]
     none = [f"  {name}: missing {lacking(signals)}" for name, signals in lacks if name not in found.ready]
     part = [f"  {name}: without {lacking(signals)}" for name, signals in lacks if name in found.ready]
     for head, block in (("not judged:", none), ("judged in part:", part)):

@@ -29,7 +29,7 @@ def matrix_text(
     measured: Mapping[int, Measured],
     lanes: Sequence[str] = (),
 ) -> str:
-    """What the campaign holds, its configurations, and what is missing."""
+    """Summary of the campaign, its configurations, and missing combinations."""
     lines = [
         f"{campaign.name}: {_count(len(campaign.runs), 'run')} in {_count(len(matrix.configurations), 'configuration')}"
     ]
@@ -42,7 +42,7 @@ def matrix_text(
         lines.append("same in all runs: " + ", ".join(f"{k} = {v}" for k, v in matrix.constants.items()))
     for factor in dict.fromkeys(matrix.together.values()):
         keys = ", ".join(k for k, f in matrix.together.items() if f == factor)
-        lines.append(f"{factor} fixes {keys}: their effects cannot be told apart")
+        lines.append(f"{factor} fixes {keys}: their effects cannot be distinguished")
     if matrix.others:
         lines.append("further keys: " + ", ".join(f"{k} ({_count(n, 'value')})" for k, n in matrix.others.items()))
     if matrix.factors:
@@ -50,7 +50,7 @@ def matrix_text(
         lines += [f"  {f.key}: {_levels(f.values, f.runs)}" for f in matrix.factors]
     lines += ["", _table(matrix), ""]
     missing = [*_missing(matrix, logs), *lanes[:10], *_failed(measured), *_unset(vehicles)] or [
-        "nothing that the campaign file could show"
+        "no configuration key in the campaign file"
     ]
     lines += ["missing:", *(f"  {m}" for m in missing)]
     return "\n".join(lines) + "\n"
@@ -84,17 +84,17 @@ def _failed(measured: Mapping[int, Measured], most: int = 5) -> list[str]:
 
 
 def _unset(vehicles: Mapping[str, Vehicle]) -> list[str]:
-    """Keys of the vehicle files for which a value of no particular car stands in."""
+    """Keys missing in the vehicle files, for which default values are used."""
     unset = {name: [k for k in NEEDED if k not in v.given] for name, v in vehicles.items()}
     return [
-        f"{name} does not give {', '.join(keys)}: a mid-size car with rear-wheel drive is taken"
+        f"{name} does not give {', '.join(keys)}: a mid-size car with rear-wheel drive is assumed"
         for name, keys in unset.items()
         if keys
     ]
 
 
 def _levels(values: Sequence[str], runs: Sequence[int]) -> str:
-    return ", ".join(f"{v or 'not told'} ({_count(n, 'run')})" for v, n in zip(values, runs, strict=True))
+    return ", ".join(f"{v or 'not given'} ({_count(n, 'run')})" for v, n in zip(values, runs, strict=True))
 
 
 def _table(matrix: Matrix) -> str:
@@ -106,7 +106,7 @@ def _table(matrix: Matrix) -> str:
     for c in matrix.configurations[:MOST_ROWS]:
         row = [*(v or _UNKNOWN for v in c.values), f"{len(c.runs)}{_mark(c)}"]
         row += [_speeds(c.speeds)] if has_speed else []
-        row += [", ".join(f"{m or 'not told'} {n}" for m, n in c.manoeuvres.items())] if has_manoeuvre else []
+        row += [", ".join(f"{m or 'not given'} {n}" for m, n in c.manoeuvres.items())] if has_manoeuvre else []
         rows.append(row)
     more = len(matrix.configurations) - len(rows)
     text = table([*header, ""], [[*r, ""] for r in rows])

@@ -16,5 +16,5 @@ def cut(text: str, most: int = LONGEST) -> str:
 
 
 def name_digest(text: str) -> str:
-    """What tells two names apart whose shown parts are alike."""
+    """A digest that distinguishes two names whose shown parts are equal."""
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,4 +1,4 @@
-"""What makes a page one file that needs no network: scripts inside, a policy that names them, data that stay data."""
+"""Builds pages as single files that need no network: scripts inside, a policy that names them, data as JSON."""
 
 from __future__ import annotations
 

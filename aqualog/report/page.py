@@ -69,7 +69,7 @@ def render_page(result: DriveResult, *, title: str) -> str:
         title=title,
         version=__version__,
         policy=content_policy(scripts.values()),
-        # Markup only for the package's own files, plotly.js and what _data has escaped
+        # Markup only for the package's own files, plotly.js and data escaped by _data
         css=Markup(_text("page.css")),
         scripts={name: Markup(text) for name, text in scripts.items()},
         data=_data(result, rows, plan, events),
@@ -119,20 +119,20 @@ def _toggles(rows: list[Row]) -> list[dict[str, str]]:
 
 
 def _picture_note(result: DriveResult) -> str:
-    """What is drawn of a drive that was gone through in windows: not its samples."""
+    """Note on the drawn data of a drive processed in windows, whose samples are not in the page."""
     if result.signals.full is None:
         return ""
     return (
-        f"Of this long drive the page holds the least and greatest value of every {2.0 * result.signals.dt:g} s: no "
-        "outlier is lost, and events are too coarse to be looked at here; signals.parquet has every sample."
+        f"For this long drive the page holds the minimum and maximum of every {2.0 * result.signals.dt:g} s, so no "
+        "outlier is lost. Use signals.parquet to look at events: it has every sample."
     )
 
 
 def _reduction_note(plan: Plan, events: int) -> str:
-    """What is drawn and what is not."""
+    """Note on the samples that the page draws."""
     if plan.is_complete:
         return "Every sample is in this page; zoomed out, minima and maxima are drawn."
-    text = f"Of the whole drive the page holds about {POINTS} minima and maxima per line: no outlier is lost."
+    text = f"The page holds about {POINTS} minima and maxima per line over the whole drive, so no outlier is lost."
     if not events:
         return text
     every = plan.events_in_full == events

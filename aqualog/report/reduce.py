@@ -18,7 +18,7 @@ Spans = NDArray[np.int64]
 POINTS = 4000  # per line over the whole drive: more than twice the pixels of a wide screen
 ALL_SAMPLES = 20_000  # a drive up to this length goes into the page as it is
 MARGIN_S = 3.0  # [s] of every sample before and after an event
-LONG_S = 20.0  # [s] of a longer event only both ends are shown in full: between them there is nothing sudden
+LONG_S = 20.0  # [s] of a longer event only both ends are shown in full: nothing sudden happens between them
 MAX_WINDOWS = 40
 DETAIL_SAMPLES = 40_000  # per line in all windows together; bounds the page at high sample rates
 

@@ -1,4 +1,4 @@
-"""The small page of one run of a campaign, from what the store keeps of it."""
+"""The small page of one run of a campaign, from the samples in the campaign's store."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def render_run_page(
 
 
 def command_of(data: CampaignData, info: RunInfo) -> str:
-    """What makes the full page of this run, to be typed in the folder of the campaign file."""
+    """The command that makes the full page of this run, for the folder of the campaign file."""
     base = data.configured.campaign.path.parent
     signals = data.configured.campaign.signals
     words = ["aqualog", "detect", *(_from(base, p) for p in info.run.logs), "--vehicle", _from(base, info.run.vehicle)]
@@ -120,7 +120,7 @@ def _problems(info: RunInfo) -> list[str]:
     q = info.about["quality"]
     found = ["the log is cut off: its end is missing"] if q["truncated"] else []
     found += [f"{q[n]} {n.replace('_', ' ')}" for n in q if n != "truncated" and q[n]]
-    found += ["where the lane is is not known: the run counts in no figure over speed"] if not info.water_from else []
+    found += ["the position of the lane is not known: figures over speed skip this run"] if not info.water_from else []
     found += [f"{detector_name(d)} not judged (needs {', '.join(m)})" for d, m in info.about["unavailable"].items()]
     found += [f"{detector_name(d)} judged without {', '.join(m)}" for d, m in info.about["limited"].items() if m]
     return [cut(x, 300) for x in [*found, *info.about["notes"]]][:20]

@@ -37,17 +37,17 @@ _CSV = (
 
 
 def way_sentence(result: DirectResult) -> str:
-    """Where slip and traction come from."""
+    """Sources of slip and traction."""
     return f"{_METHODS[result.method]}, {_TRACTIONS[result.traction]}"
 
 
 def delay_sentence(line: Line) -> str:
-    """By how much v_x is late; empty where it is not asked or cannot be told."""
+    """Delay of v_x; empty if it was not requested or could not be estimated."""
     if not (line.told and math.isfinite(line.delay)):
         return ""
     low, high = line.delay_ci
     interval = f" (95 %: {low:+.3f} ... {high:+.3f})" if math.isfinite(low) else " (given)"
-    return f"v_x is late by {line.delay:+.3f} s{interval}, taken out"
+    return f"v_x is late by {line.delay:+.3f} s{interval}; the slip is corrected for it"
 
 
 # --- text ------------------------------------------------------------------------------------------------------------
@@ -61,7 +61,7 @@ def slope_text(result: DirectResult) -> str:
                 for r in result.recursions]  # fmt: skip
         return "\n".join([*lines, table(("place", "slope", "sd", "learnt s", "changes"), rows)]) + "\n"
     lines.append(table(_HEADER, [_row(p) for p in result.places]))
-    lines += [f"  {p.place}: cannot tell: {p.line.reason}" for p in result.places if not p.line.told]
+    lines += [f"  {p.place}: not estimated: {p.line.reason}" for p in result.places if not p.line.told]
     lines += [f"  {p.place}: {delay_sentence(p.line)}" for p in result.places if delay_sentence(p.line)]
     lines += ["", "over the session"]
     parts = [_segment_row(p, i) for p in result.places for i in range(len(p.segments))]
@@ -104,7 +104,7 @@ def _row(p: PlaceSlope) -> tuple[str, ...]:
         f"{p.seconds:.1f}",
         f"{p.mu_range[0]:+.3f}" if line.samples else "-",
         f"{p.mu_range[1]:+.3f}" if line.samples else "-",
-        f"{end.slope:.1f} +- {end.slope_sd:.1f}" if math.isfinite(end.slope) else "-",
+        f"{end.slope:.1f} ± {end.slope_sd:.1f}" if math.isfinite(end.slope) else "-",
     )
 
 
@@ -223,7 +223,7 @@ def _place(p: PlaceSlope) -> dict[str, Any]:
 
 
 def slope_csv(result: DirectResult) -> str:
-    """One line per place over all, and one per part of the session; an empty cell is what cannot be told."""
+    """One line per place over the whole drive, and one per part of the session; an empty cell has no estimate."""
     rows = [",".join(_CSV)]
     for p in result.places:
         whole = (float(p.t[0]), float(p.t[-1])) if p.t.size else (math.nan, math.nan)

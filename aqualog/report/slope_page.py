@@ -92,8 +92,8 @@ def _row(p: PlaceSlope) -> dict[str, Any]:
             number(p.seconds, 1),
             f"{number(p.mu_range[0], 3)} … {number(p.mu_range[1], 3)}",
             number(100.0 * line.scatter, 3),
-            f"{number(100.0 * line.attenuation, 1)}{' (given back)' if line.is_corrected else ''}",
+            f"{number(100.0 * line.attenuation, 1)}{' (corrected)' if line.is_corrected else ''}",
             f"{number(end.slope, 1)} ± {number(end.slope_sd, 1)}",
         ],
-        "reason": f"cannot tell: {line.reason}" if line.reason else delay_sentence(line),
+        "reason": f"not estimated: {line.reason}" if line.reason else delay_sentence(line),
     }

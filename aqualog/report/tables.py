@@ -62,7 +62,7 @@ def _utc(start_ns: int) -> str:
 
 
 def problems(result: DriveResult) -> list[str]:
-    """What a reader must know before trusting the page."""
+    """Problems of the data that limit how far the page can be trusted."""
     quality = result.signals.quality
     found = ["The log is cut off: its end is missing."] if quality.truncated else []
     if quality.dropped_samples:
@@ -109,7 +109,7 @@ def _ratio(event: Event) -> float:
 
 
 def detector_rows(result: DriveResult) -> list[dict[str, str]]:
-    """Each detector with what became of it."""
+    """Each detector with its state and number of events."""
     counts: dict[str, int] = {}
     for event in result.events:
         counts[event.detector] = counts.get(event.detector, 0) + 1
@@ -128,7 +128,7 @@ def detector_rows(result: DriveResult) -> list[dict[str, str]]:
 
 
 def slope_rows(result: DriveResult) -> list[list[Cell]]:
-    """What the slip-slope estimator made of each side: estimate, reference, and how long it could tell what."""
+    """Result of the slip-slope estimator by side: estimate, reference, and seconds in each state."""
     return [_slope_row(s) for s in result.slopes]
 
 
@@ -156,7 +156,7 @@ def _slope_row(s: SlopeSummary) -> list[Cell]:
 
 
 def signal_rows(result: DriveResult) -> list[list[Cell]]:
-    """Where each signal came from and what was bad in it."""
+    """Source and bad samples of each signal."""
     return [_signal_row(result, s) for s in result.signals.symbols]
 
 
@@ -194,7 +194,7 @@ def fault_columns() -> list[str]:
 
 
 def fault_rows(result: DriveResult) -> list[tuple[str, list[int]]]:
-    """Time faults of the whole drive and of each signal that has any."""
+    """Time faults of the whole drive and of each signal with faults."""
     rows = [("all sources", _counts(result.signals.quality.faults))]
     rows += [(name, _counts(o.faults)) for name, o in result.signals.origins.items() if any(_counts(o.faults))]
     return rows if any(any(counts) for _, counts in rows) else []

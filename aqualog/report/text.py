@@ -15,7 +15,7 @@ NOTE = 1000  # characters of a sentence that names what a log holds
 
 
 def event_table(result: DriveResult) -> str:
-    """Events, what could not be judged and why, and what was lost."""
+    """Events, detectors that could not judge with their missing signals, and slip slopes."""
     signals = result.signals
     rate = 1e9 / signals.step_ns
     lines = [f"{result.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz, {len(signals.symbols)} signals"]
@@ -39,7 +39,7 @@ def event_table(result: DriveResult) -> str:
 
 
 def _slope(summary: SlopeSummary) -> str:
-    """What the slip-slope estimator saw of one side, empty if it saw nothing."""
+    """Slip slope of one side with the shares of its states; empty without an estimate."""
     total = sum(summary.seconds.values())
     if not math.isfinite(summary.slope) or total <= 0.0:
         return ""
@@ -48,14 +48,14 @@ def _slope(summary: SlopeSummary) -> str:
         if math.isfinite(summary.reference)
         else ", no dry value yet"
     )
-    states = {"told": "estimating", "too even": "slope_frozen", "blind": "blind"}
+    states = {"estimated": "estimating", "traction too even": "slope_frozen", "blind": "blind"}
     shares = [f"{label} {summary.seconds[key] / total:.0%}" for label, key in states.items()]
     name = summary.wheel or summary.place
-    return f"{name}: {summary.slope:.1f} +- {summary.slope_sd:.1f}{dry}; {', '.join(shares)} of the time"
+    return f"{name}: {summary.slope:.1f} ± {summary.slope_sd:.1f}{dry}; {', '.join(shares)} of the time"
 
 
 def lacking(missing: Sequence[str]) -> str:
-    """Signals that a detector lacks, with what may stand in their place."""
+    """Missing signals of a detector, with possible replacements."""
     text = ", ".join(missing)
     for axle in "fr":  # an axle's torque will do
         text = text.replace(f"torque_{axle}l, torque_{axle}r", f"torque_{axle}l, torque_{axle}r (or torque_{axle})")
@@ -88,11 +88,11 @@ def _evidence(event: Event) -> str:
     if "slope_min" in evidence:
         parts.append(f"slope down to {evidence['slope_min']:.1f}, dry {evidence.get('slope_ref', math.nan):.1f}")
     if "delta_a_x_max" in evidence:
-        parts.append(f"resistance up to {evidence['delta_a_x_max']:.2f} m/s^2")
+        parts.append(f"resistance up to {evidence['delta_a_x_max']:.2f} m/s²")
     for key in ("force_residual", "torque_residual"):
         if f"{key}_min" in evidence:
             worst = max(evidence[f"{key}_min"], evidence[f"{key}_max"], key=abs)
-            parts.append(f"{worst:+.0f} N off the model" if key[0] == "f" else f"{worst:+.1f} N m off the model")
+            parts.append(f"{worst:+.0f} N off the model" if key[0] == "f" else f"{worst:+.1f} N·m off the model")
     if evidence.get("from_steering_torque"):
         parts.append("from the steering torque")
     met = [n for n in (1, 2, 3, 4, 5) if evidence.get(f"criterion_{n}")]

@@ -18,7 +18,7 @@ MOST_NAMED = 4
 class Verdict:
     """`level` is `full`, `partial`, `none`, or `open` where nothing could be judged.
 
-    `details` name the events, or sum them up where they are many; `not_judged` says what stays open.
+    `details` name the events, or summarise many of them; `not_judged` lists detectors that could not judge.
     """
 
     level: str
@@ -43,7 +43,7 @@ def by_importance(events: Sequence[Event]) -> list[Event]:
 
 
 def verdict(result: DriveResult) -> Verdict:
-    """What was found and what could not be judged."""
+    """Events, and detectors that could not judge."""
     events = by_importance(result.events)
     braking = sum(bool(e.evidence.get("braking_at_start")) for e in events)
     full = sum(e.severity == "full" for e in events if not e.evidence.get("braking_at_start"))

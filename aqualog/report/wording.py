@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from aqualog.types import Event
+from aqualog.units import displayed_unit
 
 __all__ = [
     "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "readable",
@@ -17,7 +18,7 @@ __all__ = [
 _KMH = 3.6
 LONGEST_WORD = 200  # characters without a space that a page shows
 LONGEST_TEXT = 4000  # characters in one place of a page
-# what a terminal or a browser obeys rather than shows: controls, and marks that turn the direction of writing
+# characters that a terminal or a browser acts on instead of showing: controls and marks of writing direction
 _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 _DETECTORS = {
@@ -30,7 +31,6 @@ _DETECTORS = {
     "joint_criteria": ("Joint criteria", "wheel criteria met while the resistance gate is open"),
     "joint_cusum": ("Joint CUSUM", "scaled sum of the single detectors"),
 }
-_UNITS = {"m/s^2": "m/s²", "(m/s^2)^2": "(m/s²)²", "m^2/s^4": "m²/s⁴", "N*m": "N·m", "-": "–"}
 # stem of the key of evidence (lowest and highest value where it ends in _min and _max) -> label, factor, unit, decimals
 _EVIDENCE = {
     "v_x": ("speed", _KMH, "km/h", 0),
@@ -54,22 +54,22 @@ def detector_name(detector: str) -> str:
 
 
 def caption(detector: str) -> str:
-    """What a detector's statistic means, in one phrase."""
+    """Meaning of a detector's statistic in one phrase."""
     return _DETECTORS[detector][1] if detector in _DETECTORS else "statistic"
 
 
 def place(wheel: str | None, side: str | None) -> str:
-    """`FR`, or the side, or nothing."""
+    """`FR`, or the side, or an empty string."""
     return wheel.upper() if wheel else (side or "")
 
 
 def pretty_unit(unit: str) -> str:
-    """Unit with real exponents."""
-    return _UNITS.get(unit) or readable(unit, LONGEST_WORD)
+    """Unit as pages and text show it."""
+    return readable(displayed_unit(unit), LONGEST_WORD)
 
 
 def number(x: float, decimals: int | None = None) -> str:
-    """A number for a table: fixed decimals, or three significant digits; a dash for what is no number."""
+    """A number for a table: fixed decimals, or three significant digits; a dash for NaN and infinities."""
     if not math.isfinite(x):
         return "–"
     if decimals is None and 999.5 <= abs(x) < 1e6:
@@ -79,13 +79,13 @@ def number(x: float, decimals: int | None = None) -> str:
 
 
 def speed_kmh(event: Event) -> float:
-    """Speed at the beginning of an event [km/h], NaN if the evidence does not tell."""
+    """Speed at the beginning of an event [km/h], NaN if the evidence has none."""
     v_x = event.evidence.get("v_x")
     return _KMH * v_x if isinstance(v_x, float | int) else math.nan
 
 
 def evidence_parts(evidence: Mapping[str, Any]) -> list[str]:
-    """What else speaks for an event, as phrases; the speed at its beginning has its own column."""
+    """Evidence for an event as phrases, without the speed, which has its own column."""
     parts = ["while braking"] if evidence.get("braking_at_start") is True else []
     met = [name for n, name in _CRITERIA.items() if evidence.get(f"criterion_{n}") is True]
     parts += [f"criteria: {' + '.join(met)}"] if met else []
@@ -115,7 +115,7 @@ def _part(stem: str, values: Mapping[str, Any]) -> str:
     if "min" in numbers and "max" in numbers:
         return f"{label} {numbers['min']} … {numbers['max']} {unit}".rstrip()
     words = {"min": "down to ", "max": "up to ", "": ""}
-    # the value at the beginning says little beside the lowest one
+    # the lowest value matters more than the one at the beginning
     found = [k for k in ("min", "max", "") if k in numbers][:1]
     return f"{label} {words[found[0]]}{numbers[found[0]]} {unit}".rstrip() if found else ""
 

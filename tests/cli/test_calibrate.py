@@ -37,7 +37,7 @@ def test_table_file_and_page(folder, tmp_path):
     )
     assert code == 0, err
     assert "2 drives" in text
-    assert "the drives cannot tell" in text
+    assert "not determined by these drives" in text
     assert "one ratio" in text
     car = load_vehicle(out)
     assert f"{car.mass:.5g}" in text

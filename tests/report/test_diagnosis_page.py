@@ -47,7 +47,7 @@ def test_the_page_is_a_function_of_the_document(pages, verdict):
 def test_what_the_page_tells_changes_with_the_document():
     d = round_trip(document_of("cannot_tell"))
     for place, key, value, said in (
-        (d["gain"], "heldout_log_score_gain", 555.0, "555 nats"),
+        (d["gain"], "heldout_log_score_gain", 555.0, "555 natural units"),
         (d["next_manoeuvre"], "minutes", 7.25, "7.25 min"),
         (d["significance"], "achieved_level", 0.0444, "achieved 0.0444"),
         (d["limits"][0], "size", 17.0, "17 kg"),
@@ -128,7 +128,7 @@ def test_gain_bars_are_relative_to_before():
     assert set(before["x"]) == {100.0}
     assert after["x"][0] == pytest.approx(38.16)
     assert after["text"][0] == "0.045 m/s²"
-    assert before["y"][:2] == ["force balance, one step", "force balance, free"]
+    assert before["y"][:2] == ["force balance, next sample", "force balance, free simulation"]
     assert gain_bars(document_of("no_effect")) is None
 
 

@@ -271,7 +271,7 @@ def test_an_hour_is_reduced_said_so_and_small(hour):
     text = render_page(hour, title="t")
     assert len(text) < 15e6
     data = data_of(text)
-    assert "Of the whole drive the page holds about 4000 minima and maxima per line" in text
+    assert "The page holds about 4000 minima and maxima per line over the whole drive" in text
     assert f"Every sample is kept from 3 s before to 3 s after each of the {len(hour.events)} events" in text
     index = next(i for i, t in enumerate(data["figure"]["data"]) if t["yaxis"] == "y4" and t["name"] == "RL")
     line = decode(data["lines"][index])

@@ -66,7 +66,7 @@ def test_delay_and_reasons_are_on_the_page():
     none = replace(first, line=replace(first.line, reason="no reason at all"))
     html = render_slope_page(replace(result, places=(none, *result.places[1:])), title="run")
     assert html.count("v_x is late by +0.1") == 3
-    assert "cannot tell: no reason at all" in html
+    assert "not estimated: no reason at all" in html
 
 
 @pytest.mark.browser

@@ -1,4 +1,4 @@
-"""What the balance of forces leaves before and after a calibration, over speed and wheel force."""
+"""Residual of the force balance before and after a calibration, over speed and wheel force."""
 
 from __future__ import annotations
 
@@ -37,4 +37,4 @@ def _figure(x: FloatArray, before: FloatArray, after: FloatArray, title: str, la
         }
         for name, y, colour in (("vehicle file", before, _BEFORE), ("calibrated", after, _AFTER))
     ]  # fmt: skip
-    return {"data": data, "layout": layout(title, axis(label), axis("measured less expected [m/s²]"))}
+    return {"data": data, "layout": layout(title, axis(label), axis("measured minus expected [m/s²]"))}

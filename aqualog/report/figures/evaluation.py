@@ -66,7 +66,7 @@ def roc_curves(points: Sequence[RocPoint], effect: str) -> dict[str, Any] | None
                 "(%{customdata[1]} times)<extra>%{fullData.name}</extra>",
             }
         )
-    x = {**axis(f"false alarms per hour (none is drawn at {floor:.2g})"), "type": "log"}
+    x = {**axis(f"false alarms per hour (zero is drawn at {floor:.2g})"), "type": "log"}
     figure = layout(f"{effect} aquaplaning over thresholds", x, axis("recall", [-0.02, 1.02]))
     return {"data": data, "layout": figure}
 

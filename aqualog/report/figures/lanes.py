@@ -17,20 +17,20 @@ MOST_BARS = 20_000  # per lane; beyond, bars that nearly touch are joined
 
 
 def lanes(result: DriveResult) -> list[Row]:
-    """When which detector held which wheel to be in trouble."""
+    """Times at which each detector reports aquaplaning, by wheel or side."""
     found = [_lane(t) for t in result.tracks]
     water = watered(result)
     if water is not None:
         found.append(Lane("On water (label)", VEHICLE, WATER, water))
     if not found:
         return []
-    caption = "a bar where the detector reports; an empty lane was judged and is clear"
+    caption = "a bar where the detector reports an event; an empty lane was judged, without event"
     return [Row("Detections", caption, "", lanes=tuple(found), height=18 * len(found) + 8)]
 
 
 def _lane(track: Track) -> Lane:
     label = f"{detector_name(track.detector)} {place(track.wheel, track.side)}".rstrip()
     if not np.isfinite(track.statistic).any():
-        label += " (not judged)"  # its signals are there, but they told nothing
+        label += " (not judged)"  # its signals are there but carry no usable value
     spans = spans_of(track.active, at_most=MOST_BARS)
     return Lane(label, track.wheel or VEHICLE, detector_colour(track.detector, track.wheel), spans)

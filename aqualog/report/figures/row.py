@@ -1,4 +1,4 @@
-"""What a row of the stack consists of."""
+"""The parts of a row of the stack."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Lane:
 class Row:
     """One pair of axes in the stack.
 
-    `caption` says what to see; `thresholds` are drawn dashed; the y axis always shows the values in `include` and
+    `caption` describes the row; `thresholds` are drawn dashed; the y axis always shows the values in `include` and
     never less than `least_span`;    `shades` are index ranges marked by a strip along the bottom.
     """
 

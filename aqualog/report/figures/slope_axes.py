@@ -1,4 +1,4 @@
-"""What the figures of the slip slope share."""
+"""Axes, colours and layout shared by the slip-slope figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["axis", "layout", "rounded", "see_through"]
 
 
 def rounded(values: FloatArray) -> list[float | None]:
-    """Numbers with five digits, None for what is none."""
+    """Numbers with five digits, None for NaN and infinities."""
     return [float(f"{v:.5g}") if math.isfinite(v) else None for v in np.asarray(values, dtype=np.float64).tolist()]
 
 

@@ -47,7 +47,7 @@ def _parts(p: PlaceSlope) -> list[dict[str, Any]]:
 
 
 def recursive_estimate(result: DirectResult) -> dict[str, Any] | None:
-    """The recursive estimate over time; None where it never worked."""
+    """The recursive estimate over time; None if it never had a value."""
     recursions = [p.recursion for p in result.places] or list(result.recursions)
     data = [_course(r) for r in recursions if np.isfinite(r.slopes).any()]
     if not data:

@@ -112,7 +112,7 @@ def _lane_trace(lane: Lane, axis: str) -> dict[str, Any]:
 
 
 def _lane_hover(axis: str) -> dict[str, Any]:
-    """Invisible points across the lanes' row, which the script fills with what is on at each place.
+    """Invisible points across the lanes' row, which the script fills with the detectors active at each time.
 
     Plotly's own hover finds the wrong one among horizontal bars of different lanes.
     """
@@ -329,6 +329,6 @@ def _threshold_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
 
 
 def groups(rows: Sequence[Row]) -> list[str]:
-    """Groups that have something to show, wheels first."""
+    """Groups that hold any line, wheels first."""
     found = dict.fromkeys(g for r in rows for g in (*(x.group for x in r.lines), *(x.group for x in r.lanes)))
     return [g for g in found if g != VEHICLE] + [g for g in found if g == VEHICLE]

@@ -1,4 +1,4 @@
-"""What became of the drive's time: used, or left out and why."""
+"""Shares of the drive's time: used, or left out with the reason."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ function colourName(g) {
   return colourKey < 0 || D.groups[g][1][colourKey] < 0 ? "" : facets[colourKey].values[D.groups[g][1][colourKey]];
 }
 
-// What has an interval sets the scale, so that a slope of two runs at the limit of what can be told does not.
+// What has an interval sets the scale, so that a slope of two runs at the limit of estimation does not.
 function largest(curves, level) {
   const of = function (isSure) {
     return curves.flatMap(function (c) {
@@ -241,10 +241,10 @@ function drawPanels(kind, unit, yTitle, level) {
     ? places.map(function (p) { return `${placeName(p)} ${DASH_NAMES[p] || "━━━"}`; }).join(", ") : placeName(places[0] ?? "");
   const silent = new Set(shown.filter(function (c) { return !isTold(c); }).map(function (c) { return c[0]; }));
   for (const c of told) silent.delete(c[0]);
-  byId(kind + "-silent").textContent = silent.size ? `Not told: ${[...silent].map(function (g) {
+  byId(kind + "-silent").textContent = silent.size ? `Not available: ${[...silent].map(function (g) {
     const points = shown.find(function (c) { return c[0] === g; })[2];
     return `${D.groups[g][0]} (${points.length ? points[points.length - 1][9] : "no samples"})`;
-  }).join("; ")}` : told.length ? "" : "Nothing is told of what the filters leave.";
+  }).join("; ")}` : told.length ? "" : "The runs that the filters leave give no estimate.";
 }
 
 function lowest(curves) {
@@ -260,8 +260,8 @@ function drawFull() {
   const silent = new Set(rows.map(function (f) { return f[0]; }));
   for (const g of groups) silent.delete(g);
   byId("full-silent").textContent = silent.size
-    ? "Not told: " + [...silent].map(function (g) { return D.groups[g][0]; }).join("; ")
-    : told.length ? "" : "Nothing is told of what the filters leave.";
+    ? "Not available: " + [...silent].map(function (g) { return D.groups[g][0]; }).join("; ")
+    : told.length ? "" : "The runs that the filters leave give no estimate.";
   byId("full").hidden = !told.length;
   const height = 110 + 34 * Math.max(2, groups.length);
   later("full", height, function () {

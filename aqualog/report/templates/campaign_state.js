@@ -166,9 +166,9 @@ function buildFilters() {
     const note = byId("pooled");
     note.hidden = !now.mixed.size;
     const keys = D.keys.map(function (k) { return facets[k].title; }).join(", ");
-    note.textContent = `Regressions are per configuration (${keys || "all runs together"}) and are not made anew here: ` +
-      `${now.mixed.size} of the ${now.groups.size} drawn also rest on runs that the filters leave out. ` +
-      "Matrix, detections and the table of runs follow the filters exactly; `aqualog report --by` splits further.";
+    note.textContent = `Regressions are per configuration (${keys || "all runs together"}). Filters do not change them: ` +
+      `${now.mixed.size} of the ${now.groups.size} drawn also use runs that the filters leave out. ` +
+      "Matrix, detections and the table of runs follow the filters exactly. `aqualog report --by` splits further.";
   });
 }
 

@@ -5,7 +5,7 @@ const BIN = 10; // [km/h] of the detections over speed
 const table = { sort: 0, down: false, page: 0, text: "", only: null, rows: [] };
 let haystack = null;
 
-// The folder that all runs share says nothing, and would push the end of the name out of sight.
+// The folder that all runs share adds no information, and would push the end of the name out of sight.
 const shared = (function () {
   const first = runs.name[0] ?? "", cut = first.lastIndexOf("/") + 1;
   return runs.name.every(function (n) { return n.startsWith(first.slice(0, cut)); }) ? cut : 0;

@@ -484,6 +484,6 @@
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { build(); });
   window.addEventListener("beforeprint", function () { build(PRINT_WIDTH); });
-  // without a width plotly keeps the last one until it is told to measure again
+  // without a width plotly keeps the last one until it has to measure again
   window.addEventListener("afterprint", function () { build().then(function () { Plotly.Plots.resize(plot); }); });
 })();
