@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from aqualog.cli.console import Console, told_if_interrupted
-from aqualog.cli.progress import Progress
 from aqualog.errors import ConfigError, ExitCode
+from aqualog.face.progress import Progress
 from aqualog.io.write_log import SUFFIXES
 from aqualog.model.campaign import simulate_campaign
 

@@ -105,22 +105,22 @@ class Console:
             steps.clear()
 
 
-class Steps:
-    """Tells which step is being worked on."""
+class Steps(Listener):
+    """Shows which step is being worked on."""
 
     def __init__(self, mode: str) -> None:
         self.mode = mode
         self._width = 0
 
-    def __call__(self, text: str) -> None:
+    def __call__(self, step: str) -> None:
         """Begin a step."""
         if self.mode == "bar":
-            line = f"{' '.join(clean(text).split())} ..."
+            line = f"{' '.join(clean(step).split())} ..."
             sys.stderr.write(f"\r{line.ljust(self._width)}")
             sys.stderr.flush()
             self._width = len(line)
         elif self.mode == "plain":
-            sys.stderr.write(f"{clean_line(text)}\n")
+            sys.stderr.write(f"{clean_line(step)}\n")
 
     def clear(self) -> None:
         """Remove the line."""
@@ -133,7 +133,7 @@ class Heard(Listener):
     """A call of the face on the terminal."""
 
     def __init__(self, console: Console, steps: Steps) -> None:
-        self.console, self.steps = console, steps
+        self.console, self.steps, self.mode = console, steps, steps.mode
 
     def __call__(self, step: str) -> None:
         """Show a step."""

@@ -81,45 +81,29 @@ def _convert(
     progress: str,
 ) -> int:
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ConfigError, ExitCode
-    from aqualog.face.paths import write_whole
-    from aqualog.io.write_log import check_suffix, write_log
+    from aqualog.errors import ExitCode
+    from aqualog.face.convert import check_target, convert
 
-    suffix = check_suffix(out)
-    if decimal_comma and suffix != ".csv":
-        raise ConfigError(f"--decimal-comma says nothing to {suffix}", where=str(out), expected="a .csv")
+    check_target(out, decimal_comma=decimal_comma)
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=[out], force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file,
+        progress=progress, vehicle_file=vehicle_file, rate_hz=rate,
     )  # fmt: skip
-    console, paths = setup.console, setup.paths
-    with console.steps() as steps, setup.reading():
-        import numpy as np
-
-        from aqualog.align.load import load_signals
-        from aqualog.report.document import signal_groups
-
-        loaded = load_signals(
-            paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps
-        )
-        changes = setup.changes()
-        steps("writing")
-        t_ns = np.arange(loaded.frame.height, dtype=np.int64) * loaded.dt_ns
-        groups = signal_groups(loaded)
-        write_whole(
-            out,
-            lambda p: write_log(p, t_ns, groups, suffix=suffix, start_ns=loaded.start_ns, decimal_comma=decimal_comma),
-        )
+    console, drive = setup.console, setup.drive
+    with console.hearing() as hear:
+        convert(drive, out, setup.vehicle, decimal_comma=decimal_comma, force=True, progress=hear)
+    loaded, changes = drive.load(setup.vehicle), drive.changes()
     assumed = _of_default_car(loaded, setup.vehicle) if vehicle_file is None else []
     for text in (*assumed, *loaded.quality.notes, *changes):
         console.note(text)
-    console.note(f"{len(loaded.symbols)} signals, {t_ns.size} samples at {1e9 / loaded.dt_ns:g} Hz are in {out}")
+    count = loaded.frame.height
+    console.note(f"{len(loaded.symbols)} signals, {count} samples at {1e9 / loaded.dt_ns:g} Hz are in {out}")
     lost = loaded.quality.truncated or loaded.quality.lost_in_files or changes
     return int(ExitCode.PARTIAL) if lost else int(ExitCode.DONE)
 
 
 def _of_default_car(signals: SignalTable, vehicle: VehicleRecord) -> list[str]:
-    """What is told where nobody has named the car: radii stand in the numbers that are written, and not beside them."""
+    """Return a note where no car is named: its radii are in the numbers that are written, and stand nowhere else."""
     from aqualog.units import parse_unit
 
     is_speed = [

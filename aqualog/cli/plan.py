@@ -110,7 +110,7 @@ def _plan(
         from aqualog.campaign.plan import choose, foretell, shards_within, work_of
         from aqualog.campaign.store import Store
         from aqualog.campaign.trial import tried
-        from aqualog.cli.progress import Progress as Counted
+        from aqualog.face.progress import Progress as Counted
         from aqualog.workers import most_processes
 
         place = Store(store_of(configured, out))
@@ -251,7 +251,7 @@ def _nothing(work: Work, store: Store) -> str:
 def _text(
     work: Work, trial: Trial, found: Plan, document: dict[str, Any], within: str | None, parts: tuple[int, float] | None
 ) -> str:
-    from aqualog.cli.progress import lasting
+    from aqualog.face.progress import lasting
     from aqualog.report.text import table
 
     def times(x: Estimate) -> tuple[str, str]:

@@ -90,7 +90,7 @@ def _report(
     folder = out if out is not None else configured.campaign.path.with_suffix(".report")
     check_folder(folder, force=force)
     _check_sources(configured, folder)
-    from aqualog.cli.progress import Progress as Told
+    from aqualog.face.progress import Progress as Told
     from aqualog.report.campaign_findings import find
 
     chosen = check_plan(configured.campaign, split(by), width_kmh=width)

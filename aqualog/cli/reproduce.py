@@ -60,9 +60,9 @@ def _reproduce(out: Path, jobs: int, *, as_json: bool, force: bool, console: Con
     from aqualog.cli.campaign_results import results
     from aqualog.cli.campaign_run import run_campaign
     from aqualog.cli.console import told_if_interrupted
-    from aqualog.cli.progress import Progress as Shown
     from aqualog.errors import AqualogError
     from aqualog.face.paths import refuse_existing, write_text
+    from aqualog.face.progress import Progress as Shown
 
     began = time.monotonic()
     refuse_existing([out / name for name in (_PAGE, _CLAIMS, _JSON)], force=force)

@@ -160,7 +160,7 @@ class Drive:
         """
         from aqualog.face.convert import convert
 
-        return convert(self, path, decimal_comma=decimal_comma, force=force).path
+        return convert(self, path, decimal_comma=decimal_comma, force=force)
 
     def __repr__(self) -> str:
         return "\n".join(_lines(self))

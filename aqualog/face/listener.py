@@ -9,7 +9,12 @@ __all__ = ["Listener", "Progress", "listener"]
 
 
 class Listener:
-    """Hears the steps of a call and the notes that cannot wait for its end; this one ignores them all."""
+    """Hears the steps of a call and the notes that cannot wait for its end; this one ignores them all.
+
+    `mode` is how steps are shown: `bar` (one line that renews itself), `plain` (a line each) or `off`.
+    """
+
+    mode = "off"
 
     def __call__(self, step: str) -> None:
         """Begin a step of the work."""
@@ -33,6 +38,8 @@ Progress = Listener | Callable[[str], object] | None
 
 
 class _Steps(Listener):
+    mode = "plain"
+
     def __init__(self, hear: Callable[[str], object]) -> None:
         self._hear = hear
 

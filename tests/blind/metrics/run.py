@@ -10,7 +10,7 @@ from blind.metrics.plan import Job
 from blind.metrics.rows import Row
 from blind.metrics.store import Store
 
-from aqualog.cli.progress import lasting
+from aqualog.face.progress import lasting
 from aqualog.workers import Crashed, work_on
 
 __all__ = ["run"]

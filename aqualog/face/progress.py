@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from aqualog.cli.console import Steps
+from aqualog.face.listener import Listener
 
 __all__ = ["Progress", "lasting"]
 
@@ -17,19 +17,19 @@ class Progress:
 
     Parameters
     ----------
-    steps : Steps
+    steps : Listener
     what : str
         The items, in the plural.
     """
 
-    def __init__(self, steps: Steps, what: str) -> None:
+    def __init__(self, steps: Listener, what: str) -> None:
         self._steps, self._what = steps, what
         self._began = time.monotonic()
         self._first: int | None = None
         self._last, self._last_done = -1e9, -1
 
     def __call__(self, done: int, total: int, failed: int = 0) -> None:
-        """Tell how far the work is."""
+        """Report how far the work is."""
         now = time.monotonic()
         if self._first is None:
             self._first, self._began = done, now
