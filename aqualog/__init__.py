@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from aqualog.errors import AqualogError
     from aqualog.face.detect import Detection, detect
     from aqualog.face.drive import Drive, read
+    from aqualog.face.slip_slope import SlipSlope, slip_slope
     from aqualog.model.term import Model
     from aqualog.types import Signals
     from aqualog.vehicle import Vehicle
@@ -31,11 +32,13 @@ __version__ = "0.10.0"
 _FACE = {
     "read": "aqualog.face.drive",
     "detect": "aqualog.face.detect",
+    "slip_slope": "aqualog.face.slip_slope",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
     "Model": "aqualog.model.term",
     "Detection": "aqualog.face.detect",
+    "SlipSlope": "aqualog.face.slip_slope",
     "physics": "aqualog.physics",
     "AqualogError": "aqualog.errors",
 }
@@ -46,11 +49,13 @@ __all__ = [
     "Drive",
     "Model",
     "Signals",
+    "SlipSlope",
     "Vehicle",
     "__version__",
     "detect",
     "physics",
     "read",
+    "slip_slope",
 ]
 
 

@@ -43,7 +43,7 @@ COMMANDS = {
         "Find the clock offset (and drift) between sources from a quantity that both carry.", module="clock"
     ),
     "slip-slope": Command(
-        "Tell the slip slope C_s/F_z of each driven wheel, how sure it is, and whether it stayed the same."
+        "Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same."
     ),
     "batch": Command("Run every log of a campaign through the detectors and keep the results."),
     "plan": Command("Tell what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -24,12 +22,7 @@ from aqualog.cli.options import (
     Verbose,
 )  # fmt: skip
 
-if TYPE_CHECKING:
-    from aqualog.detect.slip_slope.direct_records import DirectResult
-
 __all__ = ["slip_slope"]
-
-_RESULTS = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
 
 
 def slip_slope(
@@ -75,7 +68,7 @@ def slip_slope(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """Tell the slip slope C_s/F_z of each driven wheel, how sure it is, and whether it stayed the same.
+    """Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same.
 
     Slip is regressed on traction over straight, unbraked driving; the intervals are from blocks of the drive left out
     in turn. The files named are ONE drive. The vehicle file must be given: it says which axle is driven.
@@ -120,44 +113,33 @@ def _slip_slope(
 ) -> int:
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.slip_slope import SLIP_SLOPE_FILES, slip_slope
 
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: which axle is driven, radii, where the mass is")
     out = None if out_name is None else _folder(out_name)
     setup = prepare(
-        logs, map_file=map_file, dbc=dbc, targets=[out / n for n in _RESULTS] if out else [], force=force,
-        quiet=quiet, verbose=verbose, progress=progress, vehicle_file=vehicle_file,
-        cached=cached,
+        logs, map_file=map_file, dbc=dbc, targets=[out / n for n in SLIP_SLOPE_FILES] if out else [], force=force,
+        quiet=quiet, verbose=verbose, progress=progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
     )  # fmt: skip
-    console, paths, vehicle = setup.console, setup.paths, setup.vehicle
-    name = ", ".join(str(p) for p in paths)
-    title = name if len(paths) <= 2 else f"{paths[0].parent.name or paths[0].name} ({len(paths)} files)"
-    with console.steps() as steps, setup.reading():
-        from aqualog.align.load import load_signals
-        from aqualog.detect.slip_slope.direct import slip_slopes
-
-        loaded = load_signals(
-            paths, vehicle=vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate, report=steps, cache=setup.cache
+    console = setup.console
+    with console.hearing() as hear:
+        result = slip_slope(
+            setup.drive, setup.vehicle, method=method, traction=traction, mu_max=mu_max, delay=delay, progress=hear
         )
-        console.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
-        changes = setup.changes()
-        notes = (*loaded.quality.notes, *changes)
-        steps("estimating")
-        result = slip_slopes(loaded, vehicle, method=method, traction=traction, mu_max=mu_max, delay=delay)
-        steps("writing")
+        hear("writing")
         if out is not None:
-            _write_results(result, out, name, title, notes)
-    _print(result, name, notes, as_json=as_json)
-    for text in (*notes, *result.notes):
+            result.save(out, force=True)
+    console.data(result, as_json=as_json)
+    for text in result.notes:
         console.note(text)
     if out is not None:
-        console.note(f"results are in {out}: {', '.join(_RESULTS)}")
-    lossy = loaded.quality.truncated or loaded.quality.lost_in_files or changes
-    return int(ExitCode.PARTIAL) if lossy else int(ExitCode.DONE)
+        console.note(f"results are in {out}: {', '.join(SLIP_SLOPE_FILES)}")
+    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
 
 
 def _folder(name: str) -> Path:
-    """The folder for results; it need not exist, but nothing may be in its way."""
+    """Return the folder for results. It need not exist, but a file must not be in its way."""
     from aqualog.errors import ConfigError
 
     expected = "a folder for the results"
@@ -170,26 +152,3 @@ def _folder(name: str) -> Path:
     if not there.is_dir():
         raise ConfigError(f"-o is below a file, {there}", where=name, expected=expected)
     return out
-
-
-def _write_results(result: DirectResult, out: Path, name: str, title: str, notes: tuple[str, ...]) -> None:
-    from aqualog.face.paths import write_text, write_whole
-    from aqualog.report.slope_document import slope_csv, slope_document
-    from aqualog.report.slope_page import write_slope_page
-
-    out.mkdir(parents=True, exist_ok=True)
-    document = slope_document(result, log=name, notes=notes)
-    write_text(out / "slip_slope.json", json.dumps(document, indent=1, allow_nan=False) + "\n")
-    write_text(out / "slip_slope.csv", slope_csv(result))
-    write_whole(out / "slip_slope.html", lambda p: write_slope_page(result, p, title=title, notes=notes))
-
-
-def _print(result: DirectResult, name: str, notes: tuple[str, ...], *, as_json: bool) -> None:
-    from aqualog.cli.console import clean
-    from aqualog.report.slope_document import slope_document, slope_text
-
-    if as_json:
-        document = slope_document(result, log=name, notes=notes)
-        sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
-        return
-    sys.stdout.write(clean(slope_text(result)))

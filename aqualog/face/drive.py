@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
     from aqualog.align.load_long import LoadedLong
 
-__all__ = ["Drive", "DriveLike", "drive_of", "read", "vehicle_of"]
+__all__ = ["Drive", "DriveLike", "drive_of", "read", "sources_of", "vehicle_needed", "vehicle_of"]
 
 Logs = PathLike | Iterable[PathLike]
 
@@ -246,6 +246,24 @@ def vehicle_of(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -
     if vehicle is None:
         return (drive.vehicle if drive is not None else None) or Vehicle()
     return vehicle if isinstance(vehicle, Vehicle) else Vehicle.read(vehicle)
+
+
+def vehicle_needed(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -> Vehicle:
+    """Return the vehicle behind an argument, or that of the drive, for work that a default car would make wrong.
+
+    Raises
+    ------
+    ConfigError
+        If neither is given.
+    """
+    if vehicle is None and (drive is None or drive.vehicle is None):
+        raise ConfigError("no vehicle", expected='a vehicle file or aq.Vehicle.read("car.toml")')
+    return vehicle_of(vehicle, drive)
+
+
+def sources_of(drive: Drive, *others: object) -> tuple[Path, ...]:
+    """Return the files that no result may overwrite: those of the drive, and each other argument that is a path."""
+    return (*drive.sources, *(Path(x) for x in others if isinstance(x, str | Path)))
 
 
 def with_vehicle(drive: Drive, vehicle: Vehicle) -> Drive:

@@ -16,6 +16,7 @@ __all__ = [
     "delay_sentence",
     "slope_csv",
     "slope_document",
+    "slope_lines",
     "slope_text",
     "used_and_left_out",
     "way_sentence",
@@ -71,6 +72,18 @@ def slope_text(result: DirectResult) -> str:
     used, left_out = used_and_left_out(result)
     lines += ["", f"used {used:.0f} s of {result.duration_s:.0f} s; left out: " + _listed(left_out)]
     return "\n".join(lines) + "\n"
+
+
+def slope_lines(result: DirectResult) -> list[str]:
+    """Return a line for each place: slope, interval, stability; without a regression the recursive estimate."""
+    if not result.places:
+        return [f"{r.place}: {r.slope:.1f} ± {r.slope_sd:.1f}, recursive" for r in result.recursions]
+    return [
+        f"{p.place}: {p.line.slope:.1f} (95 %: {_interval(p.line.slope_ci)}), {p.stability.sentence}"
+        if p.line.told
+        else f"{p.place}: not estimated: {p.line.reason}"
+        for p in result.places
+    ]
 
 
 def used_and_left_out(result: DirectResult) -> tuple[float, dict[str, float]]:

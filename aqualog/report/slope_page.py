@@ -17,7 +17,7 @@ from aqualog.report.slope_document import delay_sentence, way_sentence
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.wording import number
 
-__all__ = ["render_slope_page", "write_slope_page"]
+__all__ = ["render_slope_page", "slope_plots", "write_slope_page"]
 
 
 def write_slope_page(result: DirectResult, path: Path, *, title: str, notes: tuple[str, ...] = ()) -> None:
@@ -36,7 +36,7 @@ def render_slope_page(result: DirectResult, *, title: str, notes: tuple[str, ...
     notes : tuple of str
         On the files, beside those of the result; escaped too.
     """
-    plots = _plots(result)
+    plots = slope_plots(result)
     scripts = {"plotly": plotly_js(), "page": _text("figures.js")}
     return environment(TEMPLATES).get_template("slope.html.j2").render(
         title=title,
@@ -59,7 +59,8 @@ def _text(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
-def _plots(result: DirectResult) -> dict[str, Any]:
+def slope_plots(result: DirectResult) -> dict[str, Any]:
+    """Return the page's figures by name; those without content are left out."""
     plots: dict[str, Any] = {f"scatter-{i}": figure for i, figure in enumerate(slip_scatter(result))}
     plots |= {
         "session": slope_over_session(result),

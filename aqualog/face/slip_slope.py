@@ -1,0 +1,212 @@
+"""`aq.slip_slope`: the slip slope of each driven wheel in one drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.errors import ConfigError
+from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
+from aqualog.face.listener import Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.detect.slip_slope.direct_records import DirectResult, Recursion
+    from aqualog.detect.slip_slope.regression import Line
+
+__all__ = ["SLIP_SLOPE_FILES", "SlipSlope", "slip_slope"]
+
+SLIP_SLOPE_FILES = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlipSlope(Result):
+    """Slip slope C_s/F_z [-] of each driven wheel, its interval, and whether it stayed the same.
+
+    `slopes` holds the records, `file_notes` the sentences on the files.
+    """
+
+    drive: Drive
+    vehicle: Vehicle
+    slopes: DirectResult
+    file_notes: tuple[str, ...] = ()
+    has_loss: bool = False
+    sources: tuple[Path, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Sentences on the log and on the estimate."""
+        return (*self.file_notes, *self.slopes.notes)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog slip-slope`."""
+        from aqualog.report.slope_document import slope_document
+
+        return slope_document(self.slopes, log=self.drive.name, notes=self.file_notes)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`slopes` of the whole drive, `segments` of its parts, `recursive` and `samples`.
+
+        The first two have the columns of slip_slope.csv. `samples` are those of the regression: place, t [s],
+        traction coefficient mu [-], slip [-].
+        """
+        import polars as pl
+
+        whole = [
+            _row(p.place, (float(p.t[0]), float(p.t[-1])) if p.t.size else (math.nan, math.nan), p.seconds, p.line)
+            for p in self.slopes.places
+        ]
+        parts = [_row(p.place, (s.start_s, s.end_s), s.seconds, s.line) for p in self.slopes.places for s in p.segments]
+        recursive = [
+            {"place": r.place, "slope": r.slope, "slope_sd": r.slope_sd, "learnt_s": r.seconds, "changes": r.alarms}
+            for r in self._recursions
+        ]
+        samples = [
+            pl.DataFrame({"t": p.t, "mu": p.mu, "slip": p.slip}).select(pl.lit(p.place).alias("place"), pl.all())
+            for p in self.slopes.places
+        ]
+        return {
+            "slopes": _table(whole, _ROW),
+            "segments": _table(parts, _ROW),
+            "recursive": _table(recursive, _RECURSIVE),
+            "samples": pl.concat(samples) if samples else _table([], ("place", "t", "mu", "slip")),
+        }
+
+    @property
+    def _recursions(self) -> tuple[Recursion, ...]:
+        return self.slopes.recursions or tuple(p.recursion for p in self.slopes.places)
+
+    def text(self) -> str:
+        """Return slopes, stability, and which part of the drive was used."""
+        from aqualog.report.slope_document import slope_text
+
+        return slope_text(self.slopes)
+
+    def headline(self) -> str:
+        """Return a line for each place: slope, 95 % interval, stability."""
+        from aqualog.report.slope_document import slope_lines, way_sentence
+
+        found = self.slopes
+        return "\n".join(
+            [
+                f"{self.drive.title}, {found.vehicle_name}: {found.duration_s:.1f} s at {found.rate_hz:.6g} Hz",
+                way_sentence(found),
+                *(f"  {line}" for line in slope_lines(found)),
+            ]
+        )
+
+    def plot(self) -> go.Figure:
+        """Return slip over traction of each place, the slope over the session, and the time used."""
+        from aqualog.report.slope_page import slope_plots
+        from aqualog.report.standalone import side_by_side
+
+        return side_by_side(list(slope_plots(self.slopes).values()))
+
+    def files(self) -> Writers:
+        """Return `slip_slope.json`, `slip_slope.csv` and `slip_slope.html`."""
+        from aqualog.report.slope_document import slope_csv
+        from aqualog.report.slope_page import write_slope_page
+
+        return {
+            "slip_slope.json": text_file(lambda: self.to_json() + "\n"),
+            "slip_slope.csv": text_file(lambda: slope_csv(self.slopes)),
+            "slip_slope.html": lambda path: write_slope_page(
+                self.slopes, path, title=self.drive.title, notes=self.file_notes
+            ),
+        }
+
+
+_ROW = (
+    "place", "start_s", "end_s", "used_s", "samples", "slope", "slope_low", "slope_high", "offset", "offset_low",
+    "offset_high", "reason",
+)  # fmt: skip
+_RECURSIVE = ("place", "slope", "slope_sd", "learnt_s", "changes")
+
+
+def _row(place: str, span: tuple[float, float], seconds: float, line: Line) -> dict[str, Any]:
+    offset = (line.offset, *line.offset_ci) if line.told else (math.nan,) * 3
+    values = (place, *span, seconds, line.samples, line.slope, *line.slope_ci, *offset, line.reason)
+    return dict(zip(_ROW, values, strict=True))
+
+
+def _table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> pl.DataFrame:
+    import polars as pl
+
+    kinds = {"place": pl.String, "reason": pl.String, "samples": pl.Int64, "changes": pl.Int64}
+    return pl.DataFrame(rows, schema={c: kinds.get(c, pl.Float64) for c in columns}).fill_nan(None)
+
+
+def slip_slope(
+    drive: DriveLike,
+    vehicle: PathLike | Vehicle | None = None,
+    *,
+    method: str = "auto",
+    traction: str = "auto",
+    mu_max: float = 0.3,
+    delay: float | None = None,
+    progress: Progress = None,
+) -> SlipSlope:
+    """Estimate the slip slope C_s/F_z of each driven wheel.
+
+    Slip is regressed on traction over straight, unbraked driving. The intervals are from blocks of the drive left out
+    in turn.
+
+    Parameters
+    ----------
+    drive : Drive, Signals, str, Path or several
+        From `aq.read`, or files of ONE drive that need no signal map.
+    vehicle : Vehicle, str or Path
+        Without it that of the drive; one of them must be given, for it says which axle is driven.
+    method : str
+        `auto`, `axle` (driven against free wheels), `velocity` (against v_x) or `differential` (recursive only).
+    traction : str
+        `auto`, `torque` or `accelerometer` (one driven axle).
+    mu_max : float
+        Largest traction coefficient used, 0.02 to 1. [-]
+    delay : float, optional
+        By how much v_x is late against the wheels, -1 to 1; else it is estimated (`velocity` only). [s]
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Returns
+    -------
+    SlipSlope
+
+    Raises
+    ------
+    LogError, SignalError, ConfigError
+        SignalError also if the drive does not determine the slope.
+
+    Examples
+    --------
+    >>> r = aq.slip_slope("drive.mf4", "car.toml")
+    >>> r.tables["slopes"].select("place", "slope", "slope_low", "slope_high")
+    """
+    hear = listener(progress)
+    one = drive_of(drive)
+    car = vehicle_needed(vehicle, one)
+    if not 0.02 <= mu_max <= 1.0:
+        raise ConfigError(f"mu_max = {mu_max:g}", expected="0.02 to 1")
+    if delay is not None and not -1.0 <= delay <= 1.0:
+        raise ConfigError(f"delay = {delay:g}", expected="-1 to 1 s")
+    with one.reading():
+        from aqualog.detect.slip_slope.direct import slip_slopes
+
+        loaded = one.load(car, report=hear)
+        hear.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
+        changes = one.changes()
+        hear("estimating")
+        found = slip_slopes(loaded, car, method=method, traction=traction, mu_max=mu_max, delay=delay)
+    quality = loaded.quality
+    has_loss = bool(quality.truncated or quality.lost_in_files or changes)
+    return SlipSlope(one, car, found, (*quality.notes, *changes), has_loss, sources_of(one, vehicle))
