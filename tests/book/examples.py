@@ -20,6 +20,7 @@ import argparse
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -207,6 +208,8 @@ def normal(text: str) -> str:
 
     text = text.replace(__version__, "VERSION")
     text = re.sub(r"\b\d+\.\d+\.\d+\b", "VERSION", text)
+    text = re.sub(r"^(note: .*?),? \d+(\.\d+)? (ms|s|min)$", r"\1 TIME", text, flags=re.M)
+    text = re.sub(r"\b\d+(\.\d+)? times as fast\b", "FACTOR times as fast", text)
     text = re.sub(r"\b\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?(\+00:00|Z)?", "WHEN", text)
     text = re.sub(r"\b(in|took|took about|after) \d+(\.\d+)? (ms|s|min)\b", r"\1 TIME", text)
     text = re.sub(r"\b[0-9a-f]{16,64}\b", "HASH", text)
@@ -222,7 +225,7 @@ class Session:
 
     def __init__(self, work: Path) -> None:
         self.work = work.resolve()
-        (work / "sample_logs").symlink_to(ROOT / "sample_logs")
+        shutil.copytree(ROOT / "sample_logs", work / "sample_logs", ignore=shutil.ignore_patterns("__pycache__"))
         if REAL_LOGS.is_dir():
             (work / "real_logs").symlink_to(REAL_LOGS)
         programs = Path(tempfile.mkdtemp(prefix="examples-"))
