@@ -284,7 +284,7 @@ class Session:
         text = text.replace(str(self.work) + "/", "").replace(str(self.work), ".").replace(str(ROOT) + "/", "")
         text = re.sub(r"\x1b\[[0-9;]*m", "", text).replace("\r", "\n")
         lines = [line.rstrip() for line in text.splitlines()]
-        lines = [line for line in lines if not line.startswith("note: compiling")]
+        lines = [line for line in lines if not re.match("note: (compiling|the detectors were compiled)", line)]
         while lines and not lines[-1]:
             lines.pop()
         return lines
