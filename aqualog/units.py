@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from aqualog.errors import SignalError
 
-__all__ = ["Unit", "convert", "displayed_unit", "is_unit", "parse_unit"]
+__all__ = ["Unit", "convert", "displayed_unit", "is_unit", "parse_unit", "spellings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +90,14 @@ _add("ratio", 0.01, "% percent Percent pct")
 def is_unit(text: str) -> bool:
     """Whether a spelling is in the table."""
     return text.strip() in _TABLE
+
+
+def spellings() -> list[tuple[Unit, list[str]]]:
+    """Every unit with all of its spellings."""
+    found: dict[Unit, list[str]] = {}
+    for spelling, (unit, _) in _TABLE.items():
+        found.setdefault(unit, []).append(spelling)
+    return list(found.items())
 
 
 def parse_unit(text: str, *, where: str = "") -> Unit:

@@ -78,9 +78,9 @@ def batch(
     """Run every log of a campaign through the detectors and keep the results.
 
     Only what is new is done: a log is measured again when its content, its vehicle, the signal map, the thresholds or
-    aqualog's own equations have changed. A log that cannot be read is told and the others go on; an interrupt or a kill
-    loses nothing that is finished. --force measures all again. One batch at a time writes to a folder; --jobs makes at
-    most four processes per core.
+    aqualog's own equations have changed. A log that cannot be read is named and the others go on; an interrupt or a
+    kill loses nothing that is finished. --force measures all again. One batch at a time writes to a folder; --jobs
+    makes at most four processes per core.
 
     The folder opens by itself: runs.parquet, events.parquet, samples/*.parquet (polars, DuckDB), manifest.json.
 

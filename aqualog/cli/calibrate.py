@@ -68,7 +68,7 @@ def calibrate(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be told.
+    """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
     Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
     rods and steering. The drives must be dry and with the same load; four or more show how drives differ. The vehicle

@@ -52,7 +52,7 @@ def init(
     Looks at every log in the folder and below it, puts together files of one drive, reads tyre, pressure, water depth,
     speed and so on from the names, and finds out which channel is which signal. Written beside the campaign file:
     runs.csv (a line per drive), map.toml (where channels have names of their own) and vehicle.toml (to be filled in).
-    Everything in them is a guess from names, units and data, told with its rule: read it before you use it.
+    Everything in them is a guess from names, units and data, printed with its rule: read it before you use it.
 
     \b
     Examples:

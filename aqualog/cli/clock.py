@@ -28,7 +28,7 @@ def align(
     ] = "speed",
     channel: Annotated[
         list[str] | None,
-        typer.Option("--channel", help="Channel of a file, if names do not tell.", metavar="FILE=CHANNEL"),
+        typer.Option("--channel", help="Channel of a file, if names do not decide.", metavar="FILE=CHANNEL"),
     ] = None,
     signals: Signals = None,
     dbc: Dbc = None,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-__all__ = ["COMMANDS", "Command", "Commands"]
+__all__ = ["COMMANDS", "Command", "Commands", "loaded"]
 
 
 class Command(NamedTuple):
@@ -37,7 +37,7 @@ COMMANDS = {
     "inspect": Command(
         "List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix."
     ),
-    "doctor": Command("Tell what is wrong with a log, what was lost of it, and what to do."),
+    "doctor": Command("Report what is wrong with a log, what was lost of it, and what to do."),
     "convert": Command("Write the aligned signals of one drive as one log, in SI units and with canonical names."),
     "align": Command(
         "Find the clock offset (and drift) between sources from a quantity that both carry.", module="clock"
@@ -46,14 +46,14 @@ COMMANDS = {
         "Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same."
     ),
     "batch": Command("Run every log of a campaign through the detectors and keep the results."),
-    "plan": Command("Tell what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),
+    "plan": Command("Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),
     "bin-slipslope": Command("Slip slope over speed for each configuration, and the speed of full aquaplaning."),
     "bin-resistance": Command("Mean resistance measure over speed for each configuration."),
     "report": Command(
         "Make the page of a campaign: quality, test matrix, slip slope and resistance over speed, detections, all runs."
     ),
     "calibrate": Command(
-        "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be told."
+        "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined."
     ),
     "diagnose": Command(
         "Say what the simulation gets wrong on measured drives: the cause, its size, how sure, and what it gains."
@@ -70,6 +70,11 @@ COMMANDS = {
         "Show the documents: topics, one page, or the pages that hold a word.", function="help_pages", runs_bare=True
     ),
 }
+
+
+def loaded() -> dict[str, Any]:
+    """Every command as the command line has it, imported: for the reference."""
+    return {name: _made(name, command) for name, command in COMMANDS.items()}
 
 
 class Commands(TyperGroup):

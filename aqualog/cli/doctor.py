@@ -27,12 +27,12 @@ def doctor(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """Tell what is wrong with a log, what was lost of it, and what to do.
+    """Report what is wrong with a log, what was lost of it, and what to do.
 
     Every file is read to its end: damage, time stamps that jump, samples that are no numbers, codes, signals that stand
-    still; then the drive as `detect` would see it: units, ranges, sensors that contradict each other, and which
-    detectors lack what. Nothing is written. Exit codes: 0 nothing lost, 3 something lost or a file of several cannot be
-    read, 4 nothing lost but no signal that aqualog knows, or no samples at all, 1 nothing can be read.
+    still. Then the drive is judged as `detect` would see it: units, ranges, sensors that contradict each other, and
+    which detectors lack what. Nothing is written. Exit codes: 0 nothing lost, 3 something lost or a file of several
+    cannot be read, 4 nothing lost but no signal that aqualog knows, or no samples at all, 1 nothing can be read.
 
     \b
     Examples:

@@ -74,7 +74,7 @@ def evaluate(
     """Compare what the detectors find with what was there: recall, latency, false alarms, confusion.
 
     What was there comes from a labels file, from the truth in a simulated log, from the signal on_water, or from the
-    lane's times in the campaign. A log that cannot be read is told; the others are evaluated.
+    lane's times in the campaign. A log that cannot be read is named; the others are evaluated.
 
     \b
     Examples:

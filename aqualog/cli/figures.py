@@ -59,9 +59,9 @@ def figures(
     Each figure leaves a page to look at and the table that is drawn, figure_3_06.html and .csv; more than one also
     figures.html with all of them. The verdicts go to stdout.
 
-    With --campaign, the figures of chapter 2 are made from its runs, and tell which they used; logs without results yet
-    are measured first, as by `aqualog batch`. A figure for which the campaign has not the runs is not made, and says
-    why; the others are (exit code 3). 2.3 to 2.7 and 2.10 to 2.20 need a campaign.
+    With --campaign, the figures of chapter 2 are made from its runs, and name those that they used; logs without
+    results are measured first, as by `aqualog batch`. A figure for which the campaign has not the runs is not made, and
+    says why; the others are (exit code 3). 2.3 to 2.7 and 2.10 to 2.20 need a campaign.
 
     \b
     Examples:

@@ -55,7 +55,7 @@ Cache = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Errors only on stderr.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Tell more on stderr.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="More detail on stderr.")]
 Progress = Annotated[str, typer.Option("--progress", help="auto, bar, plain or off.", metavar="MODE")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")]
 Inputs = Annotated[

@@ -50,7 +50,7 @@ def plan(
     within: Annotated[
         str | None,
         typer.Option(
-            "--within", help="Tell how many --shard are done in that time: 90s, 30min, 8h, 2d.", metavar="TIME"
+            "--within", help="Report how many --shard are done in that time: 90s, 30min, 8h, 2d.", metavar="TIME"
         ),
     ] = None,
     vehicle: CarOfLogs = None,
@@ -63,7 +63,7 @@ def plan(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """Tell what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards.
+    """Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards.
 
     A few logs of every format, from the smallest to the largest, are measured in processes as the batch has them, into
     a store that is thrown away. What is in the campaign's store already is not counted. The interval (90 %) is from how

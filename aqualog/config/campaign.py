@@ -18,6 +18,7 @@ from typing import Any
 from aqualog.campaign.logs import near_name
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.run_table import RunTable, as_point, decimal_sign, read_table
+from aqualog.config.file_key import FileKey
 from aqualog.config.labels import load_labels
 from aqualog.config.run_faults import RunFaults, RunKey, TableRun, TomlRun, check_twice
 from aqualog.config.signal_map import load_signal_map
@@ -26,10 +27,18 @@ from aqualog.config.toml_file import TableFaults, load_toml
 from aqualog.config.vehicle import load_vehicle
 from aqualog.errors import ConfigError, LogError
 
-__all__ = ["RUN_KEYS", "CampaignFile", "RunKey", "load_campaign", "read_campaign"]
+__all__ = ["CAMPAIGN_KEYS", "RUN_KEYS", "CampaignFile", "RunKey", "load_campaign", "read_campaign"]
 
 WEAR = ("new", "worn", "very_worn")
-_TOP = ("name", "vehicle", "signals", "run", "runs")
+CAMPAIGN_KEYS = (
+    FileKey("", "name", "text", "", "the file's name", "name of the campaign"),
+    FileKey("", "vehicle", "path", "", "", "vehicle file of all runs; a run may name its own"),
+    FileKey("", "signals", "path", "", "", "signal map of all logs"),
+    FileKey("", "runs", "path", "", "", "table of the runs (CSV); this or `[[run]]` must be given"),
+    FileKey("", "run", "tables", "", "", "`[[run]]` tables in the file itself, in place of `runs`"),
+)
+"""Keys of the campaign file itself; those of a run are `RUN_KEYS`."""
+_TOP = tuple(k.name for k in CAMPAIGN_KEYS)
 
 
 _ALL = (

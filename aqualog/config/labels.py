@@ -8,15 +8,24 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+from aqualog.config.file_key import FileKey
 from aqualog.config.table_faults import LineFaults
 from aqualog.errors import ConfigError
 from aqualog.evaluate.labels import Label, joined
 from aqualog.io.small_file import read_small
 from aqualog.notation import WHEELS
 
-__all__ = ["load_labels"]
+__all__ = ["LABEL_KEYS", "load_labels"]
 
-_COLUMNS = ("start_s", "end_s", "effect", "wheel")
+LABEL_KEYS = (
+    FileKey("", "start_s", "number", "s", "", "begin, from the log's first sample; must be given"),
+    FileKey("", "end_s", "number", "s", "", "end; what runs beyond the log is cut; must be given"),
+    FileKey("", "effect", "text", "", "", "full, partial, water, a detector's name, a surface or a situation; must be "
+            "given"),
+    FileKey("", "wheel", "text", "", "", "fl, fr, rl, rr; empty: the car"),
+)  # fmt: skip
+"""Columns of a labels file."""
+_COLUMNS = tuple(k.name for k in LABEL_KEYS)
 _LARGEST = 64 * 2**20  # [byte]
 
 

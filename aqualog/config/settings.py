@@ -6,16 +6,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from aqualog.config.file_key import FileKey
 from aqualog.config.thresholds import load_thresholds
 from aqualog.config.toml_file import TableFaults, load_toml
 from aqualog.detect.joint_cusum import TERMS, JointCusumParams
 from aqualog.detect.stream import Settings
 
-__all__ = ["joint_text", "load_settings"]
+__all__ = ["JOINT_KEYS", "joint_text", "load_settings"]
 
 _SWITCHES = ("with_slope", "gated")
 _THIRD = ("resistance", "variance")
-_KEYS = ("third", *_SWITCHES, "weights")
+JOINT_KEYS = (
+    FileKey("joint_cusum", "third", "text", "", "resistance", "third term of (2.11): resistance, or variance as "
+            "printed (E6)"),
+    FileKey("joint_cusum", "with_slope", "true or false", "", "true", "whether the lost slip slope is in the sum"),
+    FileKey("joint_cusum", "gated", "true or false", "", "true", "whether the sum counts only while the resistance "
+            "gate is open"),
+    FileKey("joint_cusum", "weights", "table", "-", "built in", f"weight of each term, 0 to 100: {', '.join(TERMS)}"),
+)  # fmt: skip
+"""Keys of the table `[joint_cusum]`."""
+_KEYS = tuple(k.name for k in JOINT_KEYS)
 
 
 def load_settings(path: Path) -> Settings:

@@ -8,17 +8,40 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
+from aqualog.config.file_key import FileKey
 from aqualog.config.toml_file import Faults, is_number, load_toml
 from aqualog.io.csv_format import CsvFormat, format_fault
 from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.units import is_unit, parse_unit
 
-__all__ = ["load_signal_map", "map_text"]
+__all__ = ["MAP_KEYS", "load_signal_map", "map_text"]
 
-_ENTRY_KEYS = ("channel", "unit", "scale", "offset", "invalid")
-_CLOCK_KEYS = ("offset_s", "drift_ppm", "at_s")
-_CSV_KEYS = ("separator", "decimal", "encoding")
+_CLOCK = 'sources."FILE"'
+MAP_KEYS = (
+    FileKey("signals", "SIGNAL.channel", "text or list", "", "", "name of the channel, or names in order of "
+            "preference; must be given; `SIGNAL = \"name\"` is short for it"),
+    FileKey("signals", "SIGNAL.unit", "text", "", "the file's", "unit of the raw values, in place of the file's"),
+    FileKey("signals", "SIGNAL.scale", "number", "", "1", "factor on the SI value; a negative one turns the sign"),
+    FileKey("signals", "SIGNAL.offset", "number", "SI", "0", "added after scaling"),
+    FileKey("signals", "SIGNAL.invalid", "list of numbers", "", "[]", "raw values that mean \"no value\""),
+    FileKey("time", "channel", "text", "", "", "the column that holds the time"),
+    FileKey("time", "unit", "text", "", "", "its unit: s, ms, us, ns, min or h"),
+    FileKey("csv", "separator", "text", "", "found", "one sign, or `tab`, `comma`, `semicolon`, `space`; in "
+            "`[csv.\"PATTERN\"]` for the files of that name alone"),
+    FileKey("csv", "decimal", "text", "", "found", "`.` or `,`"),
+    FileKey("csv", "encoding", "text", "", "found", "an encoding that Python knows, `cp1252`"),
+    FileKey(_CLOCK, "offset_s", "number", "s", "0", "by how much the clock of this file is late; the name may be a "
+            "pattern"),
+    FileKey(_CLOCK, "drift_ppm", "number", "ppm", "0", "by how much it runs fast"),
+    FileKey(_CLOCK, "at_s", "number", "s", "0", "stamp of the file's own clock at which the offset holds"),
+)  # fmt: skip
+"""Every key of a signal map."""
+
 _TABLES = ("signals", "time", "csv", "sources")
+_ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")
+_TIME_KEYS = tuple(k.name for k in MAP_KEYS if k.table == "time")
+_CSV_KEYS = tuple(k.name for k in MAP_KEYS if k.table == "csv")
+_CLOCK_KEYS = tuple(k.name for k in MAP_KEYS if k.table == _CLOCK)
 
 
 def load_signal_map(path: Path) -> SignalMap:
@@ -45,8 +68,8 @@ def load_signal_map(path: Path) -> SignalMap:
     clocks = {name: _clock(name, t, faults) for name, t in _table(document, "sources", faults).items()}
     time = _table(document, "time", faults)
     for key in time:
-        if key not in ("channel", "unit"):
-            faults.unknown(key, ("channel", "unit"))
+        if key not in _TIME_KEYS:
+            faults.unknown(key, _TIME_KEYS)
     channel = time.get("channel")
     if channel is not None and not isinstance(channel, str):
         faults.add("channel", f"[time] channel = {str(channel)[:40]} is not a name")

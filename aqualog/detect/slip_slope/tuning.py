@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-__all__ = ["TUNING", "Params", "Tuning"]
+__all__ = ["MEANINGS", "TUNING", "Params", "Tuning"]
 
 
 class Tuning(NamedTuple):
@@ -48,6 +48,33 @@ class Tuning(NamedTuple):
 
 
 TUNING = Tuning()
+
+MEANINGS: dict[str, tuple[str, str]] = {
+    "r": ("s", "spectral density of the slip's noise: 5e-4 rms at 5 Hz on a measured road drive"),
+    "q_k": ("1/s", "variance that 1/C gains per second"),
+    "q_beta": ("1/s", "variance that the slope ratio of the axles gains per second"),
+    "q_delta": ("1/s", "variance that the slip offset gains per second"),
+    "sd_k": ("-", "standard deviation of 1/C at the start, relative to a slope of 33"),
+    "sd_beta": ("-", "standard deviation of the slope ratio at the start"),
+    "sd_delta": ("-", "standard deviation of the slip offset at the start"),
+    "sd_k_reset": ("-", "standard deviation of 1/C after an alarm"),
+    "zeta": ("-", "drift of the CUSUM on the slip's error"),
+    "h": ("s", "threshold of that CUSUM"),
+    "adapted": ("", "whether equation (3.25) of the thesis is used, rather than (3.23)"),
+    "tau_settle": ("s", "the offset rests for this time after an alarm"),
+    "tau_sort": ("s", "then slope and offset are separated anew, in case a radius has changed"),
+    "sd_delta_release": ("-", "standard deviation for it, along the line on which both explain the same"),
+    "rest": ("-", "the offset rests while a sum stands above this share of `h`"),
+    "tau_fade": ("s", "evidence of a change fades in this time where no differential traction is seen"),
+    "mu_min": ("-", "least differential traction that counts; below it only the offset is learnt"),
+    "mu_max": ("-", "largest differential traction that counts"),
+    "s_min": ("-", "least differential slip that counts"),
+    "s_max": ("-", "largest differential slip that counts; beyond it a wheel spins"),
+    "tau_window": ("s", "window of observability"),
+    "told_k": ("-", "how well the window must determine 1/C: relative standard deviation"),
+    "told_beta": ("-", "how well it must determine the slope ratio"),
+}
+"""Unit and meaning of each number."""
 
 
 class Params(NamedTuple):

@@ -1,0 +1,40 @@
+"""`python -m aqualog.book` writes the generated pages and schemas."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from aqualog.book.topics import DOCS
+
+__all__ = ["generated", "main"]
+
+
+def generated() -> dict[Path, str]:
+    """Every generated file with its text."""
+    from aqualog.book import reference
+    from aqualog.book.reference import commands_page
+    from aqualog.cli.commands import loaded
+
+    found = {DOCS / "reference" / "commands.md": commands_page.text(loaded())}
+    found |= {DOCS / "reference" / f"{n}.md": reference.page(n) for n in reference.PAGES if n != "commands"}
+    if find_spec("aqualog.book.sources"):
+        from importlib import import_module
+
+        found[DOCS / "sources.md"] = import_module("aqualog.book.sources").sources_page()
+    return found
+
+
+def main(arguments: list[str]) -> int:
+    """Write what has changed, and say which files that are."""
+    for path, text in generated().items():
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+            sys.stdout.write(f"{path.relative_to(DOCS)}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
