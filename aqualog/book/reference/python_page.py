@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import aqualog
@@ -19,9 +20,12 @@ import aqualog as aq
 ```
 
 Every command is argument parsing around one function here. A path may be text or a `Path`, and where several fit, a
-list. Faults are exceptions, see [exit codes](exit_codes.md). Nothing is limited as it is in a command: a log that
-crashes its reader ends your process.
+list. Faults are exceptions, see [exit codes](exit_codes.md). A command reads logs in a process of its own, with limits;
+from Python nothing is limited, and a log that crashes its reader ends your process.
 """
+_MOST = 90  # characters of a signature on one line
+_SECTION = re.compile(r"^(Parameters|Returns|Raises|Yields)\n-{3,}\n", re.M)
+_ITEM = re.compile(r"^(\S.*?)(?: : (.*))?$\n((?:^(?:    .*)?$\n?)*)", re.M)
 
 
 def text() -> str:
@@ -50,11 +54,21 @@ def _line(doc: str) -> str:
 def _entry(name: str, x: Any) -> list[str]:
     if _kind(x) in ("module", "value"):
         return []
-    doc = (inspect.getdoc(x) or "").split("\nParameters\n")[0].split("\nRaises\n")[0].split("\nReturns\n")[0].strip()
-    parts = [f"## `aq.{name}`", fence(f"aq.{name}{_signature(x)}", "text"), doc]
+    parts = [f"## `aq.{name}`", fence(f"aq.{name}{_signature(x)}", "text"), *_doc(inspect.getdoc(x) or "")]
     if inspect.isclass(x):
         rows = list(_members(x))
         parts.append(table(("member", "meaning"), rows) if rows else "")
+    return parts
+
+
+def _doc(doc: str) -> list[str]:
+    """Paragraphs of a docstring, and its sections as tables."""
+    about, *sections = _SECTION.split(f"{doc}\n")
+    parts = [about.strip()]
+    for title, body in zip(sections[::2], sections[1::2], strict=True):
+        rows = [(code(n), (kind or "").strip(), _line(said)) for n, kind, said in _ITEM.findall(body)]
+        heading = {"Parameters": "parameter", "Returns": "returns", "Yields": "yields", "Raises": "raises"}[title]
+        parts.append(table((heading, "type", "meaning"), rows))
     return parts
 
 
@@ -66,14 +80,39 @@ def _members(x: type) -> Iterable[tuple[str, str]]:
             continue
         if not value.__module__.startswith("aqualog"):
             continue
-        shown = name if isinstance(member, property) else f"{name}{_signature(member, without_self=True)}"
+        shown = name if isinstance(member, property) else f"{name}{_signature(member, most=1000)}"
         yield code(shown), _line(inspect.getdoc(value) or "")
 
 
-def _signature(x: Any, *, without_self: bool = False) -> str:
+def _signature(x: Any, most: int = _MOST) -> str:
+    """Parameters with their types as they stand in the code; one a line where they are long."""
     try:
         signature = inspect.signature(x)
     except (ValueError, TypeError):
         return "()"
-    parameters = [p for n, p in signature.parameters.items() if not (without_self and n == "self")]
-    return str(signature.replace(parameters=parameters)).replace("'", "")
+    parts: list[str] = []
+    has_star = False
+    for name, p in signature.parameters.items():
+        if name == "self" or name.startswith("_"):
+            continue
+        if p.kind is p.KEYWORD_ONLY and not has_star:
+            parts.append("*")
+        has_star = has_star or p.kind in (p.KEYWORD_ONLY, p.VAR_POSITIONAL)
+        star = {p.VAR_POSITIONAL: "*", p.VAR_KEYWORD: "**"}.get(p.kind, "")
+        parts.append(f"{star}{name}{_annotation(p.annotation, ': ')}{_default(p.default)}")
+    end = "" if inspect.isclass(x) else _annotation(signature.return_annotation, " -> ")
+    line = f"({', '.join(parts)}){end}"
+    return line if len(line) <= most else "(\n" + "".join(f"    {p},\n" for p in parts) + f"){end}"
+
+
+def _annotation(annotation: Any, sign: str) -> str:
+    if annotation is inspect.Parameter.empty:
+        return ""
+    return sign + (annotation if isinstance(annotation, str) else inspect.formatannotation(annotation))
+
+
+def _default(value: Any) -> str:
+    if value is inspect.Parameter.empty:
+        return ""
+    is_made = isinstance(value, FunctionType) or repr(value).startswith("<")
+    return " = ..." if is_made else f" = {value!r}"
