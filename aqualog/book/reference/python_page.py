@@ -24,7 +24,7 @@ list. Faults are exceptions, see [exit codes](exit_codes.md). A command reads lo
 from Python nothing is limited, and a log that crashes its reader ends your process.
 """
 _MOST = 90  # characters of a signature on one line
-_SECTION = re.compile(r"^(Parameters|Returns|Raises|Yields)\n-{3,}\n", re.M)
+_SECTION = re.compile(r"^(Parameters|Returns|Raises|Yields|Examples|Notes)\n-{3,}\n", re.M)
 _ITEM = re.compile(r"^(\S.*?)(?: : (.*))?$\n((?:^(?:    .*)?$\n?)*)", re.M)
 
 
@@ -66,7 +66,13 @@ def _doc(doc: str) -> list[str]:
     about, *sections = _SECTION.split(f"{doc}\n")
     parts = [about.strip()]
     for title, body in zip(sections[::2], sections[1::2], strict=True):
-        rows = [(code(n), (kind or "").strip(), _line(said)) for n, kind, said in _ITEM.findall(body)]
+        if title in ("Examples", "Notes"):
+            parts.append(fence(inspect.cleandoc(body), "text") if title == "Examples" else body.strip())
+            continue
+        rows = [
+            (n if title == "Returns" else code(n), (kind or "").strip(), _line(said))
+            for n, kind, said in _ITEM.findall(body)
+        ]
         heading = {"Parameters": "parameter", "Returns": "returns", "Yields": "yields", "Raises": "raises"}[title]
         parts.append(table((heading, "type", "meaning"), rows))
     return parts
