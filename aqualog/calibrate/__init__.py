@@ -1,1 +1,1 @@
-"""What detectors must know of a car, estimated from its dry drives."""
+"""Estimate what detectors must know of a car from its dry drives."""

@@ -1,4 +1,4 @@
-"""The vehicle with what a calibration has told."""
+"""Put the values of a calibration into a vehicle."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _KEYS = {
 
 
 def told(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
-    """Values by key of the vehicle file (`wheels.r_e_f`) that are told, each with the parameter it comes from.
+    """Return the identified values by key of the vehicle file (`wheels.r_e_f`), each with the parameter it comes from.
 
-    A ratio of radii that is told without their size keeps the file's mean. The torque gain is that of the torques as
-    they were read, which the file's own gain has multiplied already.
+    A ratio of radii without their size keeps the file's mean radius. The torque gain applies to the torques as they
+    were read, which the file's own gain has already multiplied.
     """
     found = {_KEYS[p.name]: (p.value, p) for p in parameters if p.identified and p.name in _KEYS}
     if "torque_gain" in found:
@@ -41,10 +41,10 @@ def calibrated(
     transfers: Mapping[str, TieRodFit] | None = None,
     spread: Mapping[str, float] | None = None,
 ) -> Vehicle:
-    """The vehicle with the values that are told; the others stay.
+    """Return the vehicle with the identified values; the others stay.
 
-    Keys that are told count as given. So do the loaded radii, once the effective ones are: forces rest on those that
-    the calibration has used. A spread from drive to drive that the drives do not show stays the file's.
+    Identified keys count as given. So do the loaded radii, once the effective ones are: forces depend on those that the
+    calibration has used. A spread from drive to drive that the drives do not show stays that of the file.
     """
     values = told(parameters, vehicle)
     radii = {"wheels.r_l_f", "wheels.r_l_r"} if "wheels.r_e_f" in values else set()

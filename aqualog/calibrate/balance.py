@@ -1,4 +1,4 @@
-"""The dry balance of forces as a regression over the windows of one or more drives."""
+"""Estimate the dry balance of forces by regression over the windows of one or more drives."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Sample(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """Estimates: `inverse_mass` torque gain over mass [1/kg], `drag` drag area over mass [m^2/kg], `levels` (J,) a_x
-    without force and drag at the offset's time [m/s^2], `drifts` (J,) of it [m/s^3], `rolling` r_w [-], `condition` of
+    """Estimates: `inverse_mass` torque gain over mass [1/kg], `drag` drag area over mass [m²/kg], `levels` (J,) a_x
+    without force and drag at the offset's time [m/s²], `drifts` (J,) of it [m/s³], `rolling` r_w [-], `condition` of
     the scaled columns of force and drag [-].
     """  # fmt: skip
 
@@ -41,7 +41,7 @@ class Balance(NamedTuple):
 
 
 def fit_balance(samples: Sequence[Sample], fixed: Mapping[str, float]) -> Balance:
-    """Least squares of a_x = k F - kappa D + level_j + drift_j (t - t_j) over the windows of all drives.
+    """Fit a_x = k F - kappa D + level_j + drift_j (t - t_j) by least squares over the windows of all drives.
 
     Parameters
     ----------
@@ -52,15 +52,15 @@ def fit_balance(samples: Sequence[Sample], fixed: Mapping[str, float]) -> Balanc
     Returns
     -------
     Balance
-        level_j = b_j - g r_w with the offset b_j of the drive's accelerometer. Specific force: no grade (E2). What the
-        wheels' inertia takes is off the force (E5).
+        level_j = b_j - g r_w with the offset b_j of the drive's accelerometer. Specific force: no grade (E2). The force
+        is that of the torque less the part that spins the wheels (E5).
 
     Raises
     ------
     FitError
-        If there are less than 20 windows, or their forces are all alike.
+        If there are fewer than 20 windows, or their forces are all alike.
 
-    Errors in the force would make k too small; means over 2 s leave little of them. A wind is in kappa and the levels.
+    Errors in the force make k too small; means over 2 s leave little of them. A wind enters kappa and the levels.
 
     Thesis: Eq. (2.9), (2.10) with a measure of zero.
     """
@@ -83,7 +83,7 @@ def fit_balance(samples: Sequence[Sample], fixed: Mapping[str, float]) -> Balanc
 
 
 def residual(sample: Sample, *, inverse_mass: float, drag: float, level: float, drift: float) -> FloatArray:
-    """What the balance leaves of a_x in each window. [m/s^2]"""
+    """Return the residual of a_x in each window. [m/s²]"""
     w = sample.windows
     return w.a_x - inverse_mass * w.force + drag * w.drag - level - drift * (w.t - _time(sample))
 
@@ -122,7 +122,7 @@ def _time(sample: Sample) -> float:
 
 
 def _line(sample: Sample, y: FloatArray) -> tuple[float, float]:
-    """Slope over the time, and level at the offset's time."""
+    """Fit the slope over time, and the level at the offset's time."""
     t = sample.windows.t - sample.windows.t.mean()
     square = float(t @ t)
     slope = float(t @ y) / square if square > 0.0 else 0.0
@@ -130,7 +130,7 @@ def _line(sample: Sample, y: FloatArray) -> tuple[float, float]:
 
 
 def _centred(sample: Sample, y: FloatArray) -> FloatArray:
-    """A column without the level and drift that each drive has of its own."""
+    """Remove from a column the level and drift that each drive has of its own."""
     if y.size == 0:
         return y
     slope, _ = _line(sample, y)
@@ -140,7 +140,7 @@ def _centred(sample: Sample, y: FloatArray) -> FloatArray:
 
 
 def _rolling(samples: Sequence[Sample], levels: FloatArray) -> float:
-    """Mean of (b_j - level_j) / g, weighted by how well each offset is known; NaN without any."""
+    """Average (b_j - level_j) / g, weighted by how well each offset is known; NaN without any offset."""
     known = np.array([math.isfinite(s.offset.value) for s in samples])
     if not known.any():
         return math.nan

@@ -1,4 +1,4 @@
-"""Is one drive's car heavier than that of others: an interval for one more drive of the same kind."""
+"""Test whether the car of one drive is heavier than that of others, with an interval for one more drive of the kind."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LEAST_DRIVES = 2
 
 
 def mass_difference(mass: float, sd: float, others: Sequence[float]) -> tuple[float, float, float]:
-    """Difference of a drive's mass to the mean of others, with the 95 % interval.
+    """Return the difference between a drive's mass and the mean of others, with the 95 % interval.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def mass_difference(mass: float, sd: float, others: Sequence[float]) -> tuple[fl
     difference, low, high : float
         NaN with fewer than two others. [kg]
 
-    Two drives of the same load differ by driver, fuel, rig, temperature of the driveline and all else that the balance
-    does not know. What the others differ by among themselves, times sqrt(1 + 1/J), is what this drive may differ by
-    without any load; its own scatter counts where it is larger.
+    Two drives with the same load differ by driver, fuel, rig, driveline temperature and all else that the balance does
+    not know. The scatter among the other drives, times sqrt(1 + 1/J), is the difference to expect of this drive without
+    any load. Its own scatter counts where it is larger.
     """
     n = len(others)
     if n < LEAST_DRIVES:

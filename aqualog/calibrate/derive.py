@@ -1,4 +1,4 @@
-"""From the balance's coefficients to the parameters of a car, with what is known from elsewhere."""
+"""Derive the parameters of a car from the balance's coefficients, with what is known from elsewhere."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ FIXABLE: Mapping[str, tuple[float, float]] = {
     **{n: (KEYS[n].low, KEYS[n].high) for n in ("mass", "rolling_resistance", "drag_area")},
     "torque_gain": (0.2, 5.0),
 }
-"""What can be given as known, with its bounds."""
+"""Values that can be given as known, with their bounds."""
 
 GAIN_SD = 0.02  # [-] of a torque signal whose scale nobody has checked (K; axle efficiency alone is 0.95-0.97, V)
 WIDE: Mapping[str, float] = {"mass": 0.10, "torque_gain": 0.10, "mass_per_gain": 0.10, "drag_area": 0.5}
-"""Half of an interval over its value beyond which the drives do not tell the parameter."""
+"""Half of an interval over its value beyond which a parameter is not identified."""
 WIDE_ROLLING = (
     0.005  # [-] the same for r_w, not over its value: else only drives that show too much of it would tell it
 )
@@ -48,7 +48,7 @@ def check_fixed(fixed: Mapping[str, float]) -> None:
 def derived(balance: Balance, fixed: Mapping[str, float]) -> dict[str, float]:
     """Parameters by name.
 
-    `mass_per_gain` is what the balance tells; a mass or a torque gain given splits it, without either the gain is 1.
+    `mass_per_gain` is what the balance identifies. A given mass or torque gain splits it; without either the gain is 1.
     """
     if "mass" in fixed:
         mass, gain = fixed["mass"], fixed.get("torque_gain", fixed["mass"] * balance.inverse_mass)
@@ -72,10 +72,10 @@ def estimates(samples: Sequence[Sample], fixed: Mapping[str, float]) -> dict[str
 def balance_parameters(
     found: Mapping[str, float], spread: Spread, fixed: Mapping[str, float], vehicle: Vehicle, samples: Sequence[Sample]
 ) -> list[Parameter]:
-    """Parameters of the balance with intervals, and why one is not told.
+    """Return the parameters of the balance with intervals, and why one is not identified.
 
-    Without a mass or a torque gain given, the gain's 2 % are in the intervals of mass and drag area: all drives share
-    the one signal, and no number of them takes that out.
+    Without a given mass or torque gain, the gain's 2 % enter the intervals of mass and drag area. All drives share the
+    one signal, so more drives do not reduce this part.
     """
     has_scale = "mass" in fixed or "torque_gain" in fixed
     parameters = []
@@ -94,7 +94,7 @@ def balance_parameters(
         limit = WIDE_ROLLING if name == "rolling_resistance" else WIDE[name] * value
         why = words.why_not(name, value, half, limit, samples, has_scale=has_scale)
         if name == "rolling_resistance" and not why and parameters and not parameters[0].identified:
-            why = words.NO_SLOPE  # the level of a balance whose slope is not told is none
+            why = words.NO_SLOPE  # without a slope the balance has no level either
         if name in KEYS and not why and not KEYS[name].low <= value <= KEYS[name].high:
             why = words.outside(KEYS[name])
         remark = "" if why else words.remark(name, has_scale=has_scale, by_drive=spread.by_drive, samples=samples)

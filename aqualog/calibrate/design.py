@@ -1,4 +1,4 @@
-"""Which stretches of a drive tell the balance of forces, as means over windows."""
+"""Select the stretches of a drive that identify the balance of forces, as means over windows."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REASONS = ("signals missing", "slow or standing", "braking", "brakes not known",
 class Windows(NamedTuple):
     """Means over windows (n,) of one drive.
 
-    `a_x` specific force [m/s^2], `force` sum (T - I omega_dot) / r_l [N], `drag` air drag of 1 m^2 [N], `v` [m/s],
+    `a_x` specific force [m/s²], `force` sum (T - I omega_dot) / r_l [N], `drag` air drag of 1 m² [N], `v` [m/s],
     `t` [s], `block` index of the stretch that a window is resampled with.
     """
 
@@ -68,14 +68,14 @@ class Drive(NamedTuple):
 
 
 def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
-    """Signals of one drive to windows.
+    """Turn the signals of one drive into windows.
 
     Parameters
     ----------
     signals : Signals
         At least `a_x`, the torques of the driven wheels, and `v_x` or wheel speeds.
     vehicle : Vehicle
-        Radii and inertias count; mass only for the loads.
+        Radii and inertias are used; mass only for the loads.
     name : str
         For messages.
 
@@ -84,8 +84,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     SignalError
         If a signal is missing.
 
-    Braked samples are left out: brake torques are hardly known. So are slow, cornering, wet ones and gear shifts, and
-    their neighbours within 0.6 s. Torque and velocity are moved to the accelerometer's time first.
+    Braked samples are left out: brake torques are hardly known. Slow, cornering and wet samples, gear shifts, and their
+    neighbours within 0.6 s are left out, too. Torque and velocity are moved to the accelerometer's time first.
     """
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
     _check(present, vehicle, name)
@@ -125,7 +125,7 @@ def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
 
 
 def _check_alive(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> None:
-    """A signal that never changes is frozen or not connected, and would be fitted to the last digit."""
+    """Refuse a signal that never changes: it is frozen or not connected, and would be fitted to the last digit."""
     torques = [f"torque_{w}" for w in vehicle.driven]
     speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]
     dead = [s for s in ("a_x", *torques, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
@@ -137,7 +137,7 @@ def _check_alive(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str)
 
 
 def _torque_force(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
-    """Wheel torques over the loaded radii; a wheel without a torque signal rolls freely. [N]"""
+    """Return wheel torques over the loaded radii; a wheel without a torque signal rolls freely. [N]"""
     force: FloatArray = np.sum(
         [columns[f"torque_{w}"] / vehicle.r_l(w) for w in WHEELS if f"torque_{w}" in columns], axis=0
     )
@@ -145,7 +145,7 @@ def _torque_force(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatA
 
 
 def _spinning_force(columns: Mapping[str, FloatArray], vehicle: Vehicle, v: FloatArray, dt: float) -> FloatArray:
-    """What of the torque spins the wheels (E5); without wheel speeds they follow the car. [N]"""
+    """Return the part of the torque that spins the wheels (E5); without wheel speeds they follow the car. [N]"""
     total = np.zeros_like(v)
     for w in WHEELS:
         omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
@@ -162,7 +162,7 @@ def _reasons(
     vehicle: Vehicle,
     dt: float,
 ) -> FloatArray:
-    """0 where a sample is used, else 1 + index into `REASONS`."""
+    """Return 0 where a sample is used, else 1 + index into `REASONS`."""
     reason = np.zeros(v.size)
 
     def mark(bits: BoolArray, name: str) -> None:
@@ -186,7 +186,7 @@ def _reasons(
 
 
 def _dry(columns: Mapping[str, FloatArray], moving: BoolArray) -> BoolArray:
-    """Moving and not on measured or labelled water."""
+    """Flag samples of a moving car that is not on measured or labelled water."""
     wet = np.zeros(moving.size, dtype=np.bool_)
     for label in _WATER:
         if label in columns:
@@ -196,7 +196,7 @@ def _dry(columns: Mapping[str, FloatArray], moving: BoolArray) -> BoolArray:
 
 
 def widened(bits: BoolArray, width: int) -> BoolArray:
-    """On also `width` samples before and after."""
+    """Extend true samples by `width` samples on both sides."""
     near: BoolArray = np.convolve(bits, np.ones(2 * width + 1), mode="same") > 0.5
     return near
 
@@ -204,7 +204,7 @@ def widened(bits: BoolArray, width: int) -> BoolArray:
 def _windows(
     a_x: FloatArray, v: FloatArray, force: FloatArray, used: BoolArray, vehicle: Vehicle, dt: float
 ) -> Windows:
-    """Means over windows without a break; the drag's mean is that of v^2, not of v."""
+    """Average over windows without a break; the drag's mean is that of v², not of v."""
     n = max(round(WINDOW_S / dt), 1)
     starts = []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], used, [False]]).astype(np.int8)))

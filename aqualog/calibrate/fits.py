@@ -1,4 +1,4 @@
-"""What each drive shows by itself."""
+"""Estimate what each drive shows by itself."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["drive_fits"]
 def drive_fits(
     drives: Sequence[Drive], samples: Sequence[Sample], found: Mapping[str, float], vehicle: Vehicle
 ) -> list[DriveFit]:
-    """Each drive with a mass, an offset and a drift of its own; torque gain and drag area are those of all."""
+    """Fit a mass, an offset and a drift for each drive; torque gain and drag area are those of all drives."""
     fixed = {"torque_gain": found["torque_gain"], "drag_area": found["drag_area"]}
     alone = [_alone(s, fixed) for s in samples]
     known = [m for m, _ in alone if math.isfinite(m)]
@@ -36,7 +36,7 @@ def drive_fits(
 
 
 def _alone(sample: Sample, fixed: Mapping[str, float]) -> tuple[float, float]:
-    """Mass by one drive and its standard deviation within the drive; NaN where it has too little."""
+    """Return the mass by one drive and its standard deviation within the drive; NaN if the drive is too short."""
 
     def mass(part: Sample) -> dict[str, float]:
         return {"mass": fixed["torque_gain"] / fit_balance([part], fixed).inverse_mass}

@@ -1,4 +1,4 @@
-"""By how much one signal is late against another, from how they move together."""
+"""Estimate how late one signal is against another, from their common changes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEAST_S = 20.0  # [s]
 
 
 def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
-    """Time by which x is late against y.
+    """Return the time by which x is late against y.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
     Returns
     -------
     lag : float
-        Within +-0.6, positive where x comes later; 0 where their best correlation is below 0.5 or less than 20 s are
-        there. [s]
+        Within ±0.6, positive where x comes later; 0 if their best correlation is below 0.5 or less than 20 s are
+        usable. [s]
 
     The peak of the correlation of both signals between 0.25 and 5 Hz, by a parabola through its three highest points.
     """
@@ -50,7 +50,7 @@ def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
 
 
 def earlier(x: FloatArray, lag: float, dt: float) -> FloatArray:
-    """A signal that is late by `lag` [s], put where it belongs; NaN beyond its ends."""
+    """Shift a signal that is late by `lag` [s] back; NaN beyond its ends."""
     if lag == 0.0:
         return x
     k = np.arange(x.size, dtype=np.float64)
@@ -63,7 +63,7 @@ def _band(x: FloatArray, dt: float) -> FloatArray:
 
 
 def _mean(x: FloatArray, seconds: float, dt: float) -> FloatArray:
-    """Centred mean without delay, NaN where a sample of it is."""
+    """Return the centred mean without delay; NaN where one of its samples is NaN."""
     half = max(round(0.5 * seconds / dt), 0)
     width = 2 * half + 1
     out = np.full(x.size, np.nan)

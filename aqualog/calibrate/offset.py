@@ -1,4 +1,4 @@
-"""Offset of the accelerometer from the energy balance of a drive: velocity and height say what it should have shown."""
+"""Estimate the offset of the accelerometer from the energy balance of a drive, by velocity and height."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ V_STOPPED = 0.5  # [m/s]
 
 
 class Offset(NamedTuple):
-    """`value` [m/s^2] at the time `t` [s] of the drive, `sd` by the height; `has_height`; way [m]."""
+    """`value` [m/s²] at the time `t` [s] of the drive, `sd` by the height; `has_height`; way [m]."""
 
     value: float
     sd: float
@@ -28,14 +28,14 @@ class Offset(NamedTuple):
 
 
 def energy_offset(drive: Drive) -> Offset:
-    """Offset of the accelerometer over one drive.
+    """Estimate the offset of the accelerometer over one drive.
 
-    b = (int v a_x dt - Delta(v^2 / 2) - g Delta h) / way: along the way the specific force lifts and accelerates the
-    car, whatever grade, brake, torque or wind there was (E2); only the heights at both ends count. Without an altitude
-    Delta h is 0 +- 20 m. The value is that of an evenly drifting offset at the mean time of the way, int v t dt / way.
+    b = (int v a_x dt - Delta(v² / 2) - g Delta h) / way. Along the way the specific force lifts and accelerates the
+    car, whatever grade, brake, torque or wind acts (E2). Only the heights at both ends count. Without an altitude
+    Delta h is 0 ± 20 m. The value is that of an evenly drifting offset at the mean time of the way, int v t dt / way.
 
-    Gaps in a_x or v are left out with the energy and height gained within them. NaN, with an infinite sd, where the
-    drive is shorter than 500 m.
+    Gaps in a_x or v are left out with the energy and height gained within them. The result is NaN, with an infinite sd,
+    where the drive is shorter than 500 m.
     """
     v, a, dt = drive.v, drive.a_x, drive.dt
     good = np.isfinite(v + a)

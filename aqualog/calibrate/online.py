@@ -1,7 +1,7 @@
-"""The slow offset of the resistance measure, learnt while driving on dry road and frozen in the wet.
+"""Estimate the slow offset of the resistance measure on dry road while driving, and freeze it in the wet.
 
 An accelerometer that drifts, a head wind and a wrong rolling resistance all leave a slow offset in the measure (2.9).
-Water comes fast and only ever adds: that is all by which a single scalar can tell them apart.
+Water comes fast and only ever adds resistance. A single scalar has no other means to distinguish the two.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["OnlineParams", "OnlineState", "initial_state", "scan"]
 
 
 class OnlineParams(NamedTuple):
-    """Tuning; made by `make`. Accelerations in m/s^2, times in s."""
+    """Tuning; made by `make`. Accelerations in m/s², times in s."""
 
     dt: float
     k_fast: float  # share of a new sample in the short memory
@@ -35,20 +35,20 @@ class OnlineParams(NamedTuple):
 
     @classmethod
     def make(cls, dt: float) -> OnlineParams:
-        """Tuning for a sample time dt [s].
+        """Return the tuning for a sample time dt [s].
 
-        A ramp of 1.6e-3 m/s^3 is what an offset with tau = 60 s follows within the guard of 0.1 m/s^2: faster ones are
-        taken for water, slower ones for drift (ESC accelerometers: 2e-4 m/s^3 rms, up to 1e-3). The guard is half the
-        threshold of partial aquaplaning (thesis 2.2: 0.2 m/s^2), so that no change that matters is learnt. The
-        bound holds an offset of 0.2, as much of drift, and a head wind of 10 m/s at motorway speed (0.17) together.
+        An offset with tau = 60 s follows a ramp of 1.6e-3 m/s³ within the guard of 0.1 m/s². Faster ramps are taken for
+        water, slower ones for drift (ESC accelerometers: 2e-4 m/s³ rms, up to 1e-3). The guard is half the threshold of
+        partial aquaplaning (thesis 2.2: 0.2 m/s²), so that no change that matters enters the offset. The bound is the
+        sum of an offset of 0.2, as much of drift, and a head wind of 10 m/s at motorway speed (0.17).
         """
         return cls(dt, gain(1.0, dt), 60.0, 0.1, 1.0, 0.6, 180.0, 10.0, 2.0, 0.5, 2.0)
 
 
 class OnlineState(NamedTuple):
-    """What is carried: offset [m/s^2], seconds learnt, short memory of x, seconds above, below and at standstill.
+    """State: offset [m/s²], seconds of learning, short memory of x, seconds above, below and at standstill.
 
-    `before` is the level that was given up for a lower one, NaN if none; `back` the seconds at that level again.
+    `before` is the level that was given up for a lower one, NaN without one; `back` the seconds at that level again.
     """
 
     offset: float
@@ -62,7 +62,7 @@ class OnlineState(NamedTuple):
 
 
 def initial_state(offset: float = 0.0) -> OnlineState:
-    """Before the first sample; `offset` [m/s^2] is reported until the first sample that can be used."""
+    """Return the state before the first sample; `offset` [m/s²] is reported until the first sample that can be used."""
     return OnlineState(offset, 0.0, math.nan, 0.0, 0.0, 0.0, math.nan, 0.0)
 
 
@@ -108,7 +108,7 @@ def _scan(p, offset, age, fast, above, beneath, resting, before, back, x, v_x, f
 def scan(
     p: OnlineParams, state: OnlineState, x: FloatArray, v_x: FloatArray, frozen: BoolArray
 ) -> tuple[FloatArray, OnlineState]:
-    """Offset of the resistance measure over a drive or a piece of one.
+    """Estimate the offset of the resistance measure over a drive or a piece of one.
 
     Parameters
     ----------
@@ -117,26 +117,26 @@ def scan(
         From `initial_state` or the piece before.
     x : array (n,)
         Resistance measure (2.9) where the balance of forces can be trusted; NaN where it is not to be used (braking,
-        cornering, gear shift, gap). Low speeds, 5 m/s and more, are welcome: water hardly shows there. [m/s^2]
+        cornering, gear shift, gap). Low speeds, 5 m/s and more, help: water hardly shows there. [m/s²]
     v_x : array (n,)
         Velocity, to see standstill; NaN holds. [m/s]
     frozen : bool array (n,)
-        Wet suspicion from outside: any wheel criterion, a lost slip slope. Nothing is learnt, no time counts.
+        Suspicion of water from elsewhere: any wheel criterion, a lost slip slope. The offset is frozen, no time counts.
 
     Returns
     -------
     offset : array (n,)
-        What to subtract from the measure, after this sample; within +-bound. [m/s^2]
+        Value to subtract from the measure, after this sample; within ±bound. [m/s²]
     state : OnlineState
 
-    A running mean at first (gain dt / age), then a low-pass with the time constant tau. Beyond +-guard nothing is
-    learnt: above it for at most `give_up` seconds, below it for `below` seconds; then the offset begins anew from the
-    lower level, and goes back to the one before where the measure stays within half a guard of it for `returned`
-    seconds. Standstill begins anew too. Limits: x constant gives that constant from the first sample on. What is
-    there from the first sample on cannot be told from an offset: a log that begins on water hides it.
+    The estimate is a running mean at first (gain dt / age), then a low-pass with the time constant tau. It is frozen
+    outside ±guard: above it for at most `give_up` seconds, below for `below` seconds. Then it restarts from the lower
+    level. It returns to the old level if the measure stays within half a guard of that level for `returned` seconds.
+    It restarts at standstill, too. Limits: a constant x gives that constant from the first sample on. Water that is
+    there from the first sample on cannot be distinguished from an offset: a log that begins on water hides it.
 
-    Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives none; this one knows
-    their joint effect at even traction only.
+    Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives no method. This one
+    estimates their joint effect at even traction only.
     """
     out, *last = _scan(
         p, *state, np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(v_x, dtype=np.float64),

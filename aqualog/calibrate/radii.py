@@ -1,4 +1,4 @@
-"""Effective radii of the wheels: with a velocity their size, without one their ratio."""
+"""Estimate the effective radii of the wheels: their size with a velocity, their ratio without one."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Radii(NamedTuple):
 
 
 def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
-    """Windows of one drive in blocks, each (k, 6).
+    """Cut one drive into blocks of windows, each (k, 6).
 
-    v / omega_f, v / omega_r [m], omega_r / omega_f, force over weight, acceleration over speed [1/s], acceleration
-    [m/s^2].
+    Columns: v / omega_f, v / omega_r [m], omega_r / omega_f, force over weight, acceleration over speed [1/s],
+    acceleration [m/s²].
 
-    Empty where a wheel speed is missing. The wheels of an axle are averaged: what a slight curve does to left and right
-    cancels.
+    Empty where a wheel speed is missing. The wheels of an axle are averaged, so that the effects of a slight curve on
+    left and right cancel.
     """
     if any(f"omega_{w}" not in drive.columns for w in WHEELS):
         return []
@@ -73,7 +73,7 @@ def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
 
 
 def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Radii:
-    """Radii of wheels that no torque drives.
+    """Estimate the radii of wheels at zero torque.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Radii:
         Blocks of each drive by `radii_of_blocks`.
     drivetrain : {"fwd", "rwd", "awd"}
 
-    v / omega of a free axle is its radius, and what its delay makes of acceleration: a / v times some 10 ms, in each
-    drive its own, which the peak of a correlation leaves. v / omega of a driven wheel falls with the force by the slip
-    (3.13), a cubic for the brush, of which only the value at zero counts, and with the acceleration, which the free
-    wheels' inertia answers with slip. At zero a wheel rolls freely, and its own rolling resistance, a slip of r_w / C
-    (0.04 %), is in the radius. On AWD cars all wheels are driven, and one delay is taken for all drives.
+    v / omega of a free axle is its radius plus the effect of its delay: a / v times some 10 ms. Each drive has its
+    own delay, which the peak of a correlation does not resolve. v / omega of a driven wheel falls with the force by the
+    slip (3.13), a cubic for the brush, of which only the value at zero counts. It also changes with the acceleration,
+    through the slip of the free wheels' inertia. At zero force a wheel rolls freely; the slip of its own rolling
+    resistance, r_w / C (0.04 %), is part of the radius. On AWD cars all drives share one delay.
     """
     of_drives = [np.concatenate(list(b)) for b in drives if len(b)]
     x = np.concatenate(of_drives)
@@ -104,12 +104,12 @@ def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Radii:
 
 
 def _constant(columns: Sequence[FloatArray], y: FloatArray) -> float:
-    """Coefficient of the first column by least squares; NaN where y is missing."""
+    """Fit the coefficient of the first column by least squares; NaN where y is missing."""
     return float(np.linalg.lstsq(np.column_stack(columns), y, rcond=None)[0][0]) if np.isfinite(y).all() else math.nan
 
 
 def radii_spread(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Spread:
-    """Blocks of 40 s left out in turn within their drive; from four drives on combined with whole drives left out."""
+    """Leave out blocks of 40 s in turn within their drive; from four drives on, whole drives, too."""
 
     def without(j: int, k: int) -> dict[str, float]:
         kept = [b for i, b in enumerate(drives[j]) if i != k]
@@ -123,7 +123,7 @@ def radii_spread(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Spr
 
 
 def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Parameter]:
-    """Radii of both axles and their ratio as parameters, intervals by `radii_spread` and what the model leaves."""
+    """Return the radii of both axles and their ratio, with intervals by `radii_spread` and the model error."""
     by_drive = [b for b in (radii_of_blocks(d, vehicle) for d in drives) if b]
     units = {"r_e_f": "m", "r_e_r": "m", "r_e_ratio": "-"}
     file = {"r_e_f": vehicle.r_e_f, "r_e_r": vehicle.r_e_r, "r_e_ratio": vehicle.r_e_f / vehicle.r_e_r}
@@ -149,7 +149,7 @@ def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Paramet
 
 
 def _model_sd(name: str, vehicle: Vehicle) -> float:
-    """What the regression leaves of a radius however long the drives are; nothing on a free axle. [-]"""
+    """Return the error that the regression leaves in a radius after any number of drives; 0 on a free axle. [-]"""
     if vehicle.drivetrain == "awd":
         return AWD_SD
     return 0.0 if name == ("r_e_f" if vehicle.drivetrain == "rwd" else "r_e_r") else SLIP_SD

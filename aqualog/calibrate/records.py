@@ -1,4 +1,4 @@
-"""What a calibration says: parameters with intervals, what each drive showed, and what could not be told."""
+"""Records of a calibration: parameters with intervals, results of each drive, and what could not be identified."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["Calibration", "DriveFit", "Parameter", "TieRodFit"]
 class Parameter:
     """One parameter, SI.
 
-    `ci95` is its interval, NaN where there is none; `identified` whether the drives tell it (with what was fixed and
-    the named assumptions); `why_not` says what they lack, empty where identified; `remark` what the interval rests on.
-    `file_value` is the vehicle file's, NaN where the file has no such key.
+    `ci95` is its interval, NaN without one. `identified`: whether the drives identify it (with what was fixed and the
+    named assumptions). `why_not` says what they lack, empty where identified; `remark` what the interval rests on.
+    `file_value` is that of the vehicle file, NaN where the file has no such key.
     """
 
     name: str
@@ -31,14 +31,14 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class DriveFit:
-    """What one drive showed by itself, the drag area taken from all.
+    """Results of one drive by itself, with the drag area of all drives.
 
-    `mass` by this drive alone [kg] with the standard deviation `mass_sd` within the drive; `against_others` by how much
-    it is heavier than the other drives, with the 95 % interval for one more drive like them (NaN with less than
-    three drives) [kg]; `offset` of the accelerometer [m/s^2] with `offset_sd`, its `drift` [m/s^3] (with it: warming
-    tyres); `torque_lag_s`, `v_lag_s` by how much torque and velocity are late against the accelerometer [s]; `used_s`,
-    `driven_s` seconds; `left_out` seconds by reason; `rmse_before`, `rmse_after` of the balance [m/s^2]; `v`, `force`,
-    `before`, `after` (n,): windows used, speed [m/s], wheel force [N] and residuals [m/s^2].
+    `mass` by this drive alone [kg] with the standard deviation `mass_sd` within the drive. `against_others`: how much
+    it is heavier than the other drives, with the 95 % interval for one more drive like them (NaN with fewer than three
+    drives) [kg]. `offset` of the accelerometer [m/s²] with `offset_sd`, its `drift` [m/s³] (with it: warming tyres).
+    `torque_lag_s`, `v_lag_s`: delay of torque and velocity against the accelerometer [s]. `used_s`, `driven_s` seconds;
+    `left_out` seconds by reason. `rmse_before`, `rmse_after` of the balance [m/s²]. `v`, `force`, `before`, `after`
+    (n,): windows used, speed [m/s], wheel force [N] and residuals [m/s²].
     """
 
     name: str
@@ -63,7 +63,7 @@ class DriveFit:
 
 @dataclass(frozen=True, slots=True)
 class TieRodFit:
-    """Transfer to tie rods or steering: coefficients and intervals by key; `sigma` rms of what it leaves [N, N m].
+    """Transfer to tie rods or steering: coefficients and intervals by key; `sigma` rms of the residual [N, N·m].
 
     `explained` share of the variance; `seconds` used.
     """
@@ -80,7 +80,7 @@ class Calibration:
     """Result over all drives. `fixed` are the values given from outside; `cannot_tell` are sentences.
 
     `transfers` are polynomials by section of the vehicle file: `tie_rod`, `steering_torque`. `spread` is the standard
-    deviation by which one more drive differs from a parameter, in its unit; empty where too few drives show it.
+    deviation by which one more drive differs from a parameter, in its unit; empty with too few drives.
     """
 
     vehicle_name: str
@@ -93,7 +93,7 @@ class Calibration:
     spread: Mapping[str, float] = field(default_factory=dict)
 
     def get(self, name: str) -> Parameter:
-        """Parameter by name; KeyError if there is none."""
+        """Return the parameter of this name; KeyError without one."""
         for p in self.parameters:
             if p.name == name:
                 return p

@@ -1,4 +1,4 @@
-"""Calibration of a car from dry drives."""
+"""Calibrate a car from dry drives."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from aqualog.vehicle import SPREAD, Vehicle
 
 __all__ = ["calibrate"]
 
-LEAST_WINDOWS = 10  # of 2 s in a drive that is to tell something of the balance
+LEAST_WINDOWS = 10  # of 2 s in a drive that contributes to the balance
 OFFSET_WIDE = 0.1  # [m/s^2] half of the resistance threshold: an offset known worse than that is of no use
 
 
 def calibrate(
     drives: Sequence[Signals], names: Sequence[str], vehicle: Vehicle, fixed: Mapping[str, float] | None = None
 ) -> Calibration:
-    """Parameters of a car from dry drives.
+    """Estimate the parameters of a car from dry drives.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def calibrate(
     names : sequence of str
         Of the drives, for messages.
     vehicle : Vehicle
-        Radii, inertias, axle distances, air density; its mass and resistances are only compared with.
+        Radii, inertias, axle distances, air density; its mass and resistances serve for comparison only.
     fixed : mapping, optional
-        Values that are known from elsewhere, by the names of `derive.FIXABLE`.
+        Values known from elsewhere, by the names of `derive.FIXABLE`.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def calibrate(
 def _offsets(
     fits: Sequence[DriveFit], samples: Sequence[Sample], levels: Sequence[float], fixed: Mapping[str, float]
 ) -> list[Parameter]:
-    """Offset of the accelerometer in each drive; a rolling resistance that is given tells it without any height."""
+    """Estimate the accelerometer's offset in each drive; a given rolling resistance yields it without any height."""
     parameters = []
     for fit, sample, level in zip(fits, samples, levels, strict=True):
         name = "accelerometer_offset" if len(fits) == 1 else f"accelerometer_offset[{fit.name}]"
@@ -101,7 +101,7 @@ def _offsets(
             parameters.append(Parameter(name, value, (math.nan, math.nan), "m/s^2", identified=True, remark=remark))
             continue
         known = math.isfinite(half) and half < OFFSET_WIDE
-        why = "" if known else "the drive is too short for its energy balance; 5 km without altitude tell it"
+        why = "" if known else "the drive is too short for its energy balance; 5 km without altitude are enough"
         parameters.append(
             Parameter(name, value, (value - half, value + half), "m/s^2", known, why, remark if known else "")
         )

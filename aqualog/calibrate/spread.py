@@ -1,4 +1,4 @@
-"""Intervals of estimates whose residuals hang together: blocks or whole drives left out in turn."""
+"""Compute intervals of estimates whose residuals are correlated: blocks or whole drives are left out in turn."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Spread(NamedTuple):
 
 
 def half_width(sd: float, dof: float) -> float:
-    """Half of the 95 % interval. NaN without a finite standard deviation."""
+    """Return half of the 95 % interval. NaN without a finite standard deviation."""
     if not math.isfinite(sd):
         return math.nan
     return student_quantile(0.975, max(dof, 1.0)) * sd if dof < 200.0 else 1.96 * sd
 
 
 def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, air_density: float) -> Spread:
-    """How far estimates are off.
+    """Estimate the errors of estimates.
 
     Parameters
     ----------
@@ -53,18 +53,18 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
         Estimates by name from any subset of drives or windows.
     samples : sequence of Sample
     drag : float
-        Drag area over mass, for the wind. [m^2/kg]
+        Drag area over mass, for the wind. [m²/kg]
     air_density : float
         [kg/m^3]
 
-    Jackknife over blocks of 40 s, plus what one drive cannot show of itself: a steady wind of 3 m/s rms, and the height
-    at its ends, in each drive on its own. Four drives or more: `combined` with a jackknife over drives, so that what
-    differs between them (wind, surface, temperature, offset, driver) is in the interval.
+    Jackknife over blocks of 40 s, plus the errors that one drive hides: a steady wind of 3 m/s rms, and the height
+    at its ends, in each drive on its own. Four drives or more: `combined` with a jackknife over drives, so that the
+    interval includes what differs between them (wind, surface, temperature, offset, driver).
 
     Raises
     ------
     FitError
-        If fewer than five blocks are there.
+        If the drives hold fewer than five blocks.
     """
     assumed = _of_blocks_and_assumptions(estimator, samples, drag=drag, air_density=air_density)
     if len(samples) < DRIVES_MIN:
@@ -73,11 +73,11 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
 
 
 def one_more(spread: Spread, count: int) -> dict[str, float]:
-    """Standard deviation by which one more drive differs from the estimates over `count` drives, by name.
+    """Return the standard deviation by which one more drive differs from the estimates over `count` drives, by name.
 
-    Of estimates over J drives like these it is sd sqrt(J) for a drive by itself and sd sqrt(J + 1) for its difference
-    to them (D). So wide that 1.96 of it is half of the 95 % interval, whatever the degrees of freedom. Empty where the
-    drives have not shown how they differ.
+    With sd that of estimates over J drives, it is sd sqrt(J) for a drive by itself and sd sqrt(J + 1) for its
+    difference to the estimates (D). It is scaled so that 1.96 of it is half of the 95 % interval, whatever the degrees
+    of freedom. Empty where the drives do not show how they differ.
     """
     if not spread.by_drive:
         return {}
@@ -86,14 +86,14 @@ def one_more(spread: Spread, count: int) -> dict[str, float]:
 
 
 def combined(assumed: Spread, seen: Spread) -> Spread:
-    """One spread from the assumed one and that seen between drives, name by name.
+    """Combine the assumed spread with that seen between drives, name by name.
 
-    Both are variances of the same estimate where the assumptions hold, and are pooled, weighted by their degrees of
-    freedom. Where the drives differ so much more that F = seen / assumed exceeds its 75 % quantile, the drives alone
-    count. Pooling after a preliminary test at 25 %, not 5 %, keeps nearly the nominal level whatever the true spread is
-    (Bozivich, Bancroft & Hartley 1956, K). For normal estimates 95 % intervals from four drives cover in 96 % where the
-    assumptions hold and in at least 92 % where the variance is any multiple of the assumed one (D). The wider of the
-    two would cover in 98 %: it picks the estimate that erred upwards.
+    Both are variances of the same estimate where the assumptions hold. They are pooled, weighted by their degrees of
+    freedom. The drives alone count where F = seen / assumed exceeds its 75 % quantile. Pooling after a preliminary test
+    at 25 %, not 5 %, keeps nearly the nominal level whatever the true spread is (Bozivich, Bancroft & Hartley 1956, K).
+    For normal estimates, 95 % intervals from four drives cover in 96 % where the assumptions hold. They cover in at
+    least 92 % where the variance is any multiple of the assumed one (D). The wider of the two spreads would cover in
+    98 %: it picks the estimate that erred upwards.
     """
     sd, dof = {}, {}
     for n in seen.sd:
@@ -107,7 +107,7 @@ def combined(assumed: Spread, seen: Spread) -> Spread:
 
 
 def variance_ratio_chance(ratio: float, dof: float, dof_below: float) -> float:
-    """Chance that F of two independent variances exceeds `ratio`; degrees of freedom >= 1 above and below."""
+    """Return the chance that F of two independent variances exceeds `ratio`; degrees of freedom >= 1 for both."""
     # x = sin^2(u) turns the beta density of x = dof F / (dof F + dof_below) into powers without a pole
     u = np.linspace(0.0, 0.5 * math.pi, 4_001)
     density = np.sin(u) ** (dof - 1.0) * np.cos(u) ** (dof_below - 1.0)
@@ -136,16 +136,16 @@ def _of_blocks_and_assumptions(
 
 
 def of_drives(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
-    """Each drive left out in turn."""
+    """Leave out each drive in turn."""
     left = [estimator([s for k, s in enumerate(samples) if k != j]) for j in range(len(samples))]
     return Spread(*jackknife(left), by_drive=True)
 
 
 def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
-    """Each block of windows left out in turn; only how blocks of one drive differ counts.
+    """Leave out each block of windows in turn; only differences between blocks of one drive count.
 
-    A sum over drives, as strata: what sets a whole drive apart (its wind) would otherwise count here and again with the
-    assumptions.
+    The sum over drives treats them as strata. Differences between whole drives (wind) would otherwise count twice:
+    here and in the assumptions.
     """
     blocks = [[(j, b) for b in np.unique(s.windows.block)] for j, s in enumerate(samples)]
     if (count := sum(len(b) for b in blocks)) < BLOCKS_MIN:
@@ -164,9 +164,9 @@ def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
 
 
 def stratified(parts: Sequence[Sequence[Estimate]]) -> Spread:
-    """From estimates with one part left out each, sorted by drive: variances and degrees of freedom add up.
+    """Add up variances and degrees of freedom of estimates with one part left out each, sorted by drive.
 
-    Drives of a single part are one stratum together; a lone one joins another drive.
+    Drives of a single part form one stratum together; a lone one joins another drive.
     """
     strata = [list(left) for left in parts if len(left) > 1]
     single = [e for left in parts if len(left) == 1 for e in left]
@@ -181,7 +181,7 @@ def stratified(parts: Sequence[Sequence[Estimate]]) -> Spread:
 
 
 def jackknife(left: Sequence[Estimate]) -> tuple[dict[str, float], dict[str, float]]:
-    """Standard deviations and degrees of freedom from estimates with one part left out each."""
+    """Return standard deviations and degrees of freedom from estimates with one part left out each."""
     n = len(left)
     sd, dof = {}, {}
     for name in left[0]:
@@ -197,7 +197,7 @@ def _without(sample: Sample, block: float) -> Sample:
 
 
 def _in_wind(sample: Sample, wind: float, *, drag: float, air_density: float) -> Sample:
-    """The drive as it would have been with some head wind more."""
+    """Return the drive as it would have been with more head wind."""
     w = sample.windows
     extra: FloatArray = 0.5 * air_density * ((w.v + wind) ** 2 - w.v**2)
     return sample._replace(windows=w._replace(a_x=w.a_x - drag * extra))

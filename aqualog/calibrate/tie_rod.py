@@ -1,4 +1,4 @@
-"""Transfer from wheel forces to tie rods, identified from a dry drive."""
+"""Identify the transfer from wheel forces to tie rods from a dry drive."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ F_X_RANGE_MIN = 60.0  # [N]
 def transfers(
     drives: Sequence[Drive], vehicle: Vehicle, *, torque_scale: float = 1.0
 ) -> tuple[dict[str, TieRodFit], tuple[str, ...]]:
-    """Polynomials of tie rods and steering torque, each from the drive that tells most, and why there is none.
+    """Fit the polynomials of tie rods and steering torque, each from its most informative drive; else return why not.
 
     The forces are those of the detectors' own model (`features.steering_model`), probed with unit polynomials, so that
-    what is identified is what they use. The vehicle's mass scales them: it must be the one that goes with the result;
-    so does `torque_scale`, by which torques will be multiplied on reading from now on. [-]
+    identification and detection use the same model. The vehicle's mass scales them: it must be the one that goes with
+    the result. So does `torque_scale`, the factor on torques that are read from now on. [-]
     """
     found: dict[str, TieRodFit] = {}
     reasons = []
@@ -49,7 +49,7 @@ def transfers(
                 continue
             F_y, measured = _probed(d, vehicle, section, {"c_y": (1.0,)}, torque_scale)
             F_x, _ = _probed(d, vehicle, section, {"c_x": (1.0,)}, torque_scale)
-            # left and right turn the steering alike, so that even powers of the axle's force are none of its torque
+            # left and right turn the steering alike, so that even powers of the axle's force give no torque
             degree = 2 if section == "tie_rod" else 1
             try:
                 fits.append(fit_tie_rod(F_y, F_x, measured, dt=d.dt, used=_telling(d, vehicle), degree=degree))
@@ -62,7 +62,7 @@ def transfers(
 
 
 def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:
-    """Dry, moving, within the polynomial's range, and unbraked as in the detector: brakes act on another lever."""
+    """Flag dry, moving, unbraked samples in the polynomial's range, as the detector: brakes act on another lever."""
     columns, f = drive.columns, drive.features
     torque = np.sum([columns[f"torque_{w}"] for w in WHEELS if f"torque_{w}" in columns], axis=0)
     with np.errstate(invalid="ignore"):
@@ -77,7 +77,7 @@ def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:
 def _probed(
     drive: Drive, vehicle: Vehicle, section: str, unit: dict[str, tuple[float, ...]], torque_scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Model and measurement (m, n) with a polynomial that shows one force as it is."""
+    """Return model and measurement (m, n), with a polynomial that passes one force unchanged."""
     rods, torque = (unit, {}) if section == "tie_rod" else ({}, unit)
     probe = replace(vehicle, tie_rod=rods, steering_torque=torque)
     columns = {s: x * torque_scale if s.startswith("torque_") else x for s, x in drive.columns.items() if s in INPUTS}
@@ -97,7 +97,7 @@ def fit_tie_rod(
     used: BoolArray | None = None,
     degree: int = 2,
 ) -> TieRodFit:
-    """Polynomial of a tie-rod force in the forces of its wheel.
+    """Fit the polynomial of a tie-rod force in the forces of its wheel.
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ def fit_tie_rod(
     FitError
         If there are less than 20 s, or the car was hardly steered.
 
-    Least squares; intervals by leaving out blocks of 8 s in turn. The explained share is that of the variance of all
-    rods together.
+    Least squares, with intervals from leaving out blocks of 8 s in turn. The explained share is that of the variance of
+    all rods together.
 
     Thesis: 2.4, polynomials from a multi-body model; here from the drive itself.
     """
@@ -172,7 +172,7 @@ def _solve(table: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _jackknife(table: FloatArray, f: FloatArray, block: NDArray[np.intp]) -> tuple[FloatArray, float]:
-    """Standard deviations of the coefficients with one block left out each, and degrees of freedom."""
+    """Return standard deviations of the coefficients with one block left out each, and degrees of freedom."""
     gram, right = table.T @ table, table.T @ f
     left = []
     for b in np.unique(block):

@@ -1,4 +1,4 @@
-"""Sentences of a calibration: what was assumed, what the drives cannot tell, and what would tell it."""
+"""Sentences of a calibration: assumptions, parameters that cannot be identified, and data that would identify them."""
 
 from __future__ import annotations
 
@@ -21,44 +21,44 @@ GAIN_NOTED = 0.005  # [-]
 CONTRADICTION = 0.05  # [-]
 PLAUSIBLE_MASS = (500.0, 45000.0)  # [kg]
 GAIN_UNKNOWN = (
-    "mass and torque gain are one ratio in the balance of forces: a weighed car (--fix mass=KG) tells the gain, a gain "
-    "known from a dynamometer (--fix torque_gain=X) the mass"
+    "mass and torque gain are one ratio in the balance of forces: a weighed car (--fix mass=KG) gives the gain, a "
+    "gain known from a dynamometer (--fix torque_gain=X) gives the mass"
 )
 
-NO_SLOPE = "the drives do not tell how force and acceleration go together, so they do not tell what is left over either"
-ACCELEROMETER = "the accelerometer's own scale taken as true"
+NO_SLOPE = "the drives do not show how force and acceleration go together, so their remainder is not identified either"
+ACCELEROMETER = "scale of the accelerometer taken as true"
 
-RADIUS_SHORT = "too little straight, unbraked driving above 30 km/h with all wheel speeds; five times 40 s tell it"
+RADIUS_SHORT = "too little straight, unbraked driving above 30 km/h with all wheel speeds; five times 40 s are enough"
 
 
 def why_not(name: str, value: float, half: float, limit: float, samples: Sequence[Sample], *, has_scale: bool) -> str:
-    """Why a parameter is not identified; empty where it is."""
+    """Say why a parameter is not identified; empty where it is."""
     if name == "torque_gain" and not has_scale:
         return GAIN_UNKNOWN
     if math.isfinite(half) and value > 0.0 and half <= limit:
         return ""
     if name == "rolling_resistance":
         return (
-            "rolling resistance and the accelerometer's offset are one sum; a longer drive, one with altitude, or one "
-            "that ends where it began tells the offset, --fix rolling_resistance=X gives it"
+            "rolling resistance and the accelerometer's offset form one sum; a longer drive, one with altitude, or one "
+            "that ends where it began identifies the offset, --fix rolling_resistance=X gives it"
         )
     if name == "drag_area":
         v = np.concatenate([s.windows.v for s in samples]) * 3.6
         low, high = np.percentile(v, [5.0, 95.0])
         return (
             f"drag needs a spread of speeds, these are {low:.0f} to {high:.0f} km/h, and a wind counts as drag; drives "
-            "from 40 to 130 km/h in both directions tell it, --fix drag_area=X gives it"
+            "from 40 to 130 km/h in both directions identify it, --fix drag_area=X gives it"
         )
-    return "the forces hardly change; some accelerations with 1 m/s^2 and more, unbraked and straight, tell it"
+    return "the forces hardly change; some accelerations of 1 m/s² and more, unbraked and straight, identify it"
 
 
 def outside(key: Key) -> str:
-    """A value that no car has."""
-    return f"it comes out beyond {key.low:g} to {key.high:g} {key.unit}: units and signs of torque and a_x want a look"
+    """Say that no car has such a value."""
+    return f"the estimate is outside {key.low:g} to {key.high:g} {key.unit}: check units and signs of torque and a_x"
 
 
 def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Sample]) -> str:
-    """What an interval rests on."""
+    """Say what an interval rests on."""
     parts = []
     if name in ("mass", "drag_area") and not has_scale:
         parts.append("torque taken as true within 2 % rms")
@@ -67,7 +67,7 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
     if name == "drag_area":
         parts.append("with the air density of the vehicle file")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
-        parts.append(f"net climb of a drive taken as 0 +- {CLIMB_SD:g} m")
+        parts.append(f"net climb of a drive taken as 0 ± {CLIMB_SD:g} m")
     parts.append(
         "a steady wind of 3 m/s rms" + (" and drives left out are" if by_drive else " is") + " in the interval"
     )
@@ -77,17 +77,17 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
 def radius_unknown(*, ratio_known: bool) -> str:
     """Without a velocity."""
     if ratio_known:
-        return "without v_x wheel speeds tell the ratio of the radii only; a GNSS velocity tells their size"
-    return "wheel speeds of all four wheels are needed"
+        return "without v_x wheel speeds give only the ratio of the radii; a GNSS velocity gives their size"
+    return "the wheel speeds of all four wheels are needed"
 
 
 def left_out(seconds: Mapping[str, float]) -> str:
-    """`braking 30 s, cornering 12 s`, longest first."""
+    """Return `braking 30 s, cornering 12 s`, longest first."""
     return ", ".join(f"{r} {s:.0f} s" for r, s in sorted(seconds.items(), key=lambda kv: -kv[1]) if s >= 0.5)
 
 
 def cannot_tell(parameters: Sequence[Parameter], more: Sequence[str]) -> tuple[str, ...]:
-    """One sentence for each parameter that is not told, and others."""
+    """Return one sentence for each parameter that is not identified, and others."""
     sentences: dict[str, list[str]] = {}
     for p in parameters:
         if not p.identified:
@@ -103,7 +103,7 @@ def notes(
     *,
     by_drive: bool,
 ) -> list[str]:
-    """What a reader should know of the result."""
+    """Return what a reader should know of the result."""
     said = []
     alone = float(np.median([f.mass for f in fits if math.isfinite(f.mass)] or [math.nan]))
     if {"mass", "torque_gain"} <= set(fixed) and abs(alone / fixed["mass"] - 1.0) > CONTRADICTION:
@@ -113,8 +113,8 @@ def notes(
         )
     if not PLAUSIBLE_MASS[0] < found["mass"] < PLAUSIBLE_MASS[1] or not 0.5 < found["torque_gain"] < 2.0:
         said.append(
-            f"a mass of {found['mass']:.0f} kg with a torque gain of {found['torque_gain']:.2f} is hardly a car's: is "
-            "the torque that of the motor, without the reduction? (scale in the signal map)"
+            f"a mass of {found['mass']:.0f} kg with a torque gain of {found['torque_gain']:.2f} is hardly that of a "
+            "car. Is the torque that of the motor, without the reduction? (scale in the signal map)"
         )
     if abs(found["torque_gain"] - 1.0) > GAIN_NOTED:
         said.append(
@@ -133,7 +133,7 @@ def notes(
             "those of these drives"
         )
     if not all(s.offset.has_height for s in samples):
-        said.append("no altitude: a grade is out of the balance of forces anyway, but stays in the offset")
+        said.append("no altitude: the balance of forces does not need the grade, but the offset includes it")
     late = [f for f in fits if abs(f.torque_lag_s) > 0.15]
     said += [f"{f.name}: torque is {f.torque_lag_s:+.2f} s late against the accelerometer; taken out" for f in late]
     return said

@@ -1,1 +1,1 @@
-"""TOML files into frozen records."""
+"""Read TOML files into frozen records."""

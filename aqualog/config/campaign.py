@@ -1,8 +1,7 @@
-"""Campaign files: which logs were driven in which configuration.
+"""Read campaign files: which logs were driven in which configuration.
 
-Everything that can be wrong in the file, in its table of runs and in the files that they name is told at once, before
-any log is opened. A log that is not there is no fault of the file (`aqualog.campaign.logs` tells it): the others can be
-worked on.
+All faults of the file, of its table of runs and of the files that they name are reported at once, before any log is
+opened. A missing log is no fault of the file: the other logs can be analysed, and `aqualog.campaign.logs` reports it.
 """
 
 from __future__ import annotations
@@ -63,14 +62,14 @@ RUN_KEYS = {k.name: k for k in _ALL}
 
 @dataclass(frozen=True, slots=True)
 class CampaignFile:
-    """A campaign and where each of its runs stands: `runs.csv: line 4`, or the name of the file alone."""
+    """A campaign and the place of each run: `runs.csv: line 4`, or the name of the file alone."""
 
     campaign: Campaign
     places: tuple[str, ...]
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read and check a campaign file. Logs need not exist yet; vehicle, signal map and labels must, and be right.
+    """Read and check a campaign file. Logs need not exist yet; vehicle, signal map and labels must exist and be valid.
 
     Raises
     ------
@@ -81,7 +80,7 @@ def load_campaign(path: Path) -> Campaign:
 
 
 def read_campaign(path: Path) -> CampaignFile:
-    """Read and check a campaign file, as `load_campaign`, and keep where each run stands."""
+    """Read and check a campaign file like `load_campaign`, and keep the place of each run."""
     document, text = _document(path)
     faults = TableFaults(path, text)
     for name in document:
@@ -136,7 +135,7 @@ def _document(path: Path) -> tuple[dict[str, Any], str]:
 
 
 def _escape_hint(value: Any) -> str:
-    """A path of Windows in double quotes loses its backslashes with what follows them: `\\temp` holds a tab."""
+    """Return a hint: in double quotes a path of Windows loses backslashes, as in `\\temp`, which then holds a tab."""
     return "; a \\ in quotes is an escape, write / in paths" if re.search(r"[\t\b\n\r\f]", str(value)) else ""
 
 
@@ -220,14 +219,14 @@ def _run(table: Mapping[str, Any], named: _NamedFiles, vehicle: Path | None, sin
 
 
 def _plain(value: Any) -> str:
-    """A TOML value as a grouping key: 60 and 60.0 are one."""
+    """Return a TOML value as a grouping key: 60 and 60.0 are one."""
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return str(int(value))
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _logs(value: Any, base: Path, sink: RunFaults) -> tuple[Path, ...]:
-    """The files of one drive; () with the fault noted if they cannot be meant."""
+    """Return the files of one drive; () with the fault noted if the names are not valid."""
     names = value.split(";") if isinstance(value, str) else value
     if isinstance(value, str) and not value.strip():
         names = None
@@ -251,7 +250,7 @@ def _logs(value: Any, base: Path, sink: RunFaults) -> tuple[Path, ...]:
 
 
 def _no_log(path: Path, name: str) -> str:
-    """Why a name cannot be that of a log; empty if it can, be it there or not."""
+    """Say why a name cannot be that of a log; empty if it can, whether or not the file exists."""
     if os.path.isdir(path):  # noqa: PTH112 - a path that is too long is no fault of the system
         from aqualog.io.sniff import sniff
 
@@ -269,7 +268,7 @@ def _no_log(path: Path, name: str) -> str:
 
 
 def _beside(base: Path, name: str) -> Path:
-    """A path from a file in `base`; backslashes of Windows are understood elsewhere too."""
+    """Return a path relative to `base`; backslashes of Windows are understood on other systems, too."""
     path = base / name
     return base / name.replace("\\", "/") if "\\" in name and not os.path.exists(path) else path  # noqa: PTH110
 
@@ -280,14 +279,14 @@ _CHECKS: dict[str, Callable[[Path], object]] = {
 
 
 class _NamedFiles:
-    """Files that a campaign names, each read once to see that it is right."""
+    """Read and check the files that a campaign names, each once."""
 
     def __init__(self, base: Path) -> None:
         self.base = base
         self._seen: set[tuple[str, Path]] = set()
 
     def find(self, name: Any, key: str, sink: RunFaults | TableFaults) -> Path | None:
-        """The file; None if it is not named. What is wrong with it is noted where it is named first."""
+        """Return the file; None if no file is named. Its faults are noted where it is named first."""
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
             return None
         path = _beside(self.base, name.strip())

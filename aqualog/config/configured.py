@@ -1,4 +1,4 @@
-"""A campaign file with all that it names: read and checked as one."""
+"""Read and check a campaign file with all files that it names."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def configure(
 
 
 def _tried(read: Callable[[Path], T], file: Path, faults: list[str]) -> T | None:
-    """What a file says, or None with its faults noted."""
+    """Return what a file says, or None with its faults noted."""
     try:
         return read(file)
     except ConfigError as error:
@@ -76,7 +76,7 @@ def _configured(
 
 
 def files_of(configured: Configured) -> tuple[Path, ...]:
-    """All files that a campaign reads, which no result may overwrite."""
+    """List all files that a campaign reads, which no result may overwrite."""
     campaign = configured.campaign
     maps = (p for p in (campaign.table, campaign.signals) if p)
     logs = (p for r in campaign.runs for p in r.logs)
@@ -93,7 +93,7 @@ def configure_logs(
     thresholds: Path | None = None,
     lists: Sequence[Path] = (),
 ) -> Configured:
-    """Logs without a campaign file as a campaign: each a run of its own, of which nothing more is known.
+    """Build a campaign from logs without a campaign file: each log is a run without further data.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""History of the dry slip slope as a JSON file, kept between drives."""
+"""Keep the history of the dry slip slope in a JSON file between drives."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_BYTES = 50_000_000  # ten thousand configurations
 
 
 def check_history_file(path: Path) -> None:
-    """Refuse a file that could be read but not written back at the end of the work.
+    """Refuse a file that can be read but not written back at the end of the work.
 
     Raises
     ------
@@ -30,12 +30,12 @@ def check_history_file(path: Path) -> None:
 
 
 def load_history(path: Path) -> History:
-    """Read a history; one that is not there yet is empty.
+    """Read a history; a missing file is an empty one.
 
     Raises
     ------
     ConfigError
-        If the file is there and is no history.
+        If the file exists and is no history.
     """
     if not path.exists():
         return History()
@@ -53,12 +53,12 @@ def load_history(path: Path) -> History:
 
 
 def save_history(path: Path, history: History) -> None:
-    """Write a history, whole or not at all; behind a link, to the file that it points to.
+    """Write a history, whole or not at all; through a link, to the file that it points to.
 
     Raises
     ------
     ConfigError
-        If it has become larger than what can be read again; the file stays as it was.
+        If it has become too large to be read again; the file stays as it was.
     """
     text = json.dumps(history_to_json(history), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     if len(text.encode("utf-8")) > MAX_BYTES:
@@ -67,7 +67,7 @@ def save_history(path: Path, history: History) -> None:
 
 
 def update_history(path: Path, change: Callable[[History], History]) -> None:
-    """Read, change and write a history while no other run does: drives looked at side by side lose nothing."""
+    """Read, change and write a history under a lock, so that parallel runs lose nothing."""
     with _alone(path.resolve().parent):
         save_history(path, change(load_history(path)))
 

@@ -32,10 +32,10 @@ _LARGEST = 64 * 2**20  # [byte]
 def load_labels(path: Path) -> tuple[Label, ...]:
     """Read and check a labels file.
 
-    `start_s` and `end_s` [s] count from the log's first sample; `effect` is `full`, `partial`, `water`, the name of a
-    single detector, or any other text (a surface, a situation), which serves the confusion table only; `wheel` is
-    `fl`, `fr`, `rl`, `rr` or empty. A heading without lines says that there was no water. Full aquaplaning is partial
-    aquaplaning too, as the simulated truth has it: its stretches are added to those of `partial`.
+    `start_s` and `end_s` [s] count from the log's first sample. `effect` is `full`, `partial`, `water`, the name of a
+    single detector, or any other text (a surface, a situation), which only enters the confusion table. `wheel` is `fl`,
+    `fr`, `rl`, `rr` or empty. A heading without lines means that there was no water. Full aquaplaning is partial
+    aquaplaning too, as in the simulated truth: its stretches are added to those of `partial`.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def load_labels(path: Path) -> tuple[Label, ...]:
 _SYNONYMS = {
     "full_aquaplaning": "full", "total_aquaplaning": "full", "full_hydroplaning": "full",
     "partial_aquaplaning": "partial", "partial_hydroplaning": "partial",
-    # what is called aquaplaning without a word on how far it went is at least partial
+    # aquaplaning of unknown extent is at least partial
     "aquaplaning": "partial", "hydroplaning": "partial", "aquaplane": "partial",
     "wet": "water", "on_water": "water", "lane": "water",
 }  # fmt: skip
 
 
 def read_csv(path: Path, *, what: str) -> list[list[str]]:
-    """Rows of a small CSV file.
+    """Read the rows of a small CSV file.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def read_csv(path: Path, *, what: str) -> list[list[str]]:
 
 
 def _check_form(first: list[str], path: Path) -> None:
-    """A table of another form has a fault in every line; one message says which form it is."""
+    """Refuse a table of another form in one message: it would have a fault in every line."""
     line = ",".join(first)
     separator = next((s for s in (";", "\t") if s in line and "start_s" in line), None)
     expected = ",".join(_COLUMNS)
@@ -140,14 +140,14 @@ def _label(cells: dict[str, str], line: int, faults: LineFaults) -> Label | None
 
 
 def _partial_too(labels: list[Label]) -> list[Label]:
-    """Full aquaplaning as partial: of the car, or of wheels, as far as the file's own partial labels are such."""
+    """Add full aquaplaning to partial: of the car, or of wheels, as far as the file's own partial labels are such."""
     of_wheels = {x.wheel is not None for x in labels if x.effect == "partial"}
     full = [x for x in labels if x.effect == "full"]
     return [replace(x, effect="partial") for x in full if not of_wheels or (x.wheel is not None) in of_wheels]
 
 
 def _merged(labels: list[Label]) -> tuple[Label, ...]:
-    """Overlapping stretches of the same effect on the same wheel become one, so that none is counted twice."""
+    """Join overlapping stretches of the same effect on the same wheel, so that none counts twice."""
     keys = dict.fromkeys((x.effect, x.wheel) for x in labels)
     return tuple(
         Label(a, b, effect, wheel)

@@ -1,4 +1,4 @@
-"""Model files: the base simulation and the effects on top of it."""
+"""Read model files: the base simulation and the effects on top of it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KNOWN = {**EFFECTS, **EMPIRICAL}
 def load_model(path: Path) -> Model:
     """Read and check a model file: `[[term]]` tables with `effect`, where it sits (`where`) and its parameters, SI.
 
-    A parameter that is left out keeps its neutral value; a file without terms is the base model. An effect that is a
+    A parameter that is left out keeps its neutral value; a file without terms gives the base model. An effect that is a
     function has `knots = [[x, value], ...]`.
 
     Raises
@@ -108,7 +108,7 @@ def _effect(table: Mapping[str, Any], faults: TableFaults) -> Effect | None:
 
 
 def dump_model(model: Model) -> str:
-    """The TOML text of a model; `load_model` reads it back equal."""
+    """Return the TOML text of a model; `load_model` reads it back equal."""
     return "\n".join(_term_text(t) for t in model.terms)
 
 

@@ -1,4 +1,4 @@
-"""Faults of a campaign's runs, wherever a run stands."""
+"""Collect the faults of a campaign's runs, from a TOML file or a table."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RunKey:
 
 
 class RunFaults(Protocol):
-    """Where faults of a run go: to its line of a table, or to its key of a TOML file."""
+    """Sink for the faults of a run: at its line of a table, or at its key of a TOML file."""
 
     place: str
 
@@ -38,7 +38,7 @@ class RunFaults(Protocol):
         """Note a key that does not exist."""
 
     def number(self, key: str, value: Any, of: RunKey) -> float | None:
-        """A number within its bounds, or None with the fault noted."""
+        """Return a number within its bounds, or None with the fault noted."""
 
 
 class TomlRun:
@@ -59,7 +59,7 @@ class TomlRun:
             self._faults.unknown(key, known)
 
     def number(self, key: str, value: Any, of: RunKey) -> float | None:
-        """A number within its bounds, or None with the fault noted."""
+        """Return a number within its bounds, or None with the fault noted."""
         if isinstance(value, str) and _reads_as_number(value):
             self.add(key, f'{key} = "{value[:40]}" is a text, not a number; write it without quotes, with a point')
             return None
@@ -93,12 +93,12 @@ class TableRun:
         self._faults.unknown(self._line, "key", key, known)
 
     def number(self, key: str, value: Any, of: RunKey) -> float | None:
-        """A number within its bounds, or None with the fault noted."""
+        """Return a number within its bounds, or None with the fault noted."""
         return self._faults.number(self._line, key, value, low=of.low, high=of.high, unit=of.unit)
 
 
 def check_twice(found: list[tuple[Run | None, RunFaults]]) -> None:
-    """The same drive in two runs counts twice, unless each is another stretch of it."""
+    """Note a drive that is in two runs, and would count twice, unless each run is another stretch of it."""
     by_logs: dict[tuple[str, ...], list[tuple[Run, RunFaults]]] = {}
     for run, sink in found:
         if run is not None:

@@ -1,4 +1,4 @@
-"""Scenario files: what is driven, where, and how it is measured."""
+"""Read scenario files: what is driven, where, and how it is measured."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _AMPLITUDES = {"amplitude_n": "force", "amplitude_mu": "mu", "amplitude_relative
 class ScenarioKey:
     """One key of a scenario file.
 
-    `table` is the TOML table, empty for the top level; `default` None: required, or without effect if left out; `low`
+    `table` is the TOML table, empty for the top level. `default` None: required, or without effect if left out. `low`
     and `high` bound numbers, and the values of profiles.
     """
 
@@ -127,7 +127,7 @@ SCENARIO_KEYS: dict[str, ScenarioKey] = {k.path: k for k in _ALL}
 def load_scenario(path: Path) -> Scenario:
     """Read and check a scenario file.
 
-    Keys, units, bounds and defaults are those of `SCENARIO_KEYS`; an empty `[steering]` or `[excitation]` is as none.
+    Keys, units, bounds and defaults: see `SCENARIO_KEYS`. An empty `[steering]` or `[excitation]` has no effect.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def vehicle_of(path: Path) -> list[Path]:
-    """The vehicle file that a scenario names, if it does; so that a result is not written over it."""
+    """Return the vehicle file that a scenario names, if any, so that a result does not overwrite it."""
     named = load_toml(path, what="scenario file")[0].get("vehicle")
     return [path.parent / named] if isinstance(named, str) and "\0" not in named else []
 
@@ -201,7 +201,7 @@ class _Reader:
                 self._faults.unknown(name, [*known, *extra])
 
     def _number(self, table: str, values: Mapping[str, Any], name: str, default: float | None = None) -> float:
-        """The number of a key, or its default; after a fault a value that lets the reading go on."""
+        """Return the number of a key, or its default; after a fault a value that lets the reading go on."""
         key = SCENARIO_KEYS[f"{table}.{name}" if table else name]
         usual = default if default is not None else key.default if isinstance(key.default, float) else key.low
         if name not in values:
@@ -226,7 +226,7 @@ class _Reader:
         return usual
 
     def _one_of(self, table: str, values: Mapping[str, Any], names: Collection[str]) -> str | None:
-        """Which one of several keys is given; a fault if it is none or more."""
+        """Return which one of several keys is given; no key or more than one is a fault."""
         given = [n for n in names if n in values]
         if len(given) == 1:
             return given[0]
@@ -249,7 +249,7 @@ class _Reader:
         return {}
 
     def _profile(self, name: str, over: str, end: float, *, values: str = "") -> Profile:
-        """Pairs of a strictly increasing number and a value, as they stand in the file."""
+        """Return pairs of a strictly increasing number and a value, as they stand in the file."""
         if name not in self._document:
             return ()
         key, points = SCENARIO_KEYS[name], self._document[name]
@@ -478,7 +478,7 @@ class _Reader:
                     )
                 self._faults.add(
                     name,
-                    f"{name} = {degrees:g} asks for {lateral:.3g} m/s^2 to the side at {v * 3.6:.3g} km/h, more than "
+                    f"{name} = {degrees:g} asks for {lateral:.3g} m/s² to the side at {v * 3.6:.3g} km/h, more than "
                     f"{LATERAL_LIMIT:g}{hint}",
                 )
             return Steering(angle, period, start)
@@ -512,7 +512,7 @@ def _overlap(a: Lane, b: Lane) -> bool:
 
 
 def _top_speed(speed: Profile, duration: float) -> float:
-    """Highest speed that the profile reaches within the drive. [m/s]"""
+    """Return the highest speed that the profile reaches within the drive. [m/s]"""
     seen = [v for t, v in speed if t <= duration] or [v for _, v in speed[:1]]
     for (t0, v0), (t1, v1) in pairwise(speed):
         if t0 <= duration < t1:

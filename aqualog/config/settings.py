@@ -1,4 +1,4 @@
-"""Settings of the detectors from a thresholds file: thresholds, and what enters the sum of joint detector 2."""
+"""Read settings of the detectors from a thresholds file: thresholds, and the terms of joint detector 2."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def load_settings(path: Path) -> Settings:
 
 
 def joint_text(params: JointCusumParams) -> str:
-    """The table `[joint_cusum]` as TOML, empty where all is as built in; reading it again gives the same values."""
+    """Return the table `[joint_cusum]` as TOML, empty if all values are defaults; reading it gives the same values."""
     if params == JointCusumParams():
         return ""
     weights = ", ".join(f"{t} = {float(w)!r}" for t, w in zip(TERMS, params.weights, strict=True))
@@ -70,7 +70,7 @@ def joint_text(params: JointCusumParams) -> str:
 
 
 def _weighted(params: JointCusumParams, value: Any, faults: TableFaults) -> JointCusumParams:
-    """Weights by the name of their term; those that are left out stay."""
+    """Return weights by the name of their term; those that are left out stay."""
     if not isinstance(value, dict):
         faults.add("weights", "weights is not a table such as { resistance = 1.0 }")
         return params

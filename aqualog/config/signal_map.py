@@ -1,4 +1,4 @@
-"""Signal maps: TOML to record and back."""
+"""Read and write signal maps as TOML."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any
 
 
 def _csv(table: dict[str, Any], faults: Faults) -> dict[str, CsvFormat]:
-    """How CSV files are written: of those that are named or match a pattern, and of all others (`*`)."""
+    """Return the format of CSV files: of those that are named or match a pattern, and of all others (`*`)."""
     common = {k: v for k, v in table.items() if not isinstance(v, dict)}
     found = {}
     for name, own in (*((k, v) for k, v in table.items() if isinstance(v, dict)), ("*", common)):
@@ -150,7 +150,7 @@ def _clock(name: str, table: Any, faults: Faults) -> SourceClock:
 
 
 def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None) -> str:
-    """The TOML text of a signal map, with remarks behind its lines; reading it again gives the same map."""
+    """Return the TOML text of a signal map, with remarks behind its lines; reading it again gives the same map."""
     remarks = remarks or {}
     lines = [f"# {_one_line(c)}" for c in comments]
     if signal_map.time_channel or signal_map.time_unit:

@@ -1,4 +1,4 @@
-"""Faults of a table file (CSV), all of them in one message."""
+"""Collect the faults of a table file (CSV) into one message."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class LineFaults:
         self._found.append(f"line {line}: {short}" if line else short)
 
     def unknown(self, line: int | None, what: str, name: str, known: Iterable[str], *, hint: str = "") -> None:
-        """Note a name that does not exist, with the nearest one that does; the hint where none is near."""
+        """Note a name that does not exist, with the nearest one that does; else with the hint."""
         near = difflib.get_close_matches(name.lower(), sorted(known), n=1, cutoff=0.5)
         told = f' (did you mean "{near[0]}"?)' if near else f" ({hint})" if hint else ""
         self.add(line, f'unknown {what} "{name[:60]}"{told}')
 
     def number(self, line: int | None, name: str, text: str, *, low: float, high: float, unit: str) -> float | None:
-        """A number within its bounds, or None with the fault noted."""
+        """Return a number within its bounds, or None with the fault noted."""
         try:
             value = math.nan if "_" in text else float(text)  # Python reads 1_9 as 19
         except ValueError:

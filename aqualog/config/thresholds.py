@@ -1,4 +1,4 @@
-"""Thresholds files: TOML with the tables `[thresholds]`, `[rivals]` and `[joint_cusum]`."""
+"""Read and write thresholds files: TOML with the tables `[thresholds]`, `[rivals]` and `[joint_cusum]`."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def load_thresholds(path: Path) -> tuple[Thresholds, dict[str, float]]:
 def thresholds_text(
     thresholds: Thresholds, rivals: Mapping[str, float] | None = None, *, comments: Iterable[str] = ()
 ) -> str:
-    """The TOML text of thresholds, with their units and meanings; reading it again gives the same values."""
+    """Return the TOML text of thresholds, with their units and meanings; reading it again gives the same values."""
     lines = [f"# {''.join(c if c.isprintable() else ' ' for c in text)}" for text in comments]
     lines.append("[thresholds]")
     for f in fields(thresholds):

@@ -1,4 +1,4 @@
-"""TOML files: read, and complain about all faults at once with line and nearest valid name."""
+"""Read TOML files, and report all faults at once with line and nearest valid name."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def load_toml(path: Path, *, what: str) -> tuple[dict[str, Any], str]:
 
 
 def _has_endless_number(value: Any) -> bool:
-    """Whether an integer is in it that TOML does not allow, and Python would refuse to print."""
+    """Return whether it holds an integer that TOML does not allow, and that Python would refuse to print."""
     if isinstance(value, dict):
         return any(_has_endless_number(v) for v in value.values())
     if isinstance(value, list):
@@ -72,7 +72,7 @@ def _has_endless_number(value: Any) -> bool:
 
 
 def line_of(text: str, key: str) -> int | None:
-    """Line (from 1) on which a key or table first stands; None where it cannot be told."""
+    """Return the line (from 1) of a key or table; None where it cannot be determined."""
     for number, line in enumerate(text.splitlines(), 1):
         stripped = line.lstrip()
         if stripped.startswith((key, f'"{key}"', f"[{key}", f"[[{key}")):
@@ -81,17 +81,17 @@ def line_of(text: str, key: str) -> int | None:
 
 
 def is_real(value: Any) -> bool:
-    """Whether a TOML value is a number, be it beyond all bounds; NaN is none."""
+    """Return whether a TOML value is a number, finite or infinite; NaN does not count."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and value == value
 
 
 def is_number(value: Any) -> bool:
-    """Whether a TOML value is a finite number that a float can hold."""
+    """Return whether a TOML value is a finite number that a float can hold."""
     return is_real(value) and abs(value) < 1e300
 
 
 class Faults:
-    """Collects the faults of one file, then raises them in one message; of very many the first are told."""
+    """Collect the faults of one file, then raise them in one message; of very many it lists the first."""
 
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
@@ -120,7 +120,7 @@ class Faults:
         self.add(key, f'unknown key "{shown}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
 
     def number(self, table: Mapping[str, Any], key: str, *, low: float, high: float, unit: str) -> float | None:
-        """A number within its bounds, or None with the fault noted."""
+        """Return a number within its bounds, or None with the fault noted."""
         value: Any = table.get(key)
         if not is_real(value):
             self.add(key, f"{key} = {str(value)[:40]} is not a number")
@@ -138,7 +138,7 @@ class Faults:
 
 
 class TableFaults(Faults):
-    """Faults of a file with several tables: the line of a key is looked for in the table that is being read."""
+    """Collect faults of a file with several tables: the line of a key is looked up in the current table."""
 
     def __init__(self, path: Path, text: str) -> None:
         super().__init__(path, text)

@@ -70,7 +70,7 @@ def _sections(document: dict[str, Any], faults: TableFaults) -> dict[str, dict[s
 
 
 def _numbers(table: dict[str, Any], section: str, faults: TableFaults, values: dict[str, Any], given: set[str]) -> None:
-    """Plain keys of a table into `values`, their paths into `given`."""
+    """Read plain keys of a table into `values`, their paths into `given`."""
     known = [k.name for k in KEYS.values() if k.section == section]
     for name in table:
         if name in known:
@@ -87,7 +87,7 @@ def _numbers(table: dict[str, Any], section: str, faults: TableFaults, values: d
 
 
 def _spread(table: Any, faults: TableFaults) -> dict[str, float]:
-    """Standard deviations from drive to drive by key, each at most as large as its key may be."""
+    """Read standard deviations from drive to drive by key, each at most as large as its key may be."""
     result: dict[str, float] = {}
     if not isinstance(table, dict):
         faults.add("spread", "spread is not a table; write [spread]")
@@ -103,7 +103,7 @@ def _spread(table: Any, faults: TableFaults) -> dict[str, float]:
 
 
 def _polynomial(table: Any, section: str, faults: TableFaults) -> dict[str, tuple[float, ...]]:
-    """`F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
+    """Read `F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
     result: dict[str, tuple[float, ...]] = {}
     if not isinstance(table, dict):
         faults.add(section, f"{section} is not a table; write [{section}]")
@@ -122,7 +122,7 @@ def _polynomial(table: Any, section: str, faults: TableFaults) -> dict[str, tupl
 
 
 def _wrong(name: str, numbers: list[Any]) -> str:
-    """What is wrong with the numbers of a coefficient; empty if nothing is."""
+    """Say what is wrong with the numbers of a coefficient; empty if they are valid."""
     if not numbers or not all(is_real(n) for n in numbers):
         return "is not a number or a list of numbers"
     most = 1 if name in ("c0", "sigma") else MOST_POWERS

@@ -1,4 +1,4 @@
-"""A vehicle file with calibrated values, each with its interval and where it comes from."""
+"""Write a vehicle file with calibrated values, each with its interval and its origin."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ __all__ = ["calibrated_toml"]
 
 
 def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
-    """Text of a vehicle file that `config.vehicle.load_vehicle` reads.
+    """Return the text of a vehicle file that `config.vehicle.load_vehicle` reads.
 
-    Keys that neither the old file nor the drives tell stand as comments, so that no default poses as given. Values have
-    seven digits.
+    Keys that neither the old file gives nor the drives identify stand as comments: no default looks like a given value.
+    Values have seven digits.
     """
     new = calibrated(vehicle, calibration.parameters, calibration.transfers, calibration.spread)
     values = told(calibration.parameters, vehicle)
@@ -30,7 +30,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         if key.path in values:
             line += "; " + _source(values[key.path][1])
         elif key.path not in new.given:
-            line = f"# {line}; not told, default"
+            line = f"# {line}; not identified, default"
         lines.append(line)
     if new.spread:
         lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
@@ -44,7 +44,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
             lines.append(f"# from {fit.seconds:.0f} s of dry driving; explains {fit.explained:.1%} of the variance")
         lines += [f"{n} = {list(c)!r}" for n, c in table.items()]
     if calibration.cannot_tell:
-        lines += ["", "# what the drives could not tell", *(f"# - {_plain(s)}" for s in calibration.cannot_tell)]
+        lines += ["", "# what the drives could not identify", *(f"# - {_plain(s)}" for s in calibration.cannot_tell)]
     return "\n".join(lines) + "\n"
 
 

@@ -6,7 +6,7 @@ from words import CHECKS, Fault, faults, length, of_document, of_javascript, of_
 
 PACKAGE = ROOT / "aqualog"
 AWAITED = frozenset({
-    "README.md", "calibrate", "campaign", "cli", "compiled.py", "config", "detect", "diagnose",
+    "README.md", "campaign", "cli", "compiled.py", "detect", "diagnose",
     "doctor", "evaluate", "features", "figures", "io", "model", "physics", "places.py", "report", "reproduce",
     "rivals", "types.py", "vehicle.py",
 })  # fmt: skip
