@@ -1,1 +1,1 @@
-"""Detectors: one recursion each, for a whole drive and for a stream."""
+"""Detectors: each one recursion, for a whole drive and for a stream."""

@@ -1,4 +1,4 @@
-"""One-sided cumulative sum with drift, clamp and reset."""
+"""Sum a signal one-sidedly, with drift, clamp and reset (CUSUM)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def initial_state() -> CusumState:
 def step(p, g, x):  # type: ignore[no-untyped-def]
     """g <- min(g_max, max(0, g + (x - nu) dt)); NaN holds the sum.
 
-    The clamp at zero is missing in thesis 3.24 as printed (E11); the clamp at g_max bounds the time that the alarm
+    The clamp at zero is missing in thesis 3.24 as printed (E11). The clamp at g_max bounds the time by which the alarm
     outlives its cause, to (g_max - off_share h) / nu. The integration over time makes threshold and detection time
     independent of the sample rate.
     """
@@ -64,7 +64,7 @@ def _scan(p, g, active, x):  # type: ignore[no-untyped-def]
 
 
 def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, BoolArray, CusumState]:
-    """Sum of a signal over a drive or a piece of one.
+    """Sum a signal over a drive or a piece of one.
 
     Parameters
     ----------

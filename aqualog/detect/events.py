@@ -1,4 +1,4 @@
-"""Detection bits into events, across pieces of a drive."""
+"""Turn detection bits into events, across pieces of a drive."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 
 
 def as_they_are(evidence: dict[str, Any]) -> dict[str, Any]:
-    """Evidence needs no further words."""
+    """Return the evidence unchanged."""
     return evidence
 
 
@@ -29,9 +29,9 @@ class _Open:
 
 
 class EventBuilder:
-    """Events of one detector on one wheel.
+    """Build the events of one detector on one wheel.
 
-    Only minima, maxima and first values are kept, so that an event cut by a piece's end comes out the same to the bit.
+    It keeps only minima, maxima and first values, so that an event cut by a piece's end comes out the same to the bit.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class EventBuilder:
     severity : callable
         Evidence -> `partial` or `full`.
     explain : callable
-        Gathered evidence -> evidence of the event, where bits and values are to be put into words.
+        Turns gathered evidence into that of the event, where bits and values become words.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class EventBuilder:
         self._open: _Open | None = None
 
     def push(self, bits: BoolArray, statistic: FloatArray, evidence: Evidence) -> list[Event]:
-        """Events that end within this piece."""
+        """Return events that end within this piece."""
         closed: list[Event] = []
         edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
@@ -86,7 +86,7 @@ class EventBuilder:
         return closed
 
     def finish(self) -> list[Event]:
-        """The event that was still going on at the end of the drive."""
+        """Return the event that is open at the end of the drive."""
         return [self._close(self._offset)] if self._open is not None else []
 
     def _gather(self, part: slice, statistic: FloatArray, evidence: Evidence) -> None:
@@ -132,7 +132,7 @@ class EventBuilder:
 
 
 class EventBook:
-    """The builders of all events of a drive, one per detector and place."""
+    """Build all events of a drive, with one builder per detector and place."""
 
     def __init__(self, dt_ns: int) -> None:
         self._dt_ns = dt_ns
@@ -145,7 +145,7 @@ class EventBook:
         severity: Callable[[Mapping[str, Any]], str],
         explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are,
     ) -> list[Event]:
-        """Events of a track that end within this piece; severity and words are those of the first piece."""
+        """Return events of a track that end within this piece; severity and words are those of the first piece."""
         key = (track.detector, track.wheel, track.side)
         if key not in self._builders:
             self._builders[key] = EventBuilder(
@@ -155,5 +155,5 @@ class EventBook:
         return self._builders[key].push(track.active, track.statistic, evidence)
 
     def finish(self) -> tuple[Event, ...]:
-        """Events that were still going on when the drive ended."""
+        """Return events that are open at the end of the drive."""
         return tuple(e for b in self._builders.values() for e in b.finish())

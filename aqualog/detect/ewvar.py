@@ -1,4 +1,4 @@
-"""Exponentially weighted moving mean and variance."""
+"""Compute the exponentially weighted moving mean and variance."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ class EwvarState(NamedTuple):
 
 
 def from_seconds(tau_mean: float, tau_var: float, dt: float) -> EwvarParams:
-    """Weights that forget with these time constants at any sample rate. [s]"""
+    """Return weights with these time constants at any sample rate. [s]"""
     return EwvarParams(gain(tau_mean, dt), gain(tau_var, dt))
 
 
 def initial_state() -> EwvarState:
-    """No sample yet; the first one becomes the mean (E4)."""
+    """Return the state before the first sample, which becomes the mean (E4)."""
     return EwvarState(math.nan, 0.0)
 
 
 @compiled
 def step(p, mean, var, x):  # type: ignore[no-untyped-def]
-    """Thesis 2.5 and 2.6 for one sample: the variance uses the mean before this sample."""
+    """Apply thesis 2.5 and 2.6 to one sample: the variance uses the mean before this sample."""
     if math.isnan(x):
         return mean, var
     if math.isnan(mean):
@@ -64,7 +64,7 @@ def _scan(p, mean, var, x):  # type: ignore[no-untyped-def]
 
 
 def scan(p: EwvarParams, state: EwvarState, x: FloatArray) -> tuple[FloatArray, FloatArray, EwvarState]:
-    """Moving mean and variance of a signal.
+    """Compute moving mean and variance of a signal.
 
     Parameters
     ----------

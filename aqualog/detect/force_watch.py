@@ -1,4 +1,4 @@
-"""Forces that dry road cannot explain: resistance of the vehicle, forces in tie rods and steering of a drive."""
+"""Watch forces that dry road cannot explain: resistance of the vehicle, forces in tie rods and steering."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FREEZE = 2.0  # [s] after a wheel has left the road's speed nothing is learnt as
 
 
 class ResistanceWatch:
-    """Resistance measure, what it is off on dry road, its alarm and the gate of the joint detector.
+    """Resistance measure, its offset on dry road, its alarm and the gate of the joint detector.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class ResistanceWatch:
         [s]
     thresholds : Thresholds
     learns : bool
-        Take off the offset that dry driving shows (a drifting accelerometer, wind).
+        Whether to subtract the offset that dry driving shows (a drifting accelerometer, wind).
     """
 
     def __init__(self, dt: float, thresholds: Thresholds, *, learns: bool = True) -> None:
@@ -46,9 +46,9 @@ class ResistanceWatch:
     def push(
         self, scene: Scene, book: EventBook, suspicion: BoolArray
     ) -> tuple[Track, list[Event], FloatArray, BoolArray, dict[str, FloatArray]]:
-        """Track, closed events, trusted measure [m/s^2], gate, and features of the next piece.
+        """Return track, closed events, trusted measure [m/s²], gate, and features of the next piece.
 
-        `suspicion` (n,): a wheel or the slip slope says that this may not be dry road; nothing is learnt then.
+        `suspicion` (n,): a wheel or the slip slope suggests that this is not dry road; the offset is frozen then.
         """
         f = scene.f
         frozen, self._frozen = hold_on(suspicion, self._frozen, seconds=FREEZE, dt=self._dt)
@@ -75,7 +75,7 @@ class ResistanceWatch:
 
 
 class TieRodWatch:
-    """Forces in the tie rods, wheel by wheel, or the torque at the steering where there is nothing better."""
+    """Forces in the tie rods, wheel by wheel; the torque at the steering without them."""
 
     def __init__(self, vehicle: Vehicle, dt: float, thresholds: Thresholds) -> None:
         self._vehicle = vehicle
@@ -83,7 +83,7 @@ class TieRodWatch:
         self._sums: dict[str, cusum.CusumState] = {}
 
     def push(self, scene: Scene, book: EventBook) -> tuple[list[Track], list[Event]]:
-        """Tracks and closed events of the next piece."""
+        """Return tracks and closed events of the next piece."""
         f = scene.f
         tracks: list[Track] = []
         events: list[Event] = []

@@ -1,4 +1,4 @@
-"""Joint detector 1: resistance as gate, and at least one other criterion (thesis 2.5, Fig. 2.24)."""
+"""Joint detector 1: the resistance opens a gate, and at least one other criterion is met (thesis 2.5, Fig. 2.24)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ GATE_HOLD = 1.0  # [s] the resistance gate stays open this long
 HOLD = 0.5  # [s] a warning outlasts its criteria by this
 CRITERIA = {"spin_down": 1, "minor_spin_down": 2, "spin_up": 3, "slip_slope_drop": 4, "resistance": 5}
 SLOPE = 4
-GATED = (1, 2, 3, 4)  # those of which one must be met while the gate is open; 5 stands for itself
+GATED = (1, 2, 3, 4)  # one of these must be met while the gate is open; 5 needs no gate
 
 
 @dataclass(frozen=True, slots=True)
 class Criteria:
-    """Which criteria are met, and how far a wheel has gone; arrays (n,)."""
+    """Which criteria are met, and how far each wheel has lost contact; arrays (n,)."""
 
     met: Mapping[int, BoolArray]
     is_full: BoolArray
     slip_min: FloatArray
 
     def behind(self, gate: BoolArray, slope: BoolArray) -> dict[int, BoolArray]:
-        """The criteria that count: 1 to 4 behind the gate, 4 also where a lost slope may be water's."""
+        """Return the criteria that count: 1 to 4 behind the gate, 4 also where water may cause a lost slope."""
         return {
             k: bits if k not in GATED else bits & gate & slope if k == SLOPE else bits & gate
             for k, bits in self.met.items()
@@ -42,20 +42,20 @@ def criteria(
     mu: Mapping[str, FloatArray | None],
     v_x: FloatArray,
 ) -> Criteria:
-    """Criteria 1 to 5 from the tracks of the single detectors.
+    """Evaluate criteria 1 to 5 from the tracks of the single detectors.
 
     Parameters
     ----------
     tracks : sequence of (Track, bool array (n,))
-        Of this piece of the drive, those of wheels with the detections that began without a braking force; tracks of
-        other detectors are left aside.
+        Of this piece of the drive. Tracks of wheels come with the detections that began without a braking force;
+        tracks of other detectors are ignored.
     v_w, mu : mapping wheel -> array (n,)
         Centre-line wheel speed [m/s]; traction coefficient, None if not known [-].
     v_x : array (n,)
         Velocity. [m/s]
 
-    Thesis: section 2.5 (C65-C69): 1 to 3 do not count under a negative tyre force; one that began without it stays
-    when the driver brakes after it. 4: slope below half of the dry one, tyre driven, wheel acceleration calm.
+    Thesis: section 2.5 (C65-C69). 1 to 3 do not count under a negative tyre force; a detection that began without it
+    stays when the driver brakes after it. 4: slope below half of the dry one, tyre driven, wheel acceleration calm.
     """
     n = v_x.size
     met = {number: np.zeros(n, dtype=bool) for number in CRITERIA.values()}

@@ -1,4 +1,4 @@
-"""Joint detector 2: the scaled statistics of all effects in one sum (thesis 2.11)."""
+"""Joint detector 2: one sum of the scaled statistics of all effects (thesis 2.11)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TERMS = ("spin_up", "spin_down", "resistance", "minor_spin_down", "slip_slope_dr
 class JointCusumParams:
     """Scales of the terms; each reaches 1 at its scale and no more.
 
-    `third` is what stands in the third place of (2.11): `resistance`, as the text has it, or `variance`, a CUSUM of the
-    variance difference, as its printed index says (E6). `with_slope` adds the lost share of the slip slope, which the
-    thesis leaves as an option. `gated`: the sum warns while the resistance gate is open only; a wheel that is braked or
-    spun on ice, or a bus that loses messages, fills several terms at once, and the thesis calls resistance necessary.
+    `third` is the third term of (2.11): `resistance`, as the text has it, or `variance`, a CUSUM of the variance
+    difference, as its printed index says (E6). `with_slope` adds the lost share of the slip slope, an option in the
+    thesis. `gated`: the sum warns only while the resistance gate is open. A wheel that is braked or spun on ice, or a
+    bus that loses messages, fills several terms at once, and the thesis calls resistance necessary.
     """
 
     g_up: float = 1.5  # [m/s]
@@ -42,7 +42,7 @@ class JointCusumParams:
 def terms(
     p: JointCusumParams, tracks: Sequence[tuple[Track, BoolArray]], g_variance: FloatArray, n: int
 ) -> Mapping[str, FloatArray]:
-    """The weighted terms of the sum, each by the wheel or side where it is largest.
+    """Return the weighted terms of the sum, each by the wheel or side where it is largest.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def terms(
     tracks : sequence of (Track, bool array (n,))
         Statistic of each single detector, and where it may count (no braking force on its wheel).
     g_variance : array (n,)
-        CUSUM of the variance difference, used with `third = "variance"`. [(m/s^2)^2 s]
+        CUSUM of the variance difference, used with `third = "variance"`. [(m/s²)^2 s]
     n : int
         Samples.
 
     Returns
     -------
     mapping
-        Name in `TERMS` -> array (n,) within 0 and its weight; zero where a statistic is not known. With
+        Name in `TERMS` -> array (n,) within 0 and its weight; zero where a statistic is missing. With
         `third = "variance"` the term `resistance` holds that CUSUM.
 
     Thesis: Eq. (2.11). Departures (E6): the third term is g_RR / g_RR,max by default; the variance term is clamped at

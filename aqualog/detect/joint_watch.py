@@ -1,4 +1,4 @@
-"""Both joint detectors over a drive, with the criteria and terms that decide."""
+"""Run both joint detectors over a drive, with the criteria and terms that decide."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ LEAST_TERM = 0.1  # [-] a term below that has decided nothing
 
 
 class SlopeJudge:
-    """Where a lost slip slope counts for the joint detectors; both ask the same."""
+    """Return where a lost slip slope counts; both joint detectors use the same condition."""
 
     def __init__(self, dt: float) -> None:
         self._p = other_surface.OtherParams.make(dt)
         self._state = other_surface.initial_state()
 
     def push(self, scene: Scene, tracks: Sequence[Track], x: FloatArray) -> BoolArray:
-        """Bits (n,) of the next piece; `x` is the trusted resistance measure. [m/s^2]"""
+        """Return bits (n,) of the next piece; `x` is the trusted resistance measure. [m/s²]"""
         slopes = [t for t in tracks if t.detector == "slip_slope_drop"]
         nothing = np.full(scene.size, np.nan)
         loss = reduce(np.fmax, (t.statistic for t in slopes), nothing)
@@ -51,7 +51,7 @@ class JointCriteriaWatch:
     def push(
         self, scene: Scene, tracks: Sequence[Track], x: FloatArray, gate: BoolArray, slope: BoolArray, book: EventBook
     ) -> tuple[Track, list[Event], dict[str, FloatArray]]:
-        """Track, closed events and features `criterion_1` ... `criterion_5`, `criterion_full`, `joint_gate`.
+        """Return track, closed events and features `criterion_1` ... `criterion_5`, `criterion_full`, `joint_gate`.
 
         Parameters
         ----------
@@ -59,11 +59,11 @@ class JointCriteriaWatch:
         tracks : sequence of Track
             Of the single detectors in this piece.
         x : array (n,)
-            Trusted resistance measure, NaN where it is not known. [m/s^2]
+            Trusted resistance measure, NaN where missing. [m/s²]
         gate : bool array (n,)
             The resistance gate.
         slope : bool array (n,)
-            Where a lost slope may be water's.
+            Where water may be the cause of a lost slope.
         """
         f = scene.f
         found = joint.criteria(
@@ -114,7 +114,7 @@ class JointCusumWatch:
     def push(
         self, scene: Scene, tracks: Sequence[Track], x: FloatArray, gate: BoolArray, slope: BoolArray, book: EventBook
     ) -> tuple[Track, list[Event], dict[str, FloatArray]]:
-        """Track, closed events and features `joint_term_*` of the next piece; arguments as of the other joint one."""
+        """Return track, closed events and features `joint_term_*` of the next piece; arguments as above."""
         f, p = scene.f, self._p
         counting = [(t, _counts(t, scene) & (slope | (t.detector != "slip_slope_drop"))) for t in tracks]
         parts = joint_cusum.terms(p, counting, self._variance_sum(tracks), scene.size)
@@ -146,7 +146,7 @@ class JointCusumWatch:
 
 
 def _counts(track: Track, scene: Scene) -> BoolArray:
-    """Without a braking force on the wheel that the statistic is of; a variance that its axle has to itself."""
+    """Flag samples without a braking force on the statistic's wheel; a variance must exceed that of the other axle."""
     bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
     if track.detector == "minor_spin_down":
         with np.errstate(invalid="ignore"):
@@ -159,13 +159,13 @@ def _severity(evidence: Mapping[str, Any]) -> str:
 
 
 def _explain_criteria(evidence: dict[str, Any]) -> dict[str, Any]:
-    """`decided_by`: the criteria that were met when the warning began."""
+    """Return `decided_by`: the criteria that were met when the warning began."""
     rest = {k: v for k, v in evidence.items() if not k.startswith("at_start_")}
     return {**rest, "decided_by": [_NAMES[k] for k in sorted(_NAMES) if evidence.get(f"at_start_{k}")]}
 
 
 def _explain_terms(evidence: dict[str, Any]) -> dict[str, Any]:
-    """`decided_by`: the terms of the sum when it crossed the threshold, largest first."""
+    """Return `decided_by`: the terms of the sum when it crossed the threshold, largest first."""
     rest = {k: v for k, v in evidence.items() if not k.startswith("at_start_")}
     start = {name: float(evidence.get(f"at_start_{name}", 0.0)) for name in joint_cusum.TERMS}
     found = sorted((n for n, v in start.items() if v >= LEAST_TERM), key=lambda n: -start[n])

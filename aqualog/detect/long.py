@@ -1,4 +1,4 @@
-"""All detectors over a drive that is longer than memory: windows of it, with the detectors' state carried on."""
+"""Run all detectors over a drive that is longer than memory, window by window with the detectors' state kept."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def detect_long(
     vehicle, settings, memory
         As of `detect_drive`.
     faults : sequence of FileFaults
-        What the readers lost, as the first pass found.
+        Losses of the readers, as the first pass found.
     rows : int
         Of a window.
     keep : callable, optional
-        Given each window with its signals, features and tracks, in order.
+        Called with each window, its signals, features and tracks, in order.
     present : sequence of str, optional
-        What `present_in` has found.
+        Result of `present_in`.
     pictured : bool
         With least and greatest values of stretches of the drive, for a page.
     tell : callable
@@ -59,7 +59,7 @@ def detect_long(
     Returns
     -------
     DriveResult
-        Events as `detect_drive` finds them; signals, features and tracks are a picture of the drive, or empty.
+        Events equal those of `detect_drive`; signals, features and tracks are a picture of the drive, or empty.
     """
     present = present_in(drive, rows) if present is None else present
     dt_ns = drive.grid.dt_ns
@@ -107,7 +107,7 @@ def detect_long(
 
 
 def present_in(drive: LongDrive, rows: int = ROWS) -> list[str]:
-    """Symbols that have a value somewhere; mostly the first window of so many rows tells."""
+    """Return symbols with a value anywhere; mostly the first window of so many rows suffices."""
     seen: set[str] = set()
     for signals, _ in drive.windows(rows):
         seen |= {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}

@@ -1,4 +1,4 @@
-"""Minor spin-downs of one vehicle side: variance of the wheel acceleration difference, front against rear."""
+"""Detect minor spin-downs of one side by the variance of the wheel acceleration difference, front against rear."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MinorParams(NamedTuple):
 
     @staticmethod
     def make(dt: float, threshold: float = DEFAULT.minor_spin_down) -> MinorParams:
-        """Defaults: half a second of memory, 1.2 (m/s^2)^2 of the wheel, 1.0 of the difference, 8 to 1 below zero."""
+        """Return defaults: 0.5 s of memory, 1.2 (m/s²)² of the wheel, 1.0 of the difference, 8 to 1 below zero."""
         return MinorParams(
             from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt
         )
@@ -57,7 +57,7 @@ RADIUS_KNOWN = 2.5  # [s] more after the start: until the radius correction has 
 
 
 def initial_state() -> MinorState:
-    """No sample yet; the age counts from below zero, because a constant offset of the speed is one-sided too."""
+    """Return the state without samples. The age starts below zero: a constant offset of the speed is one-sided too."""
     return MinorState(math.nan, 0.0, math.nan, 0.0, 0.0, 0.0, -RADIUS_KNOWN, math.inf, active=False)
 
 
@@ -113,14 +113,14 @@ def scan(
     v_x: FloatArray,
     allowed: BoolArray,
 ) -> tuple[FloatArray, FloatArray, BoolArray, MinorState]:
-    """Minor spin-down detector of one vehicle side over a drive or a piece of one.
+    """Run the minor spin-down detector of one vehicle side over a drive or a piece of one.
 
     Parameters
     ----------
     p : MinorParams
     state : MinorState
     a_w_delta, a_w_delta_other : array (n,)
-        Acceleration differences of the watched (non-driven) wheel and of the other one on the same side. [m/s^2]
+        Acceleration differences of the watched (non-driven) wheel and of the other one on the same side. [m/s²]
     v_w_delta : array (n,)
         Speed difference of the watched wheel, less the slow part that all wheels share. [m/s]
     v_x : array (n,)
@@ -131,17 +131,16 @@ def scan(
     Returns
     -------
     delta_var : array (n,)
-        Variance of the watched wheel minus that of the other one: the road's roughness, which both wheels see, drops
-        out. [(m/s^2)^2]
+        Variance of the watched wheel minus that of the other one. The road's roughness acts on both wheels and drops
+        out. [(m/s²)²]
     var : array (n,)
-        Variance of the watched wheel. [(m/s^2)^2]
+        Variance of the watched wheel. [(m/s²)^2]
     active : bool array (n,)
         Begins when variance and difference exceed their limits (the difference also 0.7 of the variance) and the
-        wheel's speed lies eight times more below the
-        vehicle's than above it (mean squares over the same memory); ends when the difference or that ratio falls
-        below half its limit, 0.6 s after the last acceleration difference beyond 1 m/s^2, or on braking. After braking
-        the moments are new and nothing begins for 0.5 s, after the start for 3 s. NaN in any input: state held,
-        statistic NaN, no detection.
+        wheel's speed lies eight times more below the vehicle's than above it (mean squares over the same memory).
+        Ends when the difference or that ratio falls below half its limit, 0.6 s after the last acceleration
+        difference beyond 1 m/s², or on braking. After braking the moments restart and no detection begins for 0.5 s,
+        after the start for 3 s. NaN in any input: state held, statistic NaN, no detection.
     state : MinorState
 
     Thesis: Eq. (2.5), (2.6), (2.8) (C30-C33, E4); criterion 2 of section 2.5 (C66).

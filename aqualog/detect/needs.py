@@ -1,4 +1,4 @@
-"""What each detector needs, checked before any work."""
+"""Check what each detector needs before any work."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel
 def check_needs(
     vehicle: Vehicle, available: Collection[str], *, rate_hz: float
 ) -> tuple[list[Unavailable], list[Unavailable]]:
-    """Which detectors cannot run, and which run without one of their conditions.
+    """Return which detectors cannot run, and which run without one of their conditions.
 
     Parameters
     ----------
@@ -73,12 +73,12 @@ def check_needs(
 
 
 def _lone_wheel(have: set[str], omega: list[str]) -> list[str]:
-    """A single wheel without a reference has nothing to be compared with."""
+    """Return whether a wheel has no reference to compare with."""
     return omega if len(omega) == len(WHEELS) - 1 and "v_x" not in have else []
 
 
 def _steering(vehicle: Vehicle, have: set[str]) -> list[str]:
-    """What is missing to compare tie-rod forces, or else the steering torque, with their model."""
+    """List what is missing to compare tie-rod forces, or else the steering torque, with their model."""
     rods = [f"tie_rod_{w}" for w in AXLES["f"]]
     front = [f"torque_{w}" for w in AXLES["f"] if w in vehicle.driven and f"torque_{w}" not in have]
     motion = [*(["a_y"] if "a_y" not in have else []), *(["yaw_rate"] if "yaw_rate" not in have else []), *front]

@@ -1,4 +1,4 @@
-"""Where a braking force acts on a wheel, from whatever the log has to tell it."""
+"""Find where a braking force acts on a wheel, from the best signals in the log."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ HOLD = 0.3  # [s] brakes and wheels need this long to settle after release
 def is_braking(
     a_kin: FloatArray, brake_pressure: FloatArray | None, torque_coefficient: FloatArray | None
 ) -> BoolArray:
-    """Whether a negative force acts, sample by sample.
+    """Flag samples with a negative force.
 
     Parameters
     ----------
     a_kin : array (n,)
-        Kinematic acceleration, low-passed. [m/s^2]
+        Kinematic acceleration, low-passed. [m/s²]
     brake_pressure : array (n,), optional
         [Pa]
     torque_coefficient : array (n,), optional
@@ -32,7 +32,7 @@ def is_braking(
     Returns
     -------
     bool array (n,)
-        By brake pressure where there is one; else by deceleration and torque. NaN compares as not braking.
+        By brake pressure if the log has it; else by deceleration and torque. NaN compares as not braking.
 
     Thesis: "without negative tyre forces" of criteria 1 and 2 in section 2.5 (C65, C66).
     """
@@ -41,7 +41,7 @@ def is_braking(
         if torque_coefficient is not None:
             braking |= torque_coefficient < TRACTION
         if brake_pressure is not None:
-            # the brake's own sensor decides where it speaks
+            # the brake's own sensor decides where it has a value
             braking = np.where(np.isnan(brake_pressure), braking, brake_pressure > BRAKE_PRESSURE)
     return braking
 
@@ -62,7 +62,7 @@ def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[Boo
     ----------
     x : bool array (n,)
     state : int
-        Samples left; 0, or what the call before returned.
+        Samples left; 0, or the return value of the call before.
     seconds, dt : float
         How long; sample time. [s]
 
@@ -87,13 +87,13 @@ def _began_free(was_active, free, active, braking):  # type: ignore[no-untyped-d
 
 
 def began_free(active: BoolArray, braking: BoolArray, state: tuple[bool, bool]) -> tuple[BoolArray, tuple[bool, bool]]:
-    """Detections that began without a braking force; a driver who brakes after that does not undo them.
+    """Keep detections that began without a braking force; braking after that does not undo them.
 
     Parameters
     ----------
     active, braking : bool array (n,)
     state : (active before, began free)
-        (False, False), or what the call before returned.
+        (False, False), or the return value of the call before.
 
     Returns
     -------

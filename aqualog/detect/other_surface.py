@@ -1,4 +1,4 @@
-"""Whether a lost slip slope can be water's: snow and gravel lose it too, but not in water's way (C57)."""
+"""Decide whether water can be the cause of a lost slip slope: snow and gravel lose it too, in another way (C57)."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ class OtherParams(NamedTuple):
 
     @classmethod
     def make(cls, dt: float) -> OtherParams:
-        """Bounds from the physics of the film.
+        """Return bounds from the physics of the film.
 
-        Half of the slope is lost at a contact of 0.71 (C68), which the wedge reaches at 0.75 to 0.8 of the speed of
-        full aquaplaning; that is 85 km/h and more in deep water at 1.8 bar (Horne), so 61 km/h and more. There the
-        thesis finds at least 0.2 m/s^2 of resistance (C3, C44). Compacted snow costs 0.05 to 0.15 m/s^2 (K).
+        Half of the slope is lost at a contact of 0.71 (C68). The wedge reaches this contact at 0.75 to 0.8 of the speed
+        of full aquaplaning. That speed is 85 km/h and more in deep water at 1.8 bar (Horne), so 61 km/h and more. There
+        the thesis finds at least 0.2 m/s² of resistance (C3, C44). Compacted snow costs 0.05 to 0.15 m/s² (K).
         """
         return cls(dt, gain(0.8, dt), 0.2, 0.1, 17.0, 14.0, 1.0, 0.3, 10.0)
 
 
 class OtherState(NamedTuple):
-    """Mean of the resistance measure [m/s^2], seconds of a loss at low speed, seconds of dry road, the bit."""
+    """Mean of the resistance measure [m/s²], seconds of a loss at low speed, seconds of dry road, the bit."""
 
     mean: float
     proved: float
@@ -76,29 +76,29 @@ def _scan(p, mean, proved, dry, allowed, x, v_x, dropped, loss):  # type: ignore
 def scan(
     p: OtherParams, state: OtherState, x: FloatArray, v_x: FloatArray, dropped: BoolArray, loss: FloatArray
 ) -> tuple[BoolArray, OtherState]:
-    """Where a lost slope may be water's.
+    """Flag samples where water may be the cause of a lost slope.
 
     Parameters
     ----------
     p : OtherParams
     state : OtherState
     x : array (n,)
-        Trusted resistance measure, NaN where not known. [m/s^2]
+        Trusted resistance measure, NaN where missing. [m/s²]
     v_x : array (n,)
         [m/s]
     dropped : bool array (n,)
         Criterion 4 on any wheel.
     loss : array (n,)
-        Largest lost share of the dry slope over the wheels, NaN where not known. [-]
+        Largest lost share of the dry slope over the wheels, NaN where missing. [-]
 
     Returns
     -------
     allowed : bool array (n,)
-        The resistance (mean over 0.8 s) exceeds 0.2 m/s^2 (0.1 while a drop that counted lasts), the car is
-        faster than 61 km/h, and the slope has not been found lost below 50 km/h since the last 10 s of dry road.
+        The resistance (mean over 0.8 s) exceeds 0.2 m/s² (0.1 during a drop that counted), the car is faster than
+        61 km/h, and no slope was lost below 50 km/h since the last 10 s of dry road.
     state : OtherState
 
-    Thesis: section 2.3: a drop on snow, ice and gravel does not depend on the speed, that by water does (C57).
+    Thesis: section 2.3: a drop on snow, ice and gravel does not depend on the speed, that on water does (C57).
     """
     out, mean, proved, dry, is_on = _scan(
         p, *state, np.ascontiguousarray(x), np.ascontiguousarray(v_x), np.ascontiguousarray(dropped),

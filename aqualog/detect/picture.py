@@ -1,4 +1,4 @@
-"""A long drive made small: of each stretch the least and the greatest value, so that no peak is lost."""
+"""Reduce a long drive to the least and greatest value of each stretch, so that no peak is lost."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Picture:
-    """Two rows for each stretch of a drive: its least and greatest value, in the order in which they came.
+    """Two rows for each stretch of a drive: its least and greatest value, in the order of their times.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Picture:
         self._kept: dict[Hashable, list[FloatArray]] = {}
 
     def push(self, columns: Mapping[_Key, FloatArray]) -> None:
-        """Take the next rows (n,) of all columns; NaN is drawn where a stretch has nothing else."""
+        """Take the next rows (n,) of all columns; a stretch without any number is drawn as NaN."""
         n = next(iter(columns.values())).size
         self._left -= n
         for key, new in columns.items():
@@ -48,12 +48,12 @@ class Picture:
             self._rest[key] = x[whole:].copy()
 
     def columns(self) -> dict[_Key, FloatArray]:
-        """The picture, by the names that were given."""
+        """Return the picture, by the names that were given."""
         return {key: np.concatenate(parts) for key, parts in self._kept.items()}  # type: ignore[misc]
 
 
 def _extremes(x: FloatArray) -> FloatArray:
-    """Least and greatest of each row (m, k), earlier first: (2 m,)."""
+    """Return least and greatest value of each row (m, k), earlier first: (2 m,)."""
     missing = np.isnan(x)
     low, high = np.where(missing, np.inf, x), np.where(missing, -np.inf, x)
     at_low, at_high = low.argmin(axis=1), high.argmax(axis=1)

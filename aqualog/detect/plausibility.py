@@ -1,4 +1,4 @@
-"""Do the signals of a drive fit each other? Wrong units and signs show as numbers that cannot be."""
+"""Check whether the signals of a drive fit each other: wrong units and signs give impossible numbers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry ro
 
 
 class _Sampled:
-    """Every k-th value of a signal, k so large that a drive of any length leaves no more than `MOST` of them."""
+    """Return every k-th value of a signal, with k such that a drive of any length leaves at most `MOST` of them."""
 
     def __init__(self) -> None:
         self._stride = 1
@@ -46,7 +46,7 @@ class _Sampled:
 
 
 class Plausibility:
-    """What of a drive is compared, gathered piece by piece: a few values for each half second.
+    """Gather the values of a drive that are compared: a few for each half second, piece by piece.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Plausibility:
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what does not fit, for the user to check; none where all fits or too little moved to tell."""
+        """Return sentences on what does not fit, for the user to check; empty if all fits or too little moved."""
         wheels = {
             w: self._whole(f"omega_{w}") * self._vehicle.r_e(w) for w in WHEELS if f"omega_{w}" in self._available
         }
@@ -113,7 +113,7 @@ class Plausibility:
 
 
 def _speeds(v_x: FloatArray, wheels: Mapping[str, FloatArray]) -> list[str]:
-    """Wheels that turn at another speed than the others all the time, else all of them than the car drives."""
+    """Report wheels that always turn at another speed than the others, else all of them against the car's speed."""
     if not wheels:
         return []
     with np.errstate(invalid="ignore"):
@@ -129,7 +129,7 @@ def _speeds(v_x: FloatArray, wheels: Mapping[str, FloatArray]) -> list[str]:
 
 
 def _ratio(x: FloatArray, y: FloatArray) -> float:
-    """Median of x over y where both are known and the faster one moves; 1 where too few do."""
+    """Return the median of x over y where both are known and the faster one moves; 1 where too few do."""
     with np.errstate(invalid="ignore"):
         good = (np.maximum(x, y) > MOVING) & (np.minimum(x, y) > 0.0)
     return float(np.median(x[good] / y[good])) if int(good.sum()) >= LEAST_WINDOWS else 1.0
@@ -151,7 +151,7 @@ def _acceleration(a_x: FloatArray, wheels: Mapping[str, FloatArray], step_s: flo
     ratio = float(y.std() / x.std())
     if 1 / RATIO < ratio < RATIO:
         return []
-    return [f"wheel speeds change {ratio:.1f} times as much as a_x says: check the units of both (km/h, g)"]
+    return [f"wheel speeds change {ratio:.1f} times as fast as a_x says: check the units of both (km/h, g)"]
 
 
 def _yaw(yaw_rate: FloatArray, wheels: Mapping[str, FloatArray]) -> list[str]:
@@ -170,13 +170,13 @@ def _resistance(measure: FloatArray) -> list[str]:
     if measure.size < LEAST_SAMPLES or abs(float(np.median(measure))) < RESISTANCE:
         return []
     return [
-        f"the resistance measure lies at {np.median(measure):+.2f} m/s^2 in the middle of this drive: check mass, "
+        f"the resistance measure lies at {np.median(measure):+.2f} m/s² in the middle of this drive: check mass, "
         "wheel torque (gear ratio, sign, unit) and the offset of a_x before believing the resistance detector"
     ]
 
 
 def _drivetrain(sums: Mapping[str, FloatArray], vehicle: Vehicle) -> list[str]:
-    """Which axles the torques drive, against which the vehicle file says."""
+    """Compare the axles that the torques drive with those in the vehicle file."""
     drive = {a: float(np.quantile(x, 0.9)) if x.size >= LEAST_SAMPLES else float("nan") for a, x in sums.items()}
     most = max((v for v in drive.values() if v == v), default=0.0)
     if most < LEAST_DRIVE:

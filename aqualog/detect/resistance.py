@@ -1,4 +1,4 @@
-"""Resistance detector: what the balance of forces says, where it can be trusted, into a CUSUM."""
+"""Detect resistance: a CUSUM of the balance of forces, where it can be trusted."""
 
 from __future__ import annotations
 
@@ -19,39 +19,40 @@ A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
 def alarm_params(dt: float, threshold: float = DEFAULT.resistance) -> CusumParams:
-    """The detector by itself, robust: half the change that is to be found as drift.
+    """Tuning of the single detector, robust: its drift is half the change that is to be found.
 
-    0.2 m/s^2 is reported 2 s after it begins, 0.4 m/s^2 after 0.7 s (C76).
+    It reports 0.2 m/s² after 2 s, 0.4 m/s² after 0.7 s (C76).
     """
     # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 0.3 m/s
     return CusumParams(0.5 * THRESHOLD, threshold, max(1.5 * threshold, 0.3), dt)
 
 
 def gate_params(dt: float, threshold: float = DEFAULT.joint_criteria) -> CusumParams:
-    """The gate of the joint detector, sensitive: it only has to say that something holds the car back (C64)."""
+    """Tuning of the joint detector's gate, sensitive: it only has to show that something holds the car back (C64)."""
     return CusumParams(0.5 * THRESHOLD, threshold, 2.0 * threshold, dt)
 
 
 def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_braking: BoolArray) -> FloatArray:
-    """Resistance measure where the longitudinal balance can be trusted.
+    """Return the resistance measure where the longitudinal balance can be trusted.
 
-    Else zero: no evidence, and sums decay; under braking the least, so that an alarm ends within a quarter of a second.
+    Elsewhere it is zero: no evidence, and sums decay. Under braking it is the least value, so that an alarm ends within
+    a quarter of a second.
 
     Parameters
     ----------
     delta_a_x : array (n,)
-        Nominal minus measured acceleration (thesis 2.9); more resistance is positive. [m/s^2]
+        Nominal minus measured acceleration (thesis 2.9); more resistance is positive. [m/s²]
     v_x : array (n,)
         Velocity. [m/s]
     a_y : array (n,)
-        Lateral acceleration, low-passed. [m/s^2]
+        Lateral acceleration, low-passed. [m/s²]
     is_braking : bool array (n,)
         A braking force acts on any wheel: brake torque is rarely known well enough.
 
     Returns
     -------
     x : array (n,)
-        Within +-0.8; NaN stays NaN. [m/s^2]
+        Within ±0.8; NaN stays NaN. [m/s²]
     """
     with np.errstate(invalid="ignore"):
         trusted = (v_x > V_MIN) & (np.abs(a_y) < A_Y_MAX)
@@ -62,18 +63,18 @@ def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_
 def usable_for_offset(
     delta_a_x: FloatArray, v_x: FloatArray, a_kin: FloatArray, a_y: FloatArray, is_braking: BoolArray
 ) -> FloatArray:
-    """Resistance measure where it can tell its own offset on dry road: rolling steadily, straight, without brake.
+    """Return the resistance measure where it shows its own offset on dry road: rolling steadily, straight, no brake.
 
     Parameters
     ----------
     delta_a_x, v_x, a_kin, a_y : array (n,)
-        As in `trusted_measure`; `a_kin` kinematic acceleration, low-passed. [m/s^2, m/s]
+        As in `trusted_measure`; `a_kin` kinematic acceleration, low-passed. [m/s², m/s]
     is_braking : bool array (n,)
 
     Returns
     -------
     x : array (n,)
-        Within +-0.8; NaN elsewhere. [m/s^2]
+        Within ±0.8; NaN elsewhere. [m/s²]
     """
     with np.errstate(invalid="ignore"):
         usable = (v_x > V_OFFSET) & (np.abs(a_kin) < A_OFFSET) & (np.abs(a_y) < A_OFFSET) & ~is_braking

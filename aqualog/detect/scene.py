@@ -31,22 +31,22 @@ class Scene:
 
     @property
     def wheels(self) -> list[str]:
-        """Wheels whose speeds are known."""
+        """Return wheels whose speeds are known."""
         return [w for w in WHEELS if f"v_w_{w}" in self.f]
 
     @property
     def is_braking(self) -> BoolArray:
-        """A braking force acts on any wheel. (n,)"""
+        """Return whether a braking force acts on any wheel. (n,)"""
         return any_wheel(self.braking)
 
     @property
     def unbraked_resistance(self) -> FloatArray:
-        """Resistance measure without its dry offset as evidence; what braking shows is not water's. (n,) [m/s^2]"""
+        """Return the resistance measure less its dry offset; braking is no evidence of water. (n,) [m/s²]"""
         return np.where(self.is_braking, np.nan, self.f["delta_a_x"] - self.f.get("delta_a_x_offset", 0.0))
 
 
 class BrakeWatch:
-    """On which wheels a braking force acts, with what lasts after its release."""
+    """Find the wheels with a braking force, with its after-effects."""
 
     def __init__(self, vehicle: Vehicle, dt: float) -> None:
         self._vehicle = vehicle
@@ -54,7 +54,7 @@ class BrakeWatch:
         self._left = dict.fromkeys(WHEELS, 0)
 
     def push(self, f: Features, columns: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
-        """Bits (n,) by wheel; `columns` holds the torques that the drive has."""
+        """Return bits (n,) by wheel; `columns` holds the torques that the drive has."""
         weight = 0.25 * self._vehicle.mass * G
         result = {}
         for wheel in WHEELS:
@@ -66,10 +66,10 @@ class BrakeWatch:
 
 
 def any_wheel(bits: Mapping[str, BoolArray]) -> BoolArray:
-    """Whether a bit is set at any wheel. (n,)"""
+    """Return whether a bit is set at any wheel. (n,)"""
     return bits["fl"] | bits["fr"] | bits["rl"] | bits["rr"]
 
 
 def traction(f: Features, wheel: str) -> FloatArray | None:
-    """Traction coefficient of a wheel without the water's resistance where that is known; None without torque."""
+    """Return the traction coefficient of a wheel, less the water's resistance where known; None without torque."""
     return f.get(f"mu_res_{wheel}", f.get(f"mu_{wheel}"))

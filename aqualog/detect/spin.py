@@ -1,4 +1,4 @@
-"""Large spin-downs and spin-ups of one wheel: CUSUM of the acceleration difference with the sign of the speed
+"""Detect large spin-downs and spin-ups of one wheel: CUSUM of the acceleration difference with the sign of the speed
 difference.
 """
 
@@ -36,7 +36,7 @@ class SpinParams(NamedTuple):
 
     @staticmethod
     def make(sign: float, dt: float, threshold: float = DEFAULT.spin_down) -> SpinParams:
-        """Defaults: 3 m/s^2 drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
+        """Return defaults: 3 m/s² drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
         # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 1.5 m/s
         sums = CusumParams(3.0, threshold, max(5.0 * threshold, 3.0), dt)
         return SpinParams(sums, sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
@@ -58,7 +58,7 @@ def initial_state() -> SpinState:
 
 @compiled
 def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
-    """One sample; `a` and `dv` positive in the direction that is looked for."""
+    """Process one sample; `a` and `dv` are positive in the direction of the event."""
     if math.isnan(a) or math.isnan(dv) or math.isnan(v):
         return s, math.nan, False
     if v < p.v_min:
@@ -93,18 +93,18 @@ def _scan(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
 def scan(
     p: SpinParams, state: SpinState, a_w_delta: FloatArray, v_w_delta: FloatArray, v_x: FloatArray, allowed: BoolArray
 ) -> tuple[FloatArray, BoolArray, SpinState]:
-    """Spin detector of one wheel over a drive or a piece of one.
+    """Run the spin detector of one wheel over a drive or a piece of one.
 
     Parameters
     ----------
     p : SpinParams
     state : SpinState
     a_w_delta : array (n,)
-        Acceleration difference of wheel and vehicle. [m/s^2]
+        Acceleration difference of wheel and vehicle. [m/s²]
     v_w_delta : array (n,)
         Speed difference of wheel and vehicle. [m/s]
     v_x : array (n,)
-        Velocity; a coarse one will do, it only decides the sign. [m/s]
+        Velocity; a coarse one suffices, since it only decides the sign. [m/s]
     allowed : bool array (n,)
         Where an alarm may begin (spin-up: traction coefficient below 0.07).
 
@@ -115,8 +115,8 @@ def scan(
         can. [m/s]
     active : bool array (n,)
         Begins when g > h and the speed difference exceeds its limit, or when a quarter of the speed has been missing
-        for 0.1 s; ends when the speed difference has fallen to half its limit, or stays within three limits without
-        acceleration for 1 s (a wrong radius); then the sum starts anew. NaN in any input: state held, statistic NaN,
+        for 0.1 s. Ends when the speed difference has fallen to half its limit, or stays within three limits without
+        acceleration for 1 s (a wrong radius); then the sum restarts. NaN in any input: state held, statistic NaN,
         no detection.
     state : SpinState
 

@@ -1,4 +1,4 @@
-"""All detectors over one drive: in one go, in pieces, or sample by sample, with the same result to the bit."""
+"""Run all detectors over one drive: in one go, in pieces, or sample by sample, with the same result to the bit."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ PIECE = 20_000  # samples that go through at once: some hundred arrays of 160 kB
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How detectors are run.
+    """Settings of the detectors.
 
-    `correct_yaw` as in `FeatureStream`; `learns_offset`: the offset of the resistance measure on dry road is learnt and
-    taken off; `joint_cusum` scales of joint detector 2, whose threshold is that of `thresholds`.
+    `correct_yaw` as in `FeatureStream`. `learns_offset`: the offset of the resistance measure on dry road is estimated
+    and subtracted. `joint_cusum`: scales of joint detector 2, whose threshold is that of `thresholds`.
     """
 
     thresholds: Thresholds = DEFAULT
@@ -45,7 +45,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """What one piece of a drive gave: features and tracks of its samples, and the events that ended in it."""
+    """Result of one piece of a drive: features and tracks of its samples, and the events that ended in it."""
 
     features: Features
     tracks: tuple[Track, ...]
@@ -61,10 +61,10 @@ class DriveStream:
     dt_ns : int
         Sample time. [ns]
     available : collection of str
-        Symbols that the drive has at all. What is missing decides which detectors run (`unavailable`, `limited`).
+        Symbols of the drive. Missing ones decide which detectors run (`unavailable`, `limited`).
     settings : Settings
     memory : Memory, optional
-        What is known of the dry slip slope.
+        Prior knowledge of the dry slip slope.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class DriveStream:
         self._sum = None if "joint_cusum" in off else JointCusumWatch(dt, settings.joint_cusum, t.joint_cusum)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
-        """Take the next samples, any number from one on.
+        """Take the next samples, one or more.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class DriveStream:
         return Piece(f, tuple(tracks), tuple(events))
 
     def finish(self) -> tuple[Event, ...]:
-        """Events that were still going on when the drive ended."""
+        """Return events that are open at the end of the drive."""
         return self._book.finish()
 
     def _slope_drop(self, watch: SlipSlopeWatch, scene: Scene, f: dict[str, FloatArray]) -> tuple[Track, list[Event]]:
@@ -181,12 +181,12 @@ def _partial(_: Mapping[str, Any]) -> str:
 
 
 def in_order(events: Iterable[Event]) -> tuple[Event, ...]:
-    """Events by their beginning."""
+    """Sort events by their beginning."""
     return tuple(sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")))
 
 
 class _Gathered:
-    """Features and tracks of the pieces of a drive, in arrays of the whole; or tracks by name alone."""
+    """Collect features and tracks of the pieces of a drive in arrays of the whole; or tracks by name alone."""
 
     def __init__(self, rows: int, *, samples: bool) -> None:
         self._rows = rows
@@ -232,9 +232,9 @@ def detect_drive(
     vehicle : Vehicle
     settings : Settings
     memory : Memory, optional
-        What is known of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
+        Prior knowledge of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
     samples : bool
-        Features and tracks with all their samples; without, less memory is touched, and the result has them empty.
+        Whether to keep features and tracks with all their samples; without them the result has them empty.
 
     Returns
     -------

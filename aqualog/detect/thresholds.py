@@ -13,7 +13,7 @@ __all__ = ["DEFAULT", "MEANINGS", "UNITS", "Thresholds"]
 class Thresholds:
     """One value per detector, in the unit of its statistic (`UNITS`); a larger one means fewer alarms.
 
-    Everything else about a detector follows from physics and stays (drifts, hysteresis, memories).
+    All other values of a detector follow from physics and stay (drifts, hysteresis, memories).
 
     Raises
     ------
@@ -41,7 +41,7 @@ class Thresholds:
                 )
 
     def scaled(self, detector: str, factor: float) -> Thresholds:
-        """The same with the threshold of one detector times a factor; a loss of slope stays below 1.
+        """Return the same with the threshold of one detector times a factor; a loss of slope stays below 1.
 
         The loss of slope is scaled by the share that may be left: 1 - (1 - loss) / factor.
         """
@@ -65,10 +65,10 @@ MEANINGS = {
     "spin_down": "speed that a wheel loses faster than a healthy one can",
     "minor_spin_down": "variance of a wheel's acceleration difference beyond that of the other axle",
     "spin_up": "speed that a wheel gains faster than a healthy one can",
-    "resistance": "sum of the resistance measure beyond 0.1 m/s^2",
+    "resistance": "sum of the resistance measure beyond 0.1 m/s²",
     "slip_slope_drop": "lost share of the dry slip slope",
     "tie_rod": "sum of the tie-rod residual over its scatter, beyond four of it",
-    "joint_criteria": "sum of the resistance measure beyond 0.1 m/s^2 that opens the gate",
+    "joint_criteria": "sum of the resistance measure beyond 0.1 m/s² that opens the gate",
     "joint_cusum": "scaled sum of all effects",
 }
 

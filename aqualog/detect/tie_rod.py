@@ -1,4 +1,4 @@
-"""Tie-rod forces that dry road cannot explain, into a CUSUM."""
+"""Detect tie-rod forces that dry road cannot explain, by a CUSUM."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ A_Y_MAX = 4.0  # [m/s^2] beyond, the lateral force is out of the range in which 
 
 
 def params(dt: float, threshold: float = DEFAULT.tie_rod) -> CusumParams:
-    """Drift of four scatters, so that neither the model's error nor early partial aquaplaning alarms (C60)."""
+    """Drift of four scatters, so that neither the model's error nor early partial aquaplaning raises an alarm (C60)."""
     return CusumParams(4.0, threshold, 3.0 * threshold, dt)
 
 
@@ -32,16 +32,16 @@ def scaled_residual(
     *,
     sigma: float,
 ) -> FloatArray:
-    """Measured minus modelled force over the scatter that it has on dry road.
+    """Return measured minus modelled force over the scatter that it has on dry road.
 
     Parameters
     ----------
     measured, modelled : array (n,)
-        Tie-rod force [N] or steering torque [N m], low-passed alike.
+        Tie-rod force [N] or steering torque [N·m], low-passed alike.
     v_x : array (n,)
         [m/s]
     a_y : array (n,)
-        Low-passed. [m/s^2]
+        Low-passed. [m/s²]
     is_braking : bool array (n,)
         A braking force acts on this wheel: brake forces pull at the rods too.
     sigma : float
@@ -53,8 +53,8 @@ def scaled_residual(
         |measured - modelled| / (sigma + 0.1 |modelled|), at most 12; 0 where the model does not hold, NaN where a
         signal is missing. [-]
 
-    Thesis: section 2.4 (C59-C63). The amount counts, not the sign: whether a resisting wheel presses or pulls its rod
-    is a matter of the axle's design.
+    Thesis: section 2.4 (C59-C63). The amount counts, not the sign: the design of the axle decides whether a resisting
+    wheel presses or pulls its rod.
     """
     with np.errstate(invalid="ignore"):
         z = np.minimum(np.abs(measured - modelled) / (sigma + SHARE * np.abs(modelled)), CLIP)

@@ -1,4 +1,4 @@
-"""Wheels that leave the road's speed: large spin-downs, spin-ups and minor spin-downs of a drive."""
+"""Watch wheels that leave the road's speed: large spin-downs, spin-ups and minor spin-downs of a drive."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class SpinWatch:
         self._states = {w: spin.initial_state() for w in self._wheels}
 
     def push(self, scene: Scene, book: EventBook) -> tuple[list[Track], list[Event]]:
-        """Tracks and closed events of the next piece."""
+        """Return tracks and closed events of the next piece."""
         f = scene.f
         tracks, events = [], []
         for wheel in scene.wheels:
@@ -72,7 +72,7 @@ class SpinWatch:
 class MinorWatch:
     """Minor spin-downs of the watched axle, side by side.
 
-    `features` of the last piece: the variances of all wheels that are compared, `variance_fl` ... [(m/s^2)^2].
+    `features` of the last piece: the variances of all wheels that are compared, `variance_fl` ... [(m/s²)^2].
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class MinorWatch:
     dt : float
         [s]
     threshold : float
-        Of the difference of variances. [(m/s^2)^2]
+        Of the difference of variances. [(m/s²)^2]
     """
 
     def __init__(self, vehicle: Vehicle, dt: float, threshold: float) -> None:
@@ -90,7 +90,7 @@ class MinorWatch:
         self.features: dict[str, FloatArray] = {}
 
     def push(self, scene: Scene, book: EventBook) -> tuple[list[Track], list[Event]]:
-        """Tracks and closed events of the next piece."""
+        """Return tracks and closed events of the next piece."""
         f = scene.f
         tracks: list[Track] = []
         events: list[Event] = []
@@ -141,5 +141,5 @@ def _severity_down(evidence: Mapping[str, Any]) -> str:
 
 
 def _severity_up(evidence: Mapping[str, Any]) -> str:
-    """Thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is not known."""
+    """Apply thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is unknown."""
     return "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial"

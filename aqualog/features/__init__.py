@@ -1,1 +1,1 @@
-"""Signals into the quantities that detectors read."""
+"""Compute from signals the quantities that detectors read."""

@@ -1,4 +1,4 @@
-"""First-order low-pass and the derivative of it, as recursions.
+"""First-order low-pass and its derivative, as recursions.
 
 Both are tuned by a time constant in seconds, so that they behave alike at any sample rate.
 """
@@ -69,7 +69,7 @@ def lowpass(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[Floa
     x : array (n,)
         Input. NaN: state held, output NaN.
     state : float
-        `UNSET`, or what the call before returned.
+        `UNSET`, or the return value of the call before.
     tau, dt : float
         Time constant, sample time. [s]
 
@@ -90,7 +90,7 @@ def fading_lowpass(x: FloatArray, state: float, *, tau: float, fade: float, dt: 
     x : array (n,)
         Input. NaN: the value held, fading with the time constant `fade`.
     state : float
-        0, or what the call before returned.
+        0, or the return value of the call before.
     tau, fade, dt : float
         [s]
 
@@ -100,8 +100,7 @@ def fading_lowpass(x: FloatArray, state: float, *, tau: float, fade: float, dt: 
         Never NaN.
     state : float
 
-    For corrections that must not take their object with them when they are missing: a lost yaw rate must not blind the
-    wheel detectors.
+    For corrections whose loss must not hide the corrected signal: a lost yaw rate must not blind the wheel detectors.
     """
     y, last = _fading(gain(tau, dt), math.exp(-dt / fade), state, np.ascontiguousarray(x, dtype=np.float64))
     return y, last
@@ -115,7 +114,7 @@ def derivative(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[F
     x : array (n,)
         Input. NaN: restarts after the gap; the first sample and the first after a gap give NaN.
     state : float
-        `UNSET`, or what the call before returned.
+        `UNSET`, or the return value of the call before.
     tau, dt : float
         Time constant, sample time. [s] tau = 0 is the backward difference.
 
@@ -125,7 +124,7 @@ def derivative(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[F
         [unit of x / s]
     state : float
 
-    A plain difference of 10 ms samples of a wheel speed carries 1 m/s^2 rms of tooth noise, and five times that at
+    A plain difference of 10 ms samples of a wheel speed carries 1 m/s² rms of tooth noise, and five times that at
     500 Hz; the time constant makes it one quantity.
     """
     y, last = _derivative(gain(tau, dt), dt, state, np.ascontiguousarray(x, dtype=np.float64))

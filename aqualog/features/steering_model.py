@@ -1,4 +1,4 @@
-"""What tie rods and steering should carry on dry road, beside what they carry."""
+"""Model the forces of tie rods and steering on dry road, beside the measured ones."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ class SteeringModel:
         F_z: tuple[FloatArray, FloatArray],
         F_x: tuple[FloatArray, FloatArray],
     ) -> dict[str, FloatArray]:
-        """Modelled and measured forces of the next piece.
+        """Return modelled and measured forces of the next piece.
 
         Parameters
         ----------
         get : mapping symbol -> array (n,)
             Measured signals.
         a_y : array (n,)
-            Low-passed. [m/s^2]
+            Low-passed. [m/s²]
         yaw_rate : array (n,)
             [rad/s]
         F_z, F_x : (left, right) arrays (n,)
@@ -65,7 +65,7 @@ class SteeringModel:
         Returns
         -------
         mapping
-            `tie_rod_meas_fl`, `tie_rod_hat_fl` ... [N] and `steering_meas`, `steering_hat` [N m], all low-passed alike.
+            `tie_rod_meas_fl`, `tie_rod_hat_fl` ... [N] and `steering_meas`, `steering_hat` [N·m], all low-passed alike.
         """
         if not self._rods and not self._has_torque:
             return {}

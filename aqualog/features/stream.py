@@ -1,7 +1,7 @@
-"""All features of a drive, sample by sample or in one go.
+"""Compute all features of a drive, sample by sample or in one go.
 
-A `FeatureStream` is fed with pieces of a drive of any length; the features of the pieces put together are bit for bit
-those of the whole, because every step is either one sample by itself or a recursion whose state is carried.
+A `FeatureStream` takes pieces of a drive of any length. The joined features of the pieces equal those of the whole bit
+for bit: every step is either one sample by itself or a recursion whose state is kept.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from aqualog.vehicle import Vehicle
 
 __all__ = ["INPUTS", "FeatureStream", "Features"]
 
-# Everything that features read. Truth and labels are not among them, so that no detector can see them.
+# Signals that features read. Truth and labels are not among them, so that no detector can see them.
 INPUTS = (
     "v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure",
     *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS), *STEERING_INPUTS,
@@ -40,7 +40,7 @@ Features = Mapping[str, FloatArray]
 
 
 class FeatureStream:
-    """Features of one drive.
+    """Compute the features of one drive.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class FeatureStream:
     available : collection of str
         Symbols that the drive has at all; fixed for the drive.
     correct_yaw : bool
-        Move the wheel speeds to the centre line; off only to show what that does.
+        Move the wheel speeds to the centre line; switched off only to show the effect.
     """
 
     def __init__(self, vehicle: Vehicle, dt: float, available: Collection[str], *, correct_yaw: bool = True) -> None:
@@ -71,7 +71,7 @@ class FeatureStream:
         self._steering = SteeringModel(vehicle, dt, self.available)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Features:
-        """Features of the next piece.
+        """Return features of the next piece.
 
         Parameters
         ----------
@@ -82,10 +82,9 @@ class FeatureStream:
         -------
         mapping name -> array (n,)
             `v_x_hat`, `a_kin`, `v_line_*` (wheel speeds on the centre line with the file's radii), `v_w_*` (the same
-            with radii learnt), `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`,
-            `mu_res_*`, `torque_sum`,
-            `delta_a_x` (2.9), low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`, and those of `SteeringModel`; only those
-            whose signals are there.
+            with corrected radii), `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`,
+            `torque_sum`, `delta_a_x` (2.9), low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`, and those of
+            `SteeringModel`; a feature is missing if its signals are.
         """
         n = next(iter(columns.values())).size
         get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}
@@ -163,7 +162,7 @@ class FeatureStream:
             out[f"a_w_delta_{wheel}"] = self._derivative(f"v_w_{wheel}", v_w[i]) - a_ref
 
     def _drive(self, get: Mapping[str, FloatArray], i: int) -> FloatArray:
-        """What the torque of a wheel pulls with; nothing where the log has no torque of it. [N]"""
+        """Return the force that the torque of a wheel makes; zero if the log has no torque of it. [N]"""
         name = f"torque_{WHEELS[i]}"
         torque = get[name] if name in self.available else np.zeros_like(get[name])
         return torque / float(self._r_l[i])

@@ -1,7 +1,7 @@
-"""Velocity and kinematic acceleration of the vehicle from what there is: a reference, the wheels, the accelerometer.
+"""Estimate velocity and kinematic acceleration of the vehicle from a reference, the wheels and the accelerometer.
 
-The detectors need the velocity only to tell a slow wheel from a fast one, and the kinematic acceleration to know what
-a healthy wheel does. Both must not follow a wheel that has left the road's speed.
+The detectors need the velocity only to distinguish a slow wheel from a fast one. They need the kinematic acceleration
+as that of a healthy wheel. Neither may follow a wheel that has left the road's speed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class VelocityParams(NamedTuple):
 
 
 class VelocityState(NamedTuple):
-    """What the observer carries: v [m/s], b [m/s^2], acceleration [m/s^2], time without a believed measurement [s]."""
+    """State of the observer: v [m/s], b [m/s²], acceleration [m/s²], time without a trusted measurement [s]."""
 
     v: float
     b: float
@@ -46,15 +46,15 @@ class VelocityState(NamedTuple):
 
 
 def initial_state() -> VelocityState:
-    """Before the first sample."""
+    """Return the state before the first sample."""
     return VelocityState(math.nan, 0.0, 0.0, 0.0, np.zeros(_N), np.ones(_N))
 
 
 def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams:
-    """Tuning in seconds turned into per-sample factors.
+    """Turn tuning in seconds into per-sample factors.
 
-    With an accelerometer its integral carries the short run, and the offset b (mounting, drift, grade) follows in
-    about 5 s; without one b itself is the acceleration and must follow in 0.3 s.
+    With an accelerometer its integral gives the short-term motion, and the offset b (mounting, drift, grade) follows in
+    about 5 s. Without one b itself is the acceleration and must follow in 0.3 s.
     """
     tau_v, tau_b = (0.25, 5.0) if has_accelerometer else (0.15, 0.3)
     k_v = gain(tau_v, dt)
@@ -63,7 +63,7 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
 
 @compiled
 def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
-    """One sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
+    """Process one sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
     for i in range(_N):
         w[i] = w[i] * (1.0 + kappa[i])
     if not p.has_accelerometer:
@@ -134,7 +134,7 @@ def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # ty
 
 @compiled
 def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped-def]
-    """Let the radius corrections follow while the car rolls steadily."""
+    """Update the radius corrections while the car rolls steadily."""
     mean = 0.0
     count = 0
     for i in range(_N):
@@ -154,7 +154,7 @@ def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped
 
 @compiled
 def _median(w):  # type: ignore[no-untyped-def]
-    """Median of the wheels that are known, by how many lie below each: at every sample, so nothing is allocated."""
+    """Return the median of the known wheels, by how many lie below each: called per sample, so nothing is allocated."""
     n = 0
     for i in range(_N):
         n += not math.isnan(w[i])
@@ -199,15 +199,14 @@ def observe(
     *,
     weights: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, VelocityState]:
-    """Velocity observer with bounded trust in every source.
+    """Observe the velocity with bounded trust in every source.
 
-    dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), where v_m is the reference velocity or,
-    without one, the weighted mean of the wheels that agree: three or more with each other, else those that agree with
-    the prediction. A wheel that spins or locks leaves the gate and no longer counts; a reference that three agreeing
-    wheels contradict does not count either. Where no wheel agrees for 2 s the
-    observer starts again.
+    dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b). v_m is the reference velocity. Without one
+    it is the weighted mean of the wheels that agree: three or more with each other, else those that agree with the
+    prediction. A wheel that spins or locks leaves the gate and no longer counts. A reference that three agreeing wheels
+    contradict does not count either. Where no wheel agrees for 2 s the observer restarts.
 
-    A slow correction per wheel (time constant 30 s, within 3 %, learnt only while rolling steadily) takes out radius
+    A slow correction per wheel (time constant 30 s, within 3 %, updated only while rolling steadily) removes radius
     errors: a reference that differs by 1 % in scale must not look like slip.
 
     Parameters
@@ -216,22 +215,22 @@ def observe(
     state : VelocityState
         Not changed.
     v_ref : array (n,)
-        Reference velocity, NaN where there is none. [m/s]
+        Reference velocity, NaN where missing. [m/s]
     v_w : array (4, n)
         Wheel speeds on the centre line. [m/s]
     a_x : array (n,)
-        Accelerometer, specific force; NaN where there is none. [m/s^2]
+        Accelerometer, specific force; NaN where missing. [m/s²]
     yaw_rate : array (n,)
-        NaN where there is none. [rad/s]
+        NaN where missing. [rad/s]
     weights : array (4,)
         Trust in each wheel; less for driven ones.
 
     Returns
     -------
     v_x : array (n,)
-        Velocity. NaN where neither a reference nor a wheel was there. [m/s]
+        Velocity. NaN where neither a reference nor a wheel has a value. [m/s]
     a_kin : array (n,)
-        Kinematic acceleration dv_x/dt, free of grade and of the accelerometer's offset (E2). [m/s^2]
+        Kinematic acceleration dv_x/dt, free of grade and of the accelerometer's offset (E2). [m/s²]
     v_w : array (4, n)
         Wheel speeds with the radius correction. [m/s]
     state : VelocityState

@@ -1,4 +1,4 @@
-"""A whole programme of simulated drives into a folder: logs, vehicle files, campaign file."""
+"""Write a whole programme of simulated drives into a folder: logs, vehicle files, campaign file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from aqualog.workers import Crashed, work_on
 
 __all__ = ["CampaignOutcome", "simulate_campaign"]
 
-STATE = "simulated.jsonl"  # one line per finished log, so that a broken run goes on where it stopped
+STATE = "simulated.jsonl"  # one line per finished log, so that an interrupted run can be continued
 _COLUMNS = (
     "log", "tyre", "tread_depth_mm", "wear", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",
     "water_depth_left_mm", "load_front_kg", "load_rear_kg", "manoeuvre", "vehicle", "lane_start_s", "lane_end_s",
@@ -42,7 +42,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class CampaignOutcome:
-    """What came of a programme: logs made now, logs that were there, and name -> reason of those that failed."""
+    """Outcome of a programme: logs made now, logs kept from before, and name -> reason of those that failed."""
 
     made: int
     kept: int
@@ -59,7 +59,7 @@ def simulate_campaign(
     programme : str
         Name in `PROGRAMMES`.
     folder : Path
-        Made if it is not there. A folder in which the same programme was begun is completed: logs whose scenario and
+        Created if missing. A folder in which the same programme was begun is completed: logs whose scenario and
         simulation have not changed are kept.
     jobs : int
         Processes.
@@ -71,7 +71,7 @@ def simulate_campaign(
     Raises
     ------
     ConfigError
-        If there is no such programme, or the folder holds something else.
+        If there is no such programme, or the folder holds other files.
     """
     if programme not in PROGRAMMES:
         raise ConfigError(f'no programme "{programme}"', expected=", ".join(PROGRAMMES))
@@ -104,7 +104,7 @@ def simulate_campaign(
 
 
 def _told(run: Run) -> str:
-    """All that a run is, the same in every process: sets of names have no order of their own."""
+    """Return all inputs of a run, the same in every process: sets of names have no order of their own."""
     believed = "" if run.vehicle is None else vehicle_toml(run.vehicle)
     return repr(replace(run, vehicle=None)) + believed
 
@@ -120,7 +120,7 @@ def _own(folder: Path) -> None:
 
 
 def _finished(folder: Path, digests: dict[str, str]) -> dict[str, Done]:
-    """Logs that are there whole, of the same scenario by the same code; a damaged line counts as not made."""
+    """Return complete logs of the same scenario by the same code; a damaged line counts as not made."""
     done: dict[str, Done] = {}
     for line in (folder / STATE).read_text(encoding="utf-8", errors="replace").splitlines():
         try:
@@ -149,14 +149,14 @@ def _log(folder: Path, name: str) -> Path:
 
 
 def _sweep(folder: Path, runs: Sequence[Run]) -> None:
-    """Remove what a killed process has left half-written of these logs, by the names that `write_whole` gives."""
+    """Remove half-written files of these logs, left by a killed process, by the names that `write_whole` gives."""
     for run in runs:
         for orphan in (folder / "logs").glob(f".{run.name[:40]}-{'?' * 8}.mf4.tmp"):
             orphan.unlink(missing_ok=True)
 
 
 def _code_stamp() -> str:
-    """Hash of the simulation's own sources: another equation makes other logs."""
+    """Return a hash of the simulation's own sources: another equation makes other logs."""
     package = Path(__file__).resolve().parents[1]
     content = hashlib.sha256()
     for path in sorted([*(package / "physics").glob("*.py"), *(package / "model").glob("*.py")]):
@@ -167,7 +167,7 @@ def _code_stamp() -> str:
 def _work(
     runs: Sequence[Run], folder: Path, digests: dict[str, str], *, jobs: int, record: Callable[[str, Done | str], None]
 ) -> None:
-    """Record each run's outcome as it comes; a run that fails leaves the others alone, an interrupt loses none."""
+    """Record each run's outcome as it comes; a failed run does not stop the others, an interrupt loses none."""
     if not runs:
         return
     simulate(Scenario(Vehicle(), duration_s=0.2))  # compiles once, before several processes do
@@ -195,7 +195,7 @@ def _one(run: Run, path: str, digest: str) -> Done | str:
 
 
 def _write_campaign(folder: Path, programme: str, runs: Sequence[Run], done: dict[str, Done]) -> None:
-    """Vehicle files, the table of runs, and last the campaign file that makes them one."""
+    """Write vehicle files, the table of runs, and last the campaign file that joins them."""
     vehicles: dict[str, Vehicle] = {_vehicle_file(r): r.vehicle or r.scenario.vehicle for r in runs}
     for name, vehicle in vehicles.items():
         write_text(folder / name, vehicle_toml(vehicle))

@@ -1,7 +1,7 @@
-"""Effects that a model may have on top of the base simulation, one table.
+"""Table of the effects that a model may have on top of the base simulation.
 
-Each names what it acts on, its parameters with unit, prior and bounds, and a source. Neutral values leave a drive as it
-is to the last bit. Sizes follow published figures where there are any: V read in a source, D derived, K general
+Each entry names its target, its parameters with unit, prior and bounds, and a source. Neutral values leave a drive
+unchanged to the last bit. Sizes follow published figures where available: V read in a source, D derived, K general
 knowledge.
 """
 
@@ -30,7 +30,7 @@ _SIGNALS = (
 
 
 def wheels_at(where: str | None) -> tuple[int, ...]:
-    """Wheel indices of a place: a wheel, an axle, a side, or all."""
+    """Return the wheel indices of a place: a wheel, an axle, a side, or all."""
     names = WHEELS if where is None else AXLES.get(where) or SIDES.get(where) or (where,)
     return tuple(WHEELS.index(w) for w in names)
 
@@ -52,7 +52,7 @@ def _on_plant(change: Callable[[Plant, Values, str | None], Plant]) -> Callable[
 
 
 def _signals_at(where: str | None) -> tuple[str, ...]:
-    """The signal of that name, or all four wheels' for `omega` and `torque`."""
+    """Return the signal of that name, or all four wheels' for `omega` and `torque`."""
     return tuple(f"{where}_{w}" for w in WHEELS) if where in ("omega", "torque") else (str(where),)
 
 
@@ -85,7 +85,7 @@ def _tone_ring(setup: Setup, v: Values, where: str | None) -> Setup:
 
 
 def _clock_skew(setup: Setup, v: Values, where: str | None) -> Setup:
-    # a clock is that of a bus: whoever shares it runs off too
+    # a bus has one clock: all its signals drift together
     shared = set(_signals_at(where))
     groups = tuple(
         replace(g, skew_ppm=g.skew_ppm + v["skew"]) if shared & set(g.signals) else g for g in setup.sensors.groups
@@ -121,12 +121,12 @@ _ALL = [
         twins=("accelerometer_bias",),
     ),
     Effect(
-        "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "+-5 m/s (K)",
+        "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
         (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive"),),
         _on_plant(lambda p, v, _: p._replace(head_wind=p.head_wind + v["speed"])), twins=("aero_drag",),
     ),
     Effect(
-        "aero_drag", "drag area c_w A [m^2]", "The drag area is {delta_drag_area:+.2f} m^2 off.", "roof box +0.2 (K)",
+        "aero_drag", "drag area c_w A [m²]", "The drag area is {delta_drag_area:+.2f} m² off.", "roof box +0.2 (K)",
         (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's"),),
         _on_plant(lambda p, v, _: p._replace(drag_area=p.drag_area + v["delta_drag_area"])), twins=("head_wind",),
     ),
@@ -154,7 +154,7 @@ _ALL = [
         twins=("track_clearing", "contact_loss"),
     ),
     Effect(
-        "brake_drag", "torque against a wheel [N m]", "The brake drags with {torque:.0f} N m.", "a few N m a wheel (K)",
+        "brake_drag", "torque against a wheel [N·m]", "The brake drags with {torque:.0f} N·m.", "a few N·m a wheel (K)",
         (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel"),),
         _on_plant(lambda p, v, w: p._replace(brake_drag=_shifted(p.brake_drag, w, v["torque"]))), _WHEEL_PLACES,
         twins=("rolling_resistance",),
@@ -188,15 +188,15 @@ _ALL = [
         twins=("payload_mass", "aero_drag"),
     ),
     Effect(
-        "wheel_inertia", "inertia of the wheels [kg m^2]", "A wheel has {delta_inertia:+.2f} kg m^2 more inertia.",
+        "wheel_inertia", "inertia of the wheels [kg·m²]", "A wheel has {delta_inertia:+.2f} kg·m² more inertia.",
         "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel"),),
         _on_plant(lambda p, v, w: p._replace(inertia=np.maximum(_shifted(p.inertia, w, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
     ),
     Effect(
-        "accelerometer_bias", "accelerometer [m/s^2]", "The accelerometer is off by {bias:+.2f} m/s^2.",
-        "ESC sensors +-50-100 mg, 20 mg short term (V)",
+        "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
+        "ESC sensors ±50-100 mg, 20 mg short term (V)",
         (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
         _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
     ),
@@ -206,7 +206,7 @@ _ALL = [
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
     ),
     Effect(
-        "accelerometer_drift", "accelerometer [m/s^3]", "The accelerometer drifts by {drift:.1e} m/s^2 a second.",
+        "accelerometer_drift", "accelerometer [m/s³]", "The accelerometer drifts by {drift:.1e} m/s² a second.",
         "20 mg short term (V)",
         (Parameter("drift", "m/s^3", 0.0, 5e-4, -0.02, 0.02, 1e-4, "from the start"),),
         _on_channels(lambda c, v: replace(c, drift=c.drift + v["drift"])), ("a_x", "a_y"), "a_x",
@@ -249,7 +249,7 @@ _ALL = [
         _WHEEL_PLACES,
     ),
     Effect(
-        "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "+-0.3 % (D), wear 1 % (K)",
+        "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
         (Parameter("delta", "-", 0.0, 0.005, -0.1, 0.1, 0.001, "relative, effective and loaded"),),
         _on_plant(
             lambda p, v, w: p._replace(

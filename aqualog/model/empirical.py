@@ -1,6 +1,6 @@
-"""Terms without a name in physics: functions that a diagnosis found and the model may carry, as tables of knots.
+"""Terms without a name in physics: functions from a diagnosis that the model may carry, as tables of knots.
 
-They stand apart from the effects that a search may name: any of them could imitate several of those.
+They are separate from the effects that a search may name: any of them could imitate several effects.
 """
 
 from __future__ import annotations

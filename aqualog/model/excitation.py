@@ -1,4 +1,4 @@
-"""Active excitation: what one axle gains the other loses, so that the car keeps its acceleration (thesis 3.3).
+"""Active excitation: one axle gains what the other loses, so that the car keeps its acceleration (thesis 3.3).
 
 Waveforms are of unit amplitude and in phase: zero at t = 0, then positive for half a period (the step is at once at 1).
 """
@@ -65,7 +65,7 @@ def f_ramp(t: FloatArray, *, period: float) -> FloatArray:
     `t`, `period` as in `f_triangle`. A sixth of the period from 0 to 1, a sixth at 1, a third down to -1, a sixth
     there, a sixth back (E17).
 
-    Thesis: Eq. (3.37). It holds the line of `f_triangle` a second time, so that it can be `inlined` by itself.
+    Thesis: Eq. (3.37). It repeats the line of `f_triangle`, so that it can be `inlined` by itself.
     """
     u = 1.0 - np.mod(2.0 * t / period - 0.5, 2.0)
     return np.minimum(np.maximum(1.5 * (2.0 * u * np.sign(u) - 1.0), -1.0), 1.0)
@@ -103,7 +103,7 @@ AMPLITUDE_KINDS = {"force": 0, "mu": 1, "relative": 2}
 
 
 def waveform(name: str, t: FloatArray, *, period: float) -> FloatArray:
-    """Waveform by its name in `WAVEFORMS`; the step in phase with the others."""
+    """Return the waveform by its name in `WAVEFORMS`; the step in phase with the others."""
     if name not in WAVEFORMS:
         raise ConfigError(f"unknown waveform {name!r}", expected=", ".join(WAVEFORMS))
     return WAVEFORMS[name](t, period=period)
@@ -113,7 +113,7 @@ _RATES = {"triangle": 4.0, "sine": 2.0 * np.pi, "ramp": 6.0, "step": np.inf}
 
 
 def force_rate(name: str, *, amplitude: float, period: float) -> float:
-    """Largest rate of change of the excitation force: with the jump of the step, what passengers feel.
+    """Return the largest rate of change of the excitation force: with the jump of the step, passengers feel it.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def axle_forces(F_sum: FloatArray, F_exc: FloatArray, *, nu: float) -> tuple[Flo
     Parameters
     ----------
     F_sum : array
-        What the driver asks of both axles together, forward positive. [N]
+        Total force that the driver requests, forward positive. [N]
     F_exc : array
         Excitation; positive loads the front axle. [N]
     nu : float
@@ -159,7 +159,7 @@ def axle_forces(F_sum: FloatArray, F_exc: FloatArray, *, nu: float) -> tuple[Flo
 def excitation_force_amplitude(
     kind: int, amplitude: float, F_0_f: FloatArray, F_0_r: FloatArray, F_z_f: FloatArray, F_z_r: FloatArray
 ) -> FloatArray:
-    """As `excitation_amplitude` with the number of the kind, for compiled code."""
+    """Return `excitation_amplitude` with the number of the kind, for compiled code."""
     if kind == 1:
         return amplitude * np.minimum(F_z_f, F_z_r)
     if kind == 2:
@@ -192,7 +192,7 @@ def excitation_amplitude(
     Limits: "relative" up to 1 keeps the sign of both axle forces (C110), and is 0 with one driven axle; "mu" bounds the
     traction coefficient that the excitation adds on either axle, and may turn forces negative.
 
-    Thesis: section 3.3 on (3.34); which axle a coefficient or a share refers to is not said there.
+    Thesis: section 3.3 on (3.34); it does not say to which axle a coefficient or a share refers.
     """
     if kind not in AMPLITUDE_KINDS:
         raise ConfigError(f"unknown kind of amplitude {kind!r}", expected=", ".join(AMPLITUDE_KINDS))

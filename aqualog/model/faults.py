@@ -30,9 +30,9 @@ class SensorFault:
 
 
 def with_faults(x: FloatArray, t: FloatArray, faults: Collection[SensorFault], *, names: Collection[str]) -> FloatArray:
-    """A signal (n,) at the times t (n,) [s] with the faults that name it (its own name, its group's) in it.
+    """Put the faults that name a signal (its own name, its group's) into it: signal (n,) at the times t (n,) [s].
 
-    Without any it is returned as it is.
+    A signal without faults is returned unchanged.
     """
     for fault in faults:
         if fault.where not in names:

@@ -1,4 +1,4 @@
-"""The simulation led along a measured drive: reported torque and steering in, what the sensors would show out."""
+"""Run the simulation along a measured drive: reported torque and steering in, simulated sensor signals out."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ STEP_S = 5e-3
 RECORD_S = 1e-2
 FOLLOW_RATE = 0.3  # [1/s] fast against a wrong resistance, slow against the noise of a measured speed
 V_START = 0.5  # [m/s]
-# perfect sensors on the buses of a series car: a clock that runs off takes its bus along
+# perfect sensors on the buses of a series car: a clock that drifts shifts its whole bus
 PERFECT = Sensors("perfect", tuple(Group(g.name, g.signals) for g in ESC.groups))
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What was done with the car, as its log tells; arrays on an even grid `t` (n,) from 0 [s], finite.
+    """Inputs of the car according to its log; arrays on an even grid `t` (n,) from 0 [s], finite.
 
-    `torque` (4, n) reported net wheel torques [N m], `steer` (n,) road-wheel angle [rad], `v_x` (n,) reference
+    `torque` (4, n) reported net wheel torques [N·m], `steer` (n,) road-wheel angle [rad], `v_x` (n,) reference
     velocity [m/s], `lanes` the water on the way.
     """
 
@@ -50,7 +50,7 @@ class Course:
 
 
 def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
-    """Plant, sensors and road of a drive along `course`: the car of the file, perfect sensors, and all terms."""
+    """Return plant, sensors and road of a drive along `course`: the car of the file, perfect sensors, and all terms."""
     scenario = Scenario(
         vehicle, duration_s=float(course.t[-1]), rate_hz=1.0 / float(course.t[1] - course.t[0]), lanes=course.lanes,
         water_scatter=0.0, sensors=PERFECT,
@@ -60,23 +60,23 @@ def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
 
 
 def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLLOW_RATE) -> dict[str, FloatArray]:
-    """What the sensors would show of a measured drive if the car were that of the file and the model.
+    """Return the sensor signals of a measured drive for a car that is that of the file and the model.
 
     Parameters
     ----------
     vehicle : Vehicle
     course : Course
     model : Model
-        Its terms act on car, road and sensors. What a term does to the sensors of torque, steering and velocity is
-        undone before they drive the simulation: a torque that is reported late is applied earlier.
+        Its terms act on car, road and sensors. The effect of a term on the sensors of torque, steering and velocity
+        is undone before they drive the simulation: a torque that is reported late is applied earlier.
     rate : float
-        How fast the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
+        Rate at which the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
 
     Returns
     -------
     columns : dict of array (n,)
-        Canonical signals on the grid of the course, without noise; `nudge` [m/s^2] is the acceleration that drew the
-        speed to the measured one, `nudge_seen` the same as the accelerometer would see it, `position` [m].
+        Canonical signals on the grid of the course, without noise; `nudge` [m/s²] is the acceleration that drew the
+        speed to the measured one, `nudge_seen` the same as the accelerometer would measure it, `position` [m].
 
     Raises
     ------
@@ -88,7 +88,7 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
 
 
 def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArray]:
-    """What `sensors` show of a truth, on the grid of the course; a column that no sensor has is taken as it is."""
+    """Return the output of `sensors` for a truth, on the course's grid; a column without a sensor stays as it is."""
     step = float(course.t[1] - course.t[0])
     out: dict[str, FloatArray] = {}
     for group in measure(truth, _bare(sensors), rate_hz=1.0 / step, seed=0):
@@ -97,7 +97,7 @@ def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArra
             out[name] = x if same else _at(group.t, x, course.t)
     for name in ("nudge", "position"):
         out[name] = _at(truth.t, truth.columns[name], course.t)
-    # the accelerometer's delay and gain: a car whose signals all come late is the same car
+    # the accelerometer's delay and gain: a car whose signals are all late is the same car
     channel = sensors.channels.get("a_x", Channel())
     true_t = course.t / (1.0 + _skew(sensors, "a_x")) - channel.delay_s - channel.latency_s
     out["nudge_seen"] = channel.gain * _at(truth.t, truth.columns["nudge"], true_t)
@@ -109,12 +109,12 @@ def _at(t: FloatArray, x: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def _bare(sensors: Sensors) -> Sensors:
-    """Sensors as they are led, without the tone ring: it has no phase that a log would share."""
+    """Return the sensors of this run, without the tone ring: a log does not share its phase."""
     return replace(sensors, teeth=0)
 
 
 def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Truth:
-    """The led drive without sensors, every 10 ms."""
+    """Return the simulated drive without sensors, every 10 ms."""
     plant, scenario = setup.plant, setup.scenario
     n = max(2, math.ceil(float(course.t[-1]) / STEP_S - 1e-9))
     fine: FloatArray = np.arange(n + 1, dtype=np.float64) * STEP_S
@@ -122,7 +122,7 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
     speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
-    # a led car is where the measured one was: another resistance must not move it along its road
+    # the car is where the measured one was: another resistance must not move it along its road
     grade = _grade_along(course, scenario, fine)
     steer = _undone(course.t, course.steer, setup.sensors, "steer_angle", fine)
     controls = _controls(speed, steer, grade, rate)
@@ -137,7 +137,7 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
 
 
 def _grade_along(course: Course, scenario: Scenario, at: FloatArray) -> FloatArray:
-    """Slope angle of the road where the measured car was. [rad]"""
+    """Return the slope angle of the road where the measured car was. [rad]"""
     if not scenario.grade:
         return np.zeros_like(at)
     position = course.position
@@ -170,7 +170,7 @@ def _controls(speed: FloatArray, steer: FloatArray, grade: FloatArray, rate: flo
 
 
 def _undone(t: FloatArray, x: FloatArray, sensors: Sensors, name: str, at: FloatArray) -> FloatArray:
-    """What a sensor was shown, from what it reported: the inverse of `Channel` without noise and lag."""
+    """Return the input of a sensor from its report: the inverse of `Channel` without noise and lag."""
     channel = sensors.channels.get(name, Channel())
     skew = _skew(sensors, name)
     reported = np.interp((at + channel.delay_s + channel.latency_s) * (1.0 + skew), t, x)

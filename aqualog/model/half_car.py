@@ -1,4 +1,4 @@
-"""The half-car of thesis 3.3 on brush tyres, which makes the noise-free input of the slip-slope estimator.
+"""Half-car of thesis 3.3 on brush tyres, which makes the noise-free input of the slip-slope estimator.
 
 Two axles, each one wheel; quasi-static load transfer; no transient tyre or body. Forward driving only: rolling
 resistance always acts backwards, as printed.
@@ -44,7 +44,7 @@ class HalfCar(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SurfaceChange:
-    """What both axles run on from the time `t` [s] on: slip slopes C_s / F_z and friction, all at once. [-]"""
+    """Surface under both axles from the time `t` [s] on: slip slopes C_s / F_z and friction, all at once. [-]"""
 
     t: float
     slope_f: float
@@ -54,7 +54,7 @@ class SurfaceChange:
 
 @dataclass(frozen=True, slots=True)
 class HalfCarRun:
-    """One drive: from `v0` [m/s] with the acceleration `a_x` [m/s^2], `nu` of the force on the REAR axle (E19).
+    """One drive: from `v0` [m/s] with the acceleration `a_x` [m/s²], `nu` of the force on the REAR axle (E19).
 
     Time runs from `t_start` [s]: excitation and surface changes are functions of it, so that a change can be at t = 0
     whatever the period.
@@ -104,7 +104,7 @@ class HalfCarResult:
 
 
 class _Loads(NamedTuple):
-    """Static axle loads [N] and what 1 m/s^2 moves from the front to the rear axle [kg], (3.33)."""
+    """Return static axle loads [N] and the load that 1 m/s² moves from the front to the rear axle [kg], (3.33)."""
 
     front: float
     rear: float
@@ -112,7 +112,7 @@ class _Loads(NamedTuple):
 
 
 class _Inputs(NamedTuple):
-    """At every time step: axle torques [N m], slip slopes and friction [-]."""
+    """At every time step: axle torques [N·m], slip slopes and friction [-]."""
 
     torque_f: FloatArray
     torque_r: FloatArray
@@ -133,8 +133,8 @@ _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)
 def _rhs(p, z, v, omega_f, omega_r, torque_f, torque_r, slope_f, slope_r, mu):  # type: ignore[no-untyped-def]
     """Time derivatives of v_x and both wheel speeds (3.28 to 3.33), slips, traction coefficients and loads.
 
-    At a given slip slope C_s / F_z the brush force is proportional to the load. The traction coefficients do not depend
-    on it then, and the loop of acceleration, load transfer and force (E15) closes without iteration:
+    At a given slip slope C_s / F_z the brush force is proportional to the load, so that the traction coefficients do
+    not depend on the load. The loop of acceleration, load transfer and force (E15) then closes without iteration:
     m a = mu_f (F_z_f0 - c a) + mu_r (F_z_r0 + c a) - drag, c = m h / l.
     """
     s_f = _bounded_slip(omega_f * p.r_e_f, v)
@@ -163,7 +163,7 @@ def _slip_derivatives(rim, s, r_e):  # type: ignore[no-untyped-def]
 
 @compiled
 def _integrate(n, dt, v, omega_f, omega_r, p, z, u):  # type: ignore[no-untyped-def]
-    """March `n` steps; rows of the state, what `_rhs` gives there, and no more.
+    """Integrate `n` steps; return rows of the state and the outputs of `_rhs` there.
 
     ROS2, (1 - g h J) k1 = f(y), (1 - g h J) k2 = f(y + h k1) - 2 k1, y += 1.5 h k1 + 0.5 h k2: a W-method, of second
     order for any J, L-stable for the exact one with g = 1 - 1/sqrt(2). J holds the tyres' slip: the wheels on their
@@ -232,7 +232,7 @@ def _slip_of_force(F_x: FloatArray, F_z: FloatArray, *, mu: float, slope: float)
 
 
 def _inputs(car: HalfCar, run: HalfCarRun, t: FloatArray) -> tuple[_Inputs, float, float]:
-    """Torques and surface over the drive, and the slips at its start."""
+    """Return torques and surface over the drive, and the slips at its start."""
     v = run.v0 + run.a_x * (t - run.t_start)
     F_sum = car.mass * run.a_x + resistance.air_drag(v, drag_area=car.drag_area, air_density=car.air_density)
     F_exc = np.zeros_like(t)
@@ -268,22 +268,22 @@ def simulate_half_car(car: HalfCar, run: HalfCarRun) -> HalfCarResult:
     ----------
     car : HalfCar
     run : HalfCarRun
-        The wanted speed v0 + a_x (t - t_start) must not become negative.
+        The requested speed v0 + a_x (t - t_start) must not become negative.
 
     Returns
     -------
     HalfCarResult
 
     The axle torques are functions of time, as in the thesis. They follow the axle forces of (3.26) and (3.27), whose
-    sum is m a_x and the air drag at the wanted speed: M = r_l (F_x + r_w F_z) + I a_x / r_e, with the loads at a_x. The
-    axle forces are then those wanted but for the change of slip, in which the wheels take or give
-    I (omega_dot - a_x / r_e) / r_l: below 1 N for 250 N of excitation at 8 s. An axle that shall give no force (nu = 0,
-    1) gets the torque of its own rolling resistance, else it would brake the car. The run begins at the slip of its
+    sum is m a_x and the air drag at the requested speed: M = r_l (F_x + r_w F_z) + I a_x / r_e, with the loads at a_x.
+    The axle forces then equal the requested ones except during changes of slip, in which the wheels take or give
+    I (omega_dot - a_x / r_e) / r_l: below 1 N for 250 N of excitation at 8 s. An axle without force (nu = 0, 1) gets
+    the torque of its own rolling resistance; without it the axle would brake the car. The run begins at the slip of its
     first forces.
 
     The loaded radius is the arm of the force and the effective one the rolling radius, as printed. Their difference
-    makes the wheels give (r_e / r_l - 1), 2.6 %, more power to the car than they take from the drive: with both radii
-    alike the balance of energy closes without that.
+    makes the wheels give (r_e / r_l - 1), 2.6 %, more power to the car than they take from the drive. With equal radii
+    the balance of energy closes.
 
     Thesis: Eq. (3.26) to (3.33), with E14 (rolling resistance is a torque r_l r_D F_z) and E15 (load transfer in closed
     form).

@@ -89,7 +89,7 @@ NO_TORQUE: FloatArray = np.zeros((1, 4))
 
 
 class Controls(NamedTuple):
-    """What driver and car do; arrays (n + 1,) at every time step."""
+    """Inputs of driver and car; arrays (n + 1,) at every time step."""
 
     v_target: FloatArray
     a_target: FloatArray
@@ -106,7 +106,7 @@ class Controls(NamedTuple):
     exc_kind: int  # 0 force, 1 traction coefficient, 2 relative
     exc_amplitude: float
     scatter: float
-    antilock: bool = False  # the brakes let go of a wheel that is about to lock
+    antilock: bool = False  # the brakes release a wheel that is about to lock
     kicks: bool = False  # the road has kerbs or holes
     follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`; 0: runs free
 
@@ -117,7 +117,7 @@ def run(
 ) -> FloatArray:  # fmt: skip
     """`integrate` with its inputs packed: records are plain memory, tuples of arrays cost a count at every access.
 
-    `applied` (n + 1, 4) [N m]: torque at each wheel on top of the driver's, scaled by the plant's `torque_gain`; one
+    `applied` (n + 1, 4) [N·m]: torque at each wheel on top of the driver's, scaled by the plant's `torque_gain`; one
     row holds for the whole drive.
     """
     fields = controls._asdict()
@@ -186,7 +186,7 @@ def _table(knots, x):  # type: ignore[no-untyped-def]
 
 @compiled
 def _lane(lanes, t, position):  # type: ignore[no-untyped-def]
-    """Index of the stretch under the front axle, -1 for dry asphalt."""
+    """Return the index of the stretch under the front axle, -1 for dry asphalt."""
     found = -1
     for i in range(lanes.shape[0]):
         x = position if lanes[i, IN_METRES] > 0.0 else t
@@ -197,7 +197,7 @@ def _lane(lanes, t, position):  # type: ignore[no-untyped-def]
 
 @compiled
 def _track(track, position, ds):  # type: ignore[no-untyped-def]
-    """Row of the memory of what the front axle met and left at a position; before the start: dry."""
+    """Return the row of the front axle's record of a position: stretch and film; before the start: dry."""
     if not 0.0 <= position < ds * track.shape[0]:
         return -1
     return min(int(position / ds), track.shape[0] - 1)
@@ -205,10 +205,10 @@ def _track(track, position, ds):  # type: ignore[no-untyped-def]
 
 @compiled
 def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released, applied, step):  # type: ignore[no-untyped-def]
-    """Time derivative `f` of the state, the stiff part `jac` of its Jacobian, and all that is `recorded`.
+    """Compute the derivative `f` of the state, the stiff part `jac` of its Jacobian, and the `recorded` outputs.
 
-    `track` (m, 3) holds the stretch and the film left by the left and right front wheel, `released` (4,) the share of
-    each wheel's brake torque that the antilock system holds off; row `step` of `applied` (m, 4) is the torque that is
+    `track` (m, 3) holds the stretch and the film behind the left and right front wheel. `released` (4,) is the share of
+    each wheel's brake torque that the antilock system releases. Row `step` of `applied` (m, 4) is the torque that is
     applied to each wheel.
     """
     v_x, v_y, yaw_rate, position = y[V_X], y[V_Y], y[YAW_RATE], y[S]
@@ -322,7 +322,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
             bump += _at(r.fields, KICK_TORQUE + side, where, r.ds)
             F_z = max(F_z + _at(r.fields, KICK_LOAD + side, where, r.ds), 0.0)
 
-        # what the water leaves of the contact, and what it costs
+        # the effect of the water on the contact, and its resistance
         L = 1.0
         film_force = 0.0
         wave = 0.0
@@ -463,7 +463,7 @@ def _rhs(t, y, f, jac, out, recorded, p, wheels, extra, r, s, c, track, released
 
 @compiled
 def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
-    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels, which pull at each other."""
+    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels, which are coupled."""
     for i in range(N_STATES):
         k[i] = f[i] / (1.0 - h * jac[i])
     right = f[V_X]
@@ -479,9 +479,9 @@ def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
 
 @compiled
 def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls, applied):  # type: ignore[no-untyped-def]
-    """March `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
+    """Integrate `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
 
-    ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part that is given,
+    ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part in the Jacobian,
     which is the stiff one: wheels and body on the tyres' slip.
     """
     h = (1.0 - np.sqrt(0.5)) * dt

@@ -1,4 +1,4 @@
-"""A simulated drive as a log file."""
+"""Write a simulated drive as a log file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aqualog.types import FloatArray, TimeArray
 
 __all__ = ["START_NS", "grid_of", "groups_of", "table_of", "write_simulation"]
 
-START_NS = 1_748_000_000_000_000_000  # made up: a drive that never was must be the same whenever it is simulated
+START_NS = 1_748_000_000_000_000_000  # arbitrary: a drive must be the same whenever it is simulated
 _OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time stamps of its messages
 
 
@@ -26,14 +26,14 @@ def write_simulation(path: Path, simulation: Simulation, *, suffix: str, comment
 
 
 def groups_of(simulation: Simulation) -> list[LogGroup]:
-    """Groups with the time stamps that their bus messages bear."""
+    """Return groups with the time stamps of their bus messages."""
     return [
         LogGroup(g.name, {n: (*_about(n), x) for n, x in g.columns.items()}, _stamps(g)) for g in simulation.measured
     ]
 
 
 def table_of(simulation: Simulation) -> list[LogGroup]:
-    """All groups on one grid at the scenario's rate, as a logger's table is made."""
+    """Put all groups on one grid at the scenario's rate, as in a logger's table."""
     grid = grid_of(simulation)
     return [
         LogGroup(g.name, {n: (*_about(n), _onto(grid, _stamps(g), n, x)) for n, x in g.columns.items()})
@@ -42,7 +42,7 @@ def table_of(simulation: Simulation) -> list[LogGroup]:
 
 
 def grid_of(simulation: Simulation) -> TimeArray:
-    """Time of the table's rows from the start. [ns]"""
+    """Return the time of the table's rows from the start. [ns]"""
     scenario = simulation.setup.scenario
     dt_ns = round(1e9 / scenario.rate_hz)
     return np.arange(max(round(scenario.duration_s * scenario.rate_hz), 2), dtype=np.int64) * dt_ns
@@ -53,13 +53,13 @@ def _stamps(group: Measured) -> TimeArray:
 
 
 def _about(name: str) -> tuple[str, str]:
-    """Unit and meaning of a channel."""
+    """Return unit and meaning of a channel."""
     symbol = SYMBOLS.get(name) or ACCEPTED.get(name)
     return (symbol.unit, symbol.meaning) if symbol else TRUTH_SYMBOLS[name]
 
 
 def _onto(grid: TimeArray, t_ns: TimeArray, name: str, x: FloatArray) -> FloatArray:
-    """Linear; states held; means where a signal is much faster than the grid."""
+    """Resample linearly; hold states; average where a signal is much faster than the grid."""
     symbol = SYMBOLS.get(name)
     is_state = symbol is not None and symbol.kind == "state"
     gap_ns = gap_limit_ns(median_period_ns(t_ns), is_state=is_state)

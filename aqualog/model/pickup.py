@@ -1,4 +1,4 @@
-"""Wheel-speed pick-ups: a toothed ring, the times of its edges, and the speed that a controller makes of them."""
+"""Wheel-speed pick-ups: a toothed ring, the times of its edges, and the speed that a controller computes from them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OMEGA_MIN = 1.5  # [rad/s] 1.7 km/h; what is slower is reported as standstill (K
 
 
 def rolled_angle(omega: FloatArray, *, dt: float) -> FloatArray:
-    """Angle that a wheel has turned since the first sample, by the trapezoidal rule.
+    """Return the angle of a wheel since the first sample, by the trapezoidal rule.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def rolled_angle(omega: FloatArray, *, dt: float) -> FloatArray:
 
 
 def ring_angles(pattern: FloatArray, *, phase: float, tone_ring: float) -> FloatArray:
-    """Wheel angles in the first turn of the ring at which its teeth pass the pick-up.
+    """Return wheel angles in the first turn of the ring at which its teeth pass the pick-up.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def ring_angles(pattern: FloatArray, *, phase: float, tone_ring: float) -> Float
 def edge_times(
     t: FloatArray, angle: FloatArray, ring: FloatArray, *, jitter: float, rng: np.random.Generator, before: float
 ) -> FloatArray:
-    """Times at which the teeth of a ring pass the pick-up.
+    """Return times at which the teeth of a ring pass the pick-up.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def edge_times(
         Ascending. [s]
 
     Limits: a wheel that rolls backwards counts as standing until it is back. The angle is linear between the grid's
-    points: at 100 rad/s^2 and 1 ms an edge is off by 1e-4 pitches at most.
+    points: at 100 rad/s² and 1 ms an edge is off by 1e-4 pitches at most.
     """
     teeth = ring.size
     pitch = TURN / teeth
@@ -109,7 +109,7 @@ def edge_times(
 
 
 def reported_speed(edges: FloatArray, at: FloatArray, *, window: float, teeth: int) -> FloatArray:
-    """Wheel speed that a controller reports.
+    """Return the wheel speed that a controller reports.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ FRONT_COMPLIANCE = 0.8  # the steering yields: cornering slope of the front axle
 
 
 class Plant(NamedTuple):
-    """SI floats, and arrays (4,) in the order fl, fr, rl, rr. Neutral values leave a drive as it is to the last bit."""
+    """SI floats, and arrays (4,) in the order fl, fr, rl, rr. Neutral values leave a drive the same to the bit."""
 
     mass: float
     l_f: float
@@ -82,7 +82,7 @@ class Plant(NamedTuple):
 
 
 def understeer_gradient(cornering_slope: float) -> float:
-    """Road-wheel angle per lateral acceleration beyond that of rolling around the curve. [1/rad] to [rad/(m/s^2)]
+    """Road-wheel angle per lateral acceleration beyond that of rolling around the curve. [1/rad] to [rad/(m/s²)]
 
     Difference of the axles' slip angles, a_y / (g c) each, where the front axle's slope is `FRONT_COMPLIANCE` c.
     """
@@ -92,7 +92,7 @@ def understeer_gradient(cornering_slope: float) -> float:
 def build_plant(
     vehicle: Vehicle, front: Tyre, rear: Tyre, *, p_front: float = P_REFERENCE, p_rear: float = P_REFERENCE
 ) -> Plant:
-    """A plant without extra load.
+    """Build a plant without extra load.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def build_plant(
 def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
     """Add a mass at a distance from the front axle. [kg, m]
 
-    The centre of mass moves along; its height stays. No mass leaves every bit as it is.
+    The centre of mass moves along; its height stays. A mass of zero leaves every bit unchanged.
 
     Raises
     ------
@@ -198,9 +198,9 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
 
 
 def flat(plant: Plant) -> tuple[Any, Any, FloatArray]:
-    """The plant as the compiled simulation reads it: one record of the car, four of the wheels, the table of drag.
+    """Pack the plant for the compiled simulation: one record of the car, four of the wheels, the table of drag.
 
-    Records are plain memory: a tuple of arrays would cost the counting of references at every access.
+    Records are plain memory; a tuple of arrays would cost reference counting at every access.
     """
     fields = plant._asdict()
     wheels = {n: np.asarray(x, dtype=np.float64) for n, x in fields.items() if np.shape(x) == (4,)}

@@ -1,4 +1,4 @@
-"""Cars, tyres and waters that situations are drawn from: two pools that share nothing."""
+"""Cars, tyres and waters that situations are drawn from: two pools without common entries."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ SUV_REAR = replace(SUV, name="SUV AWD, drive to the rear", torque_split_rear=0.9
 
 CONSTANT = (60, 70, 80, 89, 98, 106, 112, 118, 124)
 BINNED = (60, 70, 80, 90, 100, 110)
-BINS = (65, 75, 85, 95, 105, 115)  # middles of the bins of 10 km/h in which slopes are told
+BINS = (65, 75, 85, 95, 105, 115)  # middles of the bins of 10 km/h in which slopes are estimated
 REGRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # [m/s^2] constant speed hardly varies the traction, one run is no interval
 WEAR = {"very_worn_summer": "very_worn", "worn_summer": "worn", "new_summer": "new", "new_winter": "new"}
 PlainTerm = tuple[str, tuple[tuple[str, float], ...], str | None]  # effect, values, place
@@ -44,7 +44,7 @@ PlainTerm = tuple[str, tuple[tuple[str, float], ...], str | None]  # effect, val
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One drive of a programme: its name (a file's stem), what is driven, and what its row in the campaign says."""
+    """One drive of a programme: its name (a file's stem), the drive, and its row in the campaign."""
 
     name: str
     scenario: Scenario
@@ -56,7 +56,7 @@ class Run:
 
     @property
     def model(self) -> Model:
-        """The model that the terms make."""
+        """Return the model that the terms make."""
         return Model(tuple(Term(EFFECTS[name], dict(values), where) for name, values, where in self.terms))
 
 
@@ -73,7 +73,7 @@ class _Case:
 
 
 def thesis() -> tuple[Run, ...]:
-    """The test programme of chapter 2, figure by figure; drives that serve several figures stand once."""
+    """Return the test programme of chapter 2, figure by figure; drives of several figures stand once."""
     runs: dict[str, Run] = {}
     for number, (case, kmh, a, repeat, manoeuvre, figures) in enumerate(_drives()):
         run = _run(case, kmh, a, repeat, manoeuvre, figures, seed=number + 1)
@@ -103,7 +103,7 @@ _Drive = tuple[_Case, float, float, int, str, str]
 
 
 def _drives() -> Iterator[_Drive]:
-    """Case, speed over the lane [km/h], acceleration [m/s^2], number of the repeat, manoeuvre, figures."""
+    """Case, speed over the lane [km/h], acceleration [m/s²], number of the repeat, manoeuvre, figures."""
     worn = _Case()
 
     def constant(case: _Case, speeds: tuple[int, ...], repeats: int, figures: str) -> Iterator[_Drive]:
@@ -168,7 +168,7 @@ def _drives() -> Iterator[_Drive]:
         for front, rear in ((270.0, 0.0), (0.0, 270.0)):
             yield from binned(_Case(pressure=pressure, depth_mm=1.2, load_front=front, load_rear=rear), "2.20")
     yield from binned(_Case("very_worn_summer", depth_mm=0.8), "2.16", (95, 105))
-    # a third pass where there were two, since two tell no interval
+    # a third pass where there were two, since two give no interval
     for depth in (0.6, 0.8, 1.1, 1.3, 2.0):
         yield from third(_Case("very_worn_summer", depth_mm=depth), "2.11,2.12,2.13")
     for depth in (1.1, 2.0):

@@ -1,4 +1,4 @@
-"""The simulation driven by a measured torque: torque in, speed out."""
+"""Drive the simulation by a measured torque: torque in, speed out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Replay", "replay"]
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What becomes of a torque: `t` [s], `v_x` [m/s], specific force `a_x` [m/s^2], `omega` (4, n) [rad/s]."""
+    """Result of a torque: `t` [s], `v_x` [m/s], specific force `a_x` [m/s²], `omega` (4, n) [rad/s]."""
 
     t: FloatArray
     v_x: FloatArray
@@ -36,7 +36,7 @@ def replay(
     grade: FloatArray | None = None,
     dt: float = 2e-3,
 ) -> Replay:
-    """Drive a dry straight road with a given torque, freely from the first speed on.
+    """Drive a dry straight road with a given torque, free from the first speed on.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def replay(
     t : array (n,)
         Even time base of the inputs, from any start. [s]
     torque : array (n,)
-        Sum of the net wheel torques, drive minus brake. [N m] Finite.
+        Sum of the net wheel torques, drive minus brake. [N·m] Finite.
     split_rear : float
         Rear share of the torque. [-]
     v_0 : float

@@ -32,9 +32,9 @@ _FIELD_WIDTH = 15
 class Road(NamedTuple):
     """Stretches (k, 15) and fields (m, 15) over the position of the front axle, from 0, `ds` apart.
 
-    The last stretch of `lanes` that holds a point rules; outside all is dry asphalt. The contact's, the depth's and
-    the bumps' fields have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`. The slope
-    angle is in rad, uphill positive; kerbs and holes give torque [N m] and wheel load [N] of either side.
+    The last stretch of `lanes` that holds a point applies; outside all is dry asphalt. The fields of contact, depth and
+    bumps have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`. The slope angle is in
+    rad, uphill positive; kerbs and holes give torque [N·m] and wheel load [N] of either side.
     """
 
     ds: float
@@ -52,7 +52,7 @@ def build_road(scenario: Scenario, length: float) -> Road:
     ----------
     scenario : Scenario
     length : float
-        To be covered, generously. [m]
+        Length to be covered, with a margin. [m]
     """
     ds = DS if length < 20e3 else DS_LONG
     m = int(length / ds) + 2

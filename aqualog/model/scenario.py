@@ -40,7 +40,7 @@ class Lane:
 class Kick:
     """A kerb, joint or hole that the wheels of a side meet, front ones first, rear ones a wheelbase later.
 
-    `at`: way of the front axle [m]; `length` of the blow [m]; `torque` against the wheel [N m] and `load` on it [N] at
+    `at`: way of the front axle [m]; `length` of the blow [m]; `torque` against the wheel [N·m] and `load` on it [N] at
     its height; the load rebounds to minus half of it. `side`: left, right or both.
     """
 

@@ -1,4 +1,4 @@
-"""Sensors and buses of a series car: what a logger sees of a simulated drive."""
+"""Sensors and buses of a series car: the signals that a logger records of a simulated drive."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Channel:
     """How one signal is measured; all zero (gain 1) is a perfect sensor. SI units of the signal.
 
     `noise` rms; `resolution` step of the bus signal; `lag_s` first-order low-pass; `latency_s` value sampled at t bears
-    the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of what a run draws by its seed.
-    `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not drawn: terms of a model act on them.
+    the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of the random values of a run.
+    `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them.
     """
 
     noise: float = 0.0
@@ -66,8 +66,8 @@ class Channel:
 class Group:
     """Signals that travel together, at `rate_hz` (None: the scenario's sample rate); `skew_ppm` its clock runs fast.
 
-    `one_draw`: gain, offset and drift are drawn once for the group, not per signal, because one estimate stands behind
-    all of them: an engine's torque that is wrong by 2 % is so at each wheel.
+    `one_draw`: gain, offset and drift are drawn once for the group, not per signal, because all its signals come from
+    one estimate: an engine's torque with an error of 2 % has this error at each wheel.
     """
 
     name: str
@@ -91,12 +91,12 @@ class Sensors:
     faults: tuple[SensorFault, ...] = ()
 
     def with_channel(self, signal: str, channel: Channel) -> Sensors:
-        """The same with another channel."""
+        """Return the same with another channel."""
         return replace(self, channels={**self.channels, signal: channel})
 
 
 def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> list[Measured]:
-    """What a logger records of a drive.
+    """Return the records of a logger for a drive.
 
     Parameters
     ----------
@@ -104,15 +104,15 @@ def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> lis
         At least two points; finite.
     sensors : Sensors
     rate_hz : float
-        Rate of the groups that have none of their own, and of the truth. [Hz]
+        Rate of groups without one of their own, and of the truth. [Hz]
     seed : int
-        Of all draws, >= 0. Each signal has streams of its own: what is changed at one leaves the others as they are.
+        Seed of all draws, >= 0. Each signal has streams of its own: a change of one leaves the others unchanged.
 
     Returns
     -------
     groups : list of Measured
-        In the order of `sensors.groups`, without signals that the truth does not hold and groups that are empty by
-        that; last the group "truth" with the columns `true_*`, which no sensor touches.
+        In the order of `sensors.groups`, without signals that the truth lacks and without empty groups. Last the
+        group "truth" with the columns `true_*`, which no sensor changes.
 
     Per signal: lag, value at (sample time - latency - delay), gain, bias, drift over the time since the start, noise,
     rounding. Limits: before the start the first value is held; states (`on_water`, `gear`) have latency and delay only
@@ -148,7 +148,7 @@ def _measure_group(truth: Truth, sensors: Sensors, group: Group, rate_hz: float,
 
 
 def _through(channel: Channel, x: FloatArray, at: FloatArray, name: str, draw_key: str, seed: int) -> FloatArray:
-    """Gain, offset, drift, noise and rounding; what is neutral is left out, so that a perfect one keeps the bits."""
+    """Apply gain, offset, drift, noise and rounding; neutral values are skipped: a perfect channel keeps the bits."""
     draws = _stream(seed, draw_key, "spread").standard_normal(3)
     gain = channel.gain * (1.0 + channel.gain_spread * draws[0])
     offset = channel.bias + channel.offset_spread * draws[1]
@@ -167,7 +167,7 @@ def _through(channel: Channel, x: FloatArray, at: FloatArray, name: str, draw_ke
 
 
 def _picked_up(truth: Truth, sensors: Sensors, name: str, seen: FloatArray, window: float, seed: int) -> FloatArray:
-    """Wheel speed as the pick-ups and their controller see it at the times `seen`."""
+    """Return the wheel speed of the pick-ups and their controller at the times `seen`."""
     place = _stream(seed, name, "ring")
     phase = place.uniform(0.0, 2.0 * math.pi)
     pattern = sensors.tooth_pattern * place.standard_normal(sensors.teeth)
@@ -184,7 +184,7 @@ def _picked_up(truth: Truth, sensors: Sensors, name: str, seen: FloatArray, wind
 
 
 def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray:
-    """Column of the truth; a wheel speed with the error of its tone ring, which sits as it does with teeth."""
+    """Return a column of the truth; a wheel speed with the error of its tone ring, in the same phase as with teeth."""
     x = _column(truth, name)
     amplitude = sensors.tone_ring[_OMEGA[name]] if name in _OMEGA else 0.0
     if amplitude == 0.0:
@@ -199,7 +199,7 @@ def _angle(truth: Truth, name: str) -> FloatArray:
 
 
 def _sampled(truth: Truth, x: FloatArray, at: FloatArray, *, held: bool = False) -> FloatArray:
-    """Values of a column of the fine grid at any times; `held`: the value before, else linear between two."""
+    """Return values of a column of the fine grid at any times; `held`: the value before, else linear between two."""
     place = np.clip(at / _step(truth), 0.0, x.size - 1.0)
     near = np.rint(place)
     place = np.where(np.abs(place - near) < SNAP, near, place)
@@ -227,12 +227,12 @@ def _lag(ratio, keep, x):  # type: ignore[no-untyped-def]
 
 
 def _stream(seed: int, name: str, purpose: str) -> np.random.Generator:
-    """Random numbers of one signal for one purpose; the name's bytes are the key, the same in every process."""
+    """Return random numbers of one signal for one purpose; the name's bytes are the key, the same in every process."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=tuple(f"{name}/{purpose}".encode())))
 
 
 def _sample_times(truth: Truth, rate_hz: float) -> FloatArray:
-    """From 0 to before the end, so that a drive of 20 s at 100 Hz has 2000 samples."""
+    """Return times from 0 to before the end, so that a drive of 20 s at 100 Hz has 2000 samples."""
     return np.arange(max(math.ceil(float(truth.t[-1]) * rate_hz - SNAP), 1)) / rate_hz
 
 

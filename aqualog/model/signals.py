@@ -1,4 +1,4 @@
-"""A simulated drive as the table of signals, without a file between."""
+"""Turn a simulated drive into the table of signals, without a file between."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _FILE = "simulated"
 
 
 def as_signals(simulation: Simulation, *, vehicle: Vehicle | None = None, truth: bool = True) -> Signals:
-    """The signals that loading this drive's written table gives, and the truth beside them.
+    """Return the signals that loading this drive's written table gives, and the truth beside them.
 
     Parameters
     ----------
     simulation : Simulation
     vehicle : Vehicle, optional
-        The car as the reader of the log knows it (it judges which wheel speeds a wheel cannot have); default the one
-        that was simulated.
+        The car as the reader of the log knows it (it decides which wheel speeds are impossible); default the
+        simulated one.
     truth : bool
         With the columns `true_*` on the same grid. No detector reads them, nor the labels (`on_water`,
         `water_depth_left`): `aqualog.features.stream.INPUTS`.

@@ -1,4 +1,4 @@
-"""A scenario and a model in, a simulated drive out."""
+"""Turn a scenario and a model into a simulated drive."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _WHEEL_TRUTH = {
     "v_full": (
         "full_speed",
         "m/s",
-        "speed at which this wheel would float here and now; none without a wedge",
+        "speed of full aquaplaning of this wheel here and now; none without a wedge",
     ),
     "torque": ("torque", "N*m", "net wheel torque"),
     "water_torque": ("water_torque", "N*m", "torque of the water against the wheel: shifted load and film"),
@@ -75,7 +75,7 @@ TRUTH_SYMBOLS: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A simulated drive: what sensors saw, and the truth on a fine grid."""
+    """A simulated drive: the sensor signals, and the truth on a fine grid."""
 
     measured: tuple[Measured, ...]
     truth: Truth
@@ -103,7 +103,7 @@ def simulate(scenario: Scenario, model: Model = BASE, *, dt: float = STEP_S) -> 
     Raises
     ------
     ConfigError
-        If the scenario or the model ask for what the car cannot do.
+        If the car cannot do what scenario or model ask for.
     """
     setup = assemble(scenario, model)
     truth = drive_truth(setup, dt=dt)
@@ -112,7 +112,7 @@ def simulate(scenario: Scenario, model: Model = BASE, *, dt: float = STEP_S) -> 
 
 
 def assemble(scenario: Scenario, model: Model = BASE) -> Setup:
-    """Plant, sensors and scenario with all terms of the model in them."""
+    """Return plant, sensors and scenario with all terms of the model in them."""
     plant = build_plant(
         scenario.vehicle, scenario.tyre_front, scenario.tyre_rear, p_front=scenario.p_front, p_rear=scenario.p_rear
     )
@@ -123,7 +123,7 @@ def assemble(scenario: Scenario, model: Model = BASE) -> Setup:
 
 
 def drive_truth(setup: Setup, *, dt: float = STEP_S) -> Truth:
-    """The drive without sensors, on a fine grid; see `Truth` and `TRUTH_SYMBOLS`."""
+    """Return the drive without sensors, on a fine grid; see `Truth` and `TRUTH_SYMBOLS`."""
     scenario, plant = setup.scenario, setup.plant
     rate = FINE_RATE_HZ if scenario.duration_s <= FINE_LIMIT_S else max(scenario.rate_hz, 200.0)
     every = max(1, round(1.0 / (rate * dt)))
@@ -192,7 +192,7 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
 
 
 def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
-    """Rolling in balance at the first speed, acceleration and slope angle: no transient at the start."""
+    """Return the state of rolling in balance at the first speed, acceleration and slope angle: no transient."""
     v, rear = float(controls.v_target[0]), float(controls.split_rear[0])
     a = float(controls.a_target[0]) + G * float(np.sin(theta))  # specific force
     drag, rolling = resistance_at(plant, v, a)
@@ -241,9 +241,9 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
 
 
 def steering_columns(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
-    """Forces in the tie rods and torque at the steering.
+    """Return forces in the tie rods and torque at the steering.
 
-    A vehicle file with a polynomial says how the dry car's rods are; what the water adds comes on top.
+    A polynomial in the vehicle file gives the forces of the dry car; the effect of the water is added.
     """
     given = scenario.vehicle.tie_rod
     rods = []
@@ -266,7 +266,7 @@ def steering_columns(wheels: dict[str, list[FloatArray]], plant: Plant, scenario
 
 
 def _labels(scenario: Scenario, front: FloatArray, rear: FloatArray) -> dict[str, FloatArray]:
-    """Water depths of the stretch that the front axle is on, and whether any axle is on water."""
+    """Return water depths of the stretch under the front axle, and whether any axle is on water."""
     left = np.array([0.0, *(lane.depth_left for lane in scenario.lanes)])
     right = np.array([0.0, *(lane.depth_right for lane in scenario.lanes)])
     wet = (left > 0.0) | (right > 0.0)

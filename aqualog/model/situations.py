@@ -1,4 +1,4 @@
-"""A catalogue of driving situations: some in which a car aquaplanes, and many that must not look like it."""
+"""Catalogue of driving situations: some with aquaplaning, and many that must not look like it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SITUATIONS: dict[str, Situation] = {
 
 
 def draw(name: str, seed: int, pool: Pool) -> Drawn:
-    """One drive of a situation.
+    """Return one drive of a situation.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def draw(name: str, seed: int, pool: Pool) -> Drawn:
 
 
 def believed_vehicle(scenario: Scenario, rng: np.random.Generator) -> Vehicle:
-    """The vehicle file that somebody wrote of this car on these tyres, dry: everything given, nothing quite right.
+    """Return a realistic vehicle file of this car on these tyres, dry: all values given, each with some error.
 
     Loads, trailers and roof boxes of the drive are not in it; neither is a tie-rod polynomial.
     """

@@ -113,7 +113,7 @@ def _split(k: Sketch) -> Taken:
 
 
 def _braking(k: Sketch, surface: Surface, mu: float, *, demand: float, antilock: bool) -> Taken:
-    """Two stops, or nearly; the driver asks for `demand` of what the friction holds."""
+    """Two stops, or nearly; the driver requests `demand` of the available friction."""
     v, low = k.between(70.0, 110.0) * KMH if mu > 0.5 else k.between(50.0, 80.0) * KMH, 10.0 * KMH
     a = min(demand, 0.85) * mu * G
     seconds = (v - low) / a
@@ -199,7 +199,7 @@ def _standstill(k: Sketch) -> Taken:
 
 
 def _roof_box(k: Sketch) -> Taken:
-    """Four passengers and a box on the roof; the vehicle file knows of neither."""
+    """Four passengers and a box on the roof; the vehicle file knows neither."""
     taken = _cruise(k, 80.0, 130.0)
     people = k.between(220.0, 330.0)
     box = {"delta_drag_area": k.between(0.1, 0.25)}

@@ -60,7 +60,7 @@ def _dropouts(k: Sketch) -> Taken:
 
 
 def _accelerometer(k: Sketch) -> Taken:
-    """An accelerometer that is off by up to 0.2 m/s^2 from the start, or drifts there."""
+    """An accelerometer that is off by up to 0.2 m/s² from the start, or drifts there."""
     duration, v = k.between(60.0, 120.0), k.between(70.0, 120.0) * KMH
     error = k.between(0.08, 0.2) * k.one_of(-1.0, 1.0)
     if k.between(0.0, 1.0) < 0.5:

@@ -42,7 +42,7 @@ def _lane(k: Sketch, start_m: float, length: float, depth: float, **given: Any) 
 def _through(
     k: Sketch, depth: float, v: float, v_full: float, a: float = 0.0, before: float = 0.0, **given: Any
 ) -> tuple[Scenario, str]:
-    """Through a lane that is met at the speed v [m/s], at the acceleration a on it and `before` ahead of it. [m/s^2]"""
+    """Through a lane that is met at the speed v [m/s], at the acceleration a on it and `before` ahead of it. [m/s²]"""
     approach = k.between(*APPROACH_S)
     on_lane = k.between(*(LANE_S if v + max(a, 0.0) * LANE_S[1] < v_full - 10.0 * KMH else FLOATING_S))
     v_0 = v - before * 5.0

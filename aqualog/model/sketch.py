@@ -1,4 +1,4 @@
-"""What all situations have in common: a car on tyres, a way to drive, weather, and dice."""
+"""Common parts of all situations: a car on tyres, a way to drive, weather, and random numbers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TORQUE_SIGNALS = ("torque_fl", "torque_fr", "torque_rl", "torque_rr")
 
 
 class Taken(NamedTuple):
-    """What a situation makes of a sketch: the drive, terms on top, and a sentence about what was drawn."""
+    """Result of a situation for a sketch: the drive, terms on top, and a sentence about the random choices."""
 
     scenario: Scenario
     model: Model
@@ -47,7 +47,7 @@ class Drawn:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """Car, tyre and pressure [Pa] of a drive, and the dice that the rest is thrown with."""
+    """Car, tyre and pressure [Pa] of a drive, and its random numbers."""
 
     rng: np.random.Generator
     pool: Pool
@@ -57,15 +57,15 @@ class Sketch:
     seed: int
 
     def between(self, low: float, high: float) -> float:
-        """A number that is as likely anywhere between the two."""
+        """Return a random number, uniform between the two."""
         return float(self.rng.uniform(low, high))
 
     def one_of(self, *choices: Any) -> Any:
-        """One of the choices."""
+        """Return one of the choices."""
         return choices[int(self.rng.integers(len(choices)))]
 
     def drive(self, duration_s: float, speed: Profile, *, weather: bool = True, **given: Any) -> Scenario:
-        """A drive of this car: with gusts (rms 1 m/s) and hills (rms 1 %) unless they are given or unwanted."""
+        """Return a drive of this car: with gusts (rms 1 m/s) and hills (rms 1 %) unless given or switched off."""
         if weather:
             given = {"wind": self.gusts(duration_s, 1.0), "grade": self.hills(0.01), **given}
         return Scenario(
@@ -74,18 +74,18 @@ class Sketch:
         )  # fmt: skip
 
     def gusts(self, duration_s: float, rms: float, *, mean: float = 0.0, every_s: float = 2.0) -> Profile:
-        """Head wind over time: independent knots `every_s` apart. [s, m/s]"""
+        """Return head wind over time: independent knots `every_s` apart. [s, m/s]"""
         t = np.arange(0.0, duration_s + every_s, every_s)
         return tuple(zip(t.tolist(), (mean + rms * self.rng.standard_normal(t.size)).tolist(), strict=True))
 
     def hills(self, rms: float, *, every_m: float = 150.0, most: float = 0.08) -> Profile:
-        """Slope angle over the way: independent knots `every_m` apart, over 6 km. [m, rad]"""
+        """Return the slope angle over the way: independent knots `every_m` apart, over 6 km. [m, rad]"""
         s = np.arange(0.0, 6000.0, every_m)
         grade = np.clip(rms * self.rng.standard_normal(s.size), -most, most)
         return tuple(zip(s.tolist(), np.arctan(grade).tolist(), strict=True))
 
     def cruise(self, duration_s: float, v: float, *, spread: float = 0.08, a_most: float = 0.6) -> Profile:
-        """Speed that wanders about v [m/s] within a relative spread, no faster than `a_most`. [s, m/s]"""
+        """Return a speed that varies about v [m/s] within a relative spread, no faster than `a_most`. [s, m/s]"""
         points = [(0.0, v)]
         while points[-1][0] < duration_s:
             step = self.between(4.0, 12.0)
@@ -95,7 +95,7 @@ class Sketch:
         return tuple(points)
 
     def surface(self, name: str, friction: tuple[float, float] | None = None, **changed: Any) -> Surface:
-        """A surface of the catalogue with a friction drawn between two."""
+        """Return a surface of the catalogue with a friction drawn between two."""
         values = dict(changed) if friction is None else {"mu": self.between(*friction), **changed}
         return replace(SURFACES[name], **values)
 
@@ -106,7 +106,7 @@ def terms(*given: tuple[str, dict[str, float], str | None]) -> Model:
 
 
 def full_speed(sketch: Sketch, depth: float) -> float:
-    """Full aquaplaning speed of a static front wheel in even water; beyond 1e4 where the tread takes it all. [m/s]"""
+    """Return the full aquaplaning speed of a static front wheel in even water; over 1e4 if drained. [m/s]"""
     car, tyre = sketch.vehicle, sketch.tyre
     load = 0.5 * car.mass * G * car.l_r / car.wheelbase
     v = full_aquaplaning_speed(
@@ -118,9 +118,9 @@ def full_speed(sketch: Sketch, depth: float) -> float:
 
 
 def slalom_angle(vehicle: Vehicle, tyre: Tyre, v: float, a_y: float) -> float:
-    """Road-wheel angle that gives a lateral acceleration by the steady gain of the linear two-track model. [rad]
+    """Return the road-wheel angle for a lateral acceleration by the steady gain of the linear two-track model. [rad]
 
-    For a_y well below the friction; near it tyres give less.
+    For a_y well below the friction; near it tyres give less force.
     """
     return a_y * (vehicle.wheelbase / (v * v) + understeer_gradient(tyre.cornering_slope))
 

@@ -1,4 +1,4 @@
-"""States from which a simulation starts without a transient."""
+"""Find states from which a simulation starts without a transient."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["resistance_at", "rolling_state"]
 
 
 def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
-    """Air drag, and what holds each of the four wheels back, at a speed and specific force on dry road. [N]"""
+    """Return air drag, and the resistance of each of the four wheels, at a speed and specific force on dry road. [N]"""
     through_air = np.array([v + plant.head_wind])
     drag = float(air_drag(through_air, drag_area=plant.drag_area, air_density=plant.air_density)[0])
     drag += float(np.interp(v, plant.drag_over_v[:, 0], plant.drag_over_v[:, 1]))
@@ -31,9 +31,9 @@ def _loads(plant: Plant, a: float) -> FloatArray:
 
 
 def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear: float) -> FloatArray:
-    """State of a car that rolls straight on dry road, each wheel on the slip that its torque needs.
+    """Return the state of a car that rolls straight on dry road, each wheel at the slip that its torque needs.
 
-    `v` [m/s], `a` specific force forward [m/s^2], `drive` torque of all wheels [N m], its rear share.
+    `v` [m/s], `a` specific force forward [m/s²], `drive` torque of all wheels [N·m], its rear share.
     """
     y = np.zeros(kernel.N_STATES)
     y[kernel.V_X], y[kernel.A_X], y[kernel.DRIVE] = v, a, drive

@@ -13,7 +13,7 @@ class Surface:
 
     `mu` is the friction of a tyre on it [-], None for the vehicle's own on dry asphalt; `compliance` the inverse slip
     slope of a layer that yields [-]; `rolling` extra rolling resistance coefficient [-]; `roughness` rms of the wheel
-    torque that unevenness makes [N m]; `source` where the values come from (K: general knowledge).
+    torque that unevenness makes [N·m]; `source` where the values come from (K: general knowledge).
     """
 
     name: str

@@ -19,7 +19,7 @@ Knots = tuple[tuple[float, float], ...]
 
 
 class Setup(NamedTuple):
-    """All that a simulation is made of; terms turn one into another."""
+    """All parts of a simulation; terms turn one setup into another."""
 
     plant: Plant
     sensors: Sensors
@@ -49,7 +49,7 @@ class Table:
     """A function that an effect has instead of parameters: knots with a straight line between neighbours.
 
     Over `x` [x_unit], within `x_low` ... `x_high`; values in `unit`, within `low` ... `high`. `apply` is pure and adds
-    the function to what the setup has already; beyond its ends the function is constant.
+    the function to that of the setup; beyond its ends the function is constant.
     """
 
     x: str
@@ -62,7 +62,7 @@ class Table:
     apply: Callable[[Setup, Knots, str | None], Setup]
 
     def fault(self, knots: Knots) -> str | None:
-        """What is wrong with knots, in words; None: nothing."""
+        """Say what is wrong with knots; None if they are valid."""
         if len(knots) < 2:
             return f"{len(knots)} knots, at least 2 are needed"
         for x, value in knots:
@@ -79,8 +79,8 @@ class Table:
 class Effect:
     """One physical effect that a model may have.
 
-    `target` is what it acts on; `places` where it may sit: `fl`, `f`, `left`, a signal's name; empty: the whole car.
-    `default` place if none is given (None: the car). `apply` is pure and returns a new setup.
+    `target`: the quantity that it changes. `places`: where it may sit, as `fl`, `f`, `left`, a signal's name; empty:
+    the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Effect:
 class Term:
     """An effect with values; parameters that are not named keep their neutral value.
 
-    `knots` (x, value) are for an effect with a table; none, or all values zero: neutral.
+    `knots` (x, value) are for an effect with a table; without knots, or with all values zero, it is neutral.
 
     Raises
     ------
@@ -134,11 +134,11 @@ class Term:
 
     @property
     def place(self) -> str | None:
-        """Where it sits: the place that is named, or else the effect's own; None: the whole car."""
+        """Return its place: the one that is named, or else the effect's own; None: the whole car."""
         return self.where or self.effect.default
 
     def apply(self, setup: Setup) -> Setup:
-        """The setup with this effect in it."""
+        """Return the setup with this effect in it."""
         values = {p.name: float(self.values.get(p.name, p.neutral)) for p in self.effect.parameters}
         setup = self.effect.apply(setup, values, self.place)
         if self.effect.table is None or all(value == 0.0 for _, value in self.knots):
@@ -166,7 +166,7 @@ class Model:
         return load_model(Path(path))
 
     def with_term(self, term: Term) -> Model:
-        """A new model with one term more.
+        """Return a new model with one term more.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class Model:
         return Model((*self.terms, term))
 
     def apply(self, setup: Setup) -> Setup:
-        """The setup with all terms in it."""
+        """Return the setup with all terms in it."""
         for term in self.terms:
             setup = term.apply(setup)
         return setup

@@ -1,9 +1,8 @@
 """The drives behind single figures of the thesis' chapter 2, as scenarios.
 
-What the text says is taken from it: car, tyre, pressure class, depth where one is named, times of entry, speeds and
-manoeuvres. Depths and speeds that it does not say, and the seed, which decides where along the lane the contact is
-worst, are chosen so that the course of events is the one that is described; tyres and water are those of every other
-drive.
+Car, tyre, pressure class, depth, times of entry, speeds and manoeuvres follow the text where it names them. Other
+depths and speeds are chosen so that the described course of events results. So is the seed, which decides where along
+the lane the contact is worst. Tyres and water are those of every other drive.
 """
 
 from __future__ import annotations
@@ -87,7 +86,7 @@ def _two_accelerations() -> Scenario:
 
 
 def _slalom() -> Scenario:
-    """Slalom of 2 m/s^2 and 4 s, almost constant speed; water at 23 s, left from 26 s, right from 27 s on (C63)."""
+    """Slalom of 2 m/s² and 4 s, almost constant speed; water at 23 s, left from 26 s, right from 27 s on (C63)."""
     v = 112 * KMH
     steering = Steering(slalom_angle(SUV_REAR, WORN, v, 2.0), 4.0, 2.0)
     lanes = (

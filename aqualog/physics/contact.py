@@ -1,4 +1,4 @@
-"""The remaining dry contact of a tyre on water, and what it leaves of friction, stiffness and symmetry.
+"""The remaining dry contact of a tyre on water, and its effect on friction, stiffness and load symmetry.
 
 L = (a + b) / 2a is the share of the contact length that still touches the road, with the half length a and the front
 edge b of the dry contact (Fig. 2.1 of [fichtinger2024]; E1: a is HALF the length). L = 1 on dry road, 0 at full

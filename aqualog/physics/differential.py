@@ -85,7 +85,7 @@ def differential_traction(mu_i: FloatArray, mu_j: FloatArray, *, rho: FloatArray
     Returns
     -------
     mu_delta : array (n,)
-        Zero where both axles slip alike: there nothing can be told about the slope (C95). [-]
+        Zero where both axles slip alike: there the slope cannot be determined (C95). [-]
 
     Thesis [fichtinger2024]: the bracket of Eq. (3.18), (3.19).
     """

@@ -24,7 +24,7 @@ def kinematic_steer_angle(yaw_rate: FloatArray, v_x: FloatArray, *, wheelbase: f
     Returns
     -------
     delta : array (n,)
-        atan(l psi_dot / v_x), left positive, within +-0.7. [rad]
+        atan(l psi_dot / v_x), left positive, within ±0.7. [rad]
 
     Source: derived; axes of ISO 8855 [iso2011].
     """

@@ -10,7 +10,7 @@ __all__ = ["front_axle_lateral_force", "outward", "split_by_load", "yaw_inertia"
 
 
 def yaw_inertia(*, mass: float, l_f: float, l_r: float) -> float:
-    """Yaw inertia of a car whose radius of gyration is the geometric mean of its axle distances, m l_f l_r. [kg m^2]
+    """Yaw inertia of a car whose radius of gyration is the geometric mean of its axle distances, m l_f l_r. [kg·m²]
 
     Mass [kg], axle distances from the centre of mass [m]. Passenger cars lie within about 10 % of it (K). With it a
     force at the front axle leaves the rear one alone.
@@ -28,27 +28,27 @@ def front_axle_lateral_force(
     Parameters
     ----------
     a_y : array (n,)
-        Specific force of the centre of mass, left positive; a road's bank is in it as it is in the force. [m/s^2]
+        Specific force of the centre of mass, left positive; a road's bank is in it as it is in the force. [m/s²]
     yaw_acceleration : array (n,)
-        psi_ddot, left positive. [rad/s^2]
+        psi_ddot, left positive. [rad/s²]
     mass, l_f, l_r : float
         Vehicle. [kg, m]
     inertia : float
-        I_zz, see `yaw_inertia`. [kg m^2]
+        I_zz, see `yaw_inertia`. [kg·m²]
 
     Returns
     -------
     F_y : array (n,)
         Of both wheels together, in the vehicle's frame, left positive; NaN where an input is NaN. [N]
 
-    From m a_y = F_y,f + F_y,r and I_zz psi_ddot = l_f F_y,f - l_r F_y,r. Knows nothing of the road: on water it tells
-    what the axle has done, not what its tyres could do. Left out: moments of unequal longitudinal forces left and
-    right (1 kN of difference over 1.5 m of track is 0.3 kN), F_x sin(delta) of steered driven wheels, aligning
-    moments (below 2 %). Limits: steady cornering gives the static share l_r / l of m a_y.
+    From m a_y = F_y,f + F_y,r and I_zz psi_ddot = l_f F_y,f - l_r F_y,r. The balance ignores the road: on water
+    it gives the force that the axle had, not the force that its tyres could have. Left out: moments of unequal
+    longitudinal forces left and right (1 kN of difference over 1.5 m of track is 0.3 kN), F_x sin(delta) of steered
+    driven wheels, aligning moments (below 2 %). Limits: steady cornering gives the static share l_r / l of m a_y.
 
     Thesis [fichtinger2024]: section 2.4 takes lateral forces from a two-wheel model (no number). Departure: that model
-    would take them from steering and side-slip angles and cornering stiffness; here the balance of forces tells them,
-    so that no stiffness need be known. Lost lateral force shows in the acceleration then, not in the residual.
+    would need steering and side-slip angles and cornering stiffness; the balance of forces needs no stiffness. A loss
+    of lateral force then shows in the acceleration, not in the residual.
     """
     wheelbase = l_f + l_r
     return (mass * l_r * a_y + inertia * yaw_acceleration) / wheelbase

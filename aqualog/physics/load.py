@@ -42,7 +42,7 @@ def wheel_loads(
     ----------
     a_x, a_y : array (n,)
         Specific force, forward and left (what an accelerometer shows: a grade shifts load as acceleration does).
-        [m/s^2]
+        [m/s²]
     mass, l_f, l_r, h_cg, track : float
         Vehicle. [kg, m]
 
@@ -62,14 +62,14 @@ def wheel_loads(
 
 
 def centre_shift(mass: float, l_f: float, delta_mass: float, x: float) -> float:
-    """By how much the centre of mass moves rearwards when a mass is added. [m]
+    """Return how far the centre of mass moves rearwards when a mass is added. [m]
 
     Parameters
     ----------
     mass, l_f : float
         Of the car before: mass [kg] and distance of its centre from the front axle [m].
     delta_mass, x : float
-        What is added [kg], and where, from the front axle rearwards [m].
+        The added mass [kg], and its place, from the front axle rearwards [m].
 
     Source: derived.
     """

@@ -78,15 +78,15 @@ def nominal_acceleration(
     Parameters
     ----------
     torque : array (4, n)
-        Net wheel torques, drive minus brake. [N m]
+        Net wheel torques, drive minus brake. [N·m]
     F_z : array (4, n)
         Wheel loads. [N]
     v_x : array (n,)
         Velocity. [m/s]
     omega_dot : array (4, n)
-        Angular accelerations of the wheels; zeros give the equation as printed. [rad/s^2]
+        Angular accelerations of the wheels; zeros give the equation as printed. [rad/s²]
     r_l, inertia : array (4,)
-        Loaded radii [m], wheel inertias [kg m^2].
+        Loaded radii [m], wheel inertias [kg·m²].
     mass, r_w, drag_area, air_density : float
         Vehicle. [kg, -, m^2, kg/m^3]
 
@@ -94,10 +94,10 @@ def nominal_acceleration(
     -------
     a_nom : array (n,)
         Forward positive. A grade is absent on purpose: it is absent from the accelerometer's specific force too, so
-        that it cancels in the difference (E2). [m/s^2]
+        that it cancels in the difference (E2). [m/s²]
 
     Thesis [fichtinger2024]: Eq. (2.10), with the part of the torque that spins the wheels taken off (E5): without it a
-    wheel that spins up by 100 rad/s^2 looks like 0.23 m/s^2 of resistance.
+    wheel that spins up by 100 rad/s² looks like 0.23 m/s² of resistance.
 
     The lever of the torque is r_l as printed. With r_e it would agree with rolling resistance and power (E24).
     """

@@ -54,7 +54,7 @@ def aligning_moment(
     Returns
     -------
     M_z : array
-        Turning left positive: a force to the left behind the centre turns the wheel to the right. [N m]
+        Turning left positive: a force to the left behind the centre turns the wheel to the right. [N·m]
 
     The sticking bristles' forces grow linearly from the front edge b of the dry contact to where they begin to slide:
     they act at two thirds of that stretch. The sliding ones follow the rest of the parabola. Limits: small slip on a
@@ -90,7 +90,7 @@ def kingpin_moment(
     r_l: float,
     geometry: SteeringGeometry = STEERING,
 ) -> FloatArray:
-    """Moment of all that acts on a front wheel about its kingpin.
+    """Moment of all forces on a front wheel about its kingpin.
 
     Parameters
     ----------
@@ -99,24 +99,24 @@ def kingpin_moment(
         centre, forward positive. [N]
     F_y_outward, M_z_outward : array
         Lateral force away from the centre line, and `aligning_moment` that turns the wheel's front there (left wheel:
-        M_z, right wheel: -M_z). [N], [N m]
+        M_z, right wheel: -M_z). [N], [N·m]
     F_z : array
         Wheel load. [N]
     braking : array
-        Brake torque, which the carrier takes up, >= 0. [N m]
+        Brake torque, which the carrier takes up, >= 0. [N·m]
     r_l : float
         Loaded radius. [m]
 
     Returns
     -------
     M : array
-        Turning the wheel's front outward positive. [N m]
+        Turning the wheel's front outward positive. [N·m]
 
-    A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, on the hub offset,
-    backward forces turn it outward. Brakes make that lever the scrub radius, hub_offset - r_l sin(inclination). A load
-    that the wedge carries ahead of the centre is a moment about the wheel's axis, which the bearings do not hand on: it
-    slows the wheel down and comes back as longitudinal force. Small angles; no steer angle, no inertia of the wheel
-    about the kingpin, no friction, no toe.
+    A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, with the hub offset as
+    its lever, and backward forces turn it outward. Under braking the lever is the scrub radius,
+    hub_offset - r_l sin(inclination). A load that the wedge carries ahead of the centre is a moment about the wheel's
+    axis. The bearings do not pass it on: it slows the wheel down and comes back as longitudinal force. Small angles; no
+    steer angle, no inertia of the wheel about the kingpin, no friction, no toe.
 
     Thesis [fichtinger2024]: section 2.4 measures what comes of it (C61-C63); geometry D.
     """
@@ -137,7 +137,7 @@ def steering_torque(rod_left: FloatArray, rod_right: FloatArray, *, ratio: float
 
     Tie-rod forces in N, compression positive, rods behind the axle; `ratio` in m. Left positive: in a left turn the
     outer, right rod is pressed and the left one pulled, and the steering is held to the left. What both front wheels
-    show alike cancels. [N m]
+    show alike cancels. [N·m]
 
     Source: derived.
     """

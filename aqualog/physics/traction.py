@@ -21,13 +21,13 @@ def traction_coefficient(
     Parameters
     ----------
     torque : array (n,)
-        Net wheel torque, drive minus brake. [N m]
+        Net wheel torque, drive minus brake. [N·m]
     F_z : array (n,)
         Wheel load. [N]
     omega_dot : array (n,)
-        Angular acceleration. [rad/s^2]
+        Angular acceleration. [rad/s²]
     r_l, inertia, r_w : float
-        Loaded radius [m], wheel inertia [kg m^2], rolling resistance coefficient [-].
+        Loaded radius [m], wheel inertia [kg·m²], rolling resistance coefficient [-].
 
     Returns
     -------
@@ -52,7 +52,7 @@ def residual_traction(mu: FloatArray, delta_a_x: FloatArray, F_z: FloatArray, *,
     mu : array (n,)
         Traction coefficient from torque, as `traction_coefficient` gives it. [-]
     delta_a_x : array (n,)
-        Resistance measure of the vehicle (thesis 2.9), low-passed. [m/s^2]
+        Resistance measure of the vehicle (thesis 2.9), low-passed. [m/s²]
     F_z : array (n,)
         Load of the wheel. [N]
     mass : float
@@ -94,9 +94,9 @@ def traction_of_one_axle(
     Parameters
     ----------
     a_x : array (n,)
-        Specific force, forward: what an accelerometer shows. [m/s^2]
+        Specific force, forward: what an accelerometer shows. [m/s²]
     a_kin : array (n,)
-        Kinematic acceleration, for the inertia of the free wheels. [m/s^2]
+        Kinematic acceleration, for the inertia of the free wheels. [m/s²]
     v_x : array (n,)
         Velocity. [m/s]
     F_z, F_z_free : array (2, n)

@@ -118,7 +118,7 @@ def test_all_wheel_drive_without_velocity(folder):
 @pytest.mark.parametrize(
     ("log", "options", "code", "text"),
     [
-        ("even.csv", (), 4, "cannot tell"),
+        ("even.csv", (), 4, "cannot estimate the slip slope"),
         ("no_torque.csv", ("--traction", "torque"), 4, "missing torque_rl"),
         ("drive.csv", ("--method", "best"), 2, "--method"),
         ("missing.csv", (), 1, "missing.csv"),
@@ -146,7 +146,7 @@ def test_delay_of_the_velocity_is_told(folder):
     assert json.loads(given.stdout)["slip_slope"][0]["slope"] == pytest.approx(C, rel=0.05)
     refused = run(folder / "one_speed.csv", "--vehicle", folder / "awd.toml")
     assert refused.returncode == 4
-    assert "delay of v_x cannot be told" in one_error_line(refused)
+    assert "delay of v_x cannot be distinguished" in one_error_line(refused)
 
 
 def test_no_figure_per_hour_of_a_short_session(written):

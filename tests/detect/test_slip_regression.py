@@ -358,7 +358,7 @@ def lacking(car, *, drop=(), **kw):
         (RWD, {"method": "guess"}, ConfigError, "--method"),
         (RWD, {"traction": "guess"}, ConfigError, "--traction"),
         (RWD, {"seconds": 30.0}, FitError, "too few"),
-        (RWD, {"even": True, "grade": 0.0}, FitError, "cannot tell"),
+        (RWD, {"even": True, "grade": 0.0}, FitError, "cannot estimate the slip slope"),
         (RWD, {"rate": 2.0}, SignalError, "2 Hz"),
     ],
     ids=lambda x: x if isinstance(x, str) else None,
@@ -407,7 +407,7 @@ def test_one_speed_cannot_tell_the_delay_from_the_slope(late_v, noise):
     signals = drive(AWD, late_v=late_v, grade=0.0, noise=noise)
     with pytest.raises(FitError) as caught:
         slip_slopes(signals, AWD)
-    assert "a delay of v_x cannot be told from the slope" in caught.value.line()
+    assert "a delay of v_x cannot be distinguished from the slope" in caught.value.line()
     assert "different speeds" in caught.value.hint
     assert "--delay" in caught.value.hint
     found = slip_slopes(signals, AWD, delay=late_v)

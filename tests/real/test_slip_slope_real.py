@@ -89,7 +89,7 @@ def test_toyota_on_a_highway_cannot_tell(real_logs):
     assert code == 4
     assert out == ""
     assert len(errors) == 1
-    assert "cannot tell the slip slope" in errors[0]
+    assert "cannot estimate the slip slope" in errors[0]
     assert "holds 0" in errors[0]
 
 

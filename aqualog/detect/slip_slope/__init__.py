@@ -1,1 +1,1 @@
-"""Slip slope of the tyres: estimated, watched for changes, compared with what it is on dry road (thesis chapter 3)."""
+"""Slip slope of the tyres: estimate, watch for changes, compare with the slope on dry road (thesis chapter 3)."""

@@ -1,4 +1,4 @@
-"""When the slip slope may be estimated at all: driving that a linear tyre on both axles describes."""
+"""Decide when the slip slope may be estimated: in driving that a linear tyre on both axles describes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ACTIVE, MISSING, SLOW, CORNERING, HARD, BRAKING, SPINNING, JUMPING = range(len(R
 class Limits(NamedTuple):
     """Bounds of the driving state; those of differential slip and traction are in the tuning of the estimator.
 
-    Thesis 3.2 names the criteria, not their values.
+    Thesis 3.2 names the criteria without values.
     """
 
     v_min: float = 8.0  # [m/s] below, a tooth of the pick-up is as much as the slip
@@ -45,18 +45,18 @@ def inactive_reason(
     mu_rate: FloatArray | None = None,
     limits: Limits = LIMITS,
 ) -> FloatArray:
-    """Index into `REASONS` for every sample; 0 where the slope may be estimated.
+    """Return an index into `REASONS` for every sample; 0 where the slope may be estimated.
 
     Parameters
     ----------
     v_x : array (n,)
         Velocity. [m/s]
     a_x, a_y : array (n,)
-        Accelerations of the body, low-passed. [m/s^2]
+        Accelerations of the body, low-passed. [m/s²]
     yaw_rate : array (n,)
         [rad/s]
     a_w_delta : array (n,)
-        Largest wheel acceleration difference of the wheels that are compared, absolute. [m/s^2]
+        Largest wheel acceleration difference of the wheels that are compared, absolute. [m/s²]
     is_braking : bool array (n,)
         A braking force acts on one of them.
     mu_rate : array (n,), optional
@@ -65,12 +65,12 @@ def inactive_reason(
     Returns
     -------
     reason : array (n,)
-        NaN in velocity means missing; a yaw rate or acceleration that is missing does not stop anything.
+        NaN in velocity means missing; a missing yaw rate or acceleration does not stop the estimate.
     """
     reason = np.zeros(v_x.size)
     jumps = np.zeros(v_x.size) if mu_rate is None else mu_rate
     with np.errstate(invalid="ignore"):
-        # the last one that holds is the one that is told
+        # of several reasons the last one is reported
         for code, bits in (
             (JUMPING, jumps > limits.mu_rate_max),
             (SPINNING, a_w_delta > limits.a_w_delta_max),

@@ -1,4 +1,4 @@
-"""Slip slope of the driven wheels of one drive by regression: samples chosen, lines fitted, parts compared."""
+"""Estimate the slip slope of the driven wheels of one drive by regression: choose samples, fit lines, compare parts."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def slip_slopes(
     mu_max: float = MU_MAX,
     delay: float | None = None,
 ) -> DirectResult:
-    """Slip slope C_s / F_z of every driven wheel.
+    """Estimate the slip slope C_s / F_z of every driven wheel.
 
     Parameters
     ----------
@@ -78,17 +78,17 @@ def slip_slopes(
     mu_max : float
         Largest traction coefficient used. [-]
     delay : float, optional
-        By which v_x is late against the wheels, where it is known; else it is estimated with the slope. [s]
+        Delay of v_x against the wheels, if known; else it is estimated with the slope. [s]
 
     Raises
     ------
     ConfigError, SignalError
         As `ways.choose_way`.
     FitError
-        If no wheel's slope can be told, with the reason.
+        If no wheel's slope can be estimated, with the reason.
 
-    Thesis: the direct approach of section 2.3 and reference [15] with Eq. (3.14); all-wheel drive without a reference
-    velocity: section 3.2, the recursive estimate alone. It asks there to take delays of the reference into account.
+    Thesis: the direct approach of section 2.3 and reference [15] with Eq. (3.14). All-wheel drive without a reference
+    velocity: section 3.2, the recursive estimate alone; the section asks to take delays of the reference into account.
     """
     where = ", ".join(signals.files)
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
@@ -194,7 +194,7 @@ def _estimate(
         shift += rest
     is_astray = s.late is not None and (abs(rest) >= DELAY_STEP or abs(shift) > DELAY_MAX)
     if is_astray and line.told:
-        # the first round says why, if it could not tell the delay
+        # the first round gives the reason, if it could not separate the delay
         line = replace(line, reason=doubt[0], hint=doubt[1])
     slip, y, late = s.slip, s.y, s.late
     if late is not None and reference is not None:
@@ -252,7 +252,7 @@ def _samples(
 
 
 def _line(s: _Samples, width: int) -> tuple[Line, float]:
-    """The line, and the noise of the traction that it takes into account."""
+    """Return the line, and the noise of the traction that it takes into account."""
     # a delay goes into this k and into the fast changes of the slip alike, so the noise does not depend on it
     first = fit_line(s.x, s.y, s.label)
     noise = noise_of_traction(s.mu, s.slip, s.reason == 0, apart=width, k=first.k)
@@ -260,7 +260,7 @@ def _line(s: _Samples, width: int) -> tuple[Line, float]:
 
 
 def _goes_on(line: Line, shift: float) -> bool:
-    """Whether the velocity is to be moved by the delay found: v(t - tau) is linear in tau for small tau only."""
+    """Return whether to move the velocity by the delay found: v(t - tau) is linear in tau for small tau only."""
     low, high = line.delay_ci
     if not (math.isfinite(line.delay) and high - low < DELAY_MAX) or abs(line.delay) < DELAY_STEP:
         return False
@@ -270,10 +270,10 @@ def _goes_on(line: Line, shift: float) -> bool:
 def _recursion(
     place: Place, line: Line, mu: FloatArray, slip: FloatArray, is_used: BoolArray, vehicle: Vehicle, dt: float
 ) -> Recursion:
-    """The recursive estimator over the samples of the regression, told of the noise that this drive has.
+    """Run the recursive estimator over the samples of the regression, with the noise of this drive.
 
-    The tuning's density of the slip's noise is of good wheel speeds; coarser ones (0.1 km/h at 10 Hz have ten times as
-    much) would be taken for changes of the road.
+    The tuning's noise density of the slip holds for good wheel speeds. Coarser ones (0.1 km/h at 10 Hz have ten times
+    as much) would look like changes of the road.
     """
     tuning = TUNING
     if line.told:
@@ -289,7 +289,7 @@ def _recursion(
 def _watched(
     watch: SlipSlopeWatch, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], dt: float
 ) -> Recursion:
-    """Both axles driven: the estimator as the detector has it."""
+    """Run the estimator for a car with two driven axles, as the detector does."""
     return _course(watch.push(f, braking, f["yaw_rate_slow"]).estimate, watch.pair.place, watch.pair.wheel, dt)
 
 
@@ -298,7 +298,7 @@ def _course(estimate: Estimate, place: str, wheel: str | None, dt: float) -> Rec
     learns = estimate.status == estimator.ESTIMATING
     last = int(np.flatnonzero(works)[-1]) if learns.any() else -1
     if last >= 0 and not 1.01 * K_MIN < 1.0 / estimate.slope[last] < 0.99 * K_MAX:
-        last = -1  # it stands at its bound: that is no tyre
+        last = -1  # it stands at its bound: no tyre is like that
     return Recursion(
         place=place,
         wheel=wheel,

@@ -1,4 +1,4 @@
-"""What goes into the regression of slip on traction: both of them without delay, and which samples are left out."""
+"""Prepare the regression of slip on traction: both without delay, and which samples are left out."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Place(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """A reference velocity, and what its delay would add to the slip: the third column of the regression."""
+    """A reference velocity, and the slip that its delay would add: the third column of the regression."""
 
     v_x: FloatArray
     a_over_v: FloatArray  # [1/s]
@@ -69,7 +69,7 @@ class Reference(NamedTuple):
 def torque_traction(
     f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, width: int
 ) -> dict[str, FloatArray]:
-    """As in the features, but without their filters' delays: those are not to be taken for one of v_x."""
+    """Return signals as in the features, but without their filters' delays, which would look like a delay of v_x."""
     a_x = columns["a_x"] if "a_x" in columns else f["a_kin_slow"]
     loads = wheel_loads(
         smoothed(a_x, width), f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
@@ -86,7 +86,7 @@ def torque_traction(
 
 
 def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle: Vehicle) -> dict[str, FloatArray]:
-    """Traction of the driven wheels from the accelerometer; see `physics.traction.traction_of_one_axle`."""
+    """Return the traction of the driven wheels by the accelerometer; see `physics.traction.traction_of_one_axle`."""
     loads = wheel_loads(
         a_x, f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg, track=vehicle.track
     )
@@ -104,7 +104,7 @@ def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle
 def braking_of_wheels(
     f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float
 ) -> dict[str, BoolArray]:
-    """Where a braking force acts on each wheel."""
+    """Flag where a braking force acts on each wheel."""
     weight = 0.25 * vehicle.mass * G
     found = {}
     for w in WHEELS:
@@ -115,9 +115,9 @@ def braking_of_wheels(
 
 
 def smoothed(x: FloatArray, width: int) -> FloatArray:
-    """Centred mean; NaN where one of its samples is. No delay: slip and traction stay together.
+    """Return the centred mean; NaN where one of its samples is NaN. No delay: slip and traction stay together.
 
-    Each mean is of its own samples alone, so that a piece of a drive has the very means of the whole.
+    Each mean uses its own samples alone, so that a piece of a drive gives the same means as the whole.
     """
     if x.size < width:
         return np.full_like(x, np.nan)
@@ -130,7 +130,7 @@ def smoothed(x: FloatArray, width: int) -> FloatArray:
 
 
 def _sums(x: FloatArray, width: int) -> FloatArray:
-    """Of `width` neighbours each; (n - width + 1,). Put together of sums of 1, 2, 4 ... neighbours."""
+    """Sum `width` neighbours each; (n - width + 1,). Built of sums of 1, 2, 4 ... neighbours."""
     rows = x.size - width + 1
     total = np.zeros(rows)
     of, length, done = x, 1, 0
@@ -144,7 +144,7 @@ def _sums(x: FloatArray, width: int) -> FloatArray:
 
 
 def _near(bad: BoolArray, width: int) -> BoolArray:
-    """Where one of the samples of a centred mean is bad."""
+    """Flag where one of the samples of a centred mean is bad."""
     half = width // 2
     near: BoolArray = _sums(np.pad(bad.astype(np.float64), half), 2 * half + 1) > 0.5
     return near
@@ -153,9 +153,9 @@ def _near(bad: BoolArray, width: int) -> BoolArray:
 def reference_of(
     v_x: FloatArray, f: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, delay: float | None
 ) -> Reference:
-    """The velocity, and what its delay would add: the acceleration of the driven wheels over their speed.
+    """Return the velocity, and what its delay would add: the acceleration of the driven wheels over their speed.
 
-    The noise of the acceleration is half of what left and right wheels differ by.
+    The noise of the acceleration is half of the difference between left and right wheels.
     """
     axles = [(w, v) for w, v in AXLES.items() if v[0] in vehicle.driven]
     v = np.mean([mean_of(f, "v_line", wheels) for _, wheels in axles], axis=0)
@@ -169,7 +169,7 @@ def reference_of(
 
 
 def earlier(v_x: FloatArray, delay: float, dt: float) -> FloatArray:
-    """A velocity that is late, put where it belongs."""
+    """Shift a late velocity back."""
     if delay == 0.0:
         return v_x
     k = np.arange(v_x.size, dtype=np.float64)
@@ -178,13 +178,13 @@ def earlier(v_x: FloatArray, delay: float, dt: float) -> FloatArray:
 
 
 def mean_of(f: Mapping[str, FloatArray], stem: str, wheels: Sequence[str]) -> FloatArray:
-    """Mean of a feature over wheels."""
+    """Average a feature over wheels."""
     mean: FloatArray = np.mean([f[f"{stem}_{w}"] for w in wheels], axis=0)
     return mean
 
 
 def slip_of(place: Place, f: Mapping[str, FloatArray], v_x: FloatArray | None, vehicle: Vehicle) -> FloatArray:
-    """Slip against the velocity (3.13), or without one against the free wheels (3.16)."""
+    """Return the slip against the velocity (3.13), or without one against the free wheels (3.16)."""
     v_i = mean_of(f, "v_line", place.i)
     if v_x is None:
         return differential_slip(v_i, mean_of(f, "v_line", place.j))
@@ -203,7 +203,7 @@ def left_out(
     mu_max: float,
     positive_only: bool,
 ) -> FloatArray:
-    """0 where a sample is used, else 1 + index into `LEFT_OUT`."""
+    """Return 0 where a sample is used, else 1 + index into `LEFT_OUT`."""
     wheels = (*place.i, *place.j)
     reason = activation.inactive_reason(
         v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"],
@@ -217,7 +217,7 @@ def left_out(
         level = float(np.nanmedian(slip[reason == 0])) if np.isfinite(slip[reason == 0]).any() else 0.0
         reason[(reason == 0) & (np.abs(slip - level) > S_MAX)] = activation.SPINNING
     reason[(reason == 0) & np.isnan(mu + slip)] = activation.MISSING
-    # what goes into a mean must all be usable driving; the traction limit is that of the mean itself
+    # all samples of a mean must be usable driving; the traction limit is that of the mean itself
     bad = (reason > 0) & (reason <= activation.SPINNING)
     reason[(reason == 0) & _near(bad, width)] = 1 + LEFT_OUT.index(BESIDE)
     return reason

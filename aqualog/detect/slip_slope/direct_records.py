@@ -17,8 +17,8 @@ __all__ = ["DirectResult", "PlaceSlope", "Recursion"]
 class Recursion:
     """The recursive estimator at one place.
 
-    `slope` with its standard deviation `slope_sd` at the end (NaN where it never worked), `alarms` of its change
-    detection, `seconds` in which it learnt the slope; `t`, `slopes` (n,) its course, NaN where it rests.
+    `slope` with its standard deviation `slope_sd` at the end (NaN where it never worked); `alarms` of its change
+    detection; `seconds` in which the slope was updated; `t`, `slopes` (n,) its course, NaN where it rests.
     """
 
     place: str
@@ -35,9 +35,9 @@ class Recursion:
 class PlaceSlope:
     """Slip slope at one place: a driven wheel, or the driven axle.
 
-    `seconds` used; `mu_range` 5 and 95 % of the traction used [-]; `lag_s` by how much the slip is late against the
-    traction (NaN where the data do not tell); `left_out` seconds by reason; `t`, `mu`, `slip` (n,) the used samples, a
-    delay of the reference velocity (`line.delay`) taken out.
+    `seconds` used; `mu_range` 5 and 95 % of the traction used [-]; `lag_s` delay of the slip against the traction (NaN
+    where it cannot be determined); `left_out` seconds by reason; `t`, `mu`, `slip` (n,) the used samples, corrected by
+    a delay of the reference velocity (`line.delay`).
     """
 
     place: str
@@ -57,9 +57,9 @@ class PlaceSlope:
 
 @dataclass(frozen=True, slots=True)
 class DirectResult:
-    """What `slip_slopes` found in one drive.
+    """Result of `slip_slopes` for one drive.
 
-    With the method `differential` there are no `places`, only `recursions`; else those of the places are meant.
+    The method `differential` gives no `places`, only `recursions`; else the recursions are those of the places.
     """
 
     vehicle_name: str

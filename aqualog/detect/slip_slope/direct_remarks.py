@@ -1,4 +1,4 @@
-"""What is said about slip slopes that were told by regression, and the refusal where none was."""
+"""Remarks on slip slopes by regression, and the refusal where no slope could be estimated."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OFFSET_NOTED = 0.03  # [-] tyres of one size and different wear differ by less
 
 
 def refuse(places: Sequence[PlaceSlope], recursions: Sequence[Recursion], where: str, duration: float) -> None:
-    """Stop with one line if nothing can be told."""
+    """Stop with one line if no slope can be estimated."""
     if any(p.line.told for p in places):
         return
     if not places:
@@ -42,11 +42,11 @@ def refuse(places: Sequence[PlaceSlope], recursions: Sequence[Recursion], where:
     text = f"{best.seconds:.1f} s of {duration:.0f} s can be used" + (f" (left out: {out})" if out else "")
     if math.isfinite(low) and not best.line.reason.startswith("too few"):
         text += f", traction {low:.3f} to {high:.3f} there"
-    raise FitError(f"cannot tell the slip slope: {best.line.reason}; {text}", where=where, hint=best.line.hint)
+    raise FitError(f"cannot estimate the slip slope: {best.line.reason}; {text}", where=where, hint=best.line.hint)
 
 
 def notes_on(places: Sequence[PlaceSlope], vehicle: Vehicle, way: Way, *, has_brake: bool) -> list[str]:
-    """Sentences on what the slopes rest on, and what does not fit."""
+    """Return sentences on what the slopes rest on, and what does not fit."""
     notes = []
     if way.traction == "accelerometer" and not has_brake:
         notes.append("no brake_pressure: braking and engine drag look alike, so only driving (mu > 0) is used")
@@ -59,12 +59,12 @@ def notes_on(places: Sequence[PlaceSlope], vehicle: Vehicle, way: Way, *, has_br
     corrected = [p for p in places if p.line.is_corrected]
     if corrected:
         shares = ", ".join(f"{p.place} {100 * p.line.attenuation:.1f} %" for p in corrected)
-        notes.append(f"noise of the traction takes away from 1 / slope, given back: {shares}")
+        notes.append(f"noise of the traction lowers 1 / slope, which is corrected: {shares}")
     late = [p for p in places if abs(p.lag_s) > LAG_NOTED]
     if late:
         shares = ", ".join(f"{p.place} {p.lag_s:+.2f} s" for p in late)
         notes.append(
-            f"the slip follows the traction best when it is taken as late by {shares}: check the clocks of wheels and "
+            f"the slip follows the traction best with a delay of {shares}: check the clocks of wheels and "
             "traction (`aqualog align`, [sources] offset_s in the map)"
         )
     notes += _notes_on_reference(places)
@@ -84,7 +84,7 @@ def _notes_on_reference(places: Sequence[PlaceSlope]) -> list[str]:
     delayed = [p for p in places if p.line.told and _is_noted(p.line)]
     if delayed:
         shares = ", ".join(f"{p.place} {p.line.delay:+.3f} s" for p in delayed)
-        notes.append(f"v_x is late against the wheels, taken out: {shares}")
+        notes.append(f"v_x is late against the wheels, which is corrected: {shares}")
     wide = [p.place for p in places if p.line.told and p.line.shared > SHARED_NOTED]
     if wide:
         notes.append(

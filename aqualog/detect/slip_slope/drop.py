@@ -1,4 +1,4 @@
-"""Criterion 4: the slope against its history, on a driven, calm wheel."""
+"""Criterion 4: compare the slope with its history, on a driven, calm wheel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DropParams(NamedTuple):
 
     @staticmethod
     def make(dt: float, rule: Rule, loss: float = DEFAULT.slip_slope_drop) -> DropParams:
-        """Half of the reference (thesis: C68); back above 0.6 of it, so that the detection does not flicker there."""
+        """Return half of the reference (thesis: C68); back above 0.6 of it, so that the detection does not flicker."""
         left = 1.0 - loss
         back = min(1.2 * left, 0.5 * (1.0 + left))
         return DropParams(left, back, 0.2, round(5.0 / dt), round(2.0 / dt), 30.0, 5.0, rule == "max", dt)
@@ -52,7 +52,7 @@ class DropState(NamedTuple):
 
 
 def initial_state(periods: tuple[Period, ...], *, rule: Rule, fallback: float = math.nan) -> DropState:
-    """Before the first sample; `fallback` is the reference without a history (from the vehicle file), or NaN."""
+    """Return the state before the first sample; `fallback`: reference without a history (vehicle file), or NaN."""
     kept = np.zeros((KEPT_PERIODS, 3))
     count = min(len(periods), KEPT_PERIODS)
     for i, p in enumerate(periods[-KEPT_PERIODS:]):
@@ -62,7 +62,7 @@ def initial_state(periods: tuple[Period, ...], *, rule: Rule, fallback: float = 
 
 
 def completed(state: DropState) -> tuple[Period, ...]:
-    """Periods that this drive added, the newest of them; a last one of 5 s or more counts."""
+    """Return the newest periods that this drive added; a last one of 5 s or more counts."""
     new = min(state.new, state.n_kept)
     periods = [
         Period(float(row[0]), float(row[1]), float(row[2])) for row in state.kept[state.n_kept - new : state.n_kept]
@@ -74,7 +74,7 @@ def completed(state: DropState) -> tuple[Period, ...]:
 
 @compiled
 def _reference(kept, count, is_max):  # type: ignore[no-untyped-def]
-    """As `history.reference`. Loops: numba's quantile and maximum bring a good part of numba along when loaded."""
+    """Return what `history.reference` does. Loops: numba's quantile and maximum load a good part of numba."""
     ordered = np.empty(count)
     for i in range(count):
         x, j = kept[i, 0 if is_max else 1], i
@@ -98,7 +98,7 @@ def _scan(p, s, slope, slope_sd, is_valid, alarm, rel, bits, refs):  # type: ign
         settling = p.settle if alarm[i] != 0.0 else max(settling - 1, 0)
         rel[i] = math.nan
         if alarm[i] < 0.0:
-            active = False  # the slope has risen; if it is still low, the next valid estimate says so
+            active = False  # the slope has risen; if it is still low, the next valid estimate shows it
         if is_valid[i] and slope_sd[i] < p.sd_max * slope[i]:
             share = slope[i] / reference  # NaN without a reference: never a drop
             rel[i] = 1.0 - share
@@ -132,7 +132,7 @@ def _scan(p, s, slope, slope_sd, is_valid, alarm, rel, bits, refs):  # type: ign
 def scan(
     p: DropParams, state: DropState, slope: FloatArray, slope_sd: FloatArray, is_valid: BoolArray, alarm: FloatArray
 ) -> tuple[FloatArray, BoolArray, FloatArray, DropState]:
-    """Compare the slope with its history and learn the history on the way.
+    """Compare the slope with its history, and update the history with it.
 
     Parameters
     ----------
@@ -144,19 +144,19 @@ def scan(
     is_valid : bool array (n,)
         The tyre is driven, its wheel calm, and the estimate is of this moment.
     alarm : array (n,)
-        Alarms of the change detection; for 5 s after one the estimate settles and teaches nothing.
+        Alarms of the change detection; for 5 s after one the estimate settles and stays out of the history.
 
     Returns
     -------
     loss : array (n,)
         1 - C / C_ref; NaN where not valid or without a reference. [-]
     active : bool array (n,)
-        From a loss above 0.5 until it is below 0.4, a rise of the slope is found, or 2 s after the last valid estimate.
+        From a loss above 0.5 until it is below 0.4, the slope rises, or 2 s after the last valid estimate.
     reference : array (n,)
-        Dry slope that was compared with; NaN before there is one. [-]
+        Dry slope that was compared with; NaN without one. [-]
     state : DropState
 
-    What has dropped does not go into the history, so a long snow drive after a dry one stays detected.
+    A slope that has dropped does not enter the history, so a long snow drive after a dry one stays detected.
     Thesis: criterion 4 of section 2.5 (C68), history of 2.3 (C56).
     """
     loss, refs = np.empty_like(slope), np.empty_like(slope)

@@ -40,7 +40,7 @@ def predict(b, q_k, q_beta, q_delta):  # type: ignore[no-untyped-def]
 
 @compiled
 def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta, learn_delta):  # type: ignore[no-untyped-def]
-    """Take one differential slip into the belief.
+    """Update the belief with one differential slip.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ __all__ = ["STATUS", "Estimate", "State", "initial_state", "scan"]
 
 STATUS = {
     0: "estimating",
-    1: "slope frozen: the traction is too even to tell slope from offset",
+    1: "slope frozen: the traction is too even to distinguish slope from offset",
     2: "blind: both axles slip alike",
     3: "differential traction too large",
     4: "a wheel spins",
@@ -36,7 +36,7 @@ K_USUAL = 1.0 / 33.0
 
 
 class Before(NamedTuple):
-    """Inverse slope, offset and its variance when a sum last was zero: before the change that it tells of began."""
+    """Inverse slope, offset and its variance when a sum was last zero: before the change that it shows began."""
 
     k: float
     delta: float
@@ -44,7 +44,7 @@ class Before(NamedTuple):
 
 
 class State(NamedTuple):
-    """Everything that is carried from sample to sample."""
+    """The state from sample to sample."""
 
     belief: Belief
     window: Window
@@ -60,10 +60,10 @@ class State(NamedTuple):
 class Estimate:
     """Estimates of a drive or a piece of one, arrays (n,).
 
-    `slope` = C_s / F_z of axle i, `slope_sd` its standard deviation by the filter; `beta` and `offset` as in `Belief`;
-    `innovation` and `innovation_sd` (NaN where not updated); `g_drop`, `g_rise` the two sums [s]; `alarm` 1 at the
-    sample at which a drop of the slope was found, -1 at a rise, else 0; `status` a key of `STATUS`; `beta_told` whether
-    the window tells the ratio.
+    `slope` = C_s / F_z of axle i, `slope_sd` its standard deviation by the filter; `beta` and `offset` as in `Belief`.
+    `innovation` and `innovation_sd` (NaN where not updated); `g_drop`, `g_rise` the two sums [s]. `alarm`: 1 at the
+    sample at which a drop of the slope was found, -1 at a rise, else 0. `status`: a key of `STATUS`. `beta_told`:
+    whether the window identifies the ratio.
     """
 
     slope: FloatArray
@@ -80,7 +80,7 @@ class Estimate:
 
 
 def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
-    """Before the first sample: slope and ratio from the vehicle file, the offset unknown."""
+    """Return the state before the first sample: slope and ratio from the vehicle file, the offset unknown."""
     k = 1.0 / slope
     # the prior is relative to the usual slope, so that a soft or a stiff tyre starts as well known
     sd_k = tuning.sd_k * k / K_USUAL
@@ -96,10 +96,10 @@ def _is_at_bound(k):  # type: ignore[no-untyped-def]
 
 @compiled
 def _bounded(b, learn_delta):  # type: ignore[no-untyped-def]
-    """The belief with slope and ratio inside their bounds.
+    """Return the belief with slope and ratio inside their bounds.
 
-    The offset goes along as it is correlated with the slope: held at its bound alone, the slope would leave an error
-    that pushes the offset further with every sample.
+    The offset moves by its correlation with the slope. If only the slope were held at its bound, it would leave an
+    error that pushes the offset further with every sample.
     """
     k = min(max(b.k, K_MIN), K_MAX)
     delta = b.delta + b.P_kd / b.P_kk * (k - b.k) if learn_delta and k != b.k else b.delta
@@ -110,20 +110,20 @@ def _bounded(b, learn_delta):  # type: ignore[no-untyped-def]
 
 @compiled
 def _changed(p, b, before):  # type: ignore[no-untyped-def]
-    """After an alarm: the slope is unknown again; ratio and offset are the car's.
+    """Return the belief after an alarm: the slope is unknown again; ratio and offset are the car's.
 
-    The offset is what it was before the change began to pull at it.
+    The offset returns to its value before the change.
     """
     return Belief(b.k, b.beta, before.delta, max(p.P_k_reset, b.P_kk), 0.0, 0.0, b.P_bb, 0.0, before.P_dd)
 
 
 @compiled
 def _released(p, b, calm, window):  # type: ignore[no-untyped-def]
-    """Allow that what was booked on the road is the car's: a radius may have changed at once.
+    """Allow that a change ascribed to the road is the car's: a radius may have changed at once.
 
-    A slope that no tyre has goes back to the one before, and the offset is unknown. Otherwise slope and offset become
-    uncertain together, along the line on which they predict the same slip at the traction of the last seconds: only
-    traction that varies can tell them apart (E10).
+    A slope that no tyre has returns to the one before, with an unknown offset. Otherwise slope and offset become
+    uncertain together, along the line on which they predict the same slip at the traction of the last seconds. Only
+    traction that varies can distinguish the two (E10).
     """
     if _is_at_bound(b.k):
         P_kk = (p.sd_k * calm.k / K_USUAL) ** 2
@@ -138,7 +138,7 @@ def _released(p, b, calm, window):  # type: ignore[no-untyped-def]
 
 @compiled
 def _faded(p, g):  # type: ignore[no-untyped-def]
-    """A sum where nothing can be seen: old evidence fades; less than one sample of drift is none."""
+    """Decay a sum while the estimator is blind: old evidence fades; less than one sample of drift becomes zero."""
     return g * p.fade if g > p.g_trace else 0.0
 
 
@@ -172,7 +172,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
                 )
                 b = _bounded(b, learn_delta)
                 if settling > 0:
-                    # evidence of another change is let speak first
+                    # evidence of another change is used up first
                     settling -= 1 if settling > 1 or max(g_drop, g_rise) < p.h_rest else 0
                     if settling == 0:
                         b = _released(p, b, calm, window)
@@ -246,9 +246,9 @@ def scan(
     estimate : Estimate
     state : State
 
-    Thesis: Eq. (3.20) to (3.25) with E8, E10 (what the data cannot tell is frozen), E11 (sums clamped at zero; after an
-    alarm they and what is known of the slope are reset, and the offset rests for half a minute; then slope and offset
-    are sorted out anew for 5 s, in which no change is looked for) and E12.
+    Thesis: Eq. (3.20) to (3.25) with E8, E10 (parameters that the data cannot identify are frozen), E11 and E12. E11:
+    sums are clamped at zero. An alarm resets them and the knowledge of the slope, and the offset rests for half a
+    minute. Then slope and offset are separated anew for 5 s without change detection.
     """
     out = np.empty((11, s_delta.size))
     sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)

@@ -1,4 +1,4 @@
-"""What the slip slope of this car on dry road is: finite periods per configuration, kept between drives."""
+"""Keep the dry slip slope of a car between drives: finite periods per configuration."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ SLOPES = (1.0, 300.0)  # bounds of the estimator
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """Slip slope over one finite period of valid estimates: largest, mean [-], and how long it was [s].
+    """Slip slope over one finite period of valid estimates: largest, mean [-], and its length [s].
 
-    `drive` names the drive that it is of, so that a drive that is looked at again does not count twice.
+    `drive` names its drive, so that a drive that is analysed again does not count twice.
     """
 
     largest: float
@@ -46,17 +46,17 @@ class History:
     periods: Mapping[str, Mapping[str, tuple[Period, ...]]] = field(default_factory=dict)
 
     def of(self, configuration: str, place: str) -> tuple[Period, ...]:
-        """Periods of one configuration at one place."""
+        """Return the periods of one configuration at one place."""
         return tuple(self.periods.get(configuration, {}).get(place, ()))
 
     def with_periods(self, configuration: str, place: str, new: Sequence[Period]) -> History:
-        """The history with the newest periods of a drive; the oldest ones drop out."""
+        """Return the history with the newest periods of a drive; the oldest ones drop out."""
         places = {p: tuple(v) for p, v in self.periods.get(configuration, {}).items()}
         places[place] = (*places.get(place, ()), *new)[-KEPT_PERIODS:]
         return History({**self.periods, configuration: places})
 
     def without(self, drive: str) -> History:
-        """The history as if a drive had not been looked at yet."""
+        """Return the history without a drive."""
         return History(
             {
                 configuration: {
@@ -68,13 +68,13 @@ class History:
 
 
 def reference(periods: Sequence[Period], *, rule: Rule = "robust") -> float:
-    """Dry slope that the actual one is compared with.
+    """Return the dry slope to compare the current one with.
 
     Parameters
     ----------
     periods : sequence of Period
     rule : "max" or "robust"
-        "max": the largest estimate of all periods, as the thesis has it; one estimate that was too high keeps the
+        "max": the largest estimate of all periods, as in the thesis; one estimate that was too high keeps the
         detector alarmed for the whole memory. "robust": the upper quartile of the periods' means.
 
     Returns
@@ -92,7 +92,7 @@ def reference(periods: Sequence[Period], *, rule: Rule = "robust") -> float:
 
 
 def remembered(history: History, configuration: str, slopes: Sequence[SlopeSummary], *, drive: str = "") -> History:
-    """The history with what a drive has shown at each place; what it had shown before is replaced."""
+    """Return the history with the periods of a drive at each place; earlier ones of the same drive are replaced."""
     history = history.without(drive) if drive else history
     for slope in slopes:
         if slope.periods:
@@ -101,7 +101,7 @@ def remembered(history: History, configuration: str, slopes: Sequence[SlopeSumma
 
 
 def drive_key(signals: Signals) -> str:
-    """A name of a drive by what was measured: start, length, rate and wheel speeds. 16 hexadecimal digits."""
+    """Return a name of a drive by its measurements: start, length, rate and wheel speeds. 16 hexadecimal digits."""
     digest = hashlib.sha256(repr((signals.start_ns, signals.frame.height, signals.dt_ns)).encode())
     for name in (n for n in signals.symbols if n.startswith("omega_")):
         digest.update(signals.array(name).tobytes())
@@ -123,12 +123,12 @@ def history_to_json(history: History) -> dict[str, Any]:
 
 
 def history_from_json(document: Any, *, where: str) -> History:
-    """From a JSON document.
+    """Read a history from a JSON document.
 
     Raises
     ------
     ConfigError
-        Naming the entry that is not what a history holds.
+        Names the entry that is not valid in a history.
     """
     if not isinstance(document, dict) or not isinstance(document.get("slip_slope_history"), dict):
         raise ConfigError("is no slip-slope history", where=where, expected='an object with "slip_slope_history"')

@@ -1,4 +1,4 @@
-"""What the last seconds of driving can tell: the information of a sliding window about slope and slope ratio."""
+"""Information of the last seconds of driving about slope and slope ratio, over a sliding window."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def step(w, keep, dt, mu_i, rho_mu_j):  # type: ignore[no-untyped-def]
 
 @compiled
 def aged(w, keep):  # type: ignore[no-untyped-def]
-    """The window after a sample of which nothing was seen."""
+    """Return the window after a sample without data."""
     return Window(w.seconds * keep, w.mean_i, w.mean_j, w.var_i, w.cov, w.var_j)
 
 
@@ -59,9 +59,9 @@ def _variance_of_difference(w, beta):  # type: ignore[no-untyped-def]
 
 @compiled
 def sd_slope(w, beta, r):  # type: ignore[no-untyped-def]
-    """Standard deviation with which the window alone gives 1 / C, the offset unknown.
+    """Return the standard deviation with which the window alone gives 1 / C, the offset unknown.
 
-    Infinite at a constant differential traction, where slope and offset cannot be told apart (E10). `r` is the
+    Infinite at a constant differential traction, where slope and offset cannot be distinguished (E10). `r` is the
     spectral density of the slip's noise. [s]
     """
     return math.sqrt(r / max(w.seconds * _variance_of_difference(w, beta), _TINY))
@@ -69,7 +69,7 @@ def sd_slope(w, beta, r):  # type: ignore[no-untyped-def]
 
 @compiled
 def sd_beta(w, k, beta, r):  # type: ignore[no-untyped-def]
-    """Standard deviation with which the window alone gives the slope ratio, slope and offset unknown.
+    """Return the standard deviation with which the window alone gives the slope ratio, slope and offset unknown.
 
     Infinite at a fixed torque split, where both traction coefficients go together (E10).
     """

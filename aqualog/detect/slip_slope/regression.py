@@ -1,4 +1,4 @@
-"""Slip over traction as a straight line: slope, offset, and how sure both are."""
+"""Fit slip over traction with a straight line: slope, offset, and their intervals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEAST_BLOCKS = 5
 CORRECTED_FROM = 0.01  # share of k that noise of the traction takes away, from which it is given back
 NOISE_MAX = 0.30  # beyond, the correction rests on the noise more than on the data
 SHARED_MAX = 0.95  # of the traction with a / v; beyond, its errors of some percent count five times and more
-TRACTION_MIN = 1e-3  # [-] standard deviation; a slip of 3e-5 goes with it, less than any wheel speed tells
+TRACTION_MIN = 1e-3  # [-] standard deviation; a slip of 3e-5 goes with it, less than any wheel speed resolves
 SLIP_MIN = 1e-7  # [-] standard deviation; measured speeds have more
 EXACT = 1e-12  # relative half width; rounding, not an interval
 SLOPE_RANGE = (1.0, 300.0)  # [-] of a tyre on any road, as the estimator's
@@ -39,10 +39,10 @@ _NOWHERE: Interval = (math.nan, math.nan)
 
 
 class Late(NamedTuple):
-    """What a late reference velocity adds to the slip: delay times acceleration over speed, v(t - tau) = v - a tau.
+    """The slip that a late reference velocity adds: delay times acceleration over speed, v(t - tau) = v - a tau.
 
-    `column` (n,) a / v [1/s]; `noise` (n,) its standard deviation. `half` [s]: the delay is off the slip already, known
-    to plus or minus this; NaN: the fit is to tell it.
+    `column` (n,) a / v [1/s]; `noise` (n,) its standard deviation. `half` [s]: the slip is already corrected by a delay
+    known to ± this value; NaN: the fit estimates the delay.
     """
 
     column: FloatArray
@@ -51,11 +51,11 @@ class Late(NamedTuple):
 
     @property
     def is_open(self) -> bool:
-        """Whether the fit is to tell the delay."""
+        """Return whether the fit estimates the delay."""
         return math.isnan(self.half)
 
     def part(self, which: NDArray[np.int64]) -> Late:
-        """Some of the samples."""
+        """Return some of the samples."""
         return Late(self.column[which], self.noise[which], self.half)
 
 
@@ -63,11 +63,11 @@ class Late(NamedTuple):
 class Line:
     """The line s = k mu + delta, and the slip slope C = 1 / k.
 
-    `slope` C_s / F_z [-] with its 95 % interval `slope_ci`; `k` [-] with `k_ci`; `offset` delta [-] with `offset_ci`;
-    `scatter` rms of the slip about the line [-]; `attenuation` share of k that the noise of the traction takes away,
-    given back where `is_corrected`; `blocks` of neighbouring samples that the intervals rest on. `delay` of the
-    reference velocity with `delay_ci` [s], and `shared`, how much of the variance of the traction goes with a / v [-],
-    NaN where not asked. `reason` says why there is no slope, `hint` what to try; then `slope` and `slope_ci` are NaN.
+    `slope` C_s / F_z [-] with its 95 % interval `slope_ci`; `k` [-] with `k_ci`; `offset` delta [-] with `offset_ci`.
+    `scatter` rms of the slip about the line [-]. `attenuation` share of k that the noise of the traction takes away,
+    corrected where `is_corrected`. `blocks` of neighbouring samples that the intervals rest on. `delay` of the
+    reference velocity with `delay_ci` [s]; `shared`, share of the traction's variance that goes with a / v [-]; NaN
+    unless estimated. `reason` says why there is no slope, `hint` what to try; then `slope` and `slope_ci` are NaN.
     """
 
     k: float
@@ -87,7 +87,7 @@ class Line:
 
     @property
     def told(self) -> bool:
-        """Whether there is a slope."""
+        """Return whether there is a slope."""
         return not self.reason
 
     @property
@@ -97,7 +97,7 @@ class Line:
 
     @property
     def slope_ci(self) -> Interval:
-        """95 % interval of the slope: that of k turned over, exact as long as 0 is outside (Fieller). [-]"""
+        """Return the 95 % interval of the slope: the inverse of that of k, exact if 0 is outside (Fieller). [-]"""
         return (1.0 / self.k_ci[1], 1.0 / self.k_ci[0]) if self.told else _NOWHERE
 
 
@@ -139,14 +139,14 @@ def fit_line(
     -------
     Line
         `reason` is set with fewer than 5 blocks, where traction or slip are constant, where k = 0 is in its interval,
-        where more than 30 % of the variance of `mu` is noise, where the delay cannot be told from the slope, and where
-        slope or offset are not those of a tyre.
+        where more than 30 % of the variance of `mu` is noise, where the delay cannot be distinguished from the slope,
+        and where slope or offset are not those of a tyre.
 
-    Slip is the noisy one of the two: regressing traction on it would give a slope that is too low (a published drive:
-    28.7 instead of 41.6). Noise of the traction biases k towards 0 by noise / var(mu); beyond 1 % its variance is taken
-    off the moments, which is Deming's regression with the noise of the traction known instead of a ratio. With a delay
-    to be told, only that part of the traction counts which does not go with a / v, and the noise of a / v is taken off
-    too.
+    Slip is the noisy one of the two: a regression of traction on slip would give a slope that is too low (a published
+    drive: 28.7 instead of 41.6). Noise of the traction biases k towards 0 by noise / var(mu). Beyond 1 % its variance
+    is subtracted from the moments; this is Deming's regression with the noise of the traction known instead of a ratio.
+    If the delay is estimated, only that part of the traction counts which does not go with a / v, and the noise of a /
+    v is subtracted, too.
 
     Intervals: jackknife over the blocks with Student's t; degrees of freedom count the blocks by their information.
 
@@ -174,7 +174,7 @@ def fit_line(
     if attenuation > NOISE_MAX and math.isnan(shared):
         reason, hint = f"{100 * min(attenuation, 1.0):.0f} % of the variation of the traction is noise", _EVEN
     elif not half_k > EXACT * abs(k):
-        reason, hint = "slip and traction repeat themselves exactly: nothing tells how sure the slope is", _EVEN
+        reason, hint = "slip and traction repeat themselves exactly: the slope has no measurable uncertainty", _EVEN
     elif k_ci[1] < 0.0 and attenuation <= NOISE_MAX:
         reason, hint = f"slip falls with traction (1 / slope is {k:.3f})", _TURNED
     elif attenuation > NOISE_MAX or shared > SHARED_MAX or not k_ci[0] > 0.0:
@@ -194,7 +194,7 @@ def fit_line(
 
 
 def _nothing_to_fit(blocks: int, spread: float, slip: FloatArray) -> tuple[str, str]:
-    """Reason and hint where there is no line at all; empty where there is."""
+    """Return reason and hint if no line can be fitted; else empty texts."""
     if blocks < LEAST_BLOCKS:
         return f"too few stretches of usable driving: {blocks} of at least {LEAST_BLOCKS}", _FEW
     if not spread > TRACTION_MIN**2:
@@ -208,7 +208,7 @@ def _nothing_to_fit(blocks: int, spread: float, slip: FloatArray) -> tuple[str, 
 
 
 def _alone(mu: FloatArray, late: Late, noise: float) -> tuple[float, float]:
-    """Of the traction that does not go with a / v: share that is noise; and share of the traction that does go."""
+    """Return the noise share of the traction that does not go with a / v, and the share of the traction that does."""
     u = late.column - late.column.mean()
     var_u, var_mu = float(np.mean(u * u)), float(np.var(mu))
     slope = float(np.mean(u * mu)) / var_u if var_u > 0.0 else 0.0
@@ -220,13 +220,13 @@ def _alone(mu: FloatArray, late: Late, noise: float) -> tuple[float, float]:
 def _open_slope(
     mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], k: float, k_ci: Interval, shared: float
 ) -> tuple[str, str]:
-    """Why no slope is told although there is a line: for the delay alone, or for the noise."""
+    """Return why a fitted line gives no slope: for the delay alone, or for the noise."""
     if math.isfinite(shared):
         value, half = _fit(mu, slip, label, 0.0, None, with_noise=False)
         if k_ci[0] > 0.0 or abs(float(value[0])) > float(half[0]):
             return (
                 f"{100.0 * shared:.1f} % of the traction's variation goes with acceleration over speed: a delay of v_x "
-                "cannot be told from the slope", _APART,
+                "cannot be distinguished from the slope", _APART,
             )  # fmt: skip
     return (
         f"1 / slope is {k:.3f} with a 95 % interval of {k_ci[0]:.3f} ... {k_ci[1]:.3f}, which holds 0: the "
@@ -235,7 +235,7 @@ def _open_slope(
 
 
 def _implausible(k: float, offset: float) -> tuple[str, str]:
-    """Reason and hint if this is no tyre; empty if it may be one."""
+    """Return reason and hint if this is no tyre; empty if it may be one."""
     if abs(offset) > OFFSET_MAX:
         faster = 100.0 * (1.0 / (1.0 - offset) - 1.0) if offset < 1.0 else math.inf
         word = "faster" if offset > 0.0 else "slower"
@@ -276,7 +276,7 @@ def fit_trend(
     noise: float = 0.0,
     late: Late | None = None,
 ) -> Trend:
-    """Change of the slope with time, s = (k + k' tau) mu + delta + delta' tau, tau from -1/2 to 1/2.
+    """Estimate the change of the slope with time, s = (k + k' tau) mu + delta + delta' tau, tau from -1/2 to 1/2.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def fit_trend(
     mu, slip, label, noise
         As in `fit_line`.
     late : Late, optional
-        A delay of the reference is left open, the same for all of the time.
+        A delay of the reference is estimated too, the same for the whole time.
 
     Returns
     -------
@@ -308,7 +308,7 @@ def fit_trend(
 
 
 def _change_of_slope(c: float) -> float:
-    """C(end) / C(start) - 1 where 1 / C grows by the share `c` of its middle value; infinite beyond ten times."""
+    """Return C(end) / C(start) - 1 if 1 / C grows by the share `c` of its middle value; infinite beyond ten times."""
     at_end, at_start = 1.0 + 0.5 * c, 1.0 - 0.5 * c
     if at_start >= TIMES_MAX * at_end:
         return math.inf
@@ -316,7 +316,7 @@ def _change_of_slope(c: float) -> float:
 
 
 def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, apart: int, k: float) -> float:
-    """Variance of that part of the fast changes of the traction which the slip does not follow.
+    """Return the variance of that part of the fast changes of the traction which the slip does not follow.
 
     Parameters
     ----------
@@ -332,10 +332,10 @@ def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, a
     Returns
     -------
     variance : float
-        Of the samples as they are. 0 where nothing can be told. [-]
+        Of the samples as they are. 0 where it cannot be estimated. [-]
 
     From second differences D: real changes show in both, so var(D mu) - cov(D mu, D s) / k is noise alone, six times.
-    Noise that changes more slowly than the smoothing is not seen.
+    Noise that changes more slowly than the smoothing stays undetected.
     """
     if mu.size <= 2 * apart or not k > 0.0:
         return 0.0
@@ -350,7 +350,7 @@ def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, a
 
 
 def lag_of_slip(mu: FloatArray, slip: FloatArray, is_used: BoolArray, dt: float) -> float:
-    """Time by which the slip is late against the traction: the shift with the best correlation.
+    """Return the delay of the slip against the traction: the shift with the best correlation.
 
     Parameters
     ----------
@@ -388,7 +388,7 @@ def lag_of_slip(mu: FloatArray, slip: FloatArray, is_used: BoolArray, dt: float)
 
 
 def _correlation(x: FloatArray, y: FloatArray) -> float:
-    """Of x with y, whose mean is 0; 0 where one of them is constant."""
+    """Correlate x with y, whose mean is 0; 0 where one of them is constant."""
     x = x - x.mean()
     size = math.sqrt(float(x @ x) * float(y @ y))
     return float(x @ y) / size if size > 1e-30 else 0.0
@@ -397,7 +397,7 @@ def _correlation(x: FloatArray, y: FloatArray) -> float:
 def _jackknife(
     columns: list[FloatArray], y: FloatArray, label: NDArray[np.int64], noises: list[_Noise]
 ) -> tuple[FloatArray, FloatArray]:
-    """Least squares with the noise of the design taken off its moments; errors by leaving out one block at a time.
+    """Fit by least squares with the noise of the design subtracted from its moments; errors by leaving out blocks.
 
     Parameters
     ----------

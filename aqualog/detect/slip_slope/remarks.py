@@ -1,4 +1,4 @@
-"""Sentences on what a drive could not tell about the slip slope, and on what does not look like a road."""
+"""Remarks on what a drive does not show of the slip slope, and on what does not look like a road."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALWAYS = 0.9  # share of the drive below half of the dry slope
 
 
 def remarks(slopes: Sequence[SlopeSummary]) -> tuple[str, ...]:
-    """Notes for places where the estimator saw little; one sentence for places alike.
+    """Return notes for places where the estimator saw little; one sentence for places alike.
 
     Thesis: section 3.2 on equal slips (C95) and 3.3 on constant driving (C96); E10.
     """
@@ -36,20 +36,20 @@ def _sentence(slope: SlopeSummary) -> str:
     if seconds["blind"] > MOST * judged and slope.beta is not None:
         return (
             "blind for most of the drive, both axles slip alike: another torque split or an active excitation of the "
-            "axle forces would tell it"
+            "axle forces would show it"
         )
     if seconds["blind"] > MOST * judged:
         return "blind for most of the drive: hardly any traction on the driven wheels"
     if seconds["estimating"] < (1.0 - MOST) * judged:
         return (
-            "traction too even for most of the drive to tell slope from radius; only sudden changes under a "
+            "traction too even for most of the drive to distinguish slope from radius; only sudden changes under a "
             "traction of 0.03 and more are found"
         )
     return ""
 
 
 def _restless(slope: SlopeSummary) -> str:
-    """More changes than a road has: something else is in the slip or in the torque."""
+    """Report more changes than a road has: something else is in the slip or in the torque."""
     driven = sum(slope.seconds[k] for k in ("estimating", "slope_frozen"))
     if slope.alarms < 4 or driven < 60.0 or slope.alarms * 600.0 <= RESTLESS * driven:
         return ""
@@ -60,17 +60,17 @@ def _restless(slope: SlopeSummary) -> str:
 
 
 def _stiff(slope: SlopeSummary) -> str:
-    """Slip that hardly grows with the traction: then no drop can be found either."""
+    """Report slip that hardly grows with the traction: then no drop can be found either."""
     if slope.stiff_s < max(LEAST, TOO_STIFF * (slope.seconds["estimating"] + slope.seconds["slope_frozen"])):
         return ""
     return (
         f"stiffer than any tyre for {slope.stiff_s:.0f} s, so that no drop can be found there: braking that neither "
-        "torque nor brake_pressure tells, a wrong drivetrain, or swapped wheels?"
+        "torque nor brake_pressure shows, a wrong drivetrain, or swapped wheels?"
     )
 
 
 def _always(slope: SlopeSummary) -> str:
-    """Low from end to end: then the reference is in doubt, not the road."""
+    """Report a slope that is low from end to end: then the reference is in doubt, not the road."""
     if slope.judged_s < 2.0 * LEAST or slope.dropped_s < ALWAYS * slope.judged_s:
         return ""
     return (
@@ -80,7 +80,7 @@ def _always(slope: SlopeSummary) -> str:
 
 
 def _own(slope: SlopeSummary) -> str:
-    """A drive that is its own reference cannot know what it began on."""
+    """Report a drive that is its own reference: it cannot know what it began on."""
     if slope.reference_from != "this drive" or slope.judged_s < LEAST:
         return ""
     return (

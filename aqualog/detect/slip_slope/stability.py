@@ -1,4 +1,4 @@
-"""Whether the slip slope stayed the same over a session."""
+"""Judge whether the slip slope stayed the same over a session."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Segment:
 class Stability:
     """`change` of the slope over `span_s` and `per_hour`, relative, with 95 % intervals.
 
-    NaN where not told, which for `per_hour` is below half an hour; infinite beyond ten times, minus infinite below a
-    tenth.
+    NaN where not estimated, which for `per_hour` is below half an hour; infinite beyond ten times, minus infinite below
+    a tenth.
     """
 
     verdict: Verdict
@@ -55,7 +55,7 @@ class Stability:
 
 
 def block_labels(t: FloatArray) -> NDArray[np.int64]:
-    """Block of each sample; a block holds what lies within 10 to 30 s, so that a long session has about 40.
+    """Return the block of each sample; a block spans 10 to 30 s, so that a long session has about 40.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def make_segments(
 ) -> tuple[Segment, ...]:
     """Cut the used samples into parts of six blocks and more, at most 12, each with a line of its own.
 
-    A delay of the reference is that of the whole drive (`late` with its half width), taken off already.
+    The delay of the reference is that of the whole drive (`late` with its half width), already corrected.
     """
     blocks = int(label[-1]) + 1 if label.size else 0
     count = min(MOST_SEGMENTS, blocks // SEGMENT_BLOCKS)
@@ -111,7 +111,7 @@ def judge_stability(
     noise: float,
     late: Late | None = None,
 ) -> Stability:
-    """Say whether the slope was stable.
+    """Judge whether the slope was stable.
 
     Parameters
     ----------
@@ -130,12 +130,12 @@ def judge_stability(
     Stability
         `drifts` where the interval of the trend does not hold 0 and its middle is beyond 10 %; else `varies` where a
         segment lies off the median of all by more than 20 % and by twice its own interval; `stable` where the
-        interval of the trend lies within +-20 %; else `cannot tell`.
+        interval of the trend lies within ±20 %; else `cannot tell`.
     """
     span = float(t[-1] - t[0]) if t.size else 0.0
     nothing = (math.nan, math.nan)
     if not whole.told or len(segments) < 2:
-        text = "cannot tell: too few stretches of usable driving to compare parts of the session"
+        text = "cannot be determined: too few stretches of usable driving to compare parts of the session"
         return Stability("cannot tell", text, span, math.nan, nothing, math.nan, nothing)
     trend = fit_trend(t, mu, slip, label, noise=noise, late=late)
     low, high = trend.change_ci
@@ -145,7 +145,7 @@ def judge_stability(
 
 
 def _per_hour(change: float, span: float) -> float:
-    """Relative change in an hour at the same rate; NaN where the session is too short to say."""
+    """Return the relative change in an hour at the same rate; NaN where the session is too short."""
     if span < LEAST_SPAN:
         return math.nan
     if math.isinf(change):
@@ -156,7 +156,7 @@ def _per_hour(change: float, span: float) -> float:
 
 
 def percent(change: float) -> str:
-    """`+12 %`; words for what is beyond ten times."""
+    """Return `+12 %`; words for changes beyond ten times."""
     if math.isinf(change):
         return f"more than {TIMES_MAX:g} times" if change > 0.0 else f"less than 1/{TIMES_MAX:g}"
     return f"{100 * change:+.0f} %"
@@ -174,7 +174,7 @@ def _verdict(change: float, low: float, high: float, span: float, segments: tupl
         return "varies", f"varies: {1.0 / s.line.k:.1f} from {part}, usually {1.0 / usual:.1f}"
     if low > -SAME and high < SAME:
         return "stable", f"stable: {bounds}"
-    return "cannot tell", f"cannot tell: {bounds}"
+    return "cannot tell", f"cannot be determined: {bounds}"
 
 
 def _lies_off(line: Line, usual: float) -> bool:

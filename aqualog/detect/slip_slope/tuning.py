@@ -1,4 +1,4 @@
-"""The one tuning of the slip-slope estimator, in seconds and per second, so that it holds at any sample rate."""
+"""Tuning of the slip-slope estimator, in seconds and per second, so that it holds at any sample rate."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Params(NamedTuple):
 
     @staticmethod
     def make(tuning: Tuning, dt: float) -> Params:
-        """The tuning at a sample time [s]."""
+        """Return the tuning at a sample time [s]."""
         t = tuning
         return Params(
             r=t.r / dt,

@@ -1,4 +1,4 @@
-"""Slip slope of a whole drive: which wheels are compared, and the chain from features to detections."""
+"""Estimate the slip slope of a whole drive: choose the wheels, and run the chain from features to detections."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Pair:
 
 
 def pairs(vehicle: Vehicle, *, form: Form | None = None, per_axle: bool = False) -> tuple[Pair, ...]:
-    """Pairs of a car: one per side, or the two axles.
+    """Return the pairs of a car: one per side, or the two axles.
 
     With one driven axle the formulation is at that axle, and the differential slip is its slip (C87). An all-wheel
     drive is formulated at the front axle by default; the rear form is the same equation solved for the rear slope.
@@ -64,14 +64,14 @@ def pairs(vehicle: Vehicle, *, form: Form | None = None, per_axle: bool = False)
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What is known of the dry slope before a drive, and how it is compared."""
+    """Prior knowledge of the dry slope, and the rule for the comparison."""
 
     history: History = field(default_factory=History)
     configuration: str = ""
     rule: Rule = "robust"
 
     def name(self, vehicle: Vehicle) -> str:
-        """Configuration under which this drive is remembered."""
+        """Return the configuration under which this drive is remembered."""
         return self.configuration or vehicle.name
 
 
@@ -130,7 +130,7 @@ class SlipSlopeWatch:
         self._drop_params = drop.DropParams.make(dt, memory.rule, loss)
         self._drop = drop.initial_state(periods, rule=memory.rule, fallback=fallback)
         self._variance = ewvar.from_seconds(TAU_VARIANCE, TAU_VARIANCE, dt)
-        # of the wheels that are judged: the others may dip while the slope of these is lost (C72, C74)
+        # of the judged wheels: the others may dip while the slope of these is lost (C72, C74)
         judged = (*pair.i, *pair.j) if self._two_driven else pair.i
         self._variances = {w: ewvar.initial_state() for w in judged}
         self._smoothed: dict[str, float] = {}
@@ -171,11 +171,11 @@ class SlipSlopeWatch:
 
     @property
     def drop_threshold(self) -> float:
-        """Loss of slope from which a detection begins. [-]"""
+        """Return the loss of slope from which a detection begins. [-]"""
         return 1.0 - self._drop_params.drop
 
     def summary(self) -> SlopeSummary:
-        """What became of the drive's samples, and the last estimate."""
+        """Return how the drive's samples were used, and the last estimate."""
         seconds = self._counts * self._dt
         slope, sd, offset = self._last
         return SlopeSummary(

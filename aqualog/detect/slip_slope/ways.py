@@ -1,4 +1,4 @@
-"""Which way to the slip slope a drive leaves open: where slip and traction come from."""
+"""Choose the method for the slip slope that a drive allows: the sources of slip and traction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MAP_HINT = "`aqualog inspect LOG --write-map map.toml`, then --signals map.toml
 
 
 class Way(NamedTuple):
-    """Where slip and traction come from; `notes` are sentences on what was taken for lack of something better."""
+    """Sources of slip and traction; `notes` are sentences on substitutes that were used."""
 
     method: Method
     traction: TractionSource
@@ -30,7 +30,7 @@ class Way(NamedTuple):
 def choose_way(
     vehicle: Vehicle, available: Collection[str], *, method: str = "auto", traction: str = "auto", where: str = ""
 ) -> Way:
-    """Choose or check.
+    """Choose the method, or check the one asked for.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def choose_way(
     Raises
     ------
     ConfigError
-        If what is asked for does not exist for this car.
+        If the method does not exist for this car.
     SignalError
         If signals are missing.
     """
@@ -93,7 +93,8 @@ def _traction(vehicle: Vehicle, have: set[str], traction: str, where: str) -> tu
     torque = [f"torque_{w}" for w in vehicle.driven if f"torque_{w}" not in have]
     if traction == "accelerometer" and is_awd:
         raise ConfigError(
-            "--traction accelerometer: it does not tell how much of the force each driven axle has", expected="torque"
+            "--traction accelerometer: it does not show how much of the force each driven axle has",
+            expected="torque",
         )
     if traction == "torque" or (traction == "auto" and (not torque or is_awd)):
         if torque:
