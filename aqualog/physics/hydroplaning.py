@@ -77,7 +77,7 @@ def pavdrn_speed(h_w: FloatArray) -> FloatArray:
     v : array
         [m/s]
 
-    For the ASTM E524 tyre [astm1988] at 165 kPa and 4800 N. 0.6, 1.3, 2.0 mm give 111, 91, 81 km/h.
+    For the ASTM E524 tyre [astm_e524_1988] at 165 kPa and 4800 N. 0.6, 1.3, 2.0 mm give 111, 91, 81 km/h.
 
     Source: as commonly quoted (K) from [anderson1998].
     """

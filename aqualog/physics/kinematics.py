@@ -26,7 +26,7 @@ def kinematic_steer_angle(yaw_rate: FloatArray, v_x: FloatArray, *, wheelbase: f
     delta : array (n,)
         atan(l psi_dot / v_x), left positive, within ±0.7. [rad]
 
-    Source: derived; axes of ISO 8855 [iso2011].
+    Source: derived; axes of ISO 8855 [iso8855_2011].
     """
     return np.clip(np.arctan2(wheelbase * yaw_rate, np.maximum(v_x, 3.0)), -0.7, 0.7)
 
@@ -60,7 +60,7 @@ def centre_line_speed(
 
     Limits: yaw_rate = 0 and steer_angle = 0 give v_rim.
 
-    Source: derived; axes of ISO 8855 [iso2011].
+    Source: derived; axes of ISO 8855 [iso8855_2011].
     """
     return (v_rim - yaw_rate * wheelbase * np.sin(steer_angle)) / np.cos(steer_angle) + yaw_rate * y
 
@@ -88,7 +88,7 @@ def wheel_velocity(
 
     Limits: no yaw, no steering: v_x, v_y. The inverse of `centre_line_speed` for a car that rolls without side slip.
 
-    Source: derived; axes of ISO 8855 [iso2011].
+    Source: derived; axes of ISO 8855 [iso8855_2011].
     """
     forward = v_x - yaw_rate * y
     left = v_y + yaw_rate * x

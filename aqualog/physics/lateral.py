@@ -86,6 +86,6 @@ def outward(F_left: FloatArray, F_right: FloatArray) -> tuple[FloatArray, FloatA
     A left wheel's is its force to the left, a right wheel's that to the right; in a left turn the left wheel's is
     positive (inwards of the curve is outwards of the car there), the right one's negative.
 
-    Source: derived; axes of ISO 8855 [iso2011].
+    Source: derived; axes of ISO 8855 [iso8855_2011].
     """
     return F_left, -F_right

@@ -66,7 +66,7 @@ def warm_up_factor(t: FloatArray, *, extra: float, time_constant: float) -> Floa
 
     `extra` up to 0.4 in the cold (K); 10 degC cost 8 % (R117); half an hour warms a tyre through. [-], [s]
 
-    Source: UN Regulation 117 [unece2011] for 8 % per 10 K; the shape is general knowledge (K).
+    Source: UN Regulation 117 [unece_r117_2011] for 8 % per 10 K; the shape is general knowledge (K).
     """
     return 1.0 + extra * np.exp(-t / time_constant)
 
