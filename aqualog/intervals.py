@@ -10,7 +10,7 @@ __all__ = ["chi2_log_p", "student_quantile"]
 
 
 def student_quantile(probability: float, dof: float) -> float:
-    """Quantile of Student's t: 0.5 < probability < 1, real dof >= 1."""
+    """Quantile of Student's t [student1908]: 0.5 < probability < 1, real dof >= 1."""
     u = np.linspace(0.0, math.pi / 2.0, 20_001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
     density = np.cos(u) ** (dof - 1.0)
     area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])

@@ -1,6 +1,7 @@
 """The dictionary of signals: the only home of column names, their units and signs.
 
-SI and radians inside; ISO 8855 axes (x forward, y left, z up); wheels `fl fr rl rr` in this order everywhere.
+SI and radians inside; ISO 8855 axes [iso8855_2011] (x forward, y left, z up); wheels `fl fr rl rr` in this order
+everywhere.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ _ALL = [
     Key("", "track", "m", 1.55, 0.5, 3.0, "track width, mean of both axles", _MID),
     Key("", "drag_area", "m^2", 0.66, 0.0, 15.0, "drag coefficient times frontal area", "2.2 m^2 * 0.30 (K)"),
     Key("", "air_density", "kg/m^3", 1.204, 0.5, 1.6, "air density", "ISA at 20 degC, sea level"),
-    Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017, mean 0.010 (V, TRB)"),
+    Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017 (V, [trb2006])"),
     Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
     Key("", "torque_gain", "-", 1.0, 0.1, 100.0, "torque at the wheels over the one that the log says", "none"),
     Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),
@@ -67,7 +67,10 @@ _ALL = [
     Key("wheels", "r_l_r", "m", 0.309, 0.1, 1.0, "loaded radius, rear", "0.975 r_e (D)"),
     Key("wheels", "inertia_f", "kg*m^2", 1.15, 0.05, 50.0, "wheel inertia, front", "1.0-1.2 per wheel (K)"),
     Key("wheels", "inertia_r", "kg*m^2", 1.15, 0.05, 50.0, "wheel inertia, rear", "1.0-1.2 per wheel (K)"),
-    Key("tyre", "slip_slope_f", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, front", "31.7 +- 3.5 (V, Gustafsson)"),
+    Key(
+        "tyre", "slip_slope_f", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, front",
+        "31.7 +- 3.5 (V, [gustafsson2000])",
+    ),
     Key("tyre", "slip_slope_r", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, rear", "as front"),
     Key("tyre", "mu_max", "-", 1.02, 0.05, 3.0, "friction of tyre and dry road", "dry asphalt (K)"),
 ]  # fmt: skip

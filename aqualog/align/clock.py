@@ -170,9 +170,8 @@ def estimate_clock(
         Too little overlap, a source without variation, a weak or ambiguous peak, a peak at the edge of the search
         range, opposite signs, or stamps that run backwards.
 
-    References: Padfield, Masked object registration in the Fourier domain, 2012, 10.1109/TIP.2011.2181402 (masked
-    correlation); Cameron and Miller, A practitioner's guide to cluster-robust inference, 2015, 10.3368/jhr.50.2.317
-    (section VI: few clusters).
+    References: Padfield 2012 [padfield2012] for the masked correlation; Cameron and Miller 2015 [cameron2015],
+    section VI, for few clusters.
     """
     o = _Options(max_offset_s, start_offset_s, min_overlap_s, min_peak, quantity, f"clock fit on {quantity}")
     _check_options(o)
@@ -403,7 +402,7 @@ def _chance_limit(a: _Smoothed, b: _Smoothed, step: float, count: float, width_s
     reach = min(int(10.0 / step), a.rate.size - 1)
     lags = np.arange(-reach, reach + 1)
     own = _correlation(a, a, lags)[0] * _correlation(b, b, lags)[0]
-    memory = max(float(own.sum()), 1.0)  # Bartlett: samples per independent one
+    memory = max(float(own.sum()), 1.0)  # Bartlett [bartlett1946]: samples per independent one
     trials = 1.0 + width_s / (memory * step)
     z = NormalDist().inv_cdf(1.0 - _CHANCE / trials)
     bursts = math.sqrt(_burstiness(a, step) * _burstiness(b, step))
@@ -522,7 +521,7 @@ def _lag_rows(pair: _Pair, value: FloatArray, terms: tuple[str, ...]) -> _Rows:
 
 
 def _fit_lag(pair: _Pair, start: FloatArray, terms: tuple[str, ...] = ()) -> tuple[FloatArray, _Rows]:
-    """Gauss-Newton over (offset, gain, *terms) with Huber weights; `terms` out of drift and slip."""
+    """Gauss-Newton over (offset, gain, *terms) with Huber weights [huber1981]; `terms` out of drift and slip."""
     value = np.append(start[:2], np.zeros(len(terms)))
     rows = _lag_rows(pair, value, terms)
     for _ in range(40):

@@ -90,10 +90,10 @@ def combined(assumed: Spread, seen: Spread) -> Spread:
 
     Both are variances of the same estimate where the assumptions hold. They are pooled, weighted by their degrees of
     freedom. The drives alone count where F = seen / assumed exceeds its 75 % quantile. Pooling after a preliminary test
-    at 25 %, not 5 %, keeps nearly the nominal level whatever the true spread is (Bozivich, Bancroft & Hartley 1956, K).
-    For normal estimates, 95 % intervals from four drives cover in 96 % where the assumptions hold. They cover in at
-    least 92 % where the variance is any multiple of the assumed one (D). The wider of the two spreads would cover in
-    98 %: it picks the estimate that erred upwards.
+    at 25 %, not 5 %, keeps nearly the nominal level whatever the true spread is (Bozivich, Bancroft and Hartley
+    [bozivich1956], K). For normal estimates, 95 % intervals from four drives cover in 96 % where the assumptions hold.
+    They cover in at least 92 % where the variance is any multiple of the assumed one (D). The wider of the two spreads
+    would cover in 98 %: it picks the estimate that erred upwards.
     """
     sd, dof = {}, {}
     for n in seen.sd:
@@ -130,7 +130,7 @@ def _of_blocks_and_assumptions(
                 # mean square over head and tail wind, which come alike
                 assumed[name] += sum((m[name] - best[name]) ** 2 for m in moved) / len(moved)
     sd = {n: math.sqrt(within.sd[n] ** 2 + assumed[n]) for n in best}
-    # Welch and Satterthwaite: the assumed part is known, the part from the blocks is not
+    # [welch1947], [satterthwaite1946]: the assumed part is known, the part from the blocks is not
     dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else DOF_KNOWN for n in best}
     return Spread(sd, dof, by_drive=False)
 

@@ -88,7 +88,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     design : Design
         At least one run; no NaN.
     robust : bool
-        Huber's weights, on the residuals about each run's own line.
+        Huber's weights [huber1981], on the residuals about each run's own line.
 
     Returns
     -------
@@ -103,9 +103,9 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     X'X and X'y alike, so what both share stays consistent; run by run, so that the error of the noise is in the
     intervals too.
 
-    Intervals: cluster-robust variance of the runs' scores with the correction of Bell and McCaffrey (2002; CR2) and
-    Satterthwaite's degrees of freedom, as Pustejovsky and Tipton (2018) give them for weighted fits: they hold with a
-    handful of runs, and whether or not the model behind the weights is right.
+    Intervals: cluster-robust variance of the runs' scores with the correction of Bell and McCaffrey (CR2 [bell2002])
+    and Satterthwaite's degrees of freedom [satterthwaite1946], as Pustejovsky and Tipton [pustejovsky2018] give them
+    for weighted fits: they hold with a handful of runs, and whether or not the model behind the weights is right.
     """
     unit = np.sqrt(np.mean(design.columns**2, axis=1))
     unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
@@ -125,7 +125,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
         if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
             break
     half, dof = _half_widths(moments, k, value)
-    # a residual that is cut does not answer to the coefficients, though its weight is not zero (Huber 1981, ch. 7)
+    # a residual that is cut does not answer to the coefficients, though its weight is not zero ([huber1981], chapter 7)
     half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
     i = d.noisy.index(True) if any(d.noisy) else -1
     noise = _noise(moments_of(d, first, weight), value, i) if i >= 0 else 0.0

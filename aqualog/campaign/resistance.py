@@ -66,7 +66,7 @@ def resistances(
         Less the run's own level on dry road before the lane (at least a second): mass, rolling resistance, grade and an
         offset of the accelerometer fall out. Where there is none of it, the run is left out and counted.
     robust : bool
-        Huber's weights.
+        Huber's weights [huber1981].
     limits : Limits
         Least runs and samples.
 

@@ -37,8 +37,9 @@ class Pass:
 @dataclass(frozen=True, slots=True)
 class SpinDownRow:
     """A bin of speed: `passes`, `events` of minor spin-downs begun on the lane, `per_s` and `per_100_m` with `per_s_ci`
-    (counts, Poisson; exact), `share` of the passes with at least one (Wilson), passes with a `full` spin-down, in which
-    minor ones have no place, `deepest` slip: median of the passes' deepest [-]. Bins are of the pass's mean speed.
+    (counts, Poisson; exact [garwood1936]), `share` of the passes with at least one (Wilson [wilson1927]), passes with a
+    `full` spin-down, in which minor ones have no place, `deepest` slip: median of the passes' deepest [-]. Bins are of
+    the pass's mean speed.
     """
 
     group: Group

@@ -42,9 +42,9 @@ def initial_state() -> CusumState:
 def step(p, g, x):  # type: ignore[no-untyped-def]
     """g <- min(g_max, max(0, g + (x - nu) dt)); NaN holds the sum.
 
-    The clamp at zero is missing in thesis 3.24 as printed (E11). The clamp at g_max bounds the time by which the alarm
-    outlives its cause, to (g_max - off_share h) / nu. The integration over time makes threshold and detection time
-    independent of the sample rate.
+    The clamp at zero is missing in thesis 3.24 as printed (E11) and present in Page's [page1954] and Gustafsson's
+    [gustafsson2000]. The clamp at g_max bounds the time by which the alarm outlives its cause, to (g_max - off_share h)
+    / nu. The integration over time makes threshold and detection time independent of the sample rate.
     """
     if math.isnan(x):
         return g

@@ -81,7 +81,7 @@ def scan(p: EwvarParams, state: EwvarState, x: FloatArray) -> tuple[FloatArray, 
     state : EwvarState
 
     With alpha = beta this is the weighted variance exactly; otherwise white noise of variance s^2 gives
-    (1 - beta) 2 / (2 - alpha) s^2 (E4).
+    (1 - beta) 2 / (2 - alpha) s^2 (E4). The form is that of Finch [finch2009] and West [west1979].
     Thesis: Eq. (2.5), (2.6); their Delta a is the wheel acceleration difference of 2.3, not the resistance measure
     of 2.9 (E3).
     """

@@ -110,7 +110,7 @@ def channel_values(
     -------
     values : array (C, m)
         NaN where a signal is missing. `force_balance` is the accelerometer itself: what the torque explains of it is
-        on the simulated side. ISO 8855 signs.
+        on the simulated side. ISO 8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)

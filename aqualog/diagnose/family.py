@@ -95,13 +95,13 @@ def calibrate(
     ----------
     bench : Bench
     quiet : sequence of array (C, n)
-        Residuals after the best set: their smoothed spectra make the surrogates.
+        Residuals after the best set: their smoothed spectra make the surrogates [theiler1992].
     gram : array (K + 1, K + 1)
         Tells which hypotheses are alike and need not be tested one by one.
     base : sequence of int
         Hypotheses that are accepted already; noise is tested beside them.
     surrogates : int
-        0: no surrogates; the gains are taken to be inflated by 1.3 and Bonferroni's bound is used.
+        0: no surrogates; the gains are taken to be inflated by 1.3 and Bonferroni's bound [bonferroni1936] is used.
     level : float
         Share of logs without effect that may be called.
     seed : int

@@ -23,7 +23,7 @@ BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
 DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be known
 DRAWS = 2000
 Z = 1.959964  # 97.5 % quantile of the normal distribution
-CORRIDOR_INNER, CORRIDOR_OUTER = 0.05, 0.5  # of the largest reference (K: corridor score of ISO/TS 18571)
+CORRIDOR_INNER, CORRIDOR_OUTER = 0.05, 0.5  # of the largest reference (K: corridor score of [iso18571_2024])
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,7 +211,7 @@ def _clipped(x: FloatArray, good: BoolArray) -> FloatArray:
 
 
 def _together(K: FloatArray, Y: FloatArray, at: BoolArray) -> tuple[float, float, float]:
-    """Covariance, correlation and how many standard deviations it is from nought: Fisher's transform."""
+    """Covariance, correlation and how many standard deviations it is from nought: Fisher's transform [fisher1921]."""
     k, y = (np.where(at, x - x[at].mean(), 0.0) for x in (K, Y))
     sd = float(k[at].std() * y[at].std())
     covariance = float(np.mean((k * y)[at]))
@@ -226,7 +226,7 @@ def _score(correlation: float, count: float) -> float:
 
 
 def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
-    """How many independent samples two series along the way are worth, from their own likeness (Bartlett)."""
+    """How many independent samples two series along the way are worth, from their own likeness [bartlett1946]."""
     n = 2 * at.size
     pairs = np.fft.irfft(np.abs(np.fft.rfft(at.astype(np.float64), n)) ** 2, n)
     own = [np.fft.irfft(np.abs(np.fft.rfft(x, n)) ** 2, n) / np.maximum(pairs, 1.0) for x in (a, b)]

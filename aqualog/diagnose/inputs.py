@@ -38,7 +38,7 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """A signal by Wiener's filter: each frequency by the share of it that stands out of the white noise.
+    """A signal by Wiener's filter [wiener1949]: each frequency by the share of it that stands out of the white noise.
 
     The noise is what the signal has in a band well above what drivers do. One that is not sampled fast enough to tell
     stays as it is. Zero phase: nothing is delayed.

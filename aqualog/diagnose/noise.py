@@ -118,8 +118,8 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     Returns
     -------
     Noise
-        Its order is chosen per contrast by Akaike's criterion; innovations beyond 3 standard deviations weigh
-        less (Huber), so that outliers and kerbs do not rule.
+        Its order is chosen per contrast by Akaike's criterion [akaike1974]; innovations beyond 3 standard deviations
+        weigh less (Huber [huber1981]), so that outliers and kerbs do not rule.
     """
     x = bridged(residual, mask)
     used = _settled(mask)

@@ -161,6 +161,7 @@ def _surely_nothing(bench: Bench, gains: FloatArray, c: Calibration, level: floa
     """The test's result where not even gains that no coloured noise has inflated are beyond Bonferroni's bound.
 
     It is a floor of every threshold: surrogates, which cost most of the time, could not make a finding of it.
+    The bound is that of [bonferroni1936].
     """
     statistic = float((gains / [len(x) for x in bench.columns]).max())
     p = chance(statistic, c.tested)

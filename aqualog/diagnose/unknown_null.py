@@ -104,8 +104,8 @@ def null_scores(ratios: FloatArray) -> FloatArray:
     Returns
     -------
     scores : (..., 1 + S)
-        Logarithms (Fisher's z, K) by mean and standard deviation of the surrogates'. Each surrogate is judged by the
-        others, as the residual is: else the residual would be the odd one out.
+        Logarithms (Fisher's z [fisher1924], K) by mean and standard deviation of the surrogates'. Each surrogate is
+        judged by the others, as the residual is: else the residual would be the odd one out.
     """
     z = np.log(np.maximum(ratios, 1e-300))
     null = z[..., 1:] - z[..., 1:].mean(axis=-1, keepdims=True)

@@ -84,7 +84,7 @@ def _filled(values: FloatArray) -> FloatArray:
 
 
 def _needed(x: FloatArray, f: FloatArray, tolerance: float) -> list[int]:
-    """Points between which straight lines stay within the tolerance (Douglas and Peucker)."""
+    """Points between which straight lines stay within the tolerance (Douglas and Peucker [douglas1973])."""
     kept = {0, x.size - 1}
     todo = [(0, x.size - 1)]
     while todo:

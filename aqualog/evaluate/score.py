@@ -36,7 +36,7 @@ class Recall:
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """Wilson interval of the recall."""
+        """Wilson interval [wilson1927] of the recall."""
         return wilson(self.found, self.episodes)
 
     @property
@@ -68,7 +68,7 @@ class Rate:
 
     @property
     def per_hour_ci95(self) -> tuple[float, float]:
-        """Exact Poisson interval. [1/h]"""
+        """Exact Poisson interval [garwood1936]. [1/h]"""
         return _over(poisson(self.count), self.seconds / HOUR_S)
 
     @property

@@ -33,9 +33,9 @@ def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> lis
     """Coefficients of columns (each (n,)) over the logarithms of the slopes; None with no more bins than columns.
 
     Weights are of each bin's own error and of a scatter about the line that the bins show beyond it (DerSimonian and
-    Laird's moment, until it stands); the interval is Student's with the bins less the columns as degrees of freedom.
-    A run passes through two or three neighbouring bins, and both wheels of an axle share it; the bins are taken to be
-    independent.
+    Laird's moment [dersimonian1986], until it stands); the interval is Student's with the bins less the columns as
+    degrees of freedom. A run passes through two or three neighbouring bins, and both wheels of an axle share it; the
+    bins are taken to be independent.
     """
     x = np.stack(columns, axis=1)
     n, p = x.shape

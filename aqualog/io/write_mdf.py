@@ -100,7 +100,7 @@ def write_mf4(
 def write_frames_mf4(
     path: Path, frames: CanFrames, start_ns: int | None, comment: str, *, compression: Compression = 2
 ) -> None:
-    """Write raw CAN frames as ASAM bus logging, one group `CAN_DataFrame`."""
+    """Write raw CAN frames as ASAM bus logging [asam_mdf_2019], one group `CAN_DataFrame`."""
     mdf = _new(start_ns, comment)
     try:
         _append_frames(mdf, frames)

@@ -116,7 +116,7 @@ def _payload(p: Plant, v: Values, where: str | None) -> Plant:
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
-        "motorways to 3-4 % (V, DMRB)",
+        "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
         twins=("accelerometer_bias",),
     ),
@@ -132,14 +132,14 @@ _ALL = [
     ),
     Effect(
         "rolling_resistance", "rolling resistance coefficient [-]", "Rolling resistance is {delta_r_w:+.4f} off.",
-        "0.007-0.017 (V, TRB)",
+        "0.007-0.017 (V, TRB [trb2006])",
         (Parameter("delta_r_w", "-", 0.0, 0.002, -0.01, 0.05, 0.0005, "on top of the vehicle file's"),),
         _on_plant(lambda p, v, w: p._replace(r_w=_shifted(p.r_w, w, v["delta_r_w"]))), _WHEEL_PLACES,
         twins=("brake_drag",),
     ),
     Effect(
         "tyre_warmup", "rolling resistance over time", "Cold tyres rolled {extra:.0%} harder at the start.",
-        "8 % per 10 degC (V, R117); cold up to +40 % (V)",
+        "8 % per 10 degC (V, R117 [unece_r117_2011]); cold up to +40 % (V)",
         (
             Parameter("extra", "-", 0.0, 0.2, -0.3, 1.0, 0.03, "relative, at the start"),
             Parameter("time_constant", "s", 600.0, 300.0, 30.0, 5000.0, 60.0, "of the warm-up"),
@@ -218,7 +218,7 @@ _ALL = [
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
-        "6.8e-4 per tooth (V, Gustafsson)",
+        "6.8e-4 per tooth (V, Gustafsson [gustafsson2000])",
         (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.0005, "once per turn, relative"),), _tone_ring,
         _WHEEL_PLACES,
     ),
@@ -230,7 +230,7 @@ _ALL = [
     ),
     Effect(
         "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
-        "15-50 over tyres (K); temperature, wear (V, Carlson/Gerdes)",
+        "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _on_plant(lambda p, v, w: p._replace(slip_slope=_scaled(p.slip_slope, w, v["gain"]))), _WHEEL_PLACES,
     ),
@@ -243,7 +243,7 @@ _ALL = [
     ),
     Effect(
         "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
-        "0.22 in MF6.1 (V)",
+        "0.22 in MF6.1 (V, [besselink2010])",
         (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
         _on_plant(lambda p, v, w: p._replace(load_sensitivity=_shifted(p.load_sensitivity, w, v["delta"]))),
         _WHEEL_PLACES,
@@ -274,7 +274,7 @@ _ALL = [
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
-        "2.9e-6 in MF6.1 (V, D)",
+        "2.9e-6 in MF6.1 (V, D, [besselink2010])",
         (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
         _on_plant(lambda p, v, w: p._replace(radius_growth=_shifted(p.radius_growth, w, v["growth"]))), _WHEEL_PLACES,
     ),
@@ -301,7 +301,7 @@ _ALL = [
     ),
     Effect(
         "uneven_water", "water of one side", "The {where} track has {depth_gain:.2f} of the water.",
-        "thesis 2.1: left lower and more irregular",
+        "thesis 2.1 (C23): left lower and more irregular",
         (
             Parameter("depth_gain", "-", 1.0, 0.3, 0.0, 5.0, 0.2, "on the depth of that side"),
             Parameter("irregularity", "-", 0.0, 0.2, 0.0, 2.0, 0.05, "added rms, relative to the depth"),

@@ -481,8 +481,8 @@ def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
 def integrate(n, dt, every, y0, car, wheels, extra, r, settings, controls, applied):  # type: ignore[no-untyped-def]
     """Integrate `n` steps of `dt` [s] from the state `y0`; record every `every`-th, the first included.
 
-    ROS2, a Rosenbrock W-method of two stages: second order for any Jacobian, L-stable for the part in the Jacobian,
-    which is the stiff one: wheels and body on the tyres' slip.
+    ROS2 [verwer1999], a Rosenbrock [rosenbrock1963] W-method [steihaug1979] of two stages: second order for any
+    Jacobian, L-stable for the part in the Jacobian, which is the stiff one: wheels and body on the tyres' slip.
     """
     h = (1.0 - np.sqrt(0.5)) * dt
     y = y0.copy()

@@ -261,7 +261,7 @@ _KMH = 1.0 / 3.6  # [m/s]
 _R_E = 0.317  # [m] of the rim speed on the bus
 
 _WHEEL = Channel(
-    resolution=0.0075 * _KMH / _R_E,  # [rad/s] 0.0075 km/h on the bus, V: opendbc, VW ESP_19
+    resolution=0.0075 * _KMH / _R_E,  # [rad/s] 0.0075 km/h on the bus, V: [opendbc2026], VW ESP_19
     latency_s=0.005,  # [s] K
 )
 _ACCELERATION = Channel(
@@ -307,8 +307,8 @@ ESC = Sensors(
         "tie_rod_fl": _TIE_ROD,
         "tie_rod_fr": _TIE_ROD,
     },
-    teeth=48,  # V: Toyota, and Gustafsson's ABS log
-    tooth_jitter=4.8e-4,  # [pitches] D: 6.8e-4 per cog (V: Gustafsson) is that of two edges
+    teeth=48,  # V: Toyota, and Gustafsson's ABS log [gustafsson2000]
+    tooth_jitter=4.8e-4,  # [pitches] D: 6.8e-4 per cog (V: [gustafsson2000]) is that of two edges
     # [pitches] D: with the jitter 1.1 m/s^2 rms in differences of 10 ms samples; V: 1.0 at 20.6 m/s, D: 1.3 at 27.8 m/s
     tooth_pattern=1e-3,
 )

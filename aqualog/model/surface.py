@@ -28,7 +28,7 @@ SURFACES: dict[str, Surface] = {
     s.name: s
     for s in (
         Surface("asphalt"),
-        Surface("damp", mu=0.85, source="wet without a layer of water: least effect on the slope (V, Carlson/Gerdes)"),
+        Surface("damp", mu=0.85, source="wet without a layer of water: least effect on the slope (V, [carlson2005])"),
         # slope 30 -> 10 on low friction (thesis 3.3): 1/10 = 1/30 + 1/15
         Surface("snow", mu=0.30, compliance=1.0 / 15.0, rolling=0.012, roughness=15.0, source="snow on asphalt (K)"),
         Surface("snow_on_ice", mu=0.29, compliance=1.0 / 30.0, rolling=0.008, roughness=8.0, source="Fig. 3.1 (D)"),

@@ -77,7 +77,7 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
     plan : Plan
         Configurations and bins.
     robust : bool
-        Use Huber's weights.
+        Use Huber's weights [huber1981].
     report : callable
         Called with the name of each step.
     """

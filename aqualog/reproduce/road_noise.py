@@ -12,7 +12,7 @@ from aqualog.types import BoolArray, FloatArray
 __all__ = ["DT", "ROAD_NOISE", "noise", "run"]
 
 DT = 0.01  # [s]
-ROAD_NOISE = 5e-4  # [-] rms of the slip as measured on a road (V, Gustafsson)
+ROAD_NOISE = 5e-4  # [-] rms of the slip as measured on a road (V, Gustafsson [gustafsson2000])
 _KEEP = 0.48 ** (DT / 0.2)  # its memory from sample to sample: a correlation of 0.48 after 0.2 s
 
 

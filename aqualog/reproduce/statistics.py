@@ -37,7 +37,7 @@ def bootstrap(
 
 
 def share(k: int, n: int) -> str:
-    """A share in words with its Wilson interval: 17 of 20 (64 to 95 %)."""
+    """A share in words with its Wilson interval [wilson1927]: 17 of 20 (64 to 95 %)."""
     low, high = wilson(k, n)
     return f"{k} of {n} ({100 * low:.0f} to {100 * high:.0f} %)"
 
@@ -45,7 +45,8 @@ def share(k: int, n: int) -> str:
 def ratio_of_counts(k: int, base: int) -> tuple[float, float] | None:
     """95 % interval of the ratio of two counts over the same time; None where the base is 0.
 
-    Given their sum, the first is binomial: its Wilson interval, turned into a ratio. Both are taken as independent.
+    Given their sum, the first is binomial: its Wilson interval [wilson1927], turned into a ratio. Both are taken as
+    independent.
     """
     if base == 0:
         return None

@@ -1,4 +1,4 @@
-"""Extended Kalman filter of inverse slope, slope ratio and slip offset: one prediction, one update."""
+"""Extended Kalman filter [kalman1960] of inverse slope, slope ratio and slip offset: one prediction, one update."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta, learn_delta):  # type: 
     r : float
         Variance of y. [-]
     learn_k, learn_beta, learn_delta : bool
-        False: the parameter keeps its value and its uncertainty still counts (Schmidt's form of the gain).
+        False: the parameter keeps its value and its uncertainty still counts (Schmidt's form of the gain
+        [schmidt1966]).
 
     Returns
     -------
@@ -61,7 +62,7 @@ def update(b, y, mu_i, rho_mu_j, r, learn_k, learn_beta, learn_delta):  # type: 
     innovation, variance : float
         epsilon = y - h(x, 0) and its expected variance H P H' + r.
 
-    The covariance is updated in Joseph's form, which holds for any gain and keeps it symmetric and positive.
+    The covariance is updated in Joseph's form [bucy1968], which holds for any gain and keeps it symmetric and positive.
     Thesis: Eq. (3.20) to (3.22), with the sign of the offset as in E8.
     """
     H_k, H_b, _ = _jacobian(mu_i, rho_mu_j, b.k, b.beta)

@@ -97,7 +97,7 @@ class Line:
 
     @property
     def slope_ci(self) -> Interval:
-        """Return the 95 % interval of the slope: the inverse of that of k, exact if 0 is outside (Fieller). [-]"""
+        """Return the 95 % interval of the slope: the inverse of that of k, exact if 0 is outside [fieller1954]. [-]"""
         return (1.0 / self.k_ci[1], 1.0 / self.k_ci[0]) if self.told else _NOWHERE
 
 
@@ -143,14 +143,14 @@ def fit_line(
         and where slope or offset are not those of a tyre.
 
     Slip is the noisy one of the two: a regression of traction on slip would give a slope that is too low (a published
-    drive: 28.7 instead of 41.6). Noise of the traction biases k towards 0 by noise / var(mu). Beyond 1 % its variance
-    is subtracted from the moments; this is Deming's regression with the noise of the traction known instead of a ratio.
-    If the delay is estimated, only that part of the traction counts which does not go with a / v, and the noise of a /
-    v is subtracted, too.
+    drive [gustafsson2000]: 28.7 instead of 41.6). Noise of the traction biases k towards 0 by noise / var(mu). Beyond 1
+    % its variance is subtracted from the moments; this is Deming's regression [deming1943] with the noise of the
+    traction known instead of a ratio. If the delay is estimated, only that part of the traction counts which does not
+    go with a / v, and the noise of a / v is subtracted, too.
 
     Intervals: jackknife over the blocks with Student's t; degrees of freedom count the blocks by their information.
 
-    Thesis: Eq. (3.14), reference [15]; the sign of the offset as in E8. Section 3.2 for the delay.
+    Thesis: Eq. (3.14), reference [15], [gustafsson1997]; the sign of the offset as in E8. Section 3.2 for the delay.
     """
     blocks = int(np.unique(label).size)
     spread = float(np.var(mu)) if mu.size else 0.0

@@ -22,8 +22,8 @@ from aqualog.vehicle import Vehicle
 __all__ = ["CHECKS", "SEEDS"]
 
 SEEDS = range(11000, 11200)
-# what changes in operation: passengers and luggage; tyres from 0 to 40 degC (8 % per 10 K, ECE R117) or soft ones; a
-# roof rack; wear of a millimetre; the air by 15 degC (K)
+# what changes in operation: passengers and luggage; tyres from 0 to 40 degC (8 % per 10 K, [unece_r117_2011]) or soft
+# ones; a roof rack; wear of a millimetre; the air by 15 degC (K)
 _CHANGES = {"mass": 300.0, "rolling_resistance": 0.30, "drag_area": 0.10, "loaded_radius": 0.003, "air_density": 0.05}
 _STATES = {"80 km/h": (80.0, 0.0), "120 km/h": (120.0, 0.0), "80 km/h, 1 m/s^2": (80.0, 1.0)}
 

@@ -46,7 +46,7 @@ def _bins(spins: FloatArray, wheel: int, rows: Rows) -> tuple[FloatArray, FloatA
 
 
 def rank_correlation(x: FloatArray, y: FloatArray) -> float:
-    """Spearman's rank correlation of arrays (n,) without ties; NaN for fewer than three."""
+    """Spearman's rank correlation [spearman1904] of arrays (n,) without ties; NaN for fewer than three."""
     if x.size < 3:
         return float("nan")
     return float(np.corrcoef(np.argsort(np.argsort(x)), np.argsort(np.argsort(y)))[0, 1])

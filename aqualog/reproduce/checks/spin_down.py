@@ -150,8 +150,8 @@ def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
     Returns
     -------
     gain : float
-        Akaike's criterion of the line minus that of the exponential, both with two parameters and fitted by least
-        squares; positive where the exponential is better.
+        Akaike's criterion [akaike1974] of the line minus that of the exponential, both with two parameters and fitted
+        by least squares; positive where the exponential is better.
     c, v0 : float
         Of the exponential; v0 in the unit of v, between 1 and 200.
     """
