@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from aqualog.cli.bin_slipslope import BinWidth, By, Road, Robust, TableOut, check_table, split, write_table
+from aqualog.cli.bin_slipslope import BinWidth, By, Road, Robust, TableOut
 from aqualog.cli.options import (
     CarOfLogs,
     Dbc,
@@ -24,9 +21,6 @@ from aqualog.cli.options import (
     StoreOption,
     Verbose,
 )
-
-if TYPE_CHECKING:
-    from aqualog.cli.console import Console
 
 __all__ = ["bin_resistance"]
 
@@ -66,62 +60,27 @@ def bin_resistance(
       aqualog bin-resistance campaign.toml --by load --bin-width 20 --robust -o resistance.csv
       aqualog bin-resistance campaign.toml --road both --as-measured
     """
+    from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
     from aqualog.cli.console import Console, guarded
+    from aqualog.face.bins import check_table
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        code = _bin_resistance(
-            inputs, by, width, road, store, vehicle, signals, dbc or [], out, jobs, robust=robust,
-            relative=not as_measured, as_json=as_json, force=force, console=console,
-        )  # fmt: skip
+        if out is not None:
+            check_table(out)
+        campaign = open_campaign(inputs, vehicle=vehicle, signals=signals, dbc=dbc, store=store)
+        campaign.check_bins(by, bin_width=width, road=road)
+        campaign.check_targets([out] if out is not None else [], force=force)
+        runs = run_campaign(campaign, console, jobs=jobs)
+        if runs.outcome.done:
+            with console.hearing() as hear:
+                found = runs.resistance(
+                    by, bin_width=width, road=road, robust=robust, as_measured=as_measured, progress=hear
+                )
+            if out is not None:
+                found.write(out, force=True)
+                console.note(f"the table is {out}")
+            console.data(found, as_json=as_json)
+        code = exit_code(runs)
     if code:
         raise typer.Exit(code)
-
-
-def _bin_resistance(
-    inputs: list[str],
-    by: str,
-    width: float,
-    road: str,
-    store: str | None,
-    vehicle: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    out: Path | None,
-    jobs: int | None,
-    *,
-    robust: bool,
-    relative: bool,
-    as_json: bool,
-    force: bool,
-    console: Console,
-) -> int:
-    from aqualog.campaign.bins import check_plan, plan
-    from aqualog.cli.campaign_results import check_targets, exit_code, opened, results
-    from aqualog.cli.console import clean
-
-    check_table(out)
-    configured = opened(inputs, vehicle=vehicle, map_file=map_file, dbc=dbc)
-    check_plan(configured.campaign, split(by), width_kmh=width, road=road)
-    check_targets(configured, [out] if out is not None else [], force=force, store=store)
-    data, outcome = results(configured, store, console=console, jobs=jobs)
-    if not outcome.done:
-        return exit_code(outcome, data)
-    with console.steps() as steps:
-        steps("averaging")
-        from aqualog.campaign.resistance import resistances
-        from aqualog.report.campaign_document import resistance_document
-        from aqualog.report.campaign_tables import resistance_text
-
-        found = resistances(
-            data, plan(data, split(by), width_kmh=width, road=road), relative=relative, robust=robust
-        )  # fmt: skip
-    document = resistance_document(data.name, found)
-    if out is not None:
-        write_table(out, document["rows"])
-        console.note(f"the table is {out}")
-    if as_json:
-        sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
-    else:
-        sys.stdout.write(clean(resistance_text(found)))
-    return exit_code(outcome, data)

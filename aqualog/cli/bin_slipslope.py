@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -25,10 +22,7 @@ from aqualog.cli.options import (
     Verbose,
 )
 
-if TYPE_CHECKING:
-    from aqualog.cli.console import Console
-
-__all__ = ["BinWidth", "By", "Road", "Robust", "TableOut", "bin_slipslope", "check_table", "split", "write_table"]
+__all__ = ["BinWidth", "By", "Road", "Robust", "TableOut", "bin_slipslope"]
 
 By = Annotated[
     str,
@@ -46,7 +40,6 @@ Robust = Annotated[bool, typer.Option("--robust", help="Weigh outliers down (Hub
 TableOut = Annotated[
     Path | None, typer.Option("-o", "--out", help="Table of the rows: FILE.csv or FILE.parquet.", metavar="FILE")
 ]
-_SUFFIXES = (".csv", ".parquet")
 
 
 def bin_slipslope(
@@ -86,104 +79,25 @@ def bin_slipslope(
       aqualog bin-slipslope campaign.toml --json | jq '.full_aquaplaning[] | select(.v_full_kmh)'
       aqualog bin-slipslope campaign.toml --store results -o slopes.csv
     """
+    from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
     from aqualog.cli.console import Console, guarded
+    from aqualog.face.bins import check_table
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        code = _bin_slipslope(
-            inputs, by, width, road, store, vehicle, signals, dbc or [], out, jobs, robust=robust, as_json=as_json,
-            force=force, console=console,
-        )  # fmt: skip
+        if out is not None:
+            check_table(out)
+        campaign = open_campaign(inputs, vehicle=vehicle, signals=signals, dbc=dbc, store=store)
+        campaign.check_bins(by, bin_width=width, road=road)
+        campaign.check_targets([out] if out is not None else [], force=force)
+        runs = run_campaign(campaign, console, jobs=jobs)
+        if runs.outcome.done:
+            with console.hearing() as hear:
+                found = runs.slip_slope(by, bin_width=width, road=road, robust=robust, progress=hear)
+            if out is not None:
+                found.write(out, force=True)
+                console.note(f"the table is {out}")
+            console.data(found, as_json=as_json)
+        code = exit_code(runs)
     if code:
         raise typer.Exit(code)
-
-
-def _bin_slipslope(
-    inputs: list[str],
-    by: str,
-    width: float,
-    road: str,
-    store: str | None,
-    vehicle: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    out: Path | None,
-    jobs: int | None,
-    *,
-    robust: bool,
-    as_json: bool,
-    force: bool,
-    console: Console,
-) -> int:
-    from aqualog.campaign.bins import check_plan, plan
-    from aqualog.cli.campaign_results import check_targets, exit_code, opened, results
-    from aqualog.cli.console import clean
-
-    check_table(out)
-    configured = opened(inputs, vehicle=vehicle, map_file=map_file, dbc=dbc)
-    check_plan(configured.campaign, split(by), width_kmh=width, road=road)
-    check_targets(configured, [out] if out is not None else [], force=force, store=store)
-    data, outcome = results(configured, store, console=console, jobs=jobs)
-    if not outcome.done:
-        return exit_code(outcome, data)
-    with console.steps() as steps:
-        steps("regressing")
-        from aqualog.campaign.full_speed import full_speeds
-        from aqualog.campaign.slip_slope import slip_slopes
-        from aqualog.campaign.spin_downs import minor_spin_downs
-        from aqualog.campaign.spin_ups import spin_ups
-        from aqualog.report.campaign_document import slope_document
-        from aqualog.report.campaign_tables import slope_text
-
-        cells = plan(data, split(by), width_kmh=width, road=road)
-        slopes = slip_slopes(data, cells, robust=robust)
-        steps("speeds of full aquaplaning")
-        wet = cells if road != "dry" else plan(data, split(by), width_kmh=width)
-        speeds = full_speeds(data, wet, slopes if road != "dry" else slip_slopes(data, wet, robust=robust))
-        ups = list(zip(spin_ups(data, wet), spin_ups(data, wet, residual=True), strict=True))
-        downs = minor_spin_downs(data, wet)
-    document = slope_document(data.name, slopes, speeds, ups, downs)
-    if out is not None:
-        write_table(out, document["rows"])
-        console.note(f"the table is {out}")
-    if as_json:
-        sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
-    else:
-        sys.stdout.write(clean(slope_text(slopes, speeds, ups, downs)))
-    return exit_code(outcome, data)
-
-
-def split(names: str) -> list[str]:
-    """Names said after --by."""
-    return [n.strip() for n in names.split(",") if n.strip()]
-
-
-def check_table(out: Path | None) -> None:
-    """Refuse a name of a table that says no known format, before any work.
-
-    Raises
-    ------
-    ConfigError
-    """
-    from aqualog.errors import ConfigError
-
-    if out is not None and out.suffix.lower() not in _SUFFIXES:
-        raise ConfigError(f'"{out.suffix}" is no format of a table', where=str(out), expected=" or ".join(_SUFFIXES))
-
-
-def write_table(out: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows of a document as CSV or Parquet, whole; intervals in two columns."""
-    import polars as pl
-
-    from aqualog.face.paths import write_whole
-    from aqualog.report.campaign_csv import safe_cell
-    from aqualog.report.campaign_document import flat_rows
-
-    plain = flat_rows(rows)
-    if out.suffix.lower() == ".csv":
-        plain = [{k: safe_cell(v) if isinstance(v, str) else v for k, v in row.items()} for row in plain]
-    frame = pl.DataFrame(plain, infer_schema_length=None)
-    if out.suffix.lower() == ".parquet":
-        write_whole(out, frame.write_parquet)
-    else:
-        write_whole(out, frame.write_csv)

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import typer
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Console", "Heard", "clean", "clean_line", "guarded", "told_if_interrupted"]
 
+_SHOWN_AT_ONCE = 20  # inputs that failed
 SLOW_S = 5.0  # a first step that takes longer than this is compiling
 _LINE = 2000  # characters that anybody reads of a line
 PROGRESS_MODES = ("auto", "bar", "plain", "off")
@@ -134,6 +136,7 @@ class Heard(Listener):
 
     def __init__(self, console: Console, steps: Steps) -> None:
         self.console, self.steps, self.mode = console, steps, steps.mode
+        self._failed = 0
 
     def __call__(self, step: str) -> None:
         """Show a step."""
@@ -148,9 +151,18 @@ class Heard(Listener):
         self.console.detail(text)
 
     def failed(self, name: str, reason: str) -> None:
-        """Show an input that failed."""
-        self.steps.clear()
-        sys.stderr.write(f"error: {clean_line(reason if name in reason else f'{name}: {reason}')}\n")
+        """Show an input that failed; of many the first ones."""
+        self._failed += 1
+        if self._failed <= _SHOWN_AT_ONCE:
+            self.steps.clear()
+            text = reason if name in reason else f"{name}: {reason.removeprefix(f'{Path(name).name}: ')}"
+            sys.stderr.write(f"error: {clean_line(text)}\n")
+
+    def settled(self, where: str) -> None:
+        """Show how many more failed."""
+        if self._failed > _SHOWN_AT_ONCE:
+            self.steps.clear()
+            sys.stderr.write(f"error: and {self._failed - _SHOWN_AT_ONCE} more; all are in {where}\n")
 
     def slow(self, what: str) -> AbstractContextManager[object]:
         """Say that something is being compiled, if it takes long."""

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from aqualog.cli.bin_slipslope import BinWidth, By, Robust, split
+from aqualog.cli.bin_slipslope import BinWidth, By, Robust
 from aqualog.cli.options import Dbc, Debug, Force, Jobs, Progress, Quiet, StoreOption, Verbose
-
-if TYPE_CHECKING:
-    from aqualog.campaign.batch import Configured
-    from aqualog.cli.console import Console
 
 __all__ = ["report"]
 
@@ -53,60 +48,25 @@ def report(
       aqualog report campaign.toml --robust --bin-width 5 --store results
       aqualog report can_campaign.toml --dbc car.dbc
     """
+    from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
     from aqualog.cli.console import Console, guarded
+    from aqualog.errors import ConfigError
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        code = _report(campaign, out, by, width, store, dbc or [], jobs, robust=robust, force=force, console=console)
+        if not campaign.lower().endswith(".toml"):
+            raise ConfigError(
+                "is no campaign file", where=campaign, expected="a campaign file (TOML)",
+                hint=f"aqualog detect {campaign} -o DIR for the page of one drive",
+            )  # fmt: skip
+        opened = open_campaign([campaign], dbc=dbc, store=store)
+        folder = out if out is not None else opened.configured.campaign.path.with_suffix(".report")
+        opened.check_report(folder, force=force)
+        opened.check_bins(by, bin_width=width)
+        runs = run_campaign(opened, console, jobs=jobs)
+        with console.hearing() as hear:
+            page = runs.report(folder, by=by, bin_width=width, robust=robust, force=True, progress=hear)
+        console.note(f"{page}: pages of {len(runs.data.runs)} runs")
+        code = exit_code(runs)
     if code:
         raise typer.Exit(code)
-
-
-def _report(
-    name: str,
-    out: Path | None,
-    by: str,
-    width: float,
-    store: str | None,
-    dbc: list[Path],
-    jobs: int | None,
-    *,
-    robust: bool,
-    force: bool,
-    console: Console,
-) -> int:
-    from aqualog.campaign.bins import check_plan
-    from aqualog.cli.campaign_results import exit_code, opened, results
-    from aqualog.errors import ConfigError
-    from aqualog.report.campaign_folder import check_folder, write_report
-
-    if not name.lower().endswith(".toml"):
-        raise ConfigError(
-            "is no campaign file", where=name, expected="a campaign file (TOML)",
-            hint=f"aqualog detect {name} -o DIR for the page of one drive",
-        )  # fmt: skip
-    began = time.monotonic()
-    configured = opened([name], dbc=dbc)
-    folder = out if out is not None else configured.campaign.path.with_suffix(".report")
-    check_folder(folder, force=force)
-    _check_sources(configured, folder)
-    from aqualog.face.progress import Progress as Told
-    from aqualog.report.campaign_findings import find
-
-    chosen = check_plan(configured.campaign, split(by), width_kmh=width)
-    data, outcome = results(configured, store, console=console, jobs=jobs)
-    with console.steps() as steps:
-        findings = find(data, chosen, robust=robust, report=steps)
-        files = write_report(data, findings, folder, report=Told(steps, "pages of runs"))
-    console.note(f"{folder / 'index.html'}: {files} files, {time.monotonic() - began:.0f} s")
-    return exit_code(outcome, data)
-
-
-def _check_sources(configured: Configured, folder: Path) -> None:
-    """Nothing that the campaign reads may be in the way, not even with --force."""
-    from aqualog.campaign.batch import name_of
-    from aqualog.cli.campaign_results import check_targets
-    from aqualog.report.campaign_folder import targets_of
-
-    names = [name_of(configured.campaign, r.logs) for r in configured.campaign.runs]
-    check_targets(configured, targets_of(folder, names), force=True)

@@ -28,6 +28,9 @@ class Listener:
     def failed(self, name: str, reason: str) -> None:
         """Hear that one input among many failed; the call goes on with the others."""
 
+    def settled(self, where: str) -> None:
+        """Hear that all inputs have been tried; the file `where` lists all that failed."""
+
     def slow(self, what: str) -> AbstractContextManager[object]:
         """Enclose work whose first run compiles `what`."""
         return nullcontext()

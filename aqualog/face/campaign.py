@@ -1,0 +1,581 @@
+"""`aq.Campaign`: many drives in known configurations, and what all of them say together."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.errors import ConfigError
+from aqualog.face.listener import Listener, Progress, listener
+from aqualog.face.paths import expand, list_files, refuse_existing
+from aqualog.face.progress import Progress as Counted
+from aqualog.face.result import PathLike, Result, Writers, text_file
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.campaign.batch import BatchOutcome, Configured
+    from aqualog.campaign.place import Address
+    from aqualog.campaign.samples import CampaignData
+    from aqualog.campaign.shard import Shard
+    from aqualog.face.bins import BinnedResistance, BinnedSlopes
+    from aqualog.face.matrix import Matrix
+    from aqualog.face.plan import BatchPlan
+    from aqualog.workers import Limits, WorkOn
+
+__all__ = ["Campaign", "CampaignRuns", "is_campaign", "names_of"]
+
+
+def names_of(inputs: PathLike | Sequence[PathLike]) -> list[str]:
+    """Return inputs as they were named."""
+    return [str(inputs)] if isinstance(inputs, str | Path) else [str(p) for p in inputs]
+
+
+def is_campaign(inputs: Sequence[str]) -> bool:
+    """Return whether a campaign file is named, and nothing else.
+
+    Raises
+    ------
+    ConfigError
+        If one stands among other inputs.
+    """
+    named = [i for i in inputs if i.lower().endswith(".toml")]
+    if named and len(inputs) > 1:
+        raise ConfigError("stands among other inputs", where=named[0], expected="one campaign file, or logs only")
+    return bool(named)
+
+
+class Campaign:
+    """A campaign file, or logs of which each is a drive of its own. Nothing is measured before `run`.
+
+    Parameters
+    ----------
+    inputs : str, Path or several
+        A campaign file (TOML), or logs: files, folders, globs, `@list.txt`.
+    vehicle : str or Path, optional
+        Vehicle file; needed for logs. A campaign file names its own.
+    map : str or Path, optional
+        Signal map, in place of the campaign's.
+    dbc : sequence of paths
+        CAN databases for raw frames.
+    thresholds : str or Path, optional
+        Thresholds of the detectors.
+    store : str or Path, optional
+        Folder or URL for the results of each log; default beside the campaign file: NAME.store.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of all files in one message.
+
+    Examples
+    --------
+    >>> runs = aq.Campaign("campaign.toml").run(jobs=8)
+    >>> runs.slip_slope(by="tyre").rows
+    """
+
+    def __init__(
+        self,
+        inputs: PathLike | Sequence[PathLike],
+        *,
+        vehicle: PathLike | None = None,
+        map: PathLike | None = None,
+        dbc: PathLike | Sequence[PathLike] = (),
+        thresholds: PathLike | None = None,
+        store: PathLike | None = None,
+    ) -> None:
+        from aqualog.config.configured import configure, configure_logs
+
+        names = names_of(inputs)
+        databases = [Path(p) for p in names_of(dbc)]
+        map_file = None if map is None else Path(map)
+        limits = None if thresholds is None else Path(thresholds)
+        if is_campaign(names):
+            if vehicle is not None:
+                raise ConfigError("--vehicle beside a campaign", where=names[0], expected="it in the campaign's runs")
+            found = configure(Path(names[0]), map_file=map_file, dbc=databases, thresholds=limits)
+        elif vehicle is None:
+            raise ConfigError("no --vehicle", expected="a vehicle file, or a campaign file that names one")
+        else:
+            found = configure_logs(
+                expand(names), Path(vehicle), map_file=map_file, dbc=databases, thresholds=limits,
+                lists=tuple(list_files(names)),
+            )  # fmt: skip
+        self.inputs = tuple(names)
+        self.configured: Configured = found
+        self._store = None if store is None else str(store)
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.configured.campaign.name
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys by which the runs can be grouped."""
+        return self.configured.campaign.keys
+
+    @property
+    def store(self) -> Address:
+        """Folder or URL of the results: the one given, else a folder beside the campaign file.
+
+        Raises
+        ------
+        ConfigError
+            For logs without a campaign file, which have no place of their own.
+        """
+        if self._store is not None:
+            from aqualog.campaign.place import address_of
+
+            return address_of(self._store)
+        path = self.configured.campaign.path
+        if path.suffix.lower() != ".toml":
+            raise ConfigError("logs without a campaign file have no place for results", expected="--store DIR")
+        return path.with_suffix(".store")
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """All files that the campaign reads, which no result may overwrite."""
+        from aqualog.config.configured import files_of
+
+        return files_of(self.configured)
+
+    @property
+    def runs(self) -> pl.DataFrame:
+        """A row for each run: log and what the campaign says of it."""
+        import polars as pl
+
+        runs = self.configured.campaign.runs
+        rows = [{"log": "; ".join(map(str, r.logs)), "vehicle": str(r.vehicle), **r.values} for r in runs]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def check_bins(self, by: str | Sequence[str] = (), *, bin_width: float = 10.0, road: str = "wet") -> Any:
+        """Check keys and bins before any work, and return the plan that they make.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.campaign.bins import check_plan
+
+        return check_plan(self.configured.campaign, split(by), width_kmh=bin_width, road=road)
+
+    def check_targets(self, targets: Sequence[Path], *, force: bool) -> None:
+        """Refuse results that are in the way of something, that the campaign reads, or that lie in a store.
+
+        Raises
+        ------
+        ConfigError
+        """
+        places = [self.store] if self._store is not None else []
+        if self.configured.campaign.path.suffix.lower() == ".toml":
+            places.append(self.configured.campaign.path.with_suffix(".store"))
+        for target in targets:
+            _refuse_in_store(target, [p for p in places if isinstance(p, Path)])
+        refuse_existing(targets, force=force, sources=self.sources)
+
+    def check_report(self, folder: Path, *, force: bool) -> None:
+        """Refuse a folder for the report that holds other files, or files that the campaign reads.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.campaign.batch import name_of
+        from aqualog.report.campaign_folder import check_folder, targets_of
+
+        check_folder(folder, force=force)
+        campaign = self.configured.campaign
+        self.check_targets(targets_of(folder, [name_of(campaign, r.logs) for r in campaign.runs]), force=True)
+
+    def matrix(self) -> Matrix:
+        """Return the test matrix: what was driven how often and how fast, and what is missing.
+
+        Raises
+        ------
+        ConfigError
+            For logs without a campaign file.
+        """
+        from aqualog.face.matrix import matrix
+
+        return matrix(self.configured.campaign.path)
+
+    def plan(
+        self,
+        *,
+        jobs: int | None = None,
+        sample: int | None = None,
+        within: str | None = None,
+        progress: Progress = None,
+    ) -> BatchPlan:
+        """Estimate what `run` will cost, from a sample of the logs: time, memory, room in the store.
+
+        Parameters
+        ----------
+        jobs : int, optional
+            Logs at a time; default one per core.
+        sample : int, optional
+            Logs to measure; default 8, or two for each process.
+        within : str, optional
+            A time such as `30min` or `8h`: how many shards end within it.
+
+        Raises
+        ------
+        ConfigError, FitError
+        """
+        from aqualog.face.plan import plan
+
+        return plan(self, jobs=jobs, sample=sample, within=within, progress=progress)
+
+    def run(
+        self,
+        *,
+        jobs: int | None = None,
+        force: bool = False,
+        shard: str | None = None,
+        cluster: str | None = None,
+        limit_s: float | None = None,
+        limit_mb: int | None = None,
+        progress: Progress = None,
+    ) -> CampaignRuns:
+        """Measure every log that is new or has changed, keep the results in the store, and load them all.
+
+        Parameters
+        ----------
+        jobs : int, optional
+            Logs at a time; default one per core.
+        force : bool
+            Measure all logs again.
+        shard : str, optional
+            `3/8`: only the third of eight parts, for several machines on one store.
+        cluster : str, optional
+            Address of a dask scheduler whose workers do the work.
+        limit_s : float, optional
+            Longest time for one log. [s]
+        limit_mb : int, optional
+            Most memory for one process. [MB]
+        progress : callable, optional
+            Called with each step of the work, such as `print`.
+
+        Raises
+        ------
+        ConfigError
+            If the folder is not a store.
+        AqualogError
+            If the store cannot be written, or another batch writes there.
+        """
+        from aqualog.campaign.shard import part_of, shard_of
+        from aqualog.workers import Limits
+
+        began = time.monotonic()
+        if cluster is not None and jobs is not None:
+            raise ConfigError("--jobs beside --cluster", expected="as many as there are workers")
+        if cluster is not None and not cluster.strip():
+            raise ConfigError("--cluster is empty", expected="tcp://host:8786")
+        part = None if shard is None else shard_of(shard)
+        configured = self.configured
+        if part is not None:
+            configured = replace(configured, campaign=part_of(configured.campaign, part))
+        if not configured.campaign.runs:  # a matrix of shards may have more parts than there are logs
+            from aqualog.campaign.batch import BatchOutcome
+            from aqualog.campaign.samples import CampaignData
+            from aqualog.campaign.store import Store
+
+            return CampaignRuns(self, CampaignData(configured, Store(self.store), ()), BatchOutcome(0, 0, {}), part)
+        data, outcome = _results(
+            configured, self.store, listener(progress), jobs=jobs, force=force, shard=part, cluster=cluster,
+            limits=Limits(limit_s, limit_mb),
+        )  # fmt: skip
+        return CampaignRuns(self, data, outcome, part, time.monotonic() - began)
+
+    def __repr__(self) -> str:
+        return f"campaign {self.name}: {len(self.configured.campaign.runs)} runs, keys {', '.join(self.keys) or 'none'}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignRuns(Result):
+    """All runs of a campaign with their results.
+
+    `data` gives access to runs and samples, `outcome` counts what came of the logs, `seconds` is the time it took.
+    """
+
+    campaign: Campaign
+    data: CampaignData
+    outcome: BatchOutcome
+    shard: Shard | None = None
+    seconds: float = 0.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Where the results are, and what a shard leaves to do."""
+        notes = (f"results are in {self.data.store.name}, {self.seconds:.0f} s",)
+        if self.shard is None:
+            return notes
+        return (*notes, "the same command without --shard makes the tables, when all parts are done")
+
+    @property
+    def sources(self) -> tuple[Path, ...]:  # type: ignore[override]
+        """All files that the campaign reads."""
+        return self.campaign.sources
+
+    @property
+    def has_loss(self) -> bool:  # type: ignore[override]
+        """Whether a log failed, was cut or lost samples."""
+        lost = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in self.data.done)
+        return bool(self.outcome.failed or lost)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog batch`."""
+        from aqualog import __version__
+
+        return {
+            "schema_version": 1,
+            "tool_version": __version__,
+            "campaign": self.data.name,
+            "store": self.data.store.name,
+            "runs": len(self.data.runs),
+            "made": self.outcome.made,
+            "kept": self.outcome.kept,
+            "failed": [{"log": name, "reason": reason} for name, reason in self.outcome.failed.items()],
+            "events": {d: n for d, (n, _) in self._counts().items()},
+        }
+
+    @property
+    def runs(self) -> pl.DataFrame:
+        """A row for each run: state, configuration, quality, events of each detector."""
+        import polars as pl
+
+        rows = [
+            {"run": r.index, "name": r.name, "state": r.state, "reason": r.reason or None, **r.run.values,
+             **{f"events_{d}": sum(e["detector"] == d for e in r.events) if r.is_done else None for d in _detectors()}}
+            for r in self.data.runs
+        ]  # fmt: skip
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    @property
+    def events(self) -> pl.DataFrame:
+        """A row for each event of each run."""
+        import polars as pl
+
+        flat = ("detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold")
+        rows = [
+            {"run": r.index, "name": r.name, **{k: e.get(k) for k in flat}} for r in self.data.done for e in r.events
+        ]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`runs` and `events`."""
+        return {"runs": self.runs, "events": self.events}
+
+    def text(self) -> str:
+        """Return how many logs are done, and the events of each detector."""
+        from aqualog.report.text import table
+
+        rows = [(d, str(n), f"{k} of {len(self.data.done)}") for d, (n, k) in self._counts().items()]
+        return f"{self._head()}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
+
+    def headline(self) -> str:
+        """Return how many logs are done and failed."""
+        failed = [f"  failed: {name}: {reason}" for name, reason in self.outcome.failed.items()]
+        return "\n".join([f"{self.data.name}: {self._head()}", *failed])
+
+    def _head(self) -> str:
+        o = self.outcome
+        return f"{o.done} logs done ({o.made} now, {o.kept} before), {len(o.failed)} failed"
+
+    def _counts(self) -> dict[str, tuple[int, int]]:
+        """Per detector: its events, and the runs that have one."""
+        of = {d: [sum(e["detector"] == d for e in r.events) for r in self.data.done] for d in _detectors()}
+        return {d: (sum(x), sum(n > 0 for n in x)) for d, x in of.items()}
+
+    def plot(self) -> go.Figure:
+        """Return the share of runs with an event, by detector."""
+        import plotly.graph_objects as go
+
+        from aqualog.report.wording import detector_name
+
+        counts, done = self._counts(), max(len(self.data.done), 1)
+        made = go.Figure(go.Bar(x=[detector_name(d) for d in counts], y=[k / done for _, k in counts.values()]))
+        made.update_layout(title=self.data.name, template="plotly_white")
+        made.update_yaxes(title="share of runs with an event", range=[0.0, 1.0], tickformat=".0%")
+        return made
+
+    def files(self) -> Writers:
+        """Return `campaign.json`, `runs.parquet` and `events.parquet`; the store itself stays where it is."""
+        return {
+            "campaign.json": text_file(lambda: self.to_json() + "\n"),
+            "runs.parquet": self.runs.write_parquet,
+            "events.parquet": self.events.write_parquet,
+        }
+
+    def slip_slope(
+        self,
+        by: str | Sequence[str] = (),
+        *,
+        bin_width: float = 10.0,
+        road: str = "wet",
+        robust: bool = False,
+        progress: Progress = None,
+    ) -> BinnedSlopes:
+        """Regress slip on traction in bins of speed for each configuration, and estimate the speed of full aquaplaning.
+
+        Parameters
+        ----------
+        by : str or several
+            Configuration keys, such as `tyre,pressure,water-depth`; default those that differ.
+        bin_width : float
+            Width of the speed bins. [km/h]
+        road : str
+            `wet`, `dry` or `both`.
+        robust : bool
+            Weigh outliers down (Huber).
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.face.bins import binned_slopes
+
+        return binned_slopes(self, split(by), bin_width=bin_width, road=road, robust=robust, hear=listener(progress))
+
+    def resistance(
+        self,
+        by: str | Sequence[str] = (),
+        *,
+        bin_width: float = 10.0,
+        road: str = "wet",
+        robust: bool = False,
+        as_measured: bool = False,
+        progress: Progress = None,
+    ) -> BinnedResistance:
+        """Average the resistance measure in bins of speed for each configuration.
+
+        Parameters
+        ----------
+        by, bin_width, road, robust
+            As of `slip_slope`.
+        as_measured : bool
+            Keep each run's own level on dry road, instead of taking it off.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.face.bins import binned_resistance
+
+        return binned_resistance(
+            self, split(by), bin_width=bin_width, road=road, robust=robust, relative=not as_measured,
+            hear=listener(progress),
+        )  # fmt: skip
+
+    def report(
+        self,
+        folder: PathLike,
+        *,
+        by: str | Sequence[str] = (),
+        bin_width: float = 10.0,
+        robust: bool = False,
+        force: bool = False,
+        progress: Progress = None,
+    ) -> Path:
+        """Write the campaign's page with a page for each run, and return the page.
+
+        An earlier report in the folder is replaced; `force` writes beside other files.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.report.campaign_findings import find
+        from aqualog.report.campaign_folder import write_report
+
+        out, hear = Path(folder), listener(progress)
+        self.campaign.check_report(out, force=force)
+        chosen = self.campaign.check_bins(by, bin_width=bin_width)
+        findings = find(self.data, chosen, robust=robust, report=hear)
+        write_report(self.data, findings, out, report=Counted(hear, "pages of runs"))
+        return out / "index.html"
+
+
+def _detectors() -> Sequence[str]:
+    from aqualog.detect.needs import DETECTORS
+
+    return DETECTORS
+
+
+def split(by: str | Sequence[str]) -> list[str]:
+    """Return keys that stand in one text, with commas, or in several."""
+    names = by.split(",") if isinstance(by, str) else by
+    return [n.strip() for n in names if n.strip()]
+
+
+def _results(
+    configured: Configured,
+    address: Address,
+    hear: Listener,
+    *,
+    jobs: int | None,
+    force: bool,
+    shard: Shard | None,
+    cluster: str | None,
+    limits: Limits,
+) -> tuple[CampaignData, BatchOutcome]:
+    """Bring the store up to date and load it; with `shard` the campaign is that shard's already."""
+    from aqualog.places import has_kept_code
+    from aqualog.workers import most_processes
+
+    if jobs is not None and jobs > most_processes():
+        hear.note(f"--jobs {jobs}: {most_processes()} processes are the most on this machine")
+    hear("looking at the logs")
+    from aqualog.campaign.batch import run_batch
+    from aqualog.campaign.samples import load_results
+    from aqualog.campaign.store import Store
+
+    if cluster is None and not has_kept_code():
+        hear.note("the first logs wait while the detectors are compiled, once after an installation")
+    place = Store(address, shard.name if shard is not None else "")
+    _check_apart(configured, place)
+    with _elsewhere(cluster, limits, hear) as elsewhere:
+        outcome = run_batch(
+            configured, place, jobs=jobs or os.cpu_count() or 1, force=force, limits=limits,
+            elsewhere=elsewhere, report=Counted(hear, "logs"), told=hear.failed,
+        )  # fmt: skip
+    hear.settled(place.at("manifest.json"))
+    hear("loading the results")
+    return load_results(configured, place), outcome
+
+
+@contextmanager
+def _elsewhere(address: str | None, limits: Limits, hear: Callable[[str], None]) -> Iterator[WorkOn | None]:
+    if address is None:
+        yield None
+        return
+    from aqualog.campaign.cluster import on_cluster
+
+    with on_cluster(address, limits=limits, tell=lambda text: hear(f"{address}: {text}")) as work_on:
+        yield work_on
+
+
+def _check_apart(configured: Configured, place: Any) -> None:
+    from aqualog.config.configured import files_of
+
+    if any(place.holds(p) for p in files_of(configured)):
+        raise ConfigError("holds a source of this campaign", where=place.name, expected="a folder of its own")
+
+
+def _refuse_in_store(target: Path, places: Sequence[Path]) -> None:
+    from aqualog.campaign.store import Store
+
+    above = [p for p in Path(os.path.realpath(target)).parents if Store(p).exists]
+    inside = next((p for p in [*above, *places] if Store(p).holds(target)), None)
+    if inside is not None:
+        raise ConfigError("lies in a store of results", where=str(target), expected=f"a place outside {inside}")
