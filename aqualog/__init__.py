@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
+    from aqualog.face.campaign import Campaign
+    from aqualog.face.convert import convert
     from aqualog.face.detect import Detection, detect
     from aqualog.face.drive import Drive, read
     from aqualog.face.slip_slope import SlipSlope, slip_slope
@@ -33,6 +35,8 @@ _FACE = {
     "read": "aqualog.face.drive",
     "detect": "aqualog.face.detect",
     "slip_slope": "aqualog.face.slip_slope",
+    "convert": "aqualog.face.convert",
+    "Campaign": "aqualog.face.campaign",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
@@ -45,6 +49,7 @@ _FACE = {
 
 __all__ = [
     "AqualogError",
+    "Campaign",
     "Detection",
     "Drive",
     "Model",
@@ -52,6 +57,7 @@ __all__ = [
     "SlipSlope",
     "Vehicle",
     "__version__",
+    "convert",
     "detect",
     "physics",
     "read",
