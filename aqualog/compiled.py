@@ -1,4 +1,4 @@
-"""Compilation of recursions, and of the physics that they call."""
+"""Compile recursions, and the physics that they call."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _inlined: dict[FunctionType, Any] = {}
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a recursion; the machine code is kept for the next process where there is a place for it.
+    """Compile a recursion, and keep the machine code for the next process if there is a folder for it.
 
-    A read-only installation without a home folder has no such place; there it is compiled in each process. No fast
-    maths: results must not depend on how a drive is cut.
+    A read-only installation without a home folder has no such folder; there each process compiles. No fast maths:
+    results must not depend on how a drive is cut.
 
-    The kept code is thrown away when a module of `physics`, one beside the function or one in the folder of what it
-    calls changes, or a constant that it has from elsewhere: numba itself looks at the file of the function alone and
-    would go on with an old equation.
+    The kept code is discarded when a module of `physics`, one beside the function or one in the folder of a called
+    function changes. So it is when a constant from elsewhere changes. numba itself checks only the file of the function
+    and would go on with an old equation.
     """
     # numba chooses the place while it decorates; beside the sources it would leave folders behind that an
     # uninstallation does not remove, and that hide an editable one
@@ -50,7 +50,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 def kept_code() -> frozenset[tuple[str, int]]:
-    """Path and time of change of what is kept of machine code: more of it after some work tells that it compiled."""
+    """Return path and time of change of the kept machine code: a difference after some work shows a compilation."""
     place = config.CACHE_DIR or _user_cache()
     found = set()
     for path in Path(place).rglob("*.nb?") if place else ():
@@ -60,7 +60,7 @@ def kept_code() -> frozenset[tuple[str, int]]:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A pure function of `physics` for use inside a compiled recursion, on scalars.
+    """Make a pure function of `physics` callable inside a compiled recursion, on scalars.
 
     The one source serves arrays and the simulator. Keyword-only arguments become ordinary ones, which is all that
     numba knows; physics functions that it calls are taken along.
@@ -82,7 +82,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _load_lightly(dispatcher: Any) -> None:
-    """Let kept machine code be loaded without what only compiling needs.
+    """Load kept machine code without the parts that only compiling needs.
 
     numba fills its tables of implementations before it looks for kept code: a hundred modules, with SciPy where that
     is installed, 0.3 s in each process. A function that must be compiled after all has them filled by the compiler.
@@ -101,9 +101,9 @@ def _load_lightly(dispatcher: Any) -> None:
 
 @cache
 def _user_cache() -> str:
-    """A folder for machine code in the user's cache; empty where there is none to write to.
+    """Return a folder for machine code in the user's cache; empty if no folder can be written.
 
-    What lies in it is run: it must be this user's, and nobody else may write to it.
+    Its content is executed: it must be this user's, and nobody else may write to it.
     """
     try:
         folder = code_folder()
@@ -120,7 +120,7 @@ def _user_cache() -> str:
 
 
 def _stamp_of(function: FunctionType) -> str:
-    """State of all that the machine code of a function is made of."""
+    """Return the state of all sources of a function's machine code."""
     folders = {Path(__file__).resolve().parent / "physics"}
     constants: set[str] = set()
     _gather(function, folders, constants, set())
@@ -128,7 +128,7 @@ def _stamp_of(function: FunctionType) -> str:
 
 
 def _gather(function: FunctionType, folders: set[Path], constants: set[str], seen: set[FunctionType]) -> None:
-    """Folders of what a function refers to, and values of constants, which are put into its machine code."""
+    """Return the folders that a function refers to, and values of constants, which enter its machine code."""
     if function in seen:
         return
     seen.add(function)

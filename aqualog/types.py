@@ -55,7 +55,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Two clocks of a log that run apart: `against` gains `ppm` on `clock`, which counts, `shift_s` over the log."""
+    """Two clocks of a log that drift apart: `against` gains `ppm` on `clock`, the reference; `shift_s` in all."""
 
     clock: str
     against: str
@@ -65,12 +65,12 @@ class Drift:
 
 @dataclass(frozen=True, slots=True)
 class FileFaults:
-    """What a reader had to leave out. `notes` are sentences for the user.
+    """Losses of a reader. `notes` are sentences for the user.
 
     `lost_samples` counts what the format stores as one: records of an MDF group, messages, rows of a table (cells,
     where the rest of the row is sound), whatever the number of channels in them.
-    `unfinalised`: the logger has not finished the file, and what is missing was made up for. `drifts`: clocks in the
-    file that run apart.
+    `unfinalised`: the logger has not finished the file, and aqualog has completed it. `drifts`: clocks in the file that
+    drift apart.
     """
 
     truncated: bool = False
@@ -136,7 +136,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What was lost on the way from the files to the grid.
+    """Losses between the files and the grid.
 
     `dropped_samples` are all samples that were not used; among them `lost_in_files` those that a reader could not get
     out of a damaged file, `frozen_samples` those with which a sensor repeated itself. `unfinalised`: a logger has not
@@ -157,9 +157,9 @@ class Quality:
 class Signals:
     """All signals of one drive on one time base.
 
-    `frame` has `t` [s] from the first sample and one column per canonical symbol in SI; a value that could not be
-    had is null. `origins` has one entry per symbol; `start_ns` is the absolute time of `t = 0` where the log has it.
-    `full`: rows and step [ns] of a drive of which `frame` is but a picture, coarser than the drive is.
+    `frame` has `t` [s] from the first sample and one column per canonical symbol in SI; a missing value is null.
+    `origins` has one entry per symbol; `start_ns` is the absolute time of `t = 0` where the log has it. `full`: rows
+    and step [ns] of the drive if `frame` is only a coarser picture of it.
     """
 
     frame: pl.DataFrame
@@ -172,12 +172,12 @@ class Signals:
 
     @property
     def rows(self) -> int:
-        """Points of the drive's grid."""
+        """Return the points of the drive's grid."""
         return self.full[0] if self.full else self.frame.height
 
     @property
     def step_ns(self) -> int:
-        """Step of the drive's grid. [ns]"""
+        """Return the step of the drive's grid. [ns]"""
         return self.full[1] if self.full else self.dt_ns
 
     @property
@@ -192,11 +192,11 @@ class Signals:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """Names of the columns beside `t`."""
+        """Return the names of the columns beside `t`."""
         return tuple(c for c in self.frame.columns if c != "t")
 
     def array(self, symbol: str) -> FloatArray:
-        """One column as float array, NaN where missing or where the drive has no such signal. Shape (n,)."""
+        """Return one column as float array, NaN where missing or if the drive has no such signal. Shape (n,)."""
         if symbol not in self.frame.columns:
             return np.full(self.frame.height, np.nan)
         import polars as pl
@@ -245,15 +245,15 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class SlopeSummary:
-    """What the slip-slope estimator made of a drive at one place (`left`, `right`, `axle`).
+    """Result of the slip-slope estimator for a drive at one place (`left`, `right`, `axle`).
 
-    `slope` C_s / F_z at the end, `slope_sd` its standard deviation by the filter, `reference` the dry slope that it was
-    compared with (NaN without one), `beta` the slope ratio (None with one driven axle), `offset` of the slip [-];
-    `seconds` by state of the estimator, `inactive` seconds by reason, `alarms` of its change detection; `periods` what
-    the drive adds to the history of the dry slope: largest, mean [-], length [s]; `reference_from` where the dry
-    slope comes from (`history`, `vehicle file`, `this drive`, or empty); `judged_s` for how long the slope was compared
-    with the dry one, `dropped_s` for how long of that it was below half of it,
-    `stiff_s` for how long the estimate was stiffer than any tyre [s].
+    `slope` C_s / F_z at the end, `slope_sd` its standard deviation by the filter; `reference` the dry slope for
+    comparison (NaN without one); `beta` the slope ratio (None with one driven axle); `offset` of the slip [-].
+    `seconds` by state of the estimator, `inactive` seconds by reason, `alarms` of its change detection. `periods` that
+    the drive adds to the history of the dry slope: largest, mean [-], length [s]. `reference_from`: source of the dry
+    slope (`history`, `vehicle file`, `this drive`, or empty). `judged_s`: time of comparison with the dry slope;
+    `dropped_s`: part of it with less than half of that slope; `stiff_s`: time with an estimate stiffer than any tyre
+    [s].
     """
 
     place: str
@@ -275,12 +275,12 @@ class SlopeSummary:
 
 @dataclass(frozen=True, slots=True)
 class DriveResult:
-    """Everything that `detect` found in one drive.
+    """All results of `detect` for one drive.
 
     `features` has the rows of `signals.frame` and no `t`: velocity estimate `v_x_hat` [m/s], centre-line wheel speeds
-    `v_w_fl` ... [m/s], differences `v_w_delta_fl` [m/s] (thesis 2.4) and `a_w_delta_fl` [m/s^2] (2.3), traction
-    coefficients `mu_fl` [-], `delta_a_x` [m/s^2] (2.9), slip slopes `slip_slope_left` with `slip_slope_ref_left` [-];
-    a column is there only if its signals are.
+    `v_w_fl` ... [m/s], differences `v_w_delta_fl` [m/s] (thesis 2.4) and `a_w_delta_fl` [m/s²] (2.3), traction
+    coefficients `mu_fl` [-], `delta_a_x` [m/s²] (2.9), slip slopes `slip_slope_left` with `slip_slope_ref_left` [-];
+    a column is present only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
     """
 

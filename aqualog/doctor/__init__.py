@@ -1,1 +1,1 @@
-"""What is wrong with a log, what was lost of it, and what to do."""
+"""Report what is wrong with a log, what was lost of it, and what to do."""

@@ -1,4 +1,4 @@
-"""Faults of single channels: of their time stamps, and of their values."""
+"""Find faults of single channels: in their time stamps and in their values."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TIMES: dict[str, tuple[Level, str, str]] = {
 def channel_findings(
     found: Sequence[ChannelOverview], channels: Sequence[Channel], standing: Sequence[Stretch] = ()
 ) -> Iterator[Finding]:
-    """Findings of all channels of a drive.
+    """Yield findings of all channels of a drive.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def channel_findings(
     channels : sequence of Channel
         In the same order.
     standing : sequence of Stretch
-        When the car stands: what does not change there is no dead sensor.
+        Times at standstill: a constant value there is no sign of a dead sensor.
 
-    Channels of one file share their clock: a fault of the stamps that several have alike is told once, of the first.
+    Channels of one file share their clock: a fault of the stamps that several share is reported once.
     """
     told: set[tuple[str, str, int]] = set()
     for own, channel in zip(found, channels, strict=True):
@@ -77,4 +77,4 @@ def _of_values(own: ChannelOverview, channel: Channel, standing: Sequence[Stretc
             f"stands at {stop.value:g} for {stop.length_s:.0f} s (from {stop.from_s:.0f} s){part}; elsewhere it "
             f"changes in {100.0 * stop.share:.0f} % of the samples"
         )
-        yield Finding("doubt", "frozen", own.file, own.path, what, "look there before you believe what rests on it")
+        yield Finding("doubt", "frozen", own.file, own.path, what, "check this part before you trust results from it")

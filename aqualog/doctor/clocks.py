@@ -1,4 +1,4 @@
-"""Clocks of several files of one drive against each other, by the speed that they carry."""
+"""Compare the clocks of several files of one drive by the speed that they carry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aqualog.vehicle import Vehicle
 __all__ = ["clock_findings", "on_clock", "speed_of"]
 
 _LEAST_SHIFT_S = 0.01  # a sample time of 100 Hz
-_SENSOR_S = 0.3  # by which a speed of GNSS comes late without a fault of its clock
+_SENSOR_S = 0.3  # delay of a GNSS speed without a fault of its clock
 _MAX_OFFSET_S = 10.0
 
 
@@ -36,9 +36,9 @@ def on_clock(speed: Carrier, signal_map: SignalMap) -> Carrier:
 
 
 def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
-    """Findings for each file whose clock runs at another rate than the first one's, or stands apart from it.
+    """Yield findings for each file whose clock runs at another rate than the first one's, or differs by an offset.
 
-    Where the match of the speeds is weak or their common time short nothing is told of the clocks.
+    Clocks are not compared where the match of the speeds is weak or their common time short.
     """
     for source in speeds[1:]:
         reference = speeds[0]
@@ -63,7 +63,7 @@ def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
         if not apart and low * high > 0.0 and min(abs(low), abs(high)) > _SENSOR_S:
             side = "after" if fit.offset_s > 0.0 else "before"
             what = (
-                f"what it tells comes {abs(fit.offset_s):.2f} s {side} the same in {reference.file} "
+                f"its speed comes {abs(fit.offset_s):.2f} s {side} the same in {reference.file} "
                 f"(95 % {low:+.2f} to {high:+.2f} s), by the speed in both"
             )
             yield Finding("doubt", "offset", source.file, source.label, what, _advice(reference, source), 1)

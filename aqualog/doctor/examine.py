@@ -40,7 +40,7 @@ def examine(
     dbc: Sequence[Path] = (),
     report: Callable[[str], None] = lambda _: None,
 ) -> Examination:
-    """Look at everything that the files of one drive hold.
+    """Examine all content of the files of one drive.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ def examine(
     dbc : sequence of Path
         Databases for raw CAN frames.
     report : callable
-        Told what is being done.
+        Called with the name of each step.
 
-    A file that cannot be read is a finding and no error, as is a drive without signals, and a file that changes.
+    An unreadable file is a finding and no error. So is a drive without signals, and a file that changes.
     """
     before = state_of(paths)
     found = _examined(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, report=report)
-    advice = "look at it again when it stays as it is"
+    advice = "run the command again when the file no longer changes"
     changed = [
         Finding("lost", "changed", Path(name).name, "", "changed while it was read", advice)
         for name in changed_files(paths, before)
@@ -103,7 +103,7 @@ def _examined(
 def _file(
     path: Path, options: ReadOptions, *, signal_map: SignalMap, vehicle: Vehicle
 ) -> tuple[FileState, list[Finding], Carrier | None]:
-    """State of one file, what is wrong with it, and the speed that it carries."""
+    """Return the state of one file, its faults, and the speed that it carries."""
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
@@ -132,7 +132,7 @@ def _file(
 
 
 def _standing(speed: Carrier | None) -> tuple[Stretch, ...]:
-    """When the car stands; not known in a file without a speed."""
+    """Return the times at standstill; unknown in a file without a speed."""
     watch = StandWatch()
     if speed is not None:
         watch.push(speed.t_ns, speed.x)
@@ -148,10 +148,10 @@ def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
         yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",
                       faults.lost_samples)  # fmt: skip
     for drift in faults.drifts:
-        advice = "look which of the two is right; `aqualog align` compares with another source"
+        advice = "check which of the two is right; `aqualog align` compares with another source"
         yield Finding("doubt", "drifts", name, "", drift_note(drift), advice, 1)
     if faults.unfinalised:
-        what = "was not finalised by the logger; this was made up for while reading"
+        what = "was not finalised by the logger; aqualog completes it while reading"
         yield Finding("mended", "unfinalised", name, "", what, "", 1)
     is_lossy = faults.truncated or faults.lost_samples > 0
     told = {drift_note(d) for d in faults.drifts}
@@ -164,7 +164,7 @@ def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
 def _of_signals(
     before: Sequence[Finding], notes: Sequence[str], frozen: Collection[tuple[str, str]]
 ) -> Iterator[Finding]:
-    """What is told of a drive beyond what its files told; `frozen` are file and channel of signals that stand still."""
+    """Yield notes on a drive beyond those of its files; `frozen` are file and channel of signals that stand still."""
     told = {f.what for f in before}
     for note in dict.fromkeys(notes):
         own = next(((f, c) for f, c in frozen if note.startswith(f"{f}:{c}: ") and "is frozen" in note), None)

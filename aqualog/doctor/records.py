@@ -1,4 +1,4 @@
-"""What an examination finds."""
+"""Records of an examination."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ __all__ = ["Examination", "FileState", "Finding", "Level"]
 
 Level = Literal["unreadable", "lost", "mended", "doubt"]
 """`unreadable`: nothing could be read; `lost`: samples are gone or not used; `mended`: a fault of the time stamps was
-undone; `doubt`: nothing is lost, but somebody should look."""
+repaired; `doubt`: nothing is lost, but the user should check."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong. `count` of `of` samples (0, 0: does not apply); `channel` empty for the whole file.
+    """One fault. `count` of `of` samples (0, 0: does not apply); `channel` empty for the whole file.
 
-    `first_s`: where the first of a fault of time stamps is, from the channel's first sample. [s]
+    `first_s`: time of the first fault of time stamps, from the channel's first sample. [s]
     """
 
     level: Level
@@ -32,7 +32,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class FileState:
-    """One file: its format (empty if unreadable), size [bytes], channels and samples read, and over which time [s]."""
+    """One file: its format (empty if unreadable), size [bytes], channels and samples read, and its time span [s]."""
 
     file: str
     format: str
@@ -54,10 +54,10 @@ class Examination:
 
     @property
     def is_unreadable(self) -> bool:
-        """Whether nothing of the drive could be read."""
+        """Return whether nothing of the drive could be read."""
         return all(not f.format for f in self.files)
 
     @property
     def has_loss(self) -> bool:
-        """Whether data was lost."""
+        """Return whether data was lost."""
         return any(f.level in ("lost", "unreadable") for f in self.findings)

@@ -1,4 +1,4 @@
-"""Situations by detector, and where a rival is better than the thesis' own method."""
+"""Count situations by detector, and find where a rival is better than the thesis' own method."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ COUNTERPARTS = {
     "slope_kalman": "slip_slope_drop",
     "slope_friction_ekf": "slip_slope_drop",
 }
-"""The thesis' detector that looks at the same effect as a rival."""
+"""The thesis' detector for the same effect as a rival."""
 
 TARGETS = {"full": 0.99, "partial": 0.9, "per_hour": 0.01}
-"""What a joint detector is asked for: recall of full and partial aquaplaning, false alarms per hour."""
+"""Requirements of a joint detector: recall of full and partial aquaplaning, false alarms per hour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,8 @@ class Better:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """In how many situations a detector does what is asked for (C78): aquaplaning found at the recall asked for,
-    quiet where there is none.
+    """Number of situations in which a detector meets the requirements (C78): it finds aquaplaning at the required
+    recall, and stays quiet elsewhere.
     """
 
     detector: str
@@ -86,7 +86,7 @@ def coverage(table: Mapping[str, Mapping[str, Score]]) -> dict[str, Coverage]:
 
 
 def better_rivals(records: Sequence[RunRecord]) -> list[Better]:
-    """Where rivals beat their counterpart or a joint detector: over all drives, and surely in single situations."""
+    """Return where rivals beat their counterpart or a joint detector: over all drives, and in single situations."""
     found: list[Better] = []
     rivals = [n for n in detector_names(records) if n in RIVALS]
     for rival in rivals:
@@ -122,7 +122,7 @@ def _compared(
 
 
 def _is_worse(a: Score, b: Score) -> bool:
-    """Whether the first is worse in anything."""
+    """Return whether the first is worse in any measure."""
     pairs = ((a.full, b.full), (a.partial, b.partial))
     return a.false_alarms.count > b.false_alarms.count or any(x.share < y.share for x, y in pairs if x.episodes)
 

@@ -30,7 +30,7 @@ _TRUTH = (*(f"{stem}_{w}" for stem in TRUTH_STEMS for w in WHEELS), "true_v_x")
 class Drive:
     """A drive with its labels.
 
-    `groups` is its configuration: key -> value as text; `joint` what joint detector 2 sums.
+    `groups` is its configuration: key -> value as text; `joint` the settings of joint detector 2.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Drive:
 
 
 class Source(Protocol):
-    """Where a drive comes from; it may be loaded more than once."""
+    """Source of a drive; it may be loaded more than once."""
 
     @property
     def name(self) -> str:
@@ -58,7 +58,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MadeSource:
-    """A drive that is there already."""
+    """A drive in memory."""
 
     drive: Drive
 
@@ -114,7 +114,7 @@ class LogSource:
             wet = tuple(Label(a, b, "water") for a, b in self.lanes)
             return Labels(wet, frozenset(("water",)), "times of the lane")
         raise SignalError(
-            "nothing says when there was water",
+            "no label says when there was water",
             where=self.name,
             expected="simulated truth, on_water, lane_start_s and lane_end_s in the campaign, or a labels file",
             hint="--labels FILE; one with a heading and no line says that the road was dry",
@@ -122,12 +122,12 @@ class LogSource:
 
 
 def _end(signals: Signals) -> float:
-    """When the last sample is over. [s]"""
+    """Return the time at which the last sample ends. [s]"""
     return signals.frame.height * signals.dt
 
 
 def _told(signals: Signals, labels: Sequence[Label]) -> Signals:
-    """The drive, with a note on labels that do not end before it does."""
+    """Return the drive, with a note on labels that do not end before it does."""
     end = _end(signals)
     late = dict.fromkeys(x.start_s for x in after(labels, end))
     cut = dict.fromkeys(x.end_s for x in labels if x.start_s < end < x.end_s - signals.dt)
@@ -140,7 +140,7 @@ def _told(signals: Signals, labels: Sequence[Label]) -> Signals:
 
 
 def labels_in(signals: Signals) -> Labels | None:
-    """Labels from the columns of a drive: the simulated truth, else `on_water`, else None."""
+    """Return labels from the columns of a drive: the simulated truth, else `on_water`, else None."""
     names = (*_TRUTH, "on_water", "v_x")
     columns = {n: signals.array(n) for n in names if n in signals.frame.columns}
     t = signals.array("t")
@@ -152,7 +152,7 @@ def labels_in(signals: Signals) -> Labels | None:
 
 
 def _truth_of(paths: Sequence[Path], options: ReadOptions, signals: Signals) -> Labels | None:
-    """Labels from the truth channels of simulated logs, on the clock of the truth itself."""
+    """Return labels from the truth channels of simulated logs, on the clock of the truth itself."""
     with DriveLog(paths, options) as log:
         found = {c.name: c for c in log.channels() if c.name in _TRUTH}
         if not any(n.startswith("true_contact") for n in found):

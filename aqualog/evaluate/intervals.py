@@ -10,7 +10,7 @@ __all__ = ["poisson", "wilson"]
 
 
 def wilson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Interval of a share: k of n. Wilson 1927 [wilson1927]; (0, 1) for n = 0, NaN-free.
+    """Return the interval of a share: k of n. Wilson 1927 [wilson1927]; (0, 1) for n = 0, never NaN.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def wilson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:
 
 
 def poisson(k: int, level: float = 0.95) -> tuple[float, float]:
-    """Exact interval of the expected number of events where k were counted (Garwood 1936 [garwood1936]).
+    """Return the exact interval of the expected number of events where k were counted (Garwood 1936 [garwood1936]).
 
     Parameters
     ----------

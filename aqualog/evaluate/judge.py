@@ -1,4 +1,4 @@
-"""One drive under all detectors: what they found against what was there."""
+"""Run all detectors over one drive, and score their events against its labels."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ODD_LABELS = "effects without a meaning here:"  # how such a note begins
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What detectors made of a drive: events, the wheels each speaks of, those that could not run; velocity (n,)."""
+    """Results of detectors on a drive: events, the wheels of each detector, those that could not run; velocity (n,)."""
 
     events: tuple[Event, ...]
     wheels: Mapping[str, tuple[str, ...]]
@@ -50,7 +50,7 @@ def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str
 def run_detectors(
     drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None, own: bool = True
 ) -> Found:
-    """Events of the thesis' detectors (`own`) and of the rivals; arguments as `judge`."""
+    """Return events of the thesis' detectors (`own`) and of the rivals; arguments as `judge`."""
     events: list[Event] = []
     tracks: list[Track] = []
     unavailable: list[str] = []
@@ -77,7 +77,7 @@ def run_detectors(
 
 
 def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -> RunRecord:
-    """Score what was found; `only` some detectors."""
+    """Score the events; `only` of some detectors."""
     labels, quality = drive.labels, drive.signals.quality
     t = drive.signals.array("t")
     dt = drive.signals.dt
@@ -144,4 +144,4 @@ def _odd_labels(drive: Drive) -> list[str]:
     unknown = ", ".join(drive.labels.unknown)
     if not unknown:
         return []
-    return [f"{ODD_LABELS} {unknown} serve the confusion table only; full, partial and water are what is scored"]
+    return [f"{ODD_LABELS} {unknown} enter the confusion table only; full, partial and water are scored"]

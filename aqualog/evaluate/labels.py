@@ -1,4 +1,4 @@
-"""Labels of a drive: what happened when, and where."""
+"""Labels of a drive: which effect, when, and at which wheel."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ WATER_AFTER_S = 1.0  # [s] what water has set off may still come to light this l
 class Label:
     """One stretch of a drive.
 
-    `effect` is one of `AQUAPLANING`, one of `EFFECTS` (what a single detector is to see), or anything else: a surface
-    or a situation, which serves the confusion table only. `wheel` is None for what holds of the car.
+    `effect` is one of `AQUAPLANING`, one of `EFFECTS` (the effects of single detectors), or anything else: a surface or
+    a situation, which only enters the confusion table. `wheel` is None for labels of the whole car.
     """
 
     start_s: float
@@ -42,8 +42,8 @@ class Label:
 class Labels:
     """All labels of one drive.
 
-    `knows` names the effects of `AQUAPLANING` whose absence means something: truth and a labels file know all three, a
-    lane's times or the signal `on_water` know of water only. `source` says where the labels come from.
+    `knows` names the effects of `AQUAPLANING` whose absence is known: truth and a labels file know all three, a lane's
+    times or the signal `on_water` only water. `source` says where the labels come from.
     """
 
     items: tuple[Label, ...]
@@ -51,53 +51,53 @@ class Labels:
     source: str
 
     def of(self, effect: str, wheel: str | None = None) -> list[Span]:
-        """Stretches of an effect: of one wheel, or of the car (union over wheels, gaps below 1 s closed)."""
+        """Return stretches of an effect: of one wheel, or of the car (union over wheels, gaps below 1 s closed)."""
         spans = [(x.start_s, x.end_s) for x in self.items if x.effect == effect and wheel in (None, x.wheel)]
         return joined(spans, CAR_GAP_S if wheel is None and effect in ("full", "partial") else 0.0)
 
     def names_wheels(self, effect: str) -> bool:
-        """Whether the labels tell on which wheel an effect was."""
+        """Return whether the labels name the wheel of an effect."""
         return any(x.effect == effect and x.wheel is not None for x in self.items)
 
     @property
     def afloat(self) -> list[Span]:
-        """Partial or full aquaplaning of any wheel, for telling it from mere water."""
+        """Return partial or full aquaplaning of any wheel, to distinguish it from mere water."""
         return joined([*self.of("partial"), *self.of("full")], 0.0)
 
     @property
     def water(self) -> list[Span]:
-        """Water under any wheel; aquaplaning and its effects are on water even where the labels do not say so."""
+        """Return water under any wheel; aquaplaning and its effects count as water even without a label of water."""
         found = [(x.start_s, x.end_s) for x in self.items if x.effect in (*AQUAPLANING, *EFFECTS)]
         return joined(found, 0.0)
 
     @property
     def water_widened(self) -> list[Span]:
-        """Water and the second after it: only an event that begins outside of this is a false alarm."""
+        """Return water and the second after it: only an event that begins outside of this is a false alarm."""
         return joined([(a, b + WATER_AFTER_S) for a, b in self.water], 0.0)
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Effects beside aquaplaning that the labels name, in order of appearance."""
+        """Return effects beside aquaplaning that the labels name, in order of appearance."""
         return tuple(dict.fromkeys(x.effect for x in self.items if x.effect not in AQUAPLANING))
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Effects that are neither aquaplaning, nor a detector's, nor a surface that aqualog knows by name."""
+        """Return effects that are neither aquaplaning, nor a detector's, nor a surface that aqualog knows by name."""
         return tuple(e for e in self.others if e not in (*EFFECTS, *SURFACES))
 
 
 def after(items: Iterable[Label], end_s: float) -> tuple[Label, ...]:
-    """Labels that begin when the drive is over: they belong to another drive, or to another clock."""
+    """Return labels that begin after the end of the drive: they belong to another drive, or to another clock."""
     return tuple(x for x in items if x.start_s >= end_s)
 
 
 def until(items: Iterable[Label], end_s: float) -> tuple[Label, ...]:
-    """Labels of a drive of `end_s` [s]: cut where it ends, without those that begin later."""
+    """Return labels of a drive of `end_s` [s]: cut where it ends, without those that begin later."""
     return tuple(replace(x, end_s=min(x.end_s, end_s)) for x in items if x.start_s < end_s)
 
 
 def joined(spans: Iterable[Span], gap: float) -> list[Span]:
-    """Union of stretches; those whose gap is below `gap` [s], or that touch, become one. Sorted."""
+    """Unite stretches; those whose gap is below `gap` [s], or that touch, become one. Sorted."""
     out: list[Span] = []
     for start, end in sorted(spans):
         if out and (start <= out[-1][1] or start - out[-1][1] < gap - 1e-9):
@@ -108,7 +108,7 @@ def joined(spans: Iterable[Span], gap: float) -> list[Span]:
 
 
 def without(spans: Sequence[Span], holes: Sequence[Span]) -> list[Span]:
-    """What is left of the stretches outside the holes. Both sorted and disjoint."""
+    """Subtract the holes from the stretches. Both sorted and disjoint."""
     out: list[Span] = []
     for start, end in spans:
         for a, b in holes:
@@ -125,5 +125,5 @@ def without(spans: Sequence[Span], holes: Sequence[Span]) -> list[Span]:
 
 
 def overlaps(span: Span, others: Iterable[Span]) -> bool:
-    """Whether a stretch shares time with any of the others."""
+    """Return whether a stretch shares time with any of the others."""
     return any(span[0] < b and a < span[1] for a, b in others)

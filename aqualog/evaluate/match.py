@@ -1,4 +1,4 @@
-"""Which event belongs to which episode."""
+"""Match events to episodes."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from aqualog.evaluate.labels import Labels, Span, joined, overlaps, without
 __all__ = ["LIMITS_S", "Cell", "Hit", "beginning_in", "cells_of", "hits", "outlasting", "rows_of"]
 
 LIMITS_S = {"full": 0.5, "partial": 2.0}
-"""An episode must be found within this time of its beginning. [s]"""
+"""Longest time from the beginning of an episode to its detection. [s]"""
 
 OUTLASTS_S = 10.0  # [s] an alarm that is still on so long after the water is a false one too
 
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """What a detector made of one episode.
+    """Result of a detector for one episode.
 
-    `found` within the limit; `latency` from the episode's beginning to the first event that belongs to it, also where
-    that came too late, NaN where none came; `before`: the event was already on when the episode began (latency 0).
+    `found` within the limit. `latency` from the episode's beginning to the first event that belongs to it, also if that
+    came too late; NaN without an event. `before`: the event was already on when the episode began (latency 0).
     """
 
     found: bool
@@ -54,8 +54,8 @@ def hits(episodes: Sequence[Span], events: Sequence[Span], *, limit: float, wate
     limit : float
         An event that overlaps the first `limit` seconds finds the episode. [s]
     water : sequence of (start, end)
-        An event that was on before the episode counts only if it began on the same stretch of water: else a stuck alarm
-        would find all.
+        An event that was on before the episode counts only if it began on the same stretch of water: else a stuck
+        alarm would find all episodes.
 
     Returns
     -------
@@ -78,12 +78,12 @@ def _hit(episode: Span, events: Sequence[Span], limit: float, water: Sequence[Sp
 
 
 def outlasting(events: Sequence[Span], water: Sequence[Span]) -> list[float]:
-    """When events that began on water had gone on for `OUTLASTS_S` seconds beyond the end of their stretch. [s]"""
+    """Return times at which events from water had lasted `OUTLASTS_S` beyond the end of their stretch. [s]"""
     return [b + OUTLASTS_S for begin, stop in events for a, b in water if a <= begin < b and stop > b + OUTLASTS_S]
 
 
 def beginning_in(events: Sequence[Span], spans: Sequence[Span]) -> list[Span]:
-    """Events that begin within any of the stretches."""
+    """Return events that begin within any of the stretches."""
     return [e for e in events if _is_in(e[0], spans)]
 
 
@@ -93,7 +93,7 @@ def _is_in(t: float, spans: Sequence[Span]) -> bool:
 
 
 def rows_of(labels: Labels, duration_s: float) -> dict[str, list[Span]]:
-    """Rows of the confusion table: `full`, `partial` (without full), `water only`, other labels, `none`.
+    """Return rows of the confusion table: `full`, `partial` (without full), `water only`, other labels, `none`.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def rows_of(labels: Labels, duration_s: float) -> dict[str, list[Span]]:
 
 
 def cells_of(rows: dict[str, list[Span]], events: Sequence[Span]) -> dict[str, Cell]:
-    """A detector's column of the confusion table. `events` are those of the car: disjoint stretches."""
+    """Return a detector's column of the confusion table. `events` are those of the car: disjoint stretches."""
     return {
         name: Cell(
             len(spans),

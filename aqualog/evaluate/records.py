@@ -1,4 +1,4 @@
-"""What came of one drive: small records that add up, and go to JSON and back."""
+"""Result of one drive: small records that can be added up and stored as JSON."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class DetectorRun:
     """One detector on one drive.
 
     `full` and `partial` are episodes of the car; `wheel_full` and `wheel_partial` those of the wheels that the detector
-    speaks of, matched with its events on that wheel; `own` those of the label that bears the detector's name.
-    `false_alarms` are times at which an event began outside water [s]; `on_water` counts events on water that began
-    outside aquaplaning; `cells` is the column of the confusion table.
+    names, matched with its events on that wheel; `own` those of the label with the detector's name. `false_alarms` are
+    times at which an event began outside water [s]; `on_water` counts events on water that began outside aquaplaning;
+    `cells` is the column of the confusion table.
     """
 
     full: tuple[Hit, ...] = ()
@@ -56,7 +56,7 @@ class RunRecord:
 
 
 def record_to_json(record: RunRecord) -> dict[str, Any]:
-    """A record as JSON values; NaN becomes null."""
+    """Return a record as JSON values; NaN becomes null."""
     return {
         "name": record.name,
         "groups": dict(record.groups),
@@ -69,7 +69,7 @@ def record_to_json(record: RunRecord) -> dict[str, Any]:
 
 
 def record_from_json(raw: Mapping[str, Any]) -> RunRecord:
-    """The record that `record_to_json` wrote."""
+    """Read the record that `record_to_json` wrote."""
     return RunRecord(
         name=raw["name"],
         groups=raw["groups"],

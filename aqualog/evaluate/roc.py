@@ -1,4 +1,4 @@
-"""Recall over false alarms as thresholds move: the detectors run again at each, each by its own threshold."""
+"""Compute recall over false alarms: run the detectors again at each threshold, each by its own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from aqualog.rivals.catalogue import RIVALS
 __all__ = ["FACTORS", "JOINT", "RocPoint", "curve_points", "records_at", "threshold_at"]
 
 FACTORS = tuple(2.0 ** (k / 2.0) for k in range(-4, 5))
-"""Times each detector's own threshold: a quarter to four times, in steps of a factor of 1.41."""
+"""Factors on each detector's own threshold: a quarter to four, in steps of a factor of 1.41."""
 
 JOINT = ("joint_criteria", "joint_cusum")
 
@@ -41,9 +41,9 @@ def records_at(
     rivals: Mapping[str, float] | None = None,
     names: Collection[str] = DETECTORS,
 ) -> RunRecord:
-    """A drive with every detector at its own threshold times a factor.
+    """Run every detector over a drive at its own threshold times a factor.
 
-    Joint detectors read the single ones: they run apart, with the single detectors where they were.
+    Joint detectors read the single ones. They run apart, with the single detectors at their original thresholds.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def records_at(
     rivals : mapping name -> float, optional
         As in `judge.judge`.
     names : collection of str
-        Detectors of the thesis that are of interest.
+        Detectors of the thesis to run.
     """
     parts = []
     single = [d for d in names if d not in JOINT]
@@ -85,7 +85,7 @@ def curve_points(
     thresholds: Thresholds = DEFAULT,
     rivals: Mapping[str, float] | None = None,
 ) -> tuple[RocPoint, ...]:
-    """Points of all curves: factor -> the drives' records at it; by detector, then by factor."""
+    """Return points of all curves: factor -> the drives' records at it; by detector, then by factor."""
     points = []
     known = {f.name for f in fields(Thresholds)} | set(RIVALS)
     names = [n for n in detector_names([r for records in by_factor.values() for r in records]) if n in known]
@@ -105,7 +105,7 @@ def _scaled(thresholds: Thresholds, names: Collection[str], factor: float) -> Th
 
 
 def _one(parts: Sequence[RunRecord]) -> RunRecord:
-    """Parts of one drive's record, each with detectors of its own."""
+    """Join parts of one drive's record, each with detectors of its own."""
     return replace(
         parts[0],
         detectors={n: d for p in parts for n, d in p.detectors.items()},

@@ -1,4 +1,4 @@
-"""Many drives evaluated: scored, swept over thresholds, tuned on some and reported on others."""
+"""Evaluate many drives: score, sweep over thresholds, tune on some and report on others."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ Report = Callable[[str], None]
 class Tuning:
     """Thresholds proposed on some drives; `records` of the evaluation are those of the other drives only.
 
-    `tuned_on`, `reported_on`, `unused` are names of drives, `before` what the reported drives give with the thresholds
-    as they were.
+    `tuned_on`, `reported_on`, `unused` are names of drives; `before` the result of the reported drives with the
+    original thresholds.
     """
 
     rule: str
@@ -40,7 +40,7 @@ class Tuning:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What came of all drives.
+    """Result of all drives.
 
     `records` are the drives that are reported; `roc` the points of the curves, empty if not asked for; `failed` drive
     -> reason; `thresholds` and `rivals` those that were used (`rivals` None: without).
@@ -63,7 +63,7 @@ def evaluate(
     factors: Sequence[float] = FACTORS,
     report: Report = lambda _: None,
 ) -> Evaluation:
-    """Score all drives; one that cannot be read is told and left out.
+    """Score all drives; report one that cannot be read and leave it out.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def evaluate(
     with_roc : bool
         Also at thresholds scaled by `factors`, which takes as much time for each.
     report : callable
-        Told what is being done.
+        Called with the name of each step.
     """
     failed: dict[str, str] = {}
     swept = [f for f in factors if abs(f - 1.0) > 1e-9] if with_roc else []
@@ -101,13 +101,13 @@ def tune(
 ) -> Evaluation:
     """Propose thresholds on some drives and evaluate them on others; arguments as `evaluate`.
 
-    Single detectors and rivals first, then the joint ones with the single ones at their proposals. Which drives serve
-    what is decided by their configuration alone (`split.split_runs`).
+    Single detectors and rivals come first, then the joint ones with the single ones at their proposals. Only their
+    configuration decides which drives are tuned on (`split.split_runs`).
 
     Raises
     ------
     ConfigError
-        If there are not drives enough for both.
+        If there are not enough drives for both.
     """
     split = split_runs([s.groups for s in sources])
     if not split.tuning or not split.reporting:
@@ -163,7 +163,7 @@ def _each(
     report: Report,
     what: str,
 ) -> list[dict[float, RunRecord]]:
-    """Work on the drives one after the other; a reason for each that cannot be read, which is not tried again."""
+    """Process the drives one after the other; give a reason for each that cannot be read, which is not tried again."""
     done = []
     for number, source in enumerate(sources, 1):
         if source.name in failed:

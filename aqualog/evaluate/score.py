@@ -1,4 +1,4 @@
-"""Scores of detectors: recall, latency and false alarms with their intervals, by configuration."""
+"""Score detectors: recall, latency and false alarms with their intervals, by configuration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KM_100 = 1e5  # [m]
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Episodes, those found within the limit, those warned of before; latencies of all that were found at all. [s]"""
+    """Episodes, those found within the limit, those with an earlier warning; latencies of all that were found. [s]"""
 
     episodes: int
     found: int
@@ -31,21 +31,21 @@ class Recall:
 
     @property
     def share(self) -> float:
-        """Recall; NaN without episodes."""
+        """Return the recall; NaN without episodes."""
         return self.found / self.episodes if self.episodes else math.nan
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """Wilson interval [wilson1927] of the recall."""
+        """Return the Wilson interval [wilson1927] of the recall."""
         return wilson(self.found, self.episodes)
 
     @property
     def before_share(self) -> float:
-        """Share of the episodes that were warned of before they began."""
+        """Return the share of episodes with a warning before they began."""
         return self.before / self.episodes if self.episodes else math.nan
 
     def latency(self, share: float) -> float:
-        """Quantile of the latency over all episodes: one without an event counts as infinitely late. [s]"""
+        """Return a quantile of the latency over all episodes: one without an event counts as infinitely late. [s]"""
         if not self.episodes:
             return math.nan
         # the smallest latency that at least this share of the episodes does not exceed
@@ -78,7 +78,7 @@ class Rate:
 
     @property
     def per_100km_ci95(self) -> tuple[float, float]:
-        """Exact Poisson interval. [1/100 km]"""
+        """Return the exact Poisson interval. [1/100 km]"""
         return _over(poisson(self.count), self.metres / KM_100)
 
 
@@ -99,7 +99,7 @@ class Score:
 
 
 def detector_names(records: Iterable[RunRecord]) -> list[str]:
-    """Detectors that ran, or could have, in order of first appearance."""
+    """List detectors that ran, or could have, in order of first appearance."""
     return list(dict.fromkeys(n for r in records for n in (*r.detectors, *r.unavailable)))
 
 
@@ -127,12 +127,12 @@ def score(records: Sequence[RunRecord], detector: str) -> Score:
 
 
 def score_all(records: Sequence[RunRecord]) -> dict[str, Score]:
-    """Scores of all detectors by name."""
+    """Return scores of all detectors by name."""
     return {name: score(records, name) for name in detector_names(records)}
 
 
 def grouped(records: Iterable[RunRecord], keys: Sequence[str]) -> dict[tuple[str, ...], list[RunRecord]]:
-    """Drives by configuration; a key that a drive does not tell is a dash. Sorted."""
+    """Group drives by configuration; a missing key becomes a dash. Sorted."""
     out: dict[tuple[str, ...], list[RunRecord]] = {}
     for r in records:
         out.setdefault(tuple(r.groups.get(k, "") or "-" for k in keys), []).append(r)

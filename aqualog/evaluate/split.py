@@ -1,4 +1,4 @@
-"""Drives apart into those to tune on and those to report on."""
+"""Divide drives into those to tune on and those to report on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Split", "split_runs"]
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Indices of the drives: to tune on, to report on, and those that would mix both; `rule` says how, in words."""
+    """Indices of the drives: to tune on, to report on, and those that would mix both; `rule` in words."""
 
     tuning: tuple[int, ...]
     reporting: tuple[int, ...]
@@ -19,7 +19,7 @@ class Split:
 
 
 def split_runs(groups: Sequence[Mapping[str, str]]) -> Split:
-    """Halve the drives so that what they are tuned on says as little as can be about those reported.
+    """Halve the drives so that the two halves share as little as possible.
 
     Parameters
     ----------
@@ -29,10 +29,10 @@ def split_runs(groups: Sequence[Mapping[str, str]]) -> Split:
     Returns
     -------
     Split
-        By the first rule that leaves drives on both sides: (1) families of drives that share a vehicle or a tyre stay
-        together, (2) half of the vehicles with half of the tyres against the other half with the other half, drives
-        that mix them unused, (3) by tyre, (4) by vehicle, (5) every other drive. Values in their sorted order, every
-        other one to either side; the same drives are always divided alike.
+        By the first rule that leaves drives on both sides. (1) Families of drives that share a vehicle or a tyre stay
+        together. (2) Half of the vehicles with half of the tyres against the other halves; drives that mix them are
+        unused. (3) By tyre. (4) By vehicle. (5) Every other drive. Values in their sorted order, every other one to
+        either side; the same drives are always divided alike.
     """
     every = range(len(groups))
     tyres = [g.get("tyre", "") for g in groups]
@@ -61,13 +61,13 @@ def _of(is_reporting: Sequence[bool | None], every: Sequence[int], rule: str) ->
 
 
 def _halves(values: Sequence[str]) -> list[bool]:
-    """Whether the value of each drive belongs to the second half: every other one in sorted order."""
+    """Return whether the value of each drive belongs to the second half: every other one in sorted order."""
     rank = {value: i for i, value in enumerate(sorted(set(values)))}
     return [bool(rank[value] % 2) for value in values]
 
 
 def _families(first: Sequence[str], second: Sequence[str]) -> list[str]:
-    """A name for each drive that is the same for drives connected by a shared value of either kind."""
+    """Return a name for each drive that is the same for drives connected by a shared value of either kind."""
     name = [min(pair) for pair in zip((f"a{x}" for x in first), (f"b{x}" for x in second), strict=True)]
     while True:
         before = list(name)

@@ -1,4 +1,4 @@
-"""Labels from the simulated truth: the contact of each wheel and the water before it."""
+"""Derive labels from the simulated truth: the contact of each wheel and the water before it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ V_MIN = 5.0  # [m/s] below, no tyre floats
 
 
 def truth_labels(t: FloatArray, columns: Mapping[str, FloatArray]) -> Labels | None:
-    """Labels of a simulated drive.
+    """Return labels of a simulated drive.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def truth_labels(t: FloatArray, columns: Mapping[str, FloatArray]) -> Labels | N
 
 
 def spans_of(t: FloatArray, bits: BoolArray) -> list[Span]:
-    """Stretches in which a bit is set; a sample lasts until the next one, the last one as long as the one before."""
+    """Return stretches in which a bit is set; a sample lasts until the next one, the last as long as the one before."""
     if t.size == 0:
         return []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))

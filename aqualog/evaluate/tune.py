@@ -1,4 +1,4 @@
-"""Thresholds from curves: few false alarms first, then recall."""
+"""Propose thresholds from curves: few false alarms first, then recall."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def choose(points: Sequence[RocPoint], *, limit: float = LIMIT_PER_HOUR) -> dict
     -------
     dict detector -> Choice
         Among the thresholds whose false alarms stay within the limit, the one of highest recall of partial
-        aquaplaning. Ties: recall of full aquaplaning, fewer false alarms, nearer to where it was. Where none stays
-        within, or those that do find nothing, the threshold stays as it is: a detector is not switched off by tuning.
+        aquaplaning. Ties: recall of full aquaplaning, fewer false alarms, nearer to the original. If no threshold
+        stays within the limit, or those that do find nothing, the original remains: tuning never disables a detector.
     """
     by_detector: dict[str, list[RocPoint]] = {}
     for p in points:
@@ -50,7 +50,7 @@ def choose(points: Sequence[RocPoint], *, limit: float = LIMIT_PER_HOUR) -> dict
 def applied(choices: Mapping[str, Choice], thresholds: Thresholds, rivals: Mapping[str, float]) -> tuple[
     Thresholds, dict[str, float]
 ]:  # fmt: skip
-    """Thresholds, and those of the rivals, with the proposals in them."""
+    """Return thresholds, and those of the rivals, with the proposals in them."""
     values = {name: c.point.threshold for name, c in choices.items()}
     own = replace(thresholds, **{n: x for n, x in values.items() if n not in RIVALS})
     return own, {**rivals, **{n: x for n, x in values.items() if n in RIVALS}}
@@ -65,7 +65,7 @@ def _choice(points: Sequence[RocPoint], limit: float) -> Choice:
         return Choice(as_it_is, f"no threshold keeps to {limit:g} false alarms per hour; stays as it is")
     best = max(within, key=_merit)
     if _merit(best)[:2] == (0.0, 0.0):
-        return Choice(as_it_is, f"what keeps to {limit:g} false alarms per hour finds nothing; stays as it is")
+        return Choice(as_it_is, f"thresholds within {limit:g} false alarms per hour find nothing; stays as it is")
     return Choice(best, f"highest recall among those without more than {limit:g} false alarms per hour seen")
 
 

@@ -1,1 +1,1 @@
-"""Files into channels, and signals into files."""
+"""Read files into channels, and write signals into files."""

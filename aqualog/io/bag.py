@@ -1,7 +1,7 @@
-"""ROS 1 bags, walked record by record: one that was never closed or indexed is read up to its end.
+"""Read ROS 1 bags record by record: one that was never closed or indexed is read up to its end.
 
-A damaged chunk or a length that lies costs that chunk only. A bag has no checksums but those of bz2 and lz4: a value
-that was altered in a plain chunk cannot be told.
+A damaged chunk or a wrong length costs that chunk only. A bag has no checksums but those of bz2 and lz4: an altered
+value in a plain chunk cannot be detected.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class BagSource:
         return found
 
     def _index(self, file: BinaryIO) -> dict[int, frozenset[int]] | None:
-        """Chunks and the connections in them by the index at the end; None if there is none or it is not whole."""
+        """Return the chunks and the connections in them by the index at the end; None without a whole index."""
         _, head, _ = next(iter(BagRecords(file, self._size)), (0, {}, b""))
         start = number(head, b"index_pos", 8)
         if head.get(b"encryptor"):

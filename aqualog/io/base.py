@@ -1,4 +1,4 @@
-"""What a reader is.
+"""The protocol of a reader.
 
 A reader opens a file without changing it, lists its channels without decoding samples where the format allows, and
 decodes only the channels that are asked for.
@@ -90,6 +90,6 @@ class FaultLog:
     drifts: list[Drift] = field(default_factory=list)
 
     def freeze(self) -> FileFaults:
-        """The record for the outside."""
+        """Return the record of all losses."""
         notes, drifts = tuple(dict.fromkeys(self.notes)), tuple(dict.fromkeys(self.drifts))
         return FileFaults(self.truncated, self.lost_samples, notes, self.unfinalised, drifts)

@@ -91,7 +91,7 @@ def rows_of(data: bytes, starts: Indices, size: int) -> NDArray[np.void]:
 
 
 def damage_notes(name: str, damaged: Mapping[int, str]) -> list[str]:
-    """What is told of damaged chunks, reason by offset in the file `name`; empty if there is none."""
+    """Return notes on damaged chunks, given the reason by offset in the file `name`; empty without damage."""
     if not damaged:
         return []
     offset, reason = min(damaged.items())

@@ -1,4 +1,4 @@
-"""Raw CAN frames to signals, by the DBC files of the vehicle.
+"""Decode raw CAN frames into signals, by the DBC files of the vehicle.
 
 cantools parses the DBC and decodes one frame at a time in Python; here a signal is decoded from all payloads of its
 message at once, with the same results to the last bit.

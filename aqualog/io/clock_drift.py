@@ -1,8 +1,8 @@
-"""Two clocks of one log that run at different rates: a message's stamp and the time of recording, two times of a table.
+"""Compare two clocks of one log that run at different rates: stamps and recording times, or two times of a table.
 
-A stamp is late by what the bus, a buffer or a rounding takes, and that only ever adds. So of each ten seconds the
-least difference counts, and a straight line through these is the drift. A clock that was set is a step, which no line
-fits, and is none.
+A stamp is late by the delay of bus, buffer or rounding, which only ever adds. So the least difference of each ten
+seconds counts, and a straight line through these is the drift. A clock that was set makes a step, which no line fits;
+it is not reported as a drift.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class DriftWatch:
             self._bins[k] = min(least, self._bins.get(k, least))
 
     def finish(self, clock: str, against: str) -> Drift | None:
-        """The drift of the other clock, called `against`, over the one that counts; None if there is none."""
+        """Return the drift of the other clock, called `against`, over the one that counts; None without a drift."""
         if len(self._bins) < _LEAST_BINS:
             return None
         points = np.array([(k * _BIN_NS, self._bins[k]) for k in sorted(self._bins)], dtype=np.float64) * 1e-9
@@ -56,7 +56,7 @@ class DriftWatch:
 
 
 def _thinned(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The points of least lag of 60 equal stretches, or all: a buffer that is full now and then is not the clock."""
+    """Return the points of least lag of 60 equal stretches, or all: a buffer that fills up is not the clock."""
     groups = np.arange(len(points)) * min(_POINTS, len(points)) // len(points)
     order = np.lexsort((points[:, 1], groups))
     least = points[order[np.append(True, np.diff(groups[order]) != 0)]]
@@ -64,14 +64,14 @@ def _thinned(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _line(t: FloatArray, x: FloatArray) -> tuple[float, float]:
-    """Slope of the regression of x (n,) on t (n,), and what it leaves, rms."""
+    """Return the slope of the regression of x (n,) on t (n,), and the rms of its residual."""
     dt, dx = t - t.mean(), x - x.mean()
     slope = float(dt @ dx / (dt @ dt))
     return slope, float(np.sqrt(np.mean((dx - slope * dt) ** 2)))
 
 
 def drift_note(drift: Drift) -> str:
-    """What is told of it."""
+    """Return the note on a drift."""
     return (
         f"{drift.against} drifts by {drift.ppm:+.0f} ppm against {drift.clock} ({drift.shift_s:+.3f} s over the log); "
         f"{drift.clock} is taken"

@@ -1,4 +1,4 @@
-"""What files hold, as hashes, and whether they still hold it."""
+"""Hash the content of files, and check whether they still hold it."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ class Contents:
 
 
 class Remembered(Contents):
-    """Hashes that are known, without reading any file: one that has none gets what is no file's hash."""
+    """Known hashes, without reading any file: an unknown one gets a value that no file's hash has."""
 
     def of(self, path: Path) -> str:
-        """As far as it is known.
+        """Return the hash if known.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Remembered(Contents):
 
 
 def change_since(paths: Sequence[Path], seen: Seen) -> str:
-    """What has become of files since they were hashed; empty if their content is still what the key stands for."""
+    """Say what has happened to files since they were hashed; empty if their content still fits the key."""
     try:
         states = [(str(f), f.stat()) for p in paths for f in _files(p)]
     except OSError as error:
@@ -92,7 +92,7 @@ def change_since(paths: Sequence[Path], seen: Seen) -> str:
 
 
 def state_of(paths: Iterable[Path]) -> Seen:
-    """The files behind `paths` as they are now, without reading them; what is no file, or not there, has no state."""
+    """Return the state of the files behind `paths` without reading them; other paths have no state."""
     found = []
     for file in (f for p in paths for f in _files(p)):
         try:
@@ -105,9 +105,10 @@ def state_of(paths: Iterable[Path]) -> Seen:
 
 
 def changed_files(paths: Iterable[Path], before: Seen) -> tuple[str, ...]:
-    """Files that are not as `state_of` found them before: written to, replaced or gone.
+    """Return the files that differ from what `state_of` found before: written to, replaced or gone.
 
-    New ones in a folder are none: results may lie there, and a recording that begins another part has written to one.
+    New files in a folder do not count: results may lie there, and a recording that begins another part has written to
+    one of the known files.
     """
     return tuple(sorted(name for name, _, _ in set(before) - set(state_of(paths))))
 

@@ -155,7 +155,7 @@ class CsvReader:
         self._tell_lost()
 
     def _last_times(self, text: TextFile) -> FloatArray:
-        """The time at the end of the file: how long a log is tells its unit."""
+        """Return the time at the end of the file: the length of a log shows its unit."""
         column = self._layout.columns[self._time.index]
         tail = text[max(len(text) - _TAIL, behind(text, self._layout.first_line - 1)) :].rstrip(b"\r\n")
         rows = rows_of(tail[tail.find(b"\n") + 1 :], self._layout, 0, is_cut=True)
@@ -179,12 +179,12 @@ class CsvReader:
         return stamps
 
     def _numeric_clock(self) -> list[int]:
-        """The second clock, if pieces of it tell as much as the whole."""
+        """Return the second clock, if it can be read piece by piece."""
         other = self._time.other
         return [other] if other is not None and self._layout.columns[other].kind == "number" else []
 
     def _compare_clocks(self, stamps: Stamps, cells: dict[int, pl.Series]) -> None:
-        """Hold the second clock of these rows against their stamps."""
+        """Compare the second clock of these rows with their stamps."""
         other = self._time.other
         if other is None:
             return
@@ -226,7 +226,7 @@ class CsvReader:
         return self._rows
 
     def _count_lost(self, bad: BoolArray, rows: Rows, column: int, text: tuple[str, str]) -> None:
-        """Cells that are lost, by what is told before and behind their number; a time of a blank row is none."""
+        """Note lost cells, with the text before and behind their number; a blank row has no time to lose."""
         if column < 0:
             bad = bad & ~rows.blank(bad)
         if bad.any():
@@ -283,7 +283,7 @@ class CsvReader:
         return self._faults.freeze()
 
     def close(self) -> None:
-        """Let go of the text."""
+        """Release the text."""
         if isinstance(self._data, TextFile):
             self._data.close()
         self._data, self._rows = b"", None

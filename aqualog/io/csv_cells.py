@@ -1,4 +1,4 @@
-"""What one cell of a CSV file says: nothing, a number, a bad sample, a time stamp or text."""
+"""Interpret one cell of a CSV file: nothing, a number, a bad sample, a time stamp or text."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How a CSV file is written: separator, decimal sign, header, units, first line of data.
+"""Find how a CSV file is written: separator, decimal sign, header, units, first line of data.
 
-Nothing is taken for granted: every separator is tried with every possible header line, and what the cells below it say
-decides. A reading counts as proven only if at least two columns hold (nearly) nothing but numbers, times and blanks.
+Every separator is tried with every possible header line, and the cells below it decide. A reading counts as proven
+only if at least two columns hold (nearly) nothing but numbers, times and blanks.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ class Column:
 class Layout:
     """Everything that is needed to read the cells.
 
-    `width` is how many cells a whole row has: that of the header, or more if every row ends with separators.
-    `first_line` counts from 1; `twice` are names that stand over several columns; `unproven` is a cell that may be a
-    fraction or thousands, if no cell of the file tells.
+    `width` is the number of cells in a whole row: that of the header, or more if every row ends with separators.
+    `first_line` counts from 1; `twice` are names of several columns; `unproven` is a cell that may be a fraction or
+    thousands, if no cell of the file decides.
     """
 
     separator: str
@@ -181,7 +181,7 @@ def _text(line: bytes) -> str:
 
 
 def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str, decimal: str) -> _Candidate | str:
-    """The best reading with this separator, or why there is none."""
+    """Return the best reading with this separator, or the reason why no reading is possible."""
     rows = [split_line(line, separator) for line in head]
     reason = ""
     for k, row in enumerate(rows):
@@ -288,9 +288,9 @@ def _trimmed(row: Row) -> Row:
 def _columns(
     names: Row, units: Row, body: Sequence[Row], separator: str, decimal: str
 ) -> tuple[tuple[Column, ...], str]:
-    """Kind and decimal sign of each column; a name or a cell that says neither goes with the rest of the file.
+    """Return kind and decimal sign of each column; a name or a cell that shows neither follows the rest of the file.
 
-    Behind them a cell that may be a fraction or thousands, if no cell of the file tells.
+    The last value is a cell that may be a fraction or thousands, if no cell of the file decides.
     """
     cells = [_Cells(tuple(r[k] for r in body if k < len(r) and r[k])) for k in range(len(names))]
     order = _told_styles(cells, decimal) if decimal else _preferred(cells, separator)
@@ -350,11 +350,11 @@ class _Cells:
 
 
 def _preferred(columns: Sequence[_Cells], separator: str) -> tuple[Style, ...]:
-    """The styles that may be, those first that the file as a whole speaks for: they decide where a column does not.
+    """Return the possible styles, those first that the file as a whole supports: they decide where a column does not.
 
-    A group of three behind a sign is as good a fraction as it is thousands: only cells with both signs, or with two
-    groups, prove thousands; a damaged cell among hundreds does not. Where commas separate the cells, a comma in quotes
-    is one of thousands rather than a decimal sign.
+    A group of three behind a sign may be a fraction or thousands. Only cells with both signs, or with two groups, prove
+    thousands; a damaged cell among hundreds does not. Where commas separate the cells, a comma in quotes marks
+    thousands rather than decimals.
     """
     by_point, by_comma = STYLES[:2]
     comma = sum(not c.is_all(by_point) and c.explained(by_comma) > c.explained(by_point) for c in columns)

@@ -1,4 +1,4 @@
-"""How a CSV file is written, as far as a user says it; what is not said is found out."""
+"""How a CSV file is written, as far as the user says it; the rest is found from the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the text of a CSV file to the cells of some of its columns, with the line of every row."""
+"""Split the text of a CSV file into the cells of some of its columns, with the line of every row."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ALL, _COMMENT = bytes(range(256)), b"#%!/"
 
 @dataclass(frozen=True, slots=True)
 class RowFaults:
-    """Lines, counted from 1, that are not as the header says; `cut_line` is the last one if the file ends inside it.
+    """Lines, counted from 1, that do not fit the header; `cut_line` is the last one if the file ends inside it.
 
     `doubtful_line` is the last one if it is whole, but may have lost the end of its last number. `empty` are lines with
     NUL bytes in them, as a page of a file that was never written has, each with their number.
@@ -62,14 +62,14 @@ class Rows:
         Raises
         ------
         LogError
-            If the library finds other rows than there are.
+            If the library finds another number of rows.
         """
         if not self.text or not columns:
             return {k: pl.Series(f"c{k}", [], dtype=pl.String) for k in columns}
         try:
             frame = self._split(columns, numbers)
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            if numbers:  # a cell that is none, as likely as not: what it is, its text tells
+            if numbers:  # a cell is no number: its text shows what it is
                 return self.cells(columns, where=where)
             reason = str(error).splitlines()[0]
             raise LogError(f"cannot be split into cells ({reason})", where=where, hint="check its quotes") from error
@@ -118,8 +118,8 @@ def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Ro
     is_cut : bool
         Whether the file ends behind them without the end of a line.
 
-    Nearly all files are regular: every line has the separators of a whole row. Only such a file is given to the library
-    as it is, which drops the cells of longer rows and fills up shorter ones without a word.
+    Nearly all files are regular: every line has the separators of a whole row. Only such a file is passed to the
+    library unchanged, because it silently drops the cells of longer rows and fills up shorter ones.
     """
     lines = None if b"\0" in body else _regular(body, layout)
     if lines is not None:
@@ -196,10 +196,10 @@ def _regular(body: bytes, layout: Layout) -> int | None:
 
 
 def _is_quoted_plainly(rows: Rows) -> bool:
-    """Whether the library, too, finds one row per line: then no quotes hold a separator or a line's end.
+    """Return whether the library also finds one row per line: then no quotes hold a separator or a line's end.
 
-    A line with an odd quote may still be a row of its own to the library, but only where it is the last one; and of a
-    quoted cell that goes on behind its quote it makes nothing.
+    A line with an odd quote is a row of its own to the library only if it is the last one. A quoted cell that goes on
+    behind its quote is lost.
     """
     octets = np.frombuffer(b"\n" + rows.text + b"\n", dtype=np.uint8)
     quotes = np.flatnonzero(octets == ord('"'))

@@ -1,4 +1,4 @@
-"""The bytes of a text file as UTF-8, whatever encoding they are in.
+"""Read the bytes of a text file as UTF-8, whatever their encoding.
 
 A wrong encoding spoils the names and units of channels (`Temperature [°C]`), so the choice is made on evidence: a byte
 order mark, strict UTF-8, and among the old code pages the one that makes the most known units.

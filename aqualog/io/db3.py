@@ -1,8 +1,8 @@
-"""sqlite3 files of ROS 2 recordings, read in the order of their rows.
+"""Read sqlite3 files of ROS 2 recordings in the order of their rows.
 
-Rows whose pages are damaged are left out and counted by the gap in their numbers; those behind them are read. Nothing
-in the file is run: tables are read as tables, without its views, computed columns and indices. SQLite has no checksums:
-a value that was altered within a row cannot be told.
+Rows on damaged pages are left out and counted by the gap in their numbers; those behind them are read. Nothing in the
+file is executed: tables are read as tables, without views, computed columns and indices. SQLite has no checksums: an
+altered value within a row cannot be detected.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Db3Source:
         base.text_factory = lambda text: text.decode(errors="replace")
         base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(self.path.stat().st_size, _LEAST_LIMIT))
         base.execute("PRAGMA trusted_schema = OFF")
-        # SQLite refuses a file that is shorter than its head says, unless it is told to bear with damage.
+        # SQLite refuses a file that is shorter than its head says, unless it is set to tolerate damage.
         base.execute("PRAGMA writable_schema = ON")
         return closing(base)
 
@@ -178,10 +178,10 @@ def _rows(
 
 
 def _readable_behind(base: sqlite3.Connection, query: str, last: int) -> tuple[Any, ...] | None:
-    """The next row that can be read behind one that cannot; None if there is none up to the end."""
+    """Return the next readable row behind an unreadable one; None if no row follows."""
 
     def first_from(start: int) -> tuple[Any, ...] | None:
-        """The first row behind `start`, an empty one if there is none; None if it cannot be read."""
+        """Return the first row behind `start`, an empty one at the end; None if it cannot be read."""
         try:
             return tuple(base.execute(f"{query} LIMIT 1", (start,)).fetchone() or ())
         except sqlite3.Error:

@@ -1,7 +1,7 @@
-"""Where the numbers of a ROS message lie, if every message of its type and lengths has them at the same place.
+"""Find where the numbers of a ROS message lie, if every message of its type and lengths has them at the same place.
 
-A message decides by a few of its bytes alone where the rest lies: the byte order (CDR) and the lengths of its texts
-and sequences. Messages that agree in these and in their size are cut into columns without decoding one by one.
+A few bytes of a message decide where the rest lies: the byte order (CDR) and the lengths of its texts and sequences.
+Messages that agree in these and in their size are cut into columns without decoding them one by one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What this process has in hand: the log that it reads, and files that it has not finished.
+"""Track the work of this process: the log that it reads, and files that it has not finished.
 
-Whoever watches over the process is told, so that it knows what to blame and what to clear away. Reading has limits
-while it is watched; a program that uses the library by itself is left alone.
+A watching process learns this, so that it knows what to blame and what to remove. Reading has limits while it is
+watched; a program that uses the library by itself has none.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _held = InHand()
 def watched_by(
     tell: Callable[[InHand], None], limits: ReadLimits, refused: Mapping[str, str] | None = None
 ) -> None:  # fmt: skip
-    """From now on tell somebody what is in hand.
+    """Report each change of the work in hand from now on.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _tell(
 
 
 def _excess(error: BaseException | None, limits: ReadLimits, size: int) -> tuple[str, str] | None:
-    """What the error says of a limit, and what raises it; None if it says nothing."""
+    """Return the limit that the error names, and how to raise it; None for other errors."""
     if isinstance(error, MemoryError):
         most = memory_bound()
         told = f" than the {most // 1_000_000} MB that it may have" if most else " than there is"

@@ -1,4 +1,4 @@
-"""What the reading of one log may take: time, memory, room; the defaults, and the variables that change them."""
+"""Limits for reading one log: time, memory, disk space; their defaults, and the variables that change them."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _number(environment: Mapping[str, str], name: str) -> float | None:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a log, of a folder those of the files in it; 0 if that cannot be told."""
+    """Return the bytes of a log, of a folder those of the files in it; 0 if unknown."""
     try:
         if path.is_dir():
             return sum(p.stat().st_size for p in path.iterdir() if p.is_file())
@@ -102,7 +102,7 @@ def size_of(path: Path) -> int:
 
 
 def machine_memory() -> int:
-    """Bytes that this machine, or the control group of this process, has; 0 if that cannot be told."""
+    """Return the memory of this machine, or of the control group of this process [bytes]; 0 if unknown."""
     try:
         installed = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):

@@ -1,8 +1,8 @@
 """MCAP logs: JSON, protobuf, ROS 1 and ROS 2 messages, indexed or not, whole or damaged.
 
-The data section is walked record by record, and every chunk is unpacked within its declared size and checked against
-its checksum. So a file that was cut off, or whose index is gone, gives all that stands before the cut; a damaged chunk
-or a length that lies costs that chunk only. The summary at the end, where it is sound, saves a pass over the file.
+The reader walks the data section record by record. It unpacks every chunk within its declared size and checks it
+against its checksum. A file that was cut off, or that has lost its index, therefore gives all messages before the cut.
+A damaged chunk or a wrong length costs that chunk only. An intact summary at the end saves a pass over the file.
 
 Format: https://mcap.dev/spec
 """

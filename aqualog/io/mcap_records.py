@@ -1,7 +1,7 @@
-"""The records of an MCAP file's data section; behind a damaged one the next chunk is sought.
+"""Walk the records of an MCAP file's data section; behind a damaged one, seek the next chunk.
 
-A length that lies leads anywhere. It shows when it leads beyond the file, over the place where the summary knows a
-chunk, or to what is no record; reading then goes on at the next chunk that the summary knows, or without one at the
+A wrong length leads anywhere. It shows if it leads beyond the file, over the place where the summary knows a chunk, or
+to bytes that are no record. Reading then resumes at the next chunk of the summary. Without a summary it resumes at the
 next place whose lengths agree with each other as those of a chunk do.
 """
 

@@ -1,7 +1,7 @@
-"""The records of an unpacked MCAP chunk: where they are, found by their lengths, their heads read all at once.
+"""Find the records of an unpacked MCAP chunk by their lengths, and read all their heads at once.
 
-Only a chunk without any fault is scanned. Of any other `scanned` gives None, and who walks it record by record says
-what is wrong: there is one set of errors.
+Only a chunk without any fault is scanned. For any other `scanned` returns None, and the walk record by record reports
+the fault, so that there is one set of errors.
 """
 
 from __future__ import annotations

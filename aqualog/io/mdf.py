@@ -1,8 +1,8 @@
 """MDF 3 and 4: measured channels, and raw CAN frames decoded by a DBC.
 
-asammdf parses the blocks, once a walk through them has found them sound (see `mdf_survey`). It is kept from everything
-that a log has no business to cause (see `mdf_harness`): it never evaluates a formula, never opens an attachment,
-inflates nothing beyond the size that it tells of, writes only into a folder of our own, and prints nothing.
+asammdf parses the blocks after a walk through them has found them sound (see `mdf_survey`). `mdf_harness` limits its
+side effects. It never evaluates a formula, never opens an attachment, and inflates nothing beyond the declared size.
+It writes only into a folder of our own, and prints nothing.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ class MdfReader:
 
     @contextmanager
     def _guard(self, what: str) -> Iterator[None]:
-        """Turn whatever a damaged file makes asammdf raise into a `LogError`."""
+        """Turn any exception of asammdf on a damaged file into a `LogError`."""
         try:
             with np.errstate(all="ignore"):  # numbers of a damaged file may be any; what is no number is counted
                 yield
@@ -238,7 +238,7 @@ class MdfReader:
         except Exception as error:
             why = f"{type(error).__name__}: {error}"
             if why.startswith("DeflateError") or type(error).__module__ == "zlib":
-                why = "a compressed block is damaged or not of the size that it tells of"
+                why = "a compressed block is damaged or not of the size that it declares"
             reason = f"{what} ({why})"
             raise LogError(reason, where=str(self._path), hint="check it with the logger's own tool") from error
 
@@ -248,7 +248,7 @@ class MdfReader:
             self._channels = _unique(self._listed(dbc))
 
     def _find_damaged(self, error: LogError) -> None:
-        """Look for packed blocks that are why the file cannot be read; raises the error if there are none."""
+        """Seek packed blocks that make the file unreadable; raise the error if there is no such block."""
         if self._damaged or not self._survey.deflated:
             raise error
         self._damaged = damaged_blocks(self._path, self._survey.deflated)
@@ -256,7 +256,7 @@ class MdfReader:
             raise error
 
     def _go_on_without_damaged(self, error: LogError) -> None:
-        """Open the file anew without damaged blocks and what follows them; raises the error if that is no help."""
+        """Open the file anew without damaged blocks and what follows them; raise the error if that does not help."""
         self._find_damaged(error)
         with self._guard("cannot be decoded"):
             self._open()
@@ -292,7 +292,7 @@ class MdfReader:
         self._start_ns, self._absolute = self._start()
 
     def _tell(self, survey: Survey, before: Survey) -> None:
-        """Tell what a walk has found beyond one before."""
+        """Report the findings of a walk that one before did not have."""
         self._faults.truncated |= survey.truncated
         self._faults.unfinalised = survey.finalised
         self._faults.lost_samples += survey.lost_samples - before.lost_samples
@@ -316,7 +316,7 @@ class MdfReader:
             )  # fmt: skip
 
     def _check_memory(self, group: int, channels: int) -> None:
-        """Refuse what a group tells of and cannot be held; nothing of it has been inflated."""
+        """Refuse a group whose declared size cannot be held; nothing of it has been inflated."""
         channel_group = self._inner.groups[group].channel_group
         declared = self._survey.inflated.get(int(channel_group.address), 0)
         records = min(int(channel_group.cycles_nr), declared // max(int(channel_group.samples_byte_nr), 1))
@@ -346,7 +346,7 @@ class MdfReader:
                 self._count_unsorted(groups)
 
     def _count_unsorted(self, groups: Sequence[Any]) -> None:
-        """Tell what was not sorted of an unfinished file's records: asammdf stops at a record of no known kind."""
+        """Report records of an unfinished file that were not sorted: asammdf stops at a record of unknown kind."""
         there = max(self._survey.inflated.get(int(g.channel_group.address), 0) for g in groups)
         zeros = max(self._survey.zeros.get(int(g.channel_group.address), 0) for g in groups)
         count, taken, longest = 0, 0, 1
@@ -446,7 +446,7 @@ class MdfReader:
         if int(group.channel_group.address) in self._survey.inferred:
             t = _joined([t for t, _ in self._columns(index, [])])
             if not (np.isfinite(t).all() and (np.diff(t) >= 0).all()):
-                return "its records cannot be told from its channels, their time does not go up"
+                return "its records cannot be reconstructed from its channels, their time does not go up"
         return None
 
     def _group_name(self, index: int) -> str:
@@ -725,7 +725,7 @@ class MdfReader:
         return found
 
     def _tell_short(self, short: Sequence[tuple[ChannelInfo, int]]) -> None:
-        """Count the frames of one message that are too short for some of its signals; told in one line."""
+        """Count the frames of one message that are too short for some of its signals; report them in one line."""
         self._faults.lost_samples += max((n for _, n in short), default=0)
         if len(short) == 1:
             info, n = short[0]
@@ -876,7 +876,7 @@ def _bus(code: int) -> int:
 
 
 def _match_notes(census: Counter[int], dbc: Dbc, total: str) -> list[str]:
-    """What the DBC decodes and what it does not, with the reason where one can be told."""
+    """Return notes on what the DBC decodes and what it does not, with the reason where known."""
     seen = sorted({_frame_key(c) for c in census})
     missed = [k for k in seen if k not in dbc.messages]
     frames = sum(n for c, n in census.items() if _frame_key(c) in dbc.messages)
@@ -963,7 +963,7 @@ def _where(usable: BoolArray, values: _Array) -> _Array:
 
 
 def _unique(entries: Sequence[_Entry]) -> tuple[ChannelInfo, ...]:
-    """Give every channel a path of its own: source in front where that tells them apart, else a number behind."""
+    """Give every channel a path of its own: with its source in front if sources differ, else with a number behind."""
     infos = [e.info for e in entries]
     for level in range(max((len(e.sources) for e in entries), default=0)):
         count = Counter(i.path for i in infos)

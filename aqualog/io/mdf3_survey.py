@@ -1,4 +1,4 @@
-"""A walk through the blocks of MDF 3: ID, HD, then DG, CG, CN with their conversions and texts, and the records."""
+"""Walk through the blocks of MDF 3: ID, HD, then DG, CG, CN with their conversions and texts, and the records."""
 
 from __future__ import annotations
 
@@ -147,10 +147,10 @@ class _Walk(Walk):
         self._declared.append((owner, records, id_size, groups))
 
     def _cut_group(self, records: int, broken: BlockError) -> _Group:
-        """A group whose own block the file ends in, where the size of its records is left.
+        """Rebuild a group whose own block is cut at the end of the file, if the size of its records is left.
 
-        Libraries write this block last. The number of records is told from where the next block begins; whether it is
-        right is seen by their time, which the reader looks at.
+        Libraries write this block last. The start of the next block gives the number of records. The reader checks it
+        by their time.
         """
         at = broken.at
         if at + 22 > self._size or self._data[at : at + 2] != b"CG" or at in self._linked:
@@ -168,7 +168,7 @@ class _Walk(Walk):
         self._texts(at, (12,), "a group's comment")
         self._found.inferred.add(at)
         self._found.truncated = True
-        self._found.remark(f"{broken}; its records are told from where the next block begins: {cycles}")
+        self._found.remark(f"{broken}; the start of the next block gives the number of its records: {cycles}")
         return _Group(at, record, cycles)
 
     def _measured(self, owner: int, records: int, id_size: int, groups: list[_Group]) -> None:

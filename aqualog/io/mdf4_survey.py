@@ -1,8 +1,8 @@
-"""A walk through the blocks of MDF 4: ID, HD, then DG, CG, CN with their conversions and texts, and the data chains.
+"""Walk through the blocks of MDF 4: ID, HD, then DG, CG, CN with their conversions and texts, and the data chains.
 
-asammdf follows addresses and believes sizes: a link to itself never ends, a conversion that it cannot read leaves raw
-numbers, a list of data blocks that the file no longer holds ends the reading of everything. Here each of them is looked
-at first. A recording that its logger did not finish is finished on the way, without a copy of it.
+asammdf follows addresses and trusts sizes. A link to itself never ends, a conversion that it cannot read leaves raw
+numbers, and a list of data blocks beyond the end of the file ends the whole reading. This walk checks each of them
+first. It also finishes a recording that its logger left unfinished, without a copy of it.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class _Walk(Walk):
         self._found.patches[0] = b"MDF     "
         self._found.patch(_FLAGS_AT, "<H", 0)
         told = f" (flags of its own: {own:#x})" if own else ""
-        self._found.notes.append(f"file was not finalised by the logger; this was made up for while reading{told}")
+        self._found.notes.append(f"file was not finalised by the logger; aqualog completes it while reading{told}")
 
     def _side_branches(self, header: _Block) -> None:
         """Histories, hierarchies, attachments and events: a branch that is damaged is left out."""
@@ -214,7 +214,7 @@ class _Walk(Walk):
             try:
                 mark = self._mark(at)
                 if mark not in (b"TX", b"MD"):
-                    raise BlockError("TX", at, "is none")
+                    raise BlockError("TX", at, "is no text block")
                 size = self._block(at, mark, 0, _HEAD).length
                 if size > _LARGEST_TEXT:
                     raise BlockError(mark.decode(), at, f"has {bytes_text(size)} of text")
@@ -300,10 +300,10 @@ class _Walk(Walk):
         return groups
 
     def _cut_group(self, owner: _Block, broken: BlockError) -> _Group:
-        """A group whose own block the file ends in, where its links are left: its records are told from its channels.
+        """Rebuild a group whose own block is cut at the end of the file, if its links are left, from its channels.
 
         Libraries write this block last. The size of a record is that of its channels if the records are a multiple of
-        it; whether they are is seen by their time, which the reader looks at.
+        it. The reader checks it by their time.
         """
         at = broken.at
         if at + _HEAD + 48 > self._size or self._data[at : at + 4] != b"##CG":
@@ -327,7 +327,7 @@ class _Walk(Walk):
         self._found.patches[at] = head + struct.pack("<QQHHIII", 0, cycles, 0, 0, 0, size, 0)
         self._found.inferred.add(at)
         self._found.truncated = True
-        self._found.remark(f"{broken}; its records are told from its channels: {cycles} of {size} bytes")
+        self._found.remark(f"{broken}; its channels give its records: {cycles} of {size} bytes")
         return _Group(block, 0, cycles, 0, size, 0)
 
     def _source(self, block: _Block, index: int) -> None:
@@ -389,13 +389,15 @@ class _Walk(Walk):
             self._composition(block, 1, block.at, depth)
 
     def _invalidation(self, block: _Block, flags: int) -> None:
-        """Look for the bit that tells invalid samples: where no record has it, what lies in memory would tell."""
+        """Check the bit that marks invalid samples: if records lack it, asammdf would read it from unrelated memory."""
         bit = struct.unpack_from("<I", self._data, block.data + 16)[0]
         if bit < self._invalidation_bits:
             return
         self._found.patch(block.data + 12, "<I", flags & ~_CN_SOME_INVALID)
         if self._invalidation_bits:
-            what = f"it is damaged, its invalidation bit {bit} is none of the {self._invalidation_bits} of its records"
+            what = (
+                f"it is damaged, its invalidation bit {bit} is not among the {self._invalidation_bits} of its records"
+            )
             self._found.refused[block.at] = what
         else:
             what = "declares an invalidation bit, and its records have none; its samples are taken for valid"
@@ -513,7 +515,7 @@ class _Walk(Walk):
             there = chain.inflated // max(group.record + id_size, 1)
             if group.cycles > min(_MOST_CYCLES, _MOST_PACKED * self._size):
                 self._found.patch(group.block.data + 8, "<Q", there)
-                broken = BlockError("CG", group.block.at, f"tells of {group.cycles:.1e} records")
+                broken = BlockError("CG", group.block.at, f"declares {group.cycles:.1e} records")
                 self._found.lost("the number of records of a group", broken)
                 continue
             if self._unfinished & _COUNTERS:
@@ -527,7 +529,7 @@ class _Walk(Walk):
             elif not there and group.cycles and group.record + id_size:
                 self._found.patch(group.block.data + 8, "<Q", 0)
                 if chain.broken is None:
-                    broken = BlockError("CG", group.block.at, f"tells of {group.cycles} records and there are none")
+                    broken = BlockError("CG", group.block.at, f"declares {group.cycles} records and holds no record")
                     self._found.lost("a group", broken)
                 self._found.lost_samples += group.cycles
 
@@ -549,7 +551,7 @@ class _Walk(Walk):
     def _bounded(self, chain: _Records, most: int) -> None:
         if chain.largest > most:
             raise LogError(
-                f"a data block of it tells of {bytes_text(chain.largest)} when inflated", where=str(self._path),
+                f"a data block of it declares {bytes_text(chain.largest)} when inflated", where=str(self._path),
                 expected=f"at most {bytes_text(most)}; the standard allows 4 MB",
                 hint="write it anew with the logger's own tool",
             )  # fmt: skip
@@ -654,7 +656,7 @@ class _Walk(Walk):
             self._deflated(at, out)
             return
         if mark not in _PLAIN:
-            raise BlockError("data", at, f"is none, there is {self._data[at : at + 4]!r}")
+            raise BlockError("data", at, f"is not there, the file holds {self._data[at : at + 4]!r}")
         length = struct.unpack_from("<Q", self._data, at + 8)[0]
         if is_end and self._unfinished & _LAST_DT:
             length = self._open_end(at, length)
@@ -698,7 +700,7 @@ class _Walk(Walk):
         if at + 48 + stored > self._size:
             raise BlockError("DZ", at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
         if at in self._damaged:
-            raise BlockError("DZ", at, "is damaged, or not of the size that it tells of")
+            raise BlockError("DZ", at, "is damaged, or not of the size that it declares")
         self._found.deflated.append(at)
         out.inflated += inflated
         out.largest = max(out.largest, inflated)

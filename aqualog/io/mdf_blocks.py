@@ -1,8 +1,8 @@
-"""Raw samples of an MDF 4 group straight from its data blocks, for the plain layouts that most loggers write.
+"""Read raw samples of an MDF 4 group straight from its data blocks, for the plain layouts that most loggers write.
 
-asammdf has parsed the file: which blocks there are, and where a channel lies in a record. Here the blocks are read,
-inflated and cut into columns without a copy of whole records; of a transposed block only the bytes of the wanted
-channels are touched. Whatever is not plain is left to asammdf: `raw_columns` gives None.
+asammdf has parsed the file: its blocks, and the place of a channel in a record. Here the blocks are read, inflated and
+cut into columns without a copy of whole records. Of a transposed block only the bytes of the wanted channels are
+touched. Other layouts are left to asammdf: `raw_columns` returns None.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def raw_columns(path: Path, inner: Any, index: int, wanted: Sequence[int]) -> Ra
     Raises
     ------
     OSError, zlib.error, deflate.DeflateError
-        If a block cannot be read or inflated to the size that it tells.
+        If a block cannot be read or inflated to the size that it declares.
     """
     plan = _plan(inner.groups[index], wanted)
     return None if plan is None else _decoded(path, plan, plan.blocks)
@@ -289,7 +289,7 @@ def inflated(data: bytes | memoryview, size: int) -> bytes | bytearray:
     if _libdeflate is not None:
         found: bytearray = _libdeflate(data, size)
         return found
-    # no more than it tells: a block that inflates without end is none; the checksum stands behind the last byte
+    # no more than declared: a block that inflates without end is invalid; the checksum stands behind the last byte
     inflater = zlib.decompressobj()
     out = inflater.decompress(data, size)
     if not inflater.eof and (inflater.decompress(inflater.unconsumed_tail, 1) or not inflater.eof):

@@ -1,8 +1,8 @@
-"""From the raw samples of an MDF channel to physical numbers.
+"""Convert the raw samples of an MDF channel to physical numbers.
 
-Algebraic conversions are text in the file. asammdf hands the text to sympy, which executes it, and returns the raw
-samples without a word where it cannot parse it. Here such text is parsed against an allow-list of arithmetic; what is
-not on it is refused.
+Algebraic conversions are text in the file. asammdf passes the text to sympy, which executes it. It silently returns the
+raw samples where it cannot parse the text. Here such text is parsed against an allow-list of arithmetic; all else is
+refused.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What asammdf does behind the back of its caller, switched off, and what it inflates without a measure, with one."""
+"""Switch off the side effects of asammdf, and limit the size of what it inflates."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def unpacked(kind: int, data: bytes, size: int) -> bytes | bytearray:
     else:
         out = inflated(data, size)
     if len(out) != size:
-        raise ValueError(f"a data block inflates to another size than the {size} bytes that it tells of")
+        raise ValueError(f"a data block inflates to another size than the {size} bytes that it declares")
     return out
 
 

@@ -1,4 +1,4 @@
-"""Which packed blocks of an MDF 4 file are damaged: looked for only when one of them could not be read."""
+"""Find the damaged packed blocks of an MDF 4 file, after one of them could not be read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PIECE = 1 << 20  # [bytes]
 
 
 def damaged_blocks(path: Path, addresses: Iterable[int]) -> frozenset[int]:
-    """Those of the blocks at these addresses that do not unpack to what they tell of.
+    """Return the blocks at these addresses that do not unpack to their declared size.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def damaged_blocks(path: Path, addresses: Iterable[int]) -> frozenset[int]:
 
 
 def _inflates_to(data: bytes) -> int:
-    """Size of deflated data, a piece at a time: what a block tells of itself may be far more than there is. [bytes]"""
+    """Return the size of deflated data, a piece at a time; the declared size may be far more than there is. [bytes]"""
     inflater, size = zlib.decompressobj(), 0
     while not inflater.eof:
         piece = inflater.decompress(data, _PIECE)

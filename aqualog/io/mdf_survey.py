@@ -1,8 +1,8 @@
-"""What a walk through the blocks of an MDF file finds before any library is given the file.
+"""Check the blocks of an MDF file before any library opens it.
 
-Every block that a reader would follow is looked at: whether it is there, is what its link says, and is linked once.
-What a cut or damaged file still holds can then be read as if what is missing had never been linked: the survey gives
-the few bytes that say so (`patches`), in place of a copy of the file.
+The walk checks every block that a reader would follow: whether it is there, is what its link says, and is linked once.
+A cut or damaged file can then be read as if its missing parts had never been linked. The survey gives the few bytes
+that say so (`patches`), in place of a copy of the file.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class Survey:
 
     `patches`: bytes in place of the file's own, by address. `refused`: why a channel is left out, by the address of its
     block. `recount`: groups whose number of records is only known when their records have been sorted, by address.
-    `inferred`: groups whose records were told from their channels, by address; their time must go up to be believed.
-    `zeros`: what such a file ends in behind the records of these groups. [bytes]
+    `inferred`: groups whose records were reconstructed from their channels, by address; valid only if their time goes
+    up. `zeros`: what such a file ends in behind the records of these groups. [bytes]
     `deflated`: addresses of deflated blocks of data.
     `inflated`: what the records of a group take when they are inflated, by address of the group. [bytes]
     """
@@ -118,7 +118,7 @@ class Walk:
             raise BlockError(name, at, f"is missing, the file ends at byte {self._size}", is_cut=True)
         found, *numbers = layout.unpack_from(self._data, at)
         if found != mark:
-            raise BlockError(name, at, f"is none, there is {found!r}")
+            raise BlockError(name, at, f"is not there, the file holds {found!r}")
         return tuple(numbers)
 
     def _seen(self, name: str, at: int, size: int) -> None:

@@ -1,4 +1,4 @@
-"""How much memory there is for what is about to be read."""
+"""Estimate the memory that is free for reading."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _UNKNOWN = 1 << 62
 
 
 def free_memory() -> int:
-    """Bytes that this process can still take: what the system, its group and its own limit leave.
+    """Return the bytes that this process can still take: within the system, its group and its own limit.
 
-    A huge number where the system does not tell.
+    A huge number where the system does not report it.
     """
     free = [_meminfo(), _group(), _limit()]
     return max(min(f for f in free if f is not None) if any(f is not None for f in free) else _UNKNOWN, 0)

@@ -1,9 +1,8 @@
-"""Recorded messages as channels: what MCAP and ROS readers share.
+"""Turn recorded messages into channels: the common part of the MCAP and ROS readers.
 
 A `Source` is one file of recorded messages; a `Codec` turns the bytes of one message type into numbers; `MessageReader`
 lists the numeric leaf fields of all topics as channels and decodes those that are asked for, in one pass per file.
-Messages that are all laid out alike are cut into columns; the codec decodes the others, and says whether the cut is
-right.
+Messages with the same layout are cut into columns. The codec decodes the others, and checks samples of the cut ones.
 """
 
 from __future__ import annotations
@@ -220,7 +219,7 @@ def _schema_leaves(node: Mapping[str, Any], path: FieldPath, depth: int) -> Iter
 
 
 def _bracket_unit(comment: str) -> str:
-    """Unit at the end of a description, `speed of the car [km/h]`; a range `[0, 1]` or an index `[2]` is none."""
+    """Return the unit at the end of a description, `speed [km/h]`; a range `[0, 1]` or an index `[2]` is no unit."""
     found = re.search(r"\[\s*([^\[\]\s,;:]{1,16})\s*\]\s*\.?\s*$", comment)
     if found is None or not (re.search(r"[^\W\d_]|[%°]", found[1]) or found[1] == "-"):
         return ""
@@ -570,7 +569,7 @@ class _Sink:
         return np.where(plausible, stamps, log)
 
     def forget(self) -> None:
-        """Let go of the samples that have been handed on."""
+        """Release the samples that have been handed on."""
         del self.log_times[:], self.stamps[:]
         for column in self.columns.values():
             del column[:]

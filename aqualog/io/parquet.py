@@ -64,7 +64,7 @@ class _Lost:
     first: int = 0
 
     def add(self, stamps: Stamps, row_of: Callable[[int], int]) -> None:
-        """Count those of a piece; `row_of` tells which row of the file each of its rows is."""
+        """Count those of a piece; `row_of` returns the row of the file of each of its rows."""
         bad = np.flatnonzero(~stamps.valid)
         if bad.size:
             self.first = self.first if self.rows else row_of(int(bad[0]))
@@ -133,7 +133,7 @@ class ParquetReader:
         return [self._channel(w, frame[self._columns[w.key].stored], self._stamps) for w in asked]
 
     def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
-        """The same piece by piece; in one where the time is text, of which only the whole tells day from month."""
+        """Return the same piece by piece; in one if the time is text, which needs the whole to find the month."""
         asked = list(wanted)
         if self._columns[self._time.index].dtype == pl.String:
             return [part_of(asked, (self.read(asked) for _ in range(1)))]
@@ -172,9 +172,9 @@ class ParquetReader:
             )  # fmt: skip
 
     def _time_unit(self) -> str:
-        """Unit of the time; where none is given, by the first rows and the last one: how long a log is tells it.
+        """Return the unit of the time; without one, infer it from the first rows and the last: the log's length.
 
-        Looked at before any other column, so that a log has the same unit whichever of its channels are read, and how.
+        It is found before any other column is read, so that a log has the same unit whichever channels are read.
         """
         column, unit = self._columns[self._time.index], self._time.unit
         if unit or not column.dtype.is_numeric():
@@ -213,7 +213,7 @@ class ParquetReader:
         return stamps
 
     def _compare_clocks(self, drift: DriftWatch, stamps: Stamps, frame: pl.DataFrame) -> None:
-        """Hold the second clock of these rows against their stamps; not if it is text, which only the whole tells."""
+        """Compare the second clock of these rows with their stamps; not if it is text, which needs the whole column."""
         other = None if self._time.other is None else self._columns[self._time.other]
         if other is None or other.dtype == pl.String:
             return
@@ -330,7 +330,7 @@ def _stamps(column: pl.Series, day: pl.Series | None, unit: str, kind: FieldKind
 
 
 def _whole(column: pl.Series, factor: int, *, absolute: bool) -> Stamps:
-    """Whole ticks of `factor` nanoseconds; those beyond what nanoseconds hold are none."""
+    """Return whole ticks of `factor` nanoseconds; ticks beyond the range of nanoseconds become missing."""
     ticks = column.to_physical().cast(pl.Int64)
     t: TimeArray = ticks.fill_null(0).to_numpy().astype(np.int64)
     latest = np.iinfo(np.int64).max // factor

@@ -1,4 +1,4 @@
-"""The rows of a Parquet file that can be believed, row group by row group."""
+"""Find the valid rows of a Parquet file, row group by row group."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _HINT = "check whether it was written to its end: the index stands there"
 
 
 class SoundRows:
-    """Rows of one file, but for those of damaged row groups, which are told and counted.
+    """Rows of one file without those of damaged row groups, which are noted and counted.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class SoundRows:
     rows : int
         As the library counts them.
     faults : FaultLog
-        What is lost is told there.
+        Collects the losses.
 
     Raises
     ------
     LogError
-        If the index cannot be so.
+        If the index is not valid.
     """
 
     def __init__(self, path: Path, rows: int, faults: FaultLog) -> None:
@@ -106,10 +106,10 @@ class SoundRows:
         return self._rows
 
     def tell(self) -> None:
-        """Tell and count what was lost; a row counts once, however many columns it has.
+        """Note and count what was lost; a row counts once, however many columns it has.
 
-        Values of a row group that is left out as a whole are none of their own: which of its columns is looked at first
-        makes no difference.
+        Values in a row group that is left out as a whole do not count again, so that the order of the columns makes no
+        difference.
         """
         for k, reason in sorted(self._bad.items()):
             if k in self._told:
@@ -128,7 +128,7 @@ class SoundRows:
                 self._counted[column] = np.union1d(self._counted.get(column, new), new)
                 self._faults.lost_samples += new.size
                 what = f"{new.size} value{'s' if new.size > 1 else ''} (first at row {new[0] + 1}) beyond the least and"
-                self._note(f'column "{column}": {what} greatest that the index tells of; left out')
+                self._note(f'column "{column}": {what} greatest that the index declares; left out')
 
     @staticmethod
     def _is_in(group: Group, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -192,7 +192,7 @@ class SoundRows:
         return pl.scan_parquet(self._path, glob=False).select(columns).slice(at, rows).collect()
 
     def _within_bounds(self, frame: pl.DataFrame, at: int) -> pl.DataFrame:
-        """Numbers beyond the bounds of their row group are none: a bit or more of them has changed."""
+        """Leave out numbers beyond the bounds of their row group: a bit or more of them has changed."""
         if not frame.height:
             return frame
         groups = [g for g in self._groups if g.rows and g.first < at + frame.height and at < g.first + g.rows]
@@ -223,7 +223,7 @@ class SoundRows:
 
 
 def _bounds(groups: Sequence[Group], column: str, code: str, dtype: Any) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Least and greatest value of a column in each group, where they are not told the type's own."""
+    """Return least and greatest value of a column in each group; without bounds in the file, those of the type."""
     limits = np.iinfo(dtype) if dtype.kind in "iu" else np.finfo(dtype)
     widest = (limits.min, limits.max) if dtype.kind in "iu" else (-np.inf, np.inf)
     found = []

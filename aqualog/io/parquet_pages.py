@@ -1,10 +1,10 @@
-"""Whether the pages of a Parquet file are those that its footer tells of, before a library decodes them.
+"""Check whether the pages of a Parquet file fit its footer, before a library decodes them.
 
-Libraries go to where the footer sends them and decode what lies there. Where bytes are missing or too many that is
-something else, and plain numbers shifted by a few bytes are numbers, too. So the headers of the pages are read first:
-they must follow each other through the whole of a column's place and hold its number of values, lie before the footer,
-unpack to no more than their values need, and fit to their checksum where there is one. Only headers are held, and one
-page at a time where there are checksums.
+Libraries go where the footer sends them and decode the bytes there. If bytes are missing or added, those are wrong
+bytes, and plain numbers shifted by a few bytes still look like numbers. So the headers of the pages are read first.
+They must follow each other through the whole of a column's place and hold its number of values. They must lie before
+the footer, unpack to no more than their values need, and fit their checksum where present. Only headers are held, and
+one page at a time where there are checksums.
 
 Format: https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift
 """
@@ -40,7 +40,7 @@ class Bounds(NamedTuple):
     high: bytes
 
     def numbers(self, code: str) -> tuple[float, float] | None:
-        """Both as numbers of a type of `struct`; None if they are none."""
+        """Return both as numbers of a type of `struct`; None if they are no numbers."""
         try:
             low, high = (struct.unpack("<" + code, x)[0] for x in self)
         except struct.error:
@@ -71,7 +71,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """What the footer tells: row groups in order, where the footer begins, and bytes before it that nothing owns."""
+    """Content of the footer: row groups in order, where the footer begins, and bytes before it that nothing owns."""
 
     groups: tuple[Group, ...]
     end: int
@@ -84,7 +84,7 @@ def read_index(path: Path) -> Index | None:
     Raises
     ------
     MalformedError
-        If it is none, or what it tells cannot be so.
+        If there is no footer, or its content is impossible.
     OSError
         If the file cannot be read.
     """
@@ -126,7 +126,7 @@ def _index(footer: Struct, end: int) -> Index:
         groups.append(Group(first, rows, chunks))
         first += rows
     if first != footer[3]:
-        raise MalformedError(f"its row groups have {first} rows, and its index tells of {footer[3]}")
+        raise MalformedError(f"its row groups have {first} rows, and its index declares {footer[3]}")
     return Index(tuple(groups), end, max(0, end - owned))
 
 
@@ -152,7 +152,7 @@ def _extras(column: Struct, about: Struct) -> Iterator[int]:
 
 
 def page_fault(path: Path, index: Index, group: Group, columns: Iterable[str]) -> str:
-    """What is wrong with the pages of some columns in a row group; empty if nothing is.
+    """Say what is wrong with the pages of some columns in a row group; empty if nothing is.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def _check_chunk(handle: int, index: Index, group: Group, chunk: Chunk) -> None:
         values += count if header[1] in (_DATA, _DATA_V2) else 0
         at = body + packed
     if values != chunk.values:
-        raise MalformedError(f"its pages hold {values} values, and the index tells of {chunk.values}")
+        raise MalformedError(f"its pages hold {values} values, and the index declares {chunk.values}")
 
 
 def _header(handle: int, at: int, end: int) -> tuple[Struct, int]:

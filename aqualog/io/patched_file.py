@@ -1,4 +1,4 @@
-"""A file that reads as if some of its bytes were others. The file itself stays as it is, and nothing is copied."""
+"""Read a file as if some of its bytes were others, without changing or copying the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ROS logs: ROS 1 bags and ROS 2 recordings in sqlite3 or MCAP, a single file or a directory of splits.
+"""Read ROS logs: ROS 1 bags and ROS 2 recordings in sqlite3 or MCAP, a single file or a directory of splits.
 
 A ROS 2 directory is read from its files; `metadata.yaml` only names and orders them, so one that lost it, or lost a
 split, is still read. Messages are decoded with the definitions in the recording, or with those of its ROS release

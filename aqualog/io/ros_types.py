@@ -1,9 +1,9 @@
-"""Message definitions that come out of a log, checked before anything is made of them.
+"""Check message definitions from a log before they are used.
 
-The library writes Python from a definition and runs it, and its decoders go through what a definition declares. So
-nothing reaches it but names of letters, digits and underscores, known number types, and arrays of a bounded size;
-constants, which no message carries, do not reach it at all. A type that holds itself, or that can repeat without taking
-a byte of the message, would keep a decoder busy without end.
+The library writes Python from a definition and runs it, and its decoders follow what a definition declares. Only safe
+parts reach it: names of letters, digits and underscores, known number types, and arrays of a bounded size. Constants,
+which no message carries, do not reach it at all. A type that holds itself, or that can repeat without taking a byte of
+the message, would keep a decoder busy without end.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Small files that a user writes: read as a whole, unless they are something else."""
+"""Read small files that a user writes as a whole, and refuse other files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def read_small(path: Path, *, what: str, expected: str, largest: int) -> bytes:
     expected : str
         What kind of file it should be, e.g. `a TOML file`.
     largest : int
-        More is none of these files. [byte]
+        Largest size of such a file. [byte]
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which format a file has, by its content; the suffix is not asked."""
+"""Find the format of a file by its content; the suffix does not count."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def sniff(path: Path, *, any_text: bool = False) -> str:
     Raises
     ------
     LogError
-        If there is no such file, it is empty, or its content is none of these.
+        If the file is missing or empty, or its content is of no known format.
     """
     if path.is_dir():
         if (path / "metadata.yaml").exists() or _is_recording(path):

@@ -14,7 +14,7 @@ _NAMED = 3  # channels of a lost group that are named
 
 
 def read_sound(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[Channel], list[str]]:
-    """Decode channels of one file; of an MDF, group by group, and what cannot be decoded is told.
+    """Decode channels of one file; of an MDF, group by group, with a note on each group that cannot be decoded.
 
     Returns
     -------

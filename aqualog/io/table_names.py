@@ -1,4 +1,4 @@
-"""Names and units of the columns of a table."""
+"""Split the headers of a table into names and units."""
 
 from __future__ import annotations
 

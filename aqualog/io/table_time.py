@@ -1,4 +1,4 @@
-"""Which column of a table is the time, what unit it has, and its stamps in nanoseconds."""
+"""Find the time column of a table, its unit, and its stamps in nanoseconds."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def _given_unit(unit: str, where: str) -> str:
 
 
 def _own_unit(field: TableField) -> str:
-    """Unit of the header, or of the end of the name; empty if there is none that is a time."""
+    """Return the unit of the header, or of the end of the name; empty without a unit of time."""
     if is_unit(field.unit) and parse_unit(field.unit).dimension == "time":
         return field.unit
     name = field.name.casefold()
@@ -221,7 +221,7 @@ def _ns_per(unit: str) -> int:
 
 
 def no_unit_note(name: str, reason: str) -> str:
-    """What is told of a time whose unit is judged."""
+    """Return the note on a time whose unit was inferred."""
     return f"the time has no unit; taken as {name} ({reason})"
 
 
@@ -273,7 +273,7 @@ def _clean(cells: pl.Series) -> pl.Series:
 
 
 def _iso(cells: pl.Series) -> tuple[pl.Series, str]:
-    """Dates as year-month-day. Which of two numbers is the month is read off the file, never guessed."""
+    """Return dates as year-month-day. The file decides which of two numbers is the month; it is never guessed."""
     first = cells.str.extract(r"^(\d{1,2})[./-]\d{1,2}[./-]\d{4}").cast(pl.Int64, strict=False)
     second = cells.str.extract(r"^\d{1,2}[./-](\d{1,2})[./-]\d{4}").cast(pl.Int64, strict=False)
     same = cells.str.replace(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})", "$1-$2-$3")
@@ -283,7 +283,9 @@ def _iso(cells: pl.Series) -> tuple[pl.Series, str]:
     month_first = bool((second > 12).any())
     if not (has_point or month_first or (first > 12).any()):
         raise LogError(
-            f'cannot tell day from month in "{cells.drop_nulls()[0]}"', expected="2026-03-01", hint="export ISO 8601"
+            f'cannot distinguish day and month in "{cells.drop_nulls()[0]}"',
+            expected="2026-03-01",
+            hint="export ISO 8601",
         )
     swapped = "$3-$1-$2" if month_first else "$3-$2-$1"
     order = "month/day/year" if month_first else "day.month.year"

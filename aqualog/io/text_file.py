@@ -1,4 +1,4 @@
-"""A large text file as if it were in memory: what is asked for is read, nothing is held."""
+"""Read a large text file like one in memory: only requested parts are read, nothing is held."""
 
 from __future__ import annotations
 

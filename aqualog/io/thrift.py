@@ -1,7 +1,7 @@
-"""Structures in Thrift's compact protocol, as the footer and the page headers of a Parquet file are.
+"""Read structures in Thrift's compact protocol, as in the footer and the page headers of a Parquet file.
 
-A structure becomes a mapping of field numbers to values: numbers, bytes, lists and further structures. What a field
-means is the caller's; unknown ones are kept, because their length is known only by reading them.
+A structure becomes a mapping of field numbers to values: numbers, bytes, lists and further structures. The caller knows
+the meaning of a field. Unknown fields are kept, because their length is known only by reading them.
 
 Format: https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md
 """
@@ -35,7 +35,7 @@ def decode(data: bytes, at: int = 0) -> tuple[Struct, int]:
     Raises
     ------
     MalformedError
-        If there is none.
+        If the bytes hold no such structure.
     """
     try:
         return _struct(data, at, 0)

@@ -1,7 +1,7 @@
-"""Decompression that gives no more than a log can hold.
+"""Decompress blocks to no more than a log can hold.
 
-Zeros shrink to a thousandth and less, measured signals do not: messages carry counters and stamps. So what is unpacked
-may be a multiple of what was packed, and beyond that a store that refills as a file is read.
+Zeros shrink to a thousandth and less; measured signals do not, since messages carry counters and stamps. The unpacked
+size may therefore be a multiple of the packed one, plus a store that refills as a file is read.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Results that are there whole or not at all, and folders that one process at a time writes."""
+"""Write results whole or not at all, and lock folders for one writing process at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals into a log file of any format, chosen by the suffix."""
+"""Write signals into a log file of any format, chosen by the suffix."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def write_parquet(path: Path, columns: Sequence[TableColumn], *, start_ns: int |
 
 
 def join_parquet(path: Path, parts: Sequence[Path]) -> None:
-    """Write tables of equal columns below each other without holding them; what the first one tells of itself is kept.
+    """Write tables of equal columns below each other without holding them; the metadata of the first one are kept.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From a statistic to the detection bit."""
+"""Turn a statistic into a detection bit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def alarm_bits(
     patience_s: float = 0.0,
     dt: float,
 ) -> BoolArray:
-    """Bit from the statistic's rise above the threshold to its fall below a share of it.
+    """Return the bit from the statistic's rise above the threshold to its fall below a share of it.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ def alarm_bits(
     off_share : float
         0 ... 1. [-]
     stay : array (n,), optional
-        What keeps the alarm on, in the same unit and never less than the statistic; the statistic itself by default.
+        Statistic that ends the alarm, in the same unit and never less than the statistic; default the same.
     patience_s, dt : float
-        How long an alarm outlasts missing evidence; sample time. [s]
+        Time that an alarm outlasts missing evidence; sample time. [s]
 
     Returns
     -------

@@ -1,10 +1,10 @@
-"""The rivals by name, and a drive through all of them.
+"""The rivals by name, and the function that runs them over a drive.
 
-Default thresholds by one rule, fixed beforehand: the smallest of a grid in steps of about a tenth at which 10 h of
-simulated dry, damp and rough driving raise at most one alarm; each of them raised none. 180 drives of 200 s between 40
-and 130 km/h with three cars, four tyres, grades, wind, series sensors and vehicle files that err; seeds 1-180. Recall
-has no part in the rule; what the methods look at and where they are held was developed on the same drives and on 120
-passes over a watered lane. The rule knows no kerbs, gear shifts or brakes.
+One rule, fixed beforehand, gives the default thresholds. It takes the smallest of a grid in steps of about a tenth at
+which 10 h of simulated dry, damp and rough driving raise at most one alarm; each rival raised no alarm. The 180 drives
+of 200 s between 40 and 130 km/h use three cars, four tyres, grades, wind, series sensors and vehicle files with errors;
+seeds 1-180. Recall has no part in the rule. The inputs of the methods and the conditions that hold them were developed
+on the same drives and on 120 passes over a watered lane. The rule covers no kerbs, gear shifts or brakes.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def run_rivals(
     Raises
     ------
     ConfigError
-        For a name that is none, or a threshold that is not positive and finite.
+        For an unknown name, or a threshold that is not positive and finite.
     """
     own = dict(thresholds or {})
     _check(own, [*own, *(RIVALS if names is None else names)])

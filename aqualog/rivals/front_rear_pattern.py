@@ -1,4 +1,4 @@
-"""Front wheel speeds against a stored reference, and against the rear wheels over the same spot (thesis [33], [34])."""
+"""Compare front wheels with a stored reference, and with the rear wheels over the same spot (thesis [33], [34])."""
 
 from __future__ import annotations
 
@@ -57,17 +57,17 @@ def _over_reference(k, floor, front, rear):  # type: ignore[no-untyped-def]
 
 
 def dips(deviation: FloatArray, *, dt: float) -> FloatArray:
-    """How far a wheel's deviation from the car lies below its own slow reference, 0 ... 5 %. [-]
+    """Return how far a wheel's deviation from the car lies below its own slow reference, 0 ... 5 %. [-]
 
-    NaN: reference held, NaN. The reference starts at the first sample and follows with 20 s, at most as a deviation of
-    half a per cent would make it.
+    NaN: reference held, NaN. The reference starts at the first sample and follows with 20 s. Its rate is at most that
+    for a deviation of half a per cent.
     """
     y: FloatArray = _dips(gain(TAU_REFERENCE, dt), STEP_MAX, DIP_MAX, np.ascontiguousarray(deviation, dtype=np.float64))
     return y
 
 
 def at_the_rear(front: FloatArray, v_x: FloatArray, *, wheelbase: float, dt: float) -> FloatArray:
-    """What the front wheel showed where the rear wheel is now, a wheelbase earlier on the way.
+    """Return the front wheel's signal at the rear wheel's place, a wheelbase earlier on the way.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def _later(x: FloatArray, samples: int) -> FloatArray:
 
 
 def _widened(x: FloatArray, samples: int) -> FloatArray:
-    """Largest value of the last 2 samples + 1; NaN where the newest is."""
+    """Return the largest value of the last 2 samples + 1; NaN where the newest is NaN."""
     largest = x.copy()
     for _ in range(2 * samples):
         largest[1:] = np.fmax(x[1:], largest[:-1])
@@ -102,12 +102,12 @@ def _widened(x: FloatArray, samples: int) -> FloatArray:
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per side, at the front wheel; the statistic is the front's dips over their stored reference. [-]
+    """Run the method: one track per side, at the front wheel; statistic: the front's dips over their reference. [-]
 
-    rms of the front's dips (0.15 s) without those that the rear wheel repeats over the same spot, over the slow rms of
-    the front's dips. A bump is under both axles; a front wheel that loses the road in water clears it for the rear one.
-    Held under braking, below 30 km/h and beyond 4 m/s^2 sideways. It comes by wheelbase / v
-    and 0.02 s late, so that the rear wheel may repeat the bump a little earlier or later.
+    The numerator is the rms of the front's dips (0.15 s) less those that the rear wheel repeats over the same spot; the
+    denominator is the slow rms of the front's dips. A bump is under both axles. A front wheel that loses the road in
+    water clears it for the rear one. Held under braking, below 30 km/h and beyond 4 m/s² sideways. The statistic is
+    late by wheelbase / v and 0.02 s, so that the rear wheel may repeat the bump a little earlier or later.
 
     Thesis [33], [34].
     """
@@ -123,7 +123,7 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
             }
         there = _later(at_the_rear(dips(share[front], dt=r.dt), v_x, wheelbase=r.vehicle.wheelbase, dt=r.dt), late)
         here = _widened(dips(share[rear], dt=r.dt), late)
-        both = there + here  # a power is told where both wheels are
+        both = there + here  # a power needs both wheels
         power_f, power_r = (
             fading_lowpass(np.where(np.isnan(both), np.nan, x * x), 0.0, tau=TAU_POWER, fade=TAU_POWER, dt=r.dt)[0]
             for x in (there, here)

@@ -1,4 +1,4 @@
-"""A drive made ready for the rivals."""
+"""Prepare a drive for the rivals."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ __all__ = ["present_symbols", "rival_inputs"]
 
 
 def present_symbols(signals: Signals) -> tuple[str, ...]:
-    """Symbols that rivals may read and that have a value at all; never truth or labels."""
+    """Return symbols that rivals may read and that have a value at all; never truth or labels."""
     height = signals.frame.height
     return tuple(s for s in signals.symbols if s in INPUTS and signals.frame[s].null_count() < height)
 
 
 def rival_inputs(signals: Signals, vehicle: Vehicle) -> RivalInputs:
-    """Features and raw columns of a whole drive; the features are those that the thesis' detectors read."""
+    """Return features and raw columns of a whole drive; the features are those of the thesis' detectors."""
     present = present_symbols(signals)
     columns = {s: signals.array(s) for s in (present or ("v_x",))}
     features = FeatureStream(vehicle, signals.dt, present).push(columns)

@@ -1,4 +1,4 @@
-"""By how much a reference velocity is late, told by the accelerometer."""
+"""Estimate the delay of a reference velocity by the accelerometer."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ __all__ = ["LAG_MAX", "velocity_lag"]
 TAU = 0.3  # [s] both accelerations are smoothed alike
 TAU_SLOW = 5.0  # [s] grade and offset of the accelerometer change more slowly
 LAG_MAX = 0.5  # [s]
-# A receiver is as likely in time as late until this much has been seen: 5 s of accelerations that change by 0.1 m/s^3
+# A receiver counts as in time until about this much has been seen: 5 s of accelerations that change by 0.1 m/s³
 KNOWN = 0.05  # [m^2/s^5]
 
 
 def velocity_lag(v_x: FloatArray, a_x: FloatArray, *, dt: float) -> FloatArray:
-    """Lag of a velocity behind the accelerometer, from what the drive has shown so far.
+    """Return the lag of a velocity behind the accelerometer, from the drive so far.
 
     Parameters
     ----------
     v_x : array (n,)
         Reference velocity. [m/s]
     a_x : array (n,)
-        Specific force; its own latency, some 10 ms, is left out. [m/s^2]
+        Specific force; its own latency, some 10 ms, is left out. [m/s²]
     dt : float
         [s]
 
@@ -33,8 +33,8 @@ def velocity_lag(v_x: FloatArray, a_x: FloatArray, *, dt: float) -> FloatArray:
     lag : array (n,)
         0 ... 0.5, starting at 0, never NaN. [s]
 
-    Least squares of dv_x/dt - a_x = -lag da_x/dt beyond the slow part, in which the grade is. No wheel takes part: a
-    slip grows with the acceleration as a lag does, and would be taken for one.
+    Least squares of dv_x/dt - a_x = -lag da_x/dt beyond the slow part, which holds the grade. Wheel speeds are not
+    used: a slip grows with the acceleration as a lag does, and would look like one.
     """
     a_v, _ = derivative(v_x, UNSET, tau=TAU, dt=dt)
     smooth, _ = lowpass(a_x, UNSET, tau=TAU, dt=dt)

@@ -1,4 +1,4 @@
-"""What rivals need, by name of the signal or key of the vehicle file that is missing."""
+"""List what rivals need, by name of the missing signal or key of the vehicle file."""
 
 from __future__ import annotations
 

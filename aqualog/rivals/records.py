@@ -1,4 +1,4 @@
-"""What a rival reads, what it is, and what a drive gives."""
+"""Records of the rivals: their inputs, their description, and their results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Severity = Callable[[Mapping[str, Any]], str]
 
 @dataclass(frozen=True, slots=True)
 class RivalInputs:
-    """A whole drive as rivals read it.
+    """A whole drive as input of the rivals.
 
     `features` as `FeatureStream.push` gives them; `columns` symbol -> array (n,), SI, NaN where missing, of
     `features.stream.INPUTS` alone; `braking` wheel -> bool array (n,), where a braking force acts; `dt` [s].
@@ -55,7 +55,7 @@ class Rival:
 
 @dataclass(frozen=True, slots=True)
 class RivalResult:
-    """Everything that rivals found in one drive; events in order of their beginning."""
+    """All results of the rivals on one drive; events in order of their beginning."""
 
     tracks: tuple[Track, ...]
     events: tuple[Event, ...]
@@ -63,5 +63,5 @@ class RivalResult:
 
 
 def always_partial(_: Mapping[str, Any]) -> str:
-    """Severity of a method that does not tell partial from full aquaplaning."""
+    """Return the severity of a method that does not distinguish partial from full aquaplaning."""
     return "partial"

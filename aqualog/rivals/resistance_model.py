@@ -22,11 +22,11 @@ A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track of the car; the statistic is the low-passed resistance beyond the nominal one, over the mass. [m/s^2]
+    """Run the method: one track of the car; the statistic is the low-passed extra resistance over the mass. [m/s²]
 
-    Wheel forces less nominal rolling and air resistance, less m (dv/dt + g sin(theta)), where the grade is the slow
-    part of accelerometer less kinematic acceleration: an accelerometer's offset is taken for a grade and stays in. A
-    plain low-pass (0.7 s) against a threshold, no sum. Held under braking, below 36 km/h and beyond 2.5 m/s^2 sideways.
+    Wheel forces less nominal rolling and air resistance, less m (dv/dt + g sin(theta)). The grade is the slow part of
+    accelerometer less kinematic acceleration, so that an accelerometer's offset looks like a grade and remains. A plain
+    low-pass (0.7 s) against a threshold, no sum. Held under braking, below 36 km/h and beyond 2.5 m/s² sideways.
 
     Thesis [36].
     """

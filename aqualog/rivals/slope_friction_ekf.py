@@ -1,4 +1,4 @@
-"""Slip slope and maximum friction jointly, by an extended Kalman filter on a bent tyre curve (thesis [16])."""
+"""Estimate slip slope and maximum friction jointly, by an extended Kalman filter on a bent tyre curve (thesis [16])."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class CurveParams(NamedTuple):
     P_mu: float
     P_delta: float
     P_most: float
-    back_C: float  # shares by which slope and friction go back to the dry ones: what is no longer told is forgotten
+    back_C: float  # shares by which slope and friction return to the dry ones: old evidence fades
     back_mu: float
 
     @staticmethod
@@ -99,13 +99,13 @@ def _scan(p, ln_C, ln_m, s, mu, is_active, lows, highs):  # type: ignore[no-unty
         x[1] = min(max(x[1], math.log(max(abs(mu[i]) / USED_MOST, 1e-6))), highs[1])
         C, m = math.exp(x[0]), math.exp(x[1])
         if abs(s[i] - x[2]) < 3.0 * m / C:
-            # the slip is the noisy one: as long as the tyre holds, it is what is measured
+            # the slip is the noisy one: as long as the tyre holds, the slip is the measurement
             predicted, H[0], H[1] = _holding(mu[i], C, m)
             H[2] = 1.0
             e, variance = s[i] - predicted - x[2], p.r_slip
         else:
             predicted, H[0], H[1] = _sliding(s[i] - x[2], C, m)
-            H[2] = 0.0  # radii are not learnt from a wheel that slides
+            H[2] = 0.0  # a wheel that slides does not update the radii
             e, variance = mu[i] - predicted, p.r
         for a in range(3):
             g[a] = P[a, 0] * H[0] + P[a, 1] * H[1] + P[a, 2] * H[2]
@@ -123,7 +123,7 @@ def _scan(p, ln_C, ln_m, s, mu, is_active, lows, highs):  # type: ignore[no-unty
 def scan(
     p: CurveParams, slip: FloatArray, mu: FloatArray, is_active: BoolArray, *, slope: float, mu_max: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Slope, maximum friction and offset of mu = brush(slip - delta; C, mu_max) over a drive.
+    """Estimate slope, maximum friction and offset of mu = brush(slip - delta; C, mu_max) over a drive.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def scan(
     Returns
     -------
     slope, mu_max, offset : array (n,)
-        The first two NaN where left out. [-] What little slip does not tell of the friction keeps its value.
+        The first two NaN where left out. [-] Small slip does not identify the friction, which then keeps its value.
     """
     lows = np.array([math.log(C_LOW), math.log(MU_LOW), -0.02])
     highs = np.array([math.log(C_HIGH), math.log(MU_HIGH), 0.02])
@@ -150,10 +150,10 @@ def scan(
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per driven wheel; the statistic is the larger loss, of slope or of maximum friction. [-]
+    """Run the method: one track per driven wheel; statistic: the larger loss, of slope or of maximum friction. [-]
 
-    Thesis [16]: a nonlinear tyre model whose slope and friction an extended Kalman filter estimates together; the tyre
-    is the brush of section 3.1. A driven wheel that spins tells its friction, so such samples stay in.
+    Thesis [16]: an extended Kalman filter estimates slope and friction of a nonlinear tyre model together; the tyre is
+    the brush of section 3.1. A driven wheel that spins shows its friction, so such samples stay in.
     """
     p = CurveParams.make(r.dt)
     dry = r.vehicle.mu_max
@@ -170,5 +170,5 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
 
 def severity(evidence: Mapping[str, Any]) -> str:
-    """Full where nine tenths are lost: less friction than wet ice has."""
+    """Return full where nine tenths are lost: less friction than wet ice has."""
     return "full" if evidence.get("statistic_max", 0.0) > 1.0 - MU_FULL else "partial"

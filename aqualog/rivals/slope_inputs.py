@@ -1,4 +1,4 @@
-"""Slip and traction of driven wheels against a velocity that no driven wheel makes, for the slip-slope rivals."""
+"""Slip and traction of driven wheels against a velocity from other sources, for the slip-slope rivals."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ OWN_LOW, OWN_HIGH = 10.0, 100.0  # [-] a slope that a tyre on asphalt can have: 
 class Driven:
     """One driven wheel, arrays (n,).
 
-    `slip` (3.13) and traction `mu`, low-passed alike, NaN where not active [-]; `is_active` where both are told;
+    `slip` (3.13) and traction `mu`, low-passed alike, NaN where not active [-]; `is_active` where both are available;
     `is_shown` where the traction is large enough for a slope to show; `expected` the slip slope of the vehicle file
-    [-], `is_given` whether the file says it.
+    [-], `is_given` whether the file gives it.
     """
 
     wheel: str
@@ -46,10 +46,10 @@ class Driven:
 
 
 def driven_wheels(r: RivalInputs) -> tuple[Driven, ...]:
-    """Driven wheels, each against the faster free wheel; on an AWD car, the reference velocity without its lag.
+    """Return driven wheels, each against the faster free wheel; on an AWD car, the reference velocity without its lag.
 
     A driven wheel that leaves the road's speed stays in: that is the slope's fall. A free wheel in water can only be
-    slow, so that the faster one is the velocity; where it too leaves the road's speed there is none.
+    slow, so that the faster one gives the velocity. If that one leaves the road's speed, too, no velocity is available.
     """
     f, car = r.features, r.vehicle
     free = [w for w in WHEELS if w not in car.driven]
@@ -87,7 +87,7 @@ def driven_wheels(r: RivalInputs) -> tuple[Driven, ...]:
 
 
 def _faster(r: RivalInputs, free: list[str]) -> tuple[FloatArray, FloatArray]:
-    """Speed of the faster free wheel [m/s], and its acceleration difference, absolute [m/s^2]."""
+    """Return the speed of the faster free wheel [m/s], and its acceleration difference, absolute [m/s²]."""
     f, (one, other) = r.features, free
     with np.errstate(invalid="ignore"):
         first = ~(f[f"v_line_{other}"] > f[f"v_line_{one}"])
@@ -97,13 +97,13 @@ def _faster(r: RivalInputs, free: list[str]) -> tuple[FloatArray, FloatArray]:
 
 
 def _in_time(r: RivalInputs) -> FloatArray:
-    """Velocity without the lag of its reference, v(t) = v(t - lag) + lag a."""
+    """Return the velocity without the lag of its reference, v(t) = v(t - lag) + lag a."""
     lag = velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=r.dt)
     return r.features["v_x_hat"] + lag * r.features["a_kin_slow"]
 
 
 def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArray:
-    """Dry slope that estimates are compared with: the vehicle file's, else the drive's own first stable part.
+    """Return the dry slope for the comparison: the vehicle file's, else that of the drive's own first stable part.
 
     Parameters
     ----------
@@ -116,9 +116,9 @@ def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArra
     Returns
     -------
     array (n,)
-        [-] Without a value in the file the median of 30 s of estimates after 10 s, NaN until they have passed and for
-        good if it is no slope of a tyre on asphalt (10-100). Left out on purpose: a drive that begins on snow without
-        a value in the file is compared with snow.
+        [-] Without a value in the file the median of 30 s of estimates after 10 s, NaN until they have passed. It stays
+        NaN if it is no slope of a tyre on asphalt (10-100). Limitation: a drive that begins on snow without a value in
+        the file is compared with snow.
     """
     if wheel.is_given:
         return np.full(slope.size, wheel.expected)
@@ -132,5 +132,5 @@ def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArra
 
 
 def loss_of_slope(slope: FloatArray, reference: FloatArray) -> FloatArray:
-    """Share of the dry slope that is lost, 1 - C / C_ref; below 0 for a stiffer one. [-]"""
+    """Return the share of the dry slope that is lost, 1 - C / C_ref; below 0 for a stiffer one. [-]"""
     return 1.0 - slope / reference

@@ -31,7 +31,7 @@ _update = ekf.update
 class KalmanParams(NamedTuple):
     """Variances per step and the change detection; made by `make`.
 
-    Noise and random walks are those of the thesis' own filter, so that both see the same drive with the same eyes.
+    Noise and random walks are those of the thesis' own filter, so that the comparison is fair.
     """
 
     r: float
@@ -78,7 +78,7 @@ def _scan(p, sums, belief, s, mu, is_active):  # type: ignore[no-untyped-def]
 def scan(
     p: KalmanParams, slip: FloatArray, mu: FloatArray, is_active: BoolArray, *, slope: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Slope and offset of slip = mu / C + delta over a drive.
+    """Estimate slope and offset of slip = mu / C + delta over a drive.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def scan(
         1 where a residual above zero was found, -1 below, else 0: the slope is unknown again from there.
 
     The filter of `detect.slip_slope.ekf` with one driven axle, which is linear: (3.20) at mu_j = 0. Two sums of the
-    residual, reset after an alarm; what the data cannot tell is not looked at.
+    residual, reset after an alarm. Observability is not checked.
     """
     start = Belief(1.0 / slope, 1.0, 0.0, p.P_k, 0.0, 0.0, 0.0, 0.0, p.P_delta)
     result: tuple[FloatArray, FloatArray, FloatArray] = _scan(
@@ -109,9 +109,9 @@ def scan(
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per driven wheel; the statistic is the loss of slope against the dry one. [-]
+    """Run the method: one track per driven wheel; the statistic is the loss of slope against the dry one. [-]
 
-    Thesis [15]: slope and offset by a Kalman filter whose covariance is raised when a CUSUM of its residual speaks.
+    Thesis [15]: slope and offset by a Kalman filter whose covariance is raised when a CUSUM of its residual alarms.
     """
     p = KalmanParams.make(r.dt)
     tracks = []

@@ -62,7 +62,7 @@ def _scan(p, k, s, mu, is_active):  # type: ignore[no-untyped-def]
 def scan(
     p: RlsParams, slip: FloatArray, mu: FloatArray, is_active: BoolArray, *, slope: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Slope and offset of slip = mu / C + delta over a drive.
+    """Estimate slope and offset of slip = mu / C + delta over a drive.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def scan(
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per driven wheel; the statistic is the loss of slope against the dry one. [-]
+    """Run the method: one track per driven wheel; the statistic is the loss of slope against the dry one. [-]
 
     Thesis [14], [17]: (3.14) by recursive least squares. [17] makes the maximum friction a linear function of the
     slope, which orders drives as the slope does, so that the slope itself is compared.

@@ -86,7 +86,7 @@ def _level_change(p, x, usable, clip, cap, floor):  # type: ignore[no-untyped-de
 
 
 def level_change(p: BandParams, x: FloatArray, usable: BoolArray) -> FloatArray:
-    """Change of the band's power against its slow reference, as a natural logarithm.
+    """Return the change of the band's power against its slow reference, as a natural logarithm.
 
     Parameters
     ----------
@@ -94,19 +94,19 @@ def level_change(p: BandParams, x: FloatArray, usable: BoolArray) -> FloatArray:
     x : array (n,)
         Wheel speed over the car's slow speed. NaN: the filter starts anew, 0.3 s without a value. [-]
     usable : bool array (n,)
-        Elsewhere no value, and nothing is learnt.
+        Elsewhere no value, and the reference is held.
 
     Returns
     -------
     change : array (n,)
-        ln(P / P_ref), at most ln(1000); NaN until 4 s have been learnt. [-]
+        ln(P / P_ref), at most ln(1000); NaN for the first 4 s of usable samples. [-]
     """
     y: FloatArray = _level_change(p, np.ascontiguousarray(x, dtype=np.float64), usable, CLIP, CAP, POWER_FLOOR)
     return y
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per wheel; the statistic is the level of the oscillation over its reference. [dB]
+    """Run the method: one track per wheel; the statistic is the level of the oscillation over its reference. [dB]
 
     The torsional mode of a tyre lies at 30 to 60 Hz (K), partly beyond what a log of 100 Hz holds: the band is 15 to
     45 Hz, or less at a lower rate. The power is that of the wheel speed over the vehicle's; a shorter contact holds the

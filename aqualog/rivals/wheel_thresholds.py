@@ -45,7 +45,7 @@ def _envelope(keep, x):  # type: ignore[no-untyped-def]
 
 
 def critical_share(deceleration: FloatArray, negative_slip: FloatArray, *, dt: float) -> FloatArray:
-    """Smaller one of the shares of both critical levels that a wheel has reached.
+    """Return the smaller one of the shares of both critical levels that a wheel has reached.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def critical_share(deceleration: FloatArray, negative_slip: FloatArray, *, dt: f
 
 
 def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
-    """One track per wheel; the statistic is the share of both critical levels. [-]
+    """Run the method: one track per wheel; the statistic is the share of both critical levels. [-]
 
-    The deceleration is the wheel's own, not its difference to the car's: the method looks at wheel speeds alone. An
+    The deceleration is the wheel's own, not its difference to the car's: the method uses wheel speeds alone. An
     alarm ends when the slip has fallen below half its level.
 
     Thesis [32]: critical deceleration levels and slips for spin-downs with and without braking.
@@ -88,6 +88,6 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
 
 def severity(evidence: Mapping[str, Any]) -> str:
-    """Full where the wheel has lost a quarter of its speed without brakes; braked wheels lose it on any road."""
+    """Return full where the wheel has lost a quarter of its speed without brakes; braked wheels lose it on any road."""
     lost = evidence.get("slip_min", 0.0) < SLIP_FULL
     return "full" if lost and not evidence.get("braking", False) else "partial"

@@ -31,7 +31,7 @@ _NATS = 'explain it at the first use, as in "nats (natural logarithm of a likeli
 BANNED = {
     r"\b(?:un)?told\b": _SAYS,
     r"\btell(?:s|ing)?\b": _APART,
-    r"\b(?:is|are|was|were) none\b": _NONE,
+    r"\b(?:is|are|was|were) (?-i:none)\b": _NONE,
     r"\blet be\b": _LEFT,
     r"\bnothing (?:is|was|can be|could be) \w+ of\b": '"no ... is reported", "not available"',
     r"\ba word of\b": '"a note on", or leave it out',

@@ -116,7 +116,7 @@ def test_logs_with_a_labels_file(folder):
     labels.write_text("start_s,end_s,effect,wheel\n5.0,9.0,water,\n5.2,8.5,full,fl\n10,11,puddle of mud,\n")
     result = run(folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels, "-v")
     assert result.returncode == 0, result.stderr
-    assert "puddle of mud serve the confusion table only" in result.stderr
+    assert "puddle of mud enter the confusion table only" in result.stderr
     row = next(line for line in result.stdout.splitlines() if line.startswith("spin_down"))
     assert "1/1 (100 %)" in row
     shifted = folder / "shifted.csv"

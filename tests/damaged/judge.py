@@ -24,7 +24,7 @@ UNCHECKED = (
     "CSV, UTF-16, comma",
     "Parquet, plain",
 )
-USUAL = "file was not finalised by the logger; this was made up for while reading"  # no word of a damage
+USUAL = "file was not finalised by the logger; aqualog completes it while reading"  # no word of a damage
 CODES = (0, 1, 3, 4)
 
 Samples = dict[str, tuple[np.ndarray, np.ndarray]]

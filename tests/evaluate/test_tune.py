@@ -42,7 +42,7 @@ def test_a_detector_is_not_switched_off_by_tuning():
     assert "no threshold keeps" in choice.reason
     choice = choose([point(1.0, 9, 7), point(4.0, 0, 0)])["spin_down"]
     assert choice.point.factor == 1.0
-    assert "finds nothing" in choice.reason
+    assert "find nothing" in choice.reason
 
 
 def test_among_equals_the_nearest_stays():

@@ -470,7 +470,7 @@ def test_date_and_time_columns(read):
 
 
 def test_a_date_that_can_be_read_two_ways(read):
-    with pytest.raises(LogError, match="day from month"):
+    with pytest.raises(LogError, match="day and month"):
         read("time,v\n03/01/2026 12:00:00,1\n03/01/2026 12:00:01,2\n")
     assert read("time,v\n02/28/2026 12:00:00,1\n03/01/2026 12:00:01,2\n").t("v")[0] == 1772280000000000000
 

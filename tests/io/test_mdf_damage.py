@@ -545,7 +545,7 @@ def deflated(raw, *, size=None, invalidation=0, kind=0):
 def test_a_block_of_no_sensible_size_is_refused_before_it_is_inflated(tmp_path, monkeypatch, size):
     monkeypatch.setattr(mdf_blocks, "inflated", None)
     line = refused(tmp_path, deflated(records(200), size=size))
-    assert "a data block of it tells of" in line
+    assert "a data block of it declares" in line
     assert ("1.1e+03 GB" if size == 2**40 else "268 MB") in line
     assert "Try" in line
 
