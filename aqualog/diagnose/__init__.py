@@ -1,1 +1,1 @@
-"""What the simulation gets wrong: residuals, causes, what cannot be told apart, the extended model and its gain."""
+"""Errors of the simulation: residuals, causes, causes that cannot be distinguished, extended model and its gain."""

@@ -1,6 +1,6 @@
-"""Several drives of the same car: does each say the same, and is it predicted by what the others say?
+"""Several drives of the same car: do they agree on a value, and does the value of the others predict each drive?
 
-An effect that only one drive has is no property of the car: an open window, a head wind, a loaded boot.
+An effect that only one drive shows is not a property of the car: an open window, a head wind, a loaded boot.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ __all__ = ["agreements", "widened"]
 
 
 def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base: FloatArray) -> tuple[Agreement, ...]:
-    """One for each value of the refitted set; none for a single drive.
+    """One agreement for each value of the refitted set; empty for a single drive.
 
     Parameters
     ----------
     bench : Bench
     candidate : Candidate
-        Its signatures at its values are those of every drive.
+        Its signatures at its values apply to every drive.
     noises : sequence of Noise
         One a drive.
     base : array (k,)
         Values without the effects.
 
-    By the tangent at the set's values: no drive is simulated again. Tolerances count for each drive by itself, as if
-    the file were off by something else in each.
+    Uses the linear model at the set's values: no drive is simulated again. Tolerances count for each drive separately,
+    as if the file had a different error in each.
     """
     r = candidate.refit
     if len(bench.drives) < 2:
@@ -50,7 +50,7 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
     G, b = G / candidate.inflation, b / candidate.inflation
     keep = np.diag((PRIOR_WIDTH * _prior(bench, r)) ** -2.0)
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
-    # what drives of the car have been seen to differ by is on top of what one of them tells
+    # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
     others = np.array([np.linalg.solve(G.sum(axis=0) - g + keep, b.sum(axis=0) - x) for g, x in zip(G, b, strict=True)])
     without = base - r.values
@@ -73,7 +73,7 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
 
 
 def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
-    """The cause with intervals wider by as much as the drives differ more than they should (Birge's ratio, K)."""
+    """The cause with intervals widened by Birge's ratio (K) where the drives differ more than their errors allow."""
     parameters = dict(cause.parameters)
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     for a in found:
@@ -121,5 +121,5 @@ def _prior(bench: Bench, r: Refit) -> FloatArray:
 
 
 def _loss(G: FloatArray, b: FloatArray, delta: FloatArray) -> float:
-    """Sum of squares but for a constant, at values that are `delta` off the set's."""
+    """Sum of squares without its constant, at values that differ by `delta` from the set's."""
     return float(delta @ G @ delta - 2.0 * b @ delta)

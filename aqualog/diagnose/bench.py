@@ -17,7 +17,7 @@ from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
 
-ROUNDS = 200  # of coordinate descent: deviations that are alike take long to share what they explain
+ROUNDS = 200  # rounds of coordinate descent: it converges slowly where deviations look alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,11 @@ class Bench:
     low: FloatArray  # (K,) bounds of its change
     high: FloatArray
     smallest: FloatArray
-    tolerance: FloatArray  # (K,) by which each may be off without being worth a word
-    barred: BoolArray  # (H,) hypotheses that the drives speak against: neither tested nor put into sets
-    spread: FloatArray  # (K,) by which drives of the same car have been seen to differ, 0 where nobody has looked
-    kinds: tuple[Kind, ...]  # (K,) the difference of days that each looks like
-    as_values: FloatArray  # (K,) what the differences of its kind look like as its value
+    tolerance: FloatArray  # (K,) deviation of each parameter that is not worth naming
+    barred: BoolArray  # (H,) hypotheses that contradict the drives: neither tested nor put into sets
+    spread: FloatArray  # (K,) measured spread between drives of the same car, 0 where it was not measured
+    kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like
+    as_values: FloatArray  # (K,) size of that difference, expressed as its value
 
     @property
     def count(self) -> int:
@@ -66,7 +66,7 @@ class Bench:
 
     @property
     def forgiven(self) -> FloatArray:
-        """Standard deviation that each parameter has before a drive is looked at. (K,)"""
+        """Prior standard deviation of each parameter. (K,)"""
         return np.maximum(self.tolerance, self.spread)
 
 
@@ -114,11 +114,11 @@ def _drag_speed(drives: Sequence[Drive]) -> float:
 
 
 def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
-    """Inner products in a metric that forgives what every parameter may be off by.
+    """Inner products in a metric that tolerates the usual errors of every parameter.
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
-    enough samples any of it is significant. The covariance of the residual is that of the noise plus that of all these
-    deviations, I + X S^2 X'; by Woodbury its inverse takes A (S^-2 + A' A)^-1 A' off.
+    enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
+    these deviations, I + X S^2 X'. By Woodbury's identity its inverse is I - A (S^-2 + A' A)^-1 A'.
     """
     k = np.flatnonzero((bench.forgiven > 0.0) & (np.diag(gram)[:-1] > 1e-12))
     inner = gram[np.ix_(k, k)] + np.diag(bench.forgiven[k] ** -2.0)
@@ -128,11 +128,12 @@ def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
 def without_deviations(
     bench: Bench, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
 ) -> FloatArray:
-    """A residual (C, n) of drive d less what deviations within the tolerances of these columns most likely are of it.
+    """A residual (C, n) of drive d minus the most likely deviations of these columns within their tolerances.
 
-    The columns' posterior means, theta = (S^-2 + A'A)^-1 A'y: what is left is y in the metric of `tolerant`. The noise
-    is estimated again after a first round, in which what the deviations are would still count as noise. None of them
-    is beyond `farthest` tolerances: something large must not vanish because it is of their form.
+    The deviations are the columns' posterior means, theta = (S^-2 + A'A)^-1 A'y; the remainder is y in the metric of
+    `tolerant`. The noise is estimated again after a first round, because the deviations still count as noise in that
+    round. No deviation exceeds `farthest` tolerances: a large effect must not vanish because it has the form of a
+    tolerance.
     """
     drive = bench.drives[d]
     k = [c for c in columns if bench.forgiven[c] > 0.0]
@@ -170,7 +171,7 @@ def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArra
 
 
 def noises_after(bench: Bench, residuals: Sequence[FloatArray], theta: Mapping[int, float]) -> list[Noise]:
-    """Noise of each drive's residual once the columns with these values have been taken away."""
+    """Noise of each drive's residual after the columns with these values are subtracted."""
     return [
         fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
         for d, r, s in zip(bench.drives, residuals, bench.signatures, strict=True)

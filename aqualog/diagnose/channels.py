@@ -1,6 +1,6 @@
 """Residual channels by physics: the same function of signals, measured or simulated.
 
-The residual of a channel is what it shows of the measured signals minus what it shows of the simulated ones.
+The residual of a channel is its value from the measured signals minus its value from the simulated ones.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ __all__ = [
     "contrasts",
 ]
 
-BLOCK_S = 0.1  # [s] what is slower than 5 Hz; faster it is springs, teeth and buses
+BLOCK_S = 0.1  # [s] keeps what is slower than 5 Hz; faster motion comes from springs, gear teeth and buses
 
 
 class Kind(NamedTuple):
-    """What a channel is: title and unit for the page, and what it compares."""
+    """Title and unit of a channel for the page, and a description of what it compares."""
 
     title: str
     unit: str
     meaning: str
 
 
-_SLIP = "rim speed of the wheel on the centre line, less the reference velocity"
+_SLIP = "rim speed of the wheel on the centre line, minus the reference velocity"
 CHANNELS: dict[str, Kind] = {
     "force_balance": Kind("Force balance", "m/s^2", "accelerometer against torque and resistance"),
     "kinematic": Kind("Kinematic", "m/s^2", "accelerometer against the acceleration of the wheels or the velocity"),
     **{f"slip_{w}": Kind(f"Slip {w}", "m/s", _SLIP) for w in WHEELS},
-    "axle_slip": Kind("Slip between axles", "m/s", "rim speed of the driven axle less the other one's"),
-    "side_slip_f": Kind("Slip between front wheels", "m/s", "rim speed left less right, curves taken out"),
-    "side_slip_r": Kind("Slip between rear wheels", "m/s", "rim speed left less right, curves taken out"),
+    "axle_slip": Kind("Slip between axles", "m/s", "rim speed of the driven axle minus that of the other axle"),
+    "side_slip_f": Kind("Slip between front wheels", "m/s", "rim speed left minus right, corrected for curves"),
+    "side_slip_r": Kind("Slip between rear wheels", "m/s", "rim speed left minus right, corrected for curves"),
     "lateral": Kind("Lateral", "m/s^2", "lateral accelerometer against v_x times yaw rate"),
     "tie_rod_fl": Kind("Tie rod left", "N", "tie-rod force against the forces of the front wheel"),
     "tie_rod_fr": Kind("Tie rod right", "N", "tie-rod force against the forces of the front wheel"),
@@ -71,10 +71,10 @@ def channels_of(present: frozenset[str], vehicle: Vehicle) -> tuple[str, ...]:
 
 
 def contrasts(channels: tuple[str, ...]) -> FloatArray:
-    """Combinations of channels (C, C) that share as little noise as may be, as rows.
+    """Combinations of channels (C, C), as rows, that share as little noise as possible.
 
     The accelerometer is in the force balance and in the kinematic channel; their difference compares wheels with torque
-    and has none of its noise. A reference velocity is in the slip of all four wheels; it is left in their mean alone.
+    and is free of its noise. A reference velocity is in the slip of all four wheels; only their mean keeps it.
     """
     out = np.eye(len(channels))
     at = {c: i for i, c in enumerate(channels)}
@@ -109,7 +109,7 @@ def channel_values(
     Returns
     -------
     values : array (C, m)
-        NaN where a signal is missing. `force_balance` is the accelerometer itself: what the torque explains of it is
+        NaN where a signal is missing. `force_balance` is the accelerometer itself: the part that the torque explains is
         on the simulated side. ISO 8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}

@@ -1,4 +1,4 @@
-"""What an extended model changes for the user: false alarms on dry road, and how soon water is found."""
+"""Effect of an extended model for the user: false alarms on dry road, and latency on water."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ DRY = (
     "hard_acceleration", "dry_cruise", "motorway", "hilly", "hard_acceleration", "gear_shifts", "cornering_limit",
     "stop_and_go", "hard_acceleration", "rough_asphalt",
 )  # fmt: skip
-"""Situations of the dry drives, 30 to 120 s each: they ask for all that a wrong vehicle file gets wrong."""
+"""Situations of the dry drives, 30 to 120 s each: together they show every error of a wrong vehicle file."""
 PASSES = (0.76, 0.78, 0.80, 0.82, 0.84, 0.86, 0.88, 0.92, 0.96, 1.0)
 """Speed of each wet pass over that of full aquaplaning; every second one speeds up on the water."""
 
 P_LOW = 1.9e5  # [Pa] worn tyres at the low pressure class of the thesis' runs
 DEPTH = 1.3e-3  # [m]
-V_MOST = 150.0 * KMH  # [m/s] no faster, also where the car would float later only
+V_MOST = 150.0 * KMH  # [m/s] upper limit, also for a car that would float only at a higher speed
 APPROACH_S, ON_LANE_S, RUN_OUT_S = 15.0, 3.0, 5.0
 A_ON_LANE = 0.8  # [m/s^2]
 
@@ -54,26 +54,26 @@ def consequences(
 ) -> tuple[Consequence, ...]:
     """Detectors on simulated drives of the extended model, without and with it.
 
-    The car of the model goes for the drives of `DRY` and through the water of `PASSES`: 1.3 mm under worn tyres, after
-    15 s of dry road. Each drive is looked at with the vehicle file alone and with the model in it.
+    The car of the model makes the drives of `DRY` and passes the water of `PASSES`: 1.3 mm under worn tyres, after 15 s
+    of dry road. Each drive is judged with the vehicle file alone and with the model in it.
 
     Parameters
     ----------
     vehicle : Vehicle
     model : Model
-        What the simulated car has, and what the second look knows.
+        Terms of the simulated car, which the second judgement also knows.
     seed : int
         Of roads, weather, drivers and sensors, >= 0.
     progress : callable
-        Told what is being done.
+        Called with the name of each step.
 
     Returns
     -------
     tuple of Consequence
         One per detector of `DETECTORS` that could run. A pass counts if a wheel floats, and as found if an event begins
         on its water no later than 2 s after that; the latencies are means over the passes found both times, None
-        without any. An event outside of water and of the second after it is a false alarm; `distance_km` is the way
-        that is left there.
+        without any. An event outside of water and of the second after it is a false alarm; `distance_km` is the
+        distance driven outside of them.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def consequences(
     seen: list[_Pair] = []
     for i, scenario in enumerate(_scenarios(vehicle, seed)):
         progress(f"drive {i + 1} of {len(DRY) + len(PASSES)} with the extended model")
-        # twice the step of a simulation that is to be looked at: half the time, the same alarms
+        # twice the usual step of a simulation: half the time, the same alarms
         signals = as_signals(simulate(scenario, model, dt=2e-3), vehicle=vehicle)
         seen.append(_both(signals, vehicle, model, labels_in(signals)))
     return _summed(seen)
@@ -109,7 +109,7 @@ def consequences_on_logs(
 
 
 class _Pair(NamedTuple):
-    """Both looks at one drive, by detector that ran in both, and the dry way [m]."""
+    """Both judgements of one drive, by detector that ran in both, and the dry distance [m]."""
 
     before: dict[str, _Seen]
     after: dict[str, _Seen]

@@ -1,4 +1,4 @@
-"""What the same car differs by from drive to drive, as its vehicle file says, in the parameters of effects."""
+"""Drive-to-drive spread of the same car from its vehicle file, expressed in the parameters of effects."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _KEY_OF: Mapping[str, str] = {
     "payload_mass": "mass", "aero_drag": "drag_area", "rolling_resistance": "rolling_resistance",
     "torque_gain": "torque_gain",
 }  # fmt: skip
-# parameters that look like one difference of days: a balance of forces tells a mass only over the torque's gain, the
-# drag area only with the wind of the day, and what rolls only with what drags
+# parameters that look like one day-to-day difference: the force balance cannot separate mass from the torque's gain,
+# drag area from the day's wind, or rolling resistance from drag
 _KIND_OF: Mapping[tuple[str, str], Kind] = {
     ("payload_mass", "delta_mass"): "inertia",
     ("trailer", "mass"): "inertia",
@@ -34,10 +34,10 @@ _KIND_OF: Mapping[tuple[str, str], Kind] = {
 
 
 def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
-    """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file has none.
+    """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file gives no value.
 
-    At the whole car: what a day changes (wind, surface, temperature, the torque's estimate) is at no single axle. Each
-    key of the file counts here once.
+    Applies to the whole car only: wind, surface, temperature and the torque's estimate do not act on a single axle.
+    Each key of the file counts here once.
     """
     key = _KEY_OF.get(h.effect.name)
     if key is None or h.where is not None or name != h.free[0]:
@@ -48,12 +48,13 @@ def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
 
 
 def kind_of(h: Hypothesis, name: str) -> Kind:
-    """The difference of days that a parameter looks like, empty for none."""
+    """The kind of day-to-day difference that a parameter looks like, or an empty string."""
     return _KIND_OF.get((h.effect.name, name), "")
 
 
 def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
-    """Standard deviation of what the differences of its kind look like as a value of this parameter, in its unit.
+    """Standard deviation of the day-to-day differences of its kind, expressed as a value of this parameter, in its
+    unit.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
 
 
 def _mass_of_unit(h: Hypothesis, vehicle: Vehicle) -> float:
-    """What a parameter must be to drive like the car's mass once more."""
+    """Value of a parameter that has the effect of doubling the car's mass."""
     if h.effect.name == "torque_gain":
         return 1.0
     if h.effect.name == "wheel_inertia":
@@ -89,7 +90,7 @@ def _mass_of_unit(h: Hypothesis, vehicle: Vehicle) -> float:
 
 
 def _rolling_of_unit(h: Hypothesis, vehicle: Vehicle) -> float:
-    """What a parameter must be to drive like a coefficient of one at the whole car."""
+    """Value of a parameter that has the effect of a coefficient of one at the whole car."""
     if h.effect.name == "brake_drag":
         wheels = 1 if h.where in ("fl", "fr", "rl", "rr") else 2 * len(_axles(h))
         return vehicle.mass * G * vehicle.r_l(_axles(h)[0]) / wheels

@@ -1,4 +1,4 @@
-"""Logs that cannot be judged because a signal is not what its name says."""
+"""Logs that cannot be judged because a signal does not hold the quantity of its name."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Defect(NamedTuple):
 def accelerometer_defect(drive: Drive) -> Defect | None:
     """Whether `a_x` is the car's longitudinal acceleration: its changes over 2 s against those of dv/dt.
 
-    None if it is, or if the drive changes its speed too little to tell. Grades and offsets, which are slow, do not
-    enter; a lag up to a second is looked for first.
+    None if it is, or if the speed changes too little for a judgement. Slow errors such as grades and offsets do not
+    matter. A lag of up to a second is estimated first.
     """
     if "a_x" not in drive.columns:
         return None

@@ -1,4 +1,4 @@
-"""A log made ready: what drives the simulation, what is compared with it, and what is left out."""
+"""A log prepared for diagnosis: inputs of the simulation, measured signals to compare, and samples left out."""
 
 from __future__ import annotations
 
@@ -38,20 +38,19 @@ BESIDE_S = 1.0  # [s] before and after what is left out
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
-# [m/s^3] steeper torque, and those few samples show clocks, filters and tyres' lag: 10 ms are 0.1 m/s^2
+# [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
-ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %: a road does not count as a brake
+ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s.
 
-    `speed` (n,) the quiet measured speed [m/s]; that of the course leads it by what draws the simulation.
-
-    `coordinates` (m,): what a remaining error may depend on. `untorqued`: the log has no torque; the one that the base
-    model needs for the measured speed stands in, and the force balance is not judged.
+    `speed` (n,) is the measured speed without noise [m/s]; the speed of the course leads it by the lag of the
+    simulation. `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque.
+    The torque that the base model needs for the measured speed replaces it, and the force balance is not judged.
     """
 
     name: str
@@ -121,7 +120,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         torque = quiet_torque(logged, dt, min(told, default=None))
     else:
         logged = torque = needed_torque(v, vehicle, dt)
-        notes.append("no wheel torque in the log: the torque that the model needs for the measured speed stands in")
+        notes.append("no wheel torque in the log: replaced by the torque that the model needs for the measured speed")
     speed = quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt
     steer = road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
@@ -145,12 +144,12 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         bad |= np.gradient(speed, dt) > A_MOST
     if not torqued and "brake_pressure" not in filled:
         bad |= smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
-        notes.append("neither torque nor brakes in the log: what is slower than rolling out is left out")
+        notes.append("neither torque nor brakes in the log: only driving and rolling out are used")
     elif torqued and "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | _on_water(course), BESIDE_S, dt)
         if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):
-            unlogged = "the car slows down more than its torque says"
+            unlogged = "the car slows down more than its torque explains"
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
@@ -163,26 +162,22 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
 
 
 def led_by(drive: Drive, model: Model) -> Drive:
-    """The drive led along so that the simulation with a model meets the measured speed.
+    """The drive with a target speed with which the simulation of a model meets the measured speed.
 
-    `prepare` leads the vehicle file's car. With an effect in the model that changes the acceleration by a, that course
-    is a / FOLLOW_RATE off: 0.2 m/s^2 of drag make 0.7 m/s, and drag at that speed is 5 % off.
+    `prepare` computes the target for the vehicle file's car. An effect that changes the acceleration by a makes that
+    target wrong by a / FOLLOW_RATE: 0.2 m/s² of drag give 0.7 m/s, and the drag at that speed is 5 % off.
     """
     return replace(drive, course=_without_lag(drive.vehicle, replace(drive.course, v_x=drive.speed), model))
 
 
 def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
-    """The course with a speed to follow that makes the simulated one meet the measured one without delay.
-
-    Drawn to a target, the simulation lags behind it by what draws it; a lagging copy of the measured speed's noise
-    would look like a signal that comes late.
-    """
+    """The course with a target speed that makes the simulated speed meet the measured one without delay."""
     nudge = follow(vehicle, course, model)["nudge"]
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
 
 
 def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
-    """Signals that are in the log and never have a value, with what goes with them."""
+    """Signals of the log that never have a value, with the signals that depend on them."""
     silent = [s for s in signals.symbols if s not in present]
     lost = any(s.startswith("omega_") for s in silent) or 0 < sum(f"omega_{w}" in present for w in WHEELS) < len(WHEELS)
     out = [f"{', '.join(silent)}: no value in the whole drive"] if silent else []
@@ -190,10 +185,7 @@ def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
 
 
 def _as_known(vehicle: Vehicle, signals: Signals) -> Vehicle:
-    """The vehicle without radii where wheel speeds are told in km/h.
-
-    The control unit used radii of its own; with the vehicle file's they are wheel speeds again, whatever these are.
-    """
+    """The vehicle without radii where the log gives wheel speeds in km/h."""
     wheels = [o for n, o in signals.origins.items() if n.startswith("omega_")]
     if not any(is_unit(o.unit) and parse_unit(o.unit).dimension == "speed" for o in wheels):
         return vehicle
@@ -238,7 +230,7 @@ def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
     assert left is not None
     assert right is not None
     wet: BoolArray = np.maximum(left, right) > 1e-5
-    # depths that are told in steps make a stretch each
+    # each step of a depth that is logged in steps makes a stretch
     change = np.flatnonzero(
         (np.diff(wet.astype(np.int8)) != 0) | (np.abs(np.diff(left)) > 5e-5) | (np.abs(np.diff(right)) > 5e-5)
     )
@@ -298,7 +290,7 @@ def _coordinates(columns: Mapping[str, FloatArray], course: Course, v: FloatArra
         "v_x": v,
         "torque": course.torque.sum(axis=0),
         "position": np.cumsum(v) * dt,
-        # as it is, the noise of the velocity would be most of its change
+        # without smoothing, most of the change would be noise of the velocity
         "a_x": np.gradient(smooth(v, dt, SPEED_S), dt),
     }
     if course.lanes:

@@ -1,4 +1,4 @@
-"""What the terms of a model change for the detectors: the car that they take as known, and the signals they read."""
+"""Applies the terms of a model to the detectors' inputs: the vehicle that they assume and the signals they read."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ _SIGNAL = frozenset({
     "torque_gain", "radius_growth", "leak_radius", "head_wind", "towed_mass", "cornering_drag", "warmup_extra",
     "drag_over_v",
 })  # fmt: skip
-# say nothing by themselves, or follow from the others
+# have no effect by themselves, or follow from the others
 _SILENT = frozenset({"I_zz", "warmup_time", "leak_start", "leak_time"})
 _FORCES = frozenset({"head_wind", "towed_mass", "cornering_drag", "warmup_extra", "drag_over_v"})
 
 
 class Extended(NamedTuple):
-    """Inputs of the detectors with a model's terms in them; `notes` tell what could not be used or not in full."""
+    """Inputs of the detectors with a model's terms in them; `notes` list terms that could not be used, or only in
+    part."""
 
     signals: Signals
     vehicle: Vehicle
@@ -45,14 +46,14 @@ class Extended(NamedTuple):
 
 
 def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
-    """Signals and vehicle as the detectors need them, so that the terms of a model are no surprise to them.
+    """Signals and vehicle for the detectors, with the terms of a model taken into account.
 
-    Each term acts on the simulation of the dry car of the vehicle file; what it changes there is read back. What the
-    vehicle file has a key for goes there: mass and its place, drag area, rolling resistance (with dragging brakes),
-    inertias, radii, slip slopes. What it has no key for goes into the signals: a sensor's error is taken off, a wheel
-    whose radius is not that of its axle is turned into one that has it, and a force that holds the car back (wind,
-    trailer, cold tyres, curves) is put on the accelerometer, which then shows the car without it. One such force is a
-    slow change of a tenth of a m/s^2, which the velocity observer takes for the offset that it learns anyway.
+    Each term acts on the simulation of the dry car of the vehicle file; the changed values are read back. Terms for
+    which the vehicle file has a key change the vehicle: mass and its position, drag area, rolling resistance (with
+    dragging brakes), inertias, radii, slip slopes. Other terms change the signals. A sensor's error is removed. A wheel
+    whose radius differs from its axle's is converted to that radius. A force that slows the car (wind, trailer, cold
+    tyres, curves) is added to the accelerometer, which then shows the car without it. Such a force is a slow change of
+    about 0.1 m/s², which the velocity observer learns as an offset anyway.
 
     Parameters
     ----------
@@ -64,12 +65,12 @@ def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extende
     Returns
     -------
     Extended
-        With a model without terms, or with neutral ones, the very objects that were given.
+        The given objects themselves if the model has no terms or only neutral ones.
 
     Raises
     ------
     ConfigError
-        If a term takes the car out of what a vehicle file may say.
+        If a term leads to a value outside the limits of a vehicle file.
     """
     base = _believed(vehicle)
     terms = tuple(t for t in model.terms if not _is_neutral(t))
@@ -127,7 +128,7 @@ class _Columns:
         return self._signals.dt
 
     def signals(self) -> Signals:
-        """The drive with its new columns; the one that was given if there are none."""
+        """The drive with its new columns; the given drive without any."""
         if not self._new:
             return self._signals
         import polars as pl
@@ -139,8 +140,8 @@ class _Columns:
 def _undo_sensors(measured: _Columns, sensors: Sensors) -> None:
     """Take off what sensors do to a signal: gain, bias and drift, then its delay and a clock that runs off.
 
-    A signal that comes late is moved by whole samples: what lies between two would have less noise than the detectors
-    of a wheel's unrest expect.
+    A late signal is moved by whole samples. Interpolated samples would have less noise than the detectors of wheel
+    vibration expect.
     """
     t = measured.t
     for name, c in sensors.channels.items():
@@ -159,7 +160,7 @@ def _taken(x: FloatArray, i: FloatArray) -> FloatArray:
 
 
 def _notes(term: Term, base: Setup, measured: _Columns) -> list[str]:
-    """Why a term changes nothing for the detectors, or not all that it says."""
+    """Reason why a term has no effect, or only part of its effect, on the detectors."""
     name = f"model: {term.effect.name}" + (f" at {term.place}" if term.place else "")
     after = term.apply(base)
     changed = _changed(base.plant, after.plant)
@@ -171,7 +172,7 @@ def _notes(term: Term, base: Setup, measured: _Columns) -> list[str]:
         return [] if acts_on & measured.names else [f"{name}: the log has no {term.place}; not used"]
     unused = changed - _VEHICLE - _SIGNAL - _SILENT
     if not changed & (_VEHICLE | _SIGNAL):
-        return [f"{name}: no detector takes that as known; not used"]
+        return [f"{name}: no detector uses this quantity; not used"]
     return [f"{name}: used without {', '.join(sorted(unused))}"] if unused else []
 
 
@@ -205,7 +206,7 @@ def _vehicle(vehicle: Vehicle, before: Plant, after: Plant, notes: list[str]) ->
 
 
 def _rolling_resistance(plant: Plant) -> float:
-    """One coefficient that holds the standing car back as its four tyres and dragging brakes do. [-]"""
+    """One rolling-resistance coefficient for all four tyres and dragging brakes. [-]"""
     loads = wheel_loads(
         np.zeros(1), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
     )[:, 0]
@@ -238,7 +239,7 @@ def _over_axle(radius: FloatArray, i: int, other: int) -> float:
 
 
 def _undo_forces(measured: _Columns, before: Plant, after: Plant) -> list[str]:
-    """Put on the accelerometer what forces that no vehicle file knows took from it: it shows the car without them."""
+    """Add forces that have no key in the vehicle file to the accelerometer, which then shows the car without them."""
     forces = _changed(before, after) & _FORCES
     if not forces or "a_x" not in measured.names:
         return [f"model: the log has no a_x; {', '.join(sorted(forces))} not used"] if forces else []

@@ -1,4 +1,5 @@
-"""Is there anything at all? The largest gain over all hypotheses against what noise of the same colour gives."""
+"""Family-wise test for any effect: the largest gain over all hypotheses, compared with simulated noise of the same
+spectrum."""
 
 from __future__ import annotations
 
@@ -21,15 +22,15 @@ from aqualog.types import FloatArray
 __all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
 
 FEW = 2  # hypotheses after which the noise is tried
-ALIKE = 0.97  # cosine of whitened signatures that surrogates need not tell apart
+ALIKE = 0.97  # cosine of whitened signatures from which one stands for both in the simulated noise
 EULER = 0.5772156649015329
-PLAIN_INFLATION = 1.3  # of the gains where no surrogates are asked for: what they gave on simulated noises (D)
+PLAIN_INFLATION = 1.3  # inflation of the gains without surrogates, as found with simulated noise (D)
 
 
 class Calibration(NamedTuple):
     """Null distribution: `inflation` (H,) mean gain of each hypothesis over its parameters, `maxima` (S,).
 
-    `achieved`: share of these very maxima beyond the threshold; `tested`: hypotheses that are not alike.
+    `achieved`: share of these maxima beyond the threshold; `tested`: hypotheses that differ from each other.
     """
 
     inflation: FloatArray
@@ -42,9 +43,9 @@ class Calibration(NamedTuple):
 def largest(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gains (H,) of all hypotheses beside a base set, and the whitened, tolerant inner products.
 
-    The noise is estimated after the hypothesis that makes the measurement likeliest, among those that gain most by the
-    colour of the residual as it is and by no colour at all: an effect that is large against the noise would pass for
-    coloured noise otherwise, and nothing would be left to find.
+    The noise is estimated after the hypothesis that makes the measurement most likely. Candidates are the hypotheses
+    that gain most with the residual's spectrum, and those that gain most with white noise. Otherwise a large effect
+    would count as coloured noise and could not be found.
     """
     noises = noises_after(bench, residuals, _theta(bench, residuals, base))
     gram = tolerant(bench, gram_of(bench, noises, residuals))
@@ -97,13 +98,13 @@ def calibrate(
     quiet : sequence of array (C, n)
         Residuals after the best set: their smoothed spectra make the surrogates [theiler1992].
     gram : array (K + 1, K + 1)
-        Tells which hypotheses are alike and need not be tested one by one.
+        Shows which hypotheses are alike, so that one test covers them.
     base : sequence of int
         Hypotheses that are accepted already; noise is tested beside them.
     surrogates : int
-        0: no surrogates; the gains are taken to be inflated by 1.3 and Bonferroni's bound [bonferroni1936] is used.
+        0: no surrogates; the gains are assumed to be inflated by 1.3, and Bonferroni's bound [bonferroni1936] applies.
     level : float
-        Share of logs without effect that may be called.
+        Share of logs without effect that may be reported as having one.
     seed : int
     """
     H = len(bench.asked)
@@ -133,7 +134,7 @@ def calibrate(
         mean[m] = max(float(drawn[:, i].mean()) / sizes[m], 1.0)
     inflation = mean[groups]
     maxima = (drawn / inflation[wanted] / sizes[wanted]).max(axis=1)
-    # where tolerances are larger than the noise, noise alone gives next to nothing; the car's own deviations do
+    # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     threshold = max(_gumbel_quantile(maxima, level), bonferroni(level, len(leaders)))
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
@@ -164,7 +165,7 @@ def bonferroni(level: float, count: int) -> float:
 
 
 def _groups(bench: Bench, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Leader of each hypothesis: the first one whose whitened signature is all but the same."""
+    """Leader of each hypothesis: the first one with nearly the same whitened signature."""
     energy = np.diag(gram)
     out = np.arange(len(bench.asked))
     leaders: list[int] = []

@@ -1,9 +1,4 @@
-"""Where a wheel floats, or nearly does: what no residual should be judged by.
-
-A wheel that has lost its grip is bistable. Whether it spins down in a puddle, when, and when it is back is decided by
-differences of the water that no model knows, and then its speed is tens of m/s off: not a residual of the model but a
-coin that fell the other way. The same drive gives some of these where nothing is hidden.
-"""
+"""Samples in which a wheel floats or nearly floats, and whose residual is not judged."""
 
 from __future__ import annotations
 
@@ -46,8 +41,8 @@ def floating(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle,
     course : Course
         The simulation is led along it as it is, and with twice the lost contact.
 
-    From where a wheel is beyond its grip, measured or in either simulation, to the end of that stretch of water and
-    until the car has recovered: who floats a little less floats a little later.
+    A span begins where a wheel loses its grip, measured or in either simulation. It ends when the stretch of water is
+    over and the car has recovered. A wheel that floats a little less also floats a little later.
     """
     out: BoolArray = np.zeros(v.shape, dtype=bool)
     if not course.lanes:

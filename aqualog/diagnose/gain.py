@@ -1,4 +1,4 @@
-"""What an extended model predicts better than the base, on drives that it was not fitted to."""
+"""Gain of an extended model over the base, on drives that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
-DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be known
+DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be estimated
 DRAWS = 2000
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 CORRIDOR_INNER, CORRIDOR_OUTER = 0.05, 0.5  # of the largest reference (K: corridor score of [iso18571_2024])
@@ -32,7 +32,7 @@ class HeldOut:
 
     `before`, `after`: residual channel -> array (n,), one step ahead; `mask` (n,) where they count; `free_before`,
     `free_after`: the same of simulations that run free, where there are any. `scores_before`, `scores_after`: log
-    scores (b,) of blocks of the drive [nats], as `block_scores` gives them.
+    scores (b,) of blocks of the drive [nats: natural logarithm], as `block_scores` gives them.
     """
 
     name: str
@@ -46,7 +46,7 @@ class HeldOut:
 
 
 class LogScoreGain(NamedTuple):
-    """Gain of the log score over all drives together, with its 95 % interval. [nats]"""
+    """Gain of the log score over all drives together, with its 95 % interval. [nats: natural logarithm]"""
 
     value: float
     low: float
@@ -112,7 +112,7 @@ def block_scores(
     dt : float
         [s]
     seconds : float
-        Length of a block; what is left at the end belongs to the last whole one. [s]
+        Length of a block; a remainder at the end belongs to the last whole block. [s]
     log_scale : array (C,) or float
         Logarithm of the innovations' standard deviation. It cancels in a gain where both models are judged with the
         same noise, and must be given where they are not.
@@ -120,8 +120,8 @@ def block_scores(
     Returns
     -------
     scores : array (b,)
-        Sum of -z^2 / 2 - log_scale over the samples of a block; at least one block. A constant, log(2 pi) / 2 a
-        sample, is left out. [nats]
+        Sum of -z^2 / 2 - log_scale over the samples of a block; at least one block. A constant, log(2 pi) / 2 a sample,
+        is left out. [nats: natural logarithm]
     """
     z = np.atleast_2d(np.asarray(whitened, dtype=np.float64))
     scale = np.broadcast_to(np.atleast_1d(np.asarray(log_scale, dtype=np.float64)), (z.shape[0],))
@@ -135,12 +135,12 @@ def block_scores(
 def log_score_gain(
     before: Sequence[FloatArray], after: Sequence[FloatArray], *, seed: int, draws: int = DRAWS
 ) -> LogScoreGain:
-    """Gain of the log score and how sure it is.
+    """Gain of the log score with its interval.
 
     Parameters
     ----------
     before, after : sequence of arrays (b,)
-        Log scores of the same blocks of each drive. [nats]
+        Log scores of the same blocks of each drive. [nats: natural logarithm]
     seed : int
         Of the bootstrap.
     draws : int
@@ -150,7 +150,7 @@ def log_score_gain(
     LogScoreGain
         With `DRIVES_AS_UNITS` drives or more, or where a drive has a single block, whole drives are drawn again and the
         interval holds for another set of such drives; else blocks of each drive, and it holds for these drives.
-        Deviations are widened as Student's t asks of so few units. NaN without two units.
+        Deviations are widened by Student's t for few units. NaN with fewer than two units.
 
     Raises
     ------
@@ -184,10 +184,10 @@ def _drives_are_units(blocks: Sequence[FloatArray]) -> bool:
 
 
 def oracle_share(nominal: float, extended: float, oracle: float) -> float:
-    """Share of what the truth itself would gain, (nominal - extended) / (nominal - oracle).
+    """Gain relative to that of the true model, (nominal - extended) / (nominal - oracle).
 
-    Losses or log scores alike; 1 as good as the truth, 0 as the base model, negative if worse; NaN where the truth
-    gains nothing. [-]
+    Losses or log scores alike; 1 is as good as the true model, 0 as the base model, negative is worse; NaN where the
+    true model has no gain. [-]
     """
     return (nominal - extended) / (nominal - oracle) if nominal != oracle else math.nan
 
@@ -221,7 +221,7 @@ def gain(
     drives : sequence of HeldOut
         At least one.
     units : mapping channel -> unit
-        Names the channels, in the order in which they are told.
+        Names the channels, in the order of the report.
     seed : int
         Of the bootstrap.
     in_sample : bool
@@ -231,7 +231,7 @@ def gain(
     Returns
     -------
     Gain
-        `notes` say what the interval holds for, on which drives the model is worse, and if there is no gain.
+        `notes` state the scope of the interval, the drives on which the model is worse, and whether there is no gain.
     """
     if not drives:
         raise FitError("a gain needs a drive", expected="at least one")
@@ -264,13 +264,13 @@ def _channel(drives: Sequence[HeldOut], name: str, unit: str) -> ChannelGain | N
 def _notes(drives: Sequence[HeldOut], score: LogScoreGain, *, in_sample: bool) -> list[str]:
     notes = []
     if in_sample:
-        notes.append("the gain is on the drives that the model was fitted to; it says little about others")
+        notes.append("the gain is on the drives that the model was fitted to; it is no evidence for other drives")
     if math.isnan(score.low):
         notes.append(f"no interval: the log score has a single block of {BLOCK_S:g} s")
     elif _drives_are_units([d.scores_after for d in drives]):
-        notes.append(f"the interval of the log score holds for another {len(drives)} drives like these")
+        notes.append(f"the interval of the log score holds for {len(drives)} other drives of this kind")
     else:
-        notes.append("the interval of the log score holds for the drives named; there are too few to tell of others")
+        notes.append("the interval of the log score holds for the drives named; they are too few for a wider statement")
     worse = [d.name for d in drives if float((d.scores_after - d.scores_before).sum()) < 0.0]
     if worse and len(drives) > 1:
         notes.append(f"worse with the model: {', '.join(worse)}")

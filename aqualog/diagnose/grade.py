@@ -1,12 +1,10 @@
-"""The road's profile: a slope angle over the position that two channels show independently of each other.
+"""The road's profile: a slope angle over position that two channels show independently of each other.
 
-The accelerometer feels a slope, and so does the balance of wheels against torque; they share no sensor's slow error:
+    kinematic                  = g sin(theta(s)) + b    accelerometer minus dv/dt, b its drift
+    kinematic - force_balance  = g sin(theta(s)) + w    torque minus dv/dt, w wind and torque error
 
-    kinematic                  = g sin(theta(s)) + b    accelerometer less dv/dt,  b its wander
-    kinematic - force_balance  = g sin(theta(s)) + w    torque less dv/dt,         w wind and what the torque is off by
-
-The velocity is in both, but its slow error is not seen in them: 0.05 m/s^2 over ten seconds would be half a metre a
-second. What the two share over 150 m and more is the road.
+The velocity is in both, but its slow error is negligible: 0.05 m/s² over ten seconds would be 0.5 m/s. The part that
+both share over 150 m and more is the road.
 """
 
 from __future__ import annotations
@@ -30,22 +28,22 @@ BIN_M = 25.0  # [m]
 OVER_M = 150.0  # [m] shorter waves are the car's pitching and the driver's pedal
 HALF_M = 200.0  # [m] wavelength of which the estimate keeps half
 FADES_M = 2000.0  # [m] from data the estimate falls to nothing
-LEAST = 0.005  # rms of the slope that is worth a word: half of what a motorway is allowed to climb unnoticed (K)
+LEAST = 0.005  # rms of the slope that is worth naming: half of the grade that goes unnoticed on a motorway (K)
 LEAST_ALONE = 0.02  # rms without torque and on one pass: 20 mg are an accelerometer's own wander (V, ESC data sheets)
 LEAST_BINS = 40
 STANDS_OUT = 4.0  # standard deviations of a correlation by chance
-SMOOTHED = 0.03  # of the rms that smoothing may take or noise may add
+SMOOTHED = 0.03  # share of the rms that smoothing may remove or noise may add
 LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.5, 0.7
-ALIKE_M = 2000.0  # [m] over which a road's likeness to itself is counted
+ALIKE_M = 2000.0  # [m] over which the road's autocorrelation counts
 GOES_WITH_ACCELERATION = slice(3, None)  # of the shapes of `_motion`
 CLIPPED = 5.0  # robust standard deviations
-BIAS_SD, FORCE_SD = 0.1, 0.03  # [m/s^2] what offsets of accelerometer and resistance hide of a mean slope (V, ESC; K)
+BIAS_SD, FORCE_SD = 0.1, 0.03  # [m/s^2] mean slope hidden by offsets of accelerometer and resistance (V, ESC; K)
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
     """A hilly road. Arrays over the knots `s` (k,) [m]: slope angle `theta` [rad], uphill positive, with its pointwise
-    95 % band; its mean over the drive is not in it: a constant is the accelerometer's offset as well.
+    95 % band; its mean over the drive is left out, because a constant could also be the accelerometer's offset.
 
     `rms` and `mean` [rad] with 95 % intervals; `shared`: correlation of the two channels over 150 m, NaN without
     torque; `lap_m`: length after which the road repeats itself, None on one pass; `known`: knots with data near by.
@@ -75,18 +73,18 @@ class Profile:
 
     @property
     def cause(self) -> Cause:
-        """What the diagnosis names."""
+        """The cause that the diagnosis reports."""
         text = f"The road climbs and falls with {self.rms.value:.1%} rms along the way"
         if self.lap_m is not None:
             text += f", and again after {self.lap_m:.0f} m"
         elif not np.isfinite(self.shared):
-            text += "; on one pass without torque, place and time cannot be told apart"
+            text += "; with one pass and no torque, place and time cannot be distinguished"
         text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}."
         return Cause("road_grade", None, {"grade_rms": self.rms, "grade_mean": self.mean}, ("kinematic",), text)
 
 
 def with_profile(model: Model, profile: Profile) -> Model:
-    """The model of a drive with its road in it; on top of a profile that the model has already."""
+    """The model of a drive with its road, added to a profile that the model already has."""
     for i, t in enumerate(model.terms):
         if t.effect is profile.term.effect:
             s = np.unique([x for x, _ in (*t.knots, *profile.knots)])
@@ -108,9 +106,9 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
     Returns
     -------
     profile : Profile or None
-        With torque: what both channels share beyond chance and beyond 0.5 % rms. Without: only if the road is driven
-        again and shows the same, or beyond 2 % rms. Errors of mass, delays, scales and clocks, which go with the
-        acceleration, are taken out of both channels first.
+        With torque: the part that both channels share, beyond chance and beyond 0.5 % rms. Without torque: only if a
+        second pass shows the same profile, or beyond 2 % rms. Errors of mass, delays, scales and clocks follow the
+        acceleration and are removed from both channels first.
     """
     if "kinematic" not in drive.channels:
         return None
@@ -129,7 +127,7 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
         common, shared, score = _together(K, K - F, at)
         if common < (LEAST * G) ** 2 or score < STANDS_OUT:
             return None
-        # what the accelerometer wanders is in both and comes off; wind and brakes are in the force balance alone
+        # the accelerometer's drift is in both and cancels; wind and brakes are in the force balance alone
         power = float(np.mean(F[at] ** 2))
         share = min(max(float(np.mean((K * F)[at])) / max(power, 1e-12), 0.0), 1.0)
         z, p = bins.kinematic - share * bins.force, math.erfc(score / math.sqrt(2.0))
@@ -140,7 +138,7 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
 
 
 def _rms(theta: FloatArray, half: FloatArray, bins: _Bins) -> Estimate:
-    """Rms of the slope over what was driven; its error hangs together over a wave of the estimate. [rad]"""
+    """Rms of the slope over the driven road; its error is correlated over a wavelength of the estimate. [rad]"""
     at = bins.used
     noise = float(np.mean((half[at] / 1.96) ** 2))
     power = float(np.mean((theta[at] - theta[at].mean()) ** 2))
@@ -152,8 +150,8 @@ def _rms(theta: FloatArray, half: FloatArray, bins: _Bins) -> Estimate:
 
 @dataclass(frozen=True, slots=True)
 class _Bins:
-    """Channels as means over 25 m of way (k,), `weight` (k,) samples in each, `used` where there are any, and what
-    goes with the motion (k, q)."""
+    """Channels as means over 25 m (k,), `weight` (k,) samples in each, `used` where there are any, and the shapes that
+    follow the motion (k, q)."""
 
     kinematic: FloatArray
     force: FloatArray | None
@@ -182,13 +180,13 @@ class _Bins:
         return _Bins(mean(kinematic), force, weight, weight > 0.0, motion)
 
     def cleaned(self, x: FloatArray) -> FloatArray:
-        """A channel without what goes with the motion, by least squares."""
+        """A channel without the part that follows the motion, by least squares."""
         root = np.sqrt(self.weight)
         beta = np.linalg.lstsq(self.motion * root[:, None], x * root, rcond=1e-10)[0]
         return np.asarray(np.where(self.used, x - self.motion @ beta, 0.0))
 
     def smooth(self, x: FloatArray) -> FloatArray:
-        """Mean with a raised cosine of 150 m half width, over what is used."""
+        """Mean with a raised cosine of 150 m half width, over the used bins."""
         window = np.hanning(2 * round(OVER_M / BIN_M) + 1)[1:-1]
         total = np.convolve(x * self.weight, window, "same")
         return np.asarray(np.where(self.used, total / np.maximum(np.convolve(self.weight, window, "same"), 1e-9), 0.0))
@@ -211,7 +209,7 @@ def _clipped(x: FloatArray, good: BoolArray) -> FloatArray:
 
 
 def _together(K: FloatArray, Y: FloatArray, at: BoolArray) -> tuple[float, float, float]:
-    """Covariance, correlation and how many standard deviations it is from nought: Fisher's transform [fisher1921]."""
+    """Covariance, correlation and its distance from zero in standard deviations by Fisher's transform [fisher1921]."""
     k, y = (np.where(at, x - x[at].mean(), 0.0) for x in (K, Y))
     sd = float(k[at].std() * y[at].std())
     covariance = float(np.mean((k * y)[at]))
@@ -226,7 +224,8 @@ def _score(correlation: float, count: float) -> float:
 
 
 def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
-    """How many independent samples two series along the way are worth, from their own likeness [bartlett1946]."""
+    """Effective number of independent samples of two series over position, from their autocorrelation
+    [bartlett1946]."""
     n = 2 * at.size
     pairs = np.fft.irfft(np.abs(np.fft.rfft(at.astype(np.float64), n)) ** 2, n)
     own = [np.fft.irfft(np.abs(np.fft.rfft(x, n)) ** 2, n) / np.maximum(pairs, 1.0) for x in (a, b)]
@@ -239,7 +238,7 @@ def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
 
 
 def _lap(bins: _Bins, K: FloatArray) -> float | None:
-    """Length after which the channel repeats itself over the way: a wandering sensor knows no place. [m]"""
+    """Length after which the channel repeats itself along the road; a drifting sensor does not repeat. [m]"""
     best, found = LAP_CORRELATION, None
     centred = np.where(bins.used, K - K[bins.used].mean(), 0.0)
     share = _independent(centred, centred, bins.used) / bins.used.sum()
@@ -257,7 +256,7 @@ def _lap(bins: _Bins, K: FloatArray) -> float | None:
 
 
 def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Penalised slope over the way beside what goes with the motion: knots [m], theta, half band [rad], known."""
+    """Penalised slope over position, fitted with the motion's shapes: knots [m], theta, half band [rad], known."""
     # speed and time would pass for slow waves of the road
     motion = bins.motion[:, GOES_WITH_ACCELERATION]
     k, q = z.size, motion.shape[1]
@@ -273,7 +272,7 @@ def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, Float
     x = inverse @ (A.T @ (z * np.sqrt(weight)))
     left = np.where(bins.used, z - x[:k] - motion @ x[k:], 0.0)
     coloured = _correlated(left, bins.used)
-    # what smoothing takes off is about what it takes off again
+    # smoothing once more removes about as much as smoothing did the first time
     bias = x[:k] - np.linalg.solve(np.diag(weight) + penalty, weight * x[:k])
     variance = np.diag(inverse @ (A.T @ A) @ inverse)[:k] * float(np.mean(left[bins.used] ** 2)) * coloured
     theta: FloatArray = x[:k] / G
@@ -284,7 +283,7 @@ def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, Float
 
 
 def _correlated(x: FloatArray, at: BoolArray) -> float:
-    """By how much a mean of correlated bins is less sure than of independent ones: 1 + 2 sum of rho. >= 1"""
+    """Variance of a mean of correlated bins relative to independent ones: 1 + 2 sum of rho. >= 1"""
     power = max(float(np.mean(x[at] ** 2)), 1e-30)
     total = 1.0
     for lag in range(1, 13):
@@ -299,7 +298,7 @@ def _correlated(x: FloatArray, at: BoolArray) -> float:
 
 
 def _mean(bins: _Bins) -> Estimate:
-    """Mean slope: from both channels by what their offsets may be. [rad]"""
+    """Mean slope from both channels, weighted by their possible offsets. [rad]"""
     kinematic = float(np.average(bins.kinematic, weights=bins.weight))
     looks: list[tuple[float, float]] = [(kinematic, BIAS_SD)]
     if bins.force is not None:

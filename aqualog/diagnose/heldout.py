@@ -1,4 +1,4 @@
-"""Drives that nothing is fitted to, with the model before and after."""
+"""Held-out drives, simulated with the model before and after."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from aqualog.types import FloatArray
 
 __all__ = ["measured_gain"]
 
-FREE_RATE = 1.0 / 30.0  # [1/s] half a minute of free running; then it is forgotten, so that one gust does not rule all
+FREE_RATE = 1.0 / 30.0  # [1/s] free simulation forgets errors after half a minute, so that one gust does not dominate
 SPEED = "speed"
 
 
@@ -50,7 +50,7 @@ def measured_gain(
     held = []
     for d in drives:
         own = for_mask(noise, d.mask)
-        # each model is led so that it meets the measured speed itself
+        # each model has its own target speed with which it meets the measured speed
         residuals = [residual(led_by(d, m), m) for m in (before, after)]
         rows = [whitened(spectra(bridged(r, d.mask)[None]), own)[0].reshape(r.shape) for r in residuals]
         used = (own.weights > 0.0).any(axis=0)
@@ -71,6 +71,6 @@ def measured_gain(
 
 
 def _free_speed(d: Drive, model: Model) -> FloatArray:
-    # the measured speed, not the one that leads: its lead is another model's
+    # the measured speed, not the target speed, which belongs to another model
     shown = follow(d.vehicle, replace(d.course, v_x=d.speed), model, rate=FREE_RATE)
     return block_means(shown["v_x"] - d.speed, d.dt)

@@ -1,4 +1,4 @@
-"""Which effects, where, a log is asked about, and what each would do to its residuals: by simulation."""
+"""Effects and places that a log is tested for, and the simulated change of its residuals by each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "val
 
 THREADS = 2
 _WET = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
-# how fast a wheel turns under its force: without wheel speeds these would only bend what others explain
+# effects on wheel speed under force: without wheel speeds these would only distort other effects
 _AT_WHEELS = (
     "slip_stiffness", "slip_stiffness_drift", "load_sensitivity", "relaxation_length", "tyre_radius",
     "tyre_radius_growth", "pressure_loss",
@@ -44,7 +44,7 @@ _FREE: Mapping[str, tuple[str, ...]] = {
     "pressure_loss": ("radius",),
     "uneven_water": ("depth_gain",),
 }
-# what a force does to the car is seen against the torque; a torque that stands in is made of the file's mass and drag
+# the effect of a force is judged against the torque; a replaced torque comes from the file's own mass and drag
 _OF_TORQUE = (
     "torque_gain", "payload_mass", "trailer", "aero_drag", "head_wind", "rolling_resistance", "tyre_warmup",
     "cornering_drag", "brake_drag", "wheel_inertia", "water_drag", "load_sensitivity",
@@ -52,11 +52,11 @@ _OF_TORQUE = (
 _NOT_ASKED: Mapping[str, str] = {
     "tone_ring": "once per turn is faster than the residuals, which are means over 0.1 s",
 }
-# effects that may well sit at a single wheel; others are asked about by axle
+# effects that may act at a single wheel; others are tested by axle
 _BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
-# what a car may have or not; all else is known to within a tolerance
+# effects that a car may have or not; all others are known within a tolerance
 _EVENTS = ("trailer",)
-# tolerances of what a vehicle file or a simulator is off by more than a third of the smallest size: slip slopes change
+# tolerances where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes change
 # by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
 # crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K)
 _LOOSE: Mapping[str, float] = {
@@ -64,7 +64,7 @@ _LOOSE: Mapping[str, float] = {
     "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1, "pressure_loss": 1e-3,
     "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
 }  # fmt: skip
-# tolerances of what the vehicle file leaves to a default, by axle, as a share of the value: tyres of one size differ by
+# tolerances of default values in the vehicle file, by axle, as a share of the value: tyres of one size differ by
 # 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K)
 _NOT_GIVEN: Mapping[str, tuple[str, float]] = {
     "tyre_radius": ("wheels.r_e_", 0.01), "wheel_inertia": ("wheels.inertia_", 0.3),
@@ -87,12 +87,12 @@ class Hypothesis:
 
     @property
     def allowed(self) -> bool:
-        """Whether it is a tolerance: allowed for and never named."""
+        """Whether it is a tolerance: taken into account but never reported."""
         return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES or self.effect is STAND_IN
 
     @property
     def of_water(self) -> bool:
-        """Whether it is about what water does."""
+        """Whether it is an effect of water."""
         return self.effect in WATER_TOLERANCES or self.effect.name in _WET
 
     @property
@@ -105,8 +105,8 @@ class Hypothesis:
         return next(p for p in self.effect.parameters if p.name == name)
 
     def tolerance(self, name: str) -> float:
-        """Standard deviation by which a parameter may be off without being worth a word; 0 for events and for
-        places whose parts are asked about."""
+        """Standard deviation of a parameter that is not worth naming; 0 for events and for places whose parts are
+        tested."""
         if self.allowed:
             return self.parameter(name).sigma
         if _sums(self) or (self.effect.name == "payload_mass" and self.where is not None):
@@ -117,7 +117,7 @@ class Hypothesis:
         return _LOOSE.get(self.key, _LOOSE.get(self.effect.name, usual))
 
     def worth_naming(self, name: str) -> float:
-        """Smallest deviation that is worth a word: the effect's own, or twice what a file is off by anyway."""
+        """Smallest deviation that is worth naming: the effect's own, or twice the usual error of a file."""
         smallest = self.parameter(name).smallest
         return max(smallest, WORTH * _LOOSE.get(self.key, _LOOSE.get(self.effect.name, 0.0)))
 
@@ -127,7 +127,7 @@ class Hypothesis:
         key, share = _NOT_GIVEN.get(self.effect.name, ("", 0.0))
         if self.where not in AXLES or not key or key + self.where in vehicle.given:
             return own
-        # radius and slope are told relative to the file's
+        # radius and slope are relative to the file's
         return max(own, share * (vehicle.inertia(self.where) if self.effect.name == "wheel_inertia" else 1.0))
 
     def step(self, name: str) -> float:
@@ -138,9 +138,9 @@ class Hypothesis:
 
 
 def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis, ...], dict[str, str]]:
-    """All that can be asked of these logs, and why the rest cannot: name to reason.
+    """All hypotheses that these logs can test, and the reason why others cannot be tested, by name.
 
-    An effect that the model has already at a place is asked about like any other: as a change of its value.
+    An effect that the model already has at a place is tested like any other: as a change of its value.
     """
     present = frozenset.intersection(*(d.present for d in drives))
     wet = any(d.course.lanes for d in drives)
@@ -232,12 +232,12 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
 def residual(drive: Drive, model: Model) -> FloatArray:
     """Residual channels of a drive under a model. (C, m)
 
-    A model that changes the velocity's own sensor changes what leads the car, which is made anew.
+    A model that changes the velocity's sensor changes the target speed, which is computed again.
     """
     if any(t.place == "v_x" for t in model.terms):
         drive = led_by(drive, model)
     shown = follow(drive.vehicle, drive.course, model)
-    # of the same signals: a speed that is the reference's on one side must not be the wheels' on the other
+    # of the same signals: both sides must use the same speed, either the reference or the wheels
     shown = {n: x for n, x in shown.items() if n in drive.present or n == "nudge_seen"}
     measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
     return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
@@ -252,18 +252,14 @@ def signatures(
     tick: Callable[[], None] = lambda: None,
     each: bool = False,
 ) -> list[FloatArray]:
-    """What a unit of each free parameter takes away from the residual: (k, C, m) per hypothesis, around a model.
-
-    By differences of simulations led along the drive. What hypotheses of a whole axle or car do is the sum of
-    what its wheels do, to first order; unless `each` is asked for, they are not simulated again.
-    """
+    """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, around a model."""
 
     def one(h: Hypothesis) -> FloatArray:
         out = []
         for name in h.free:
             at, step = value_in(model, h, name), h.step(name)
             if h.effect.name in _SHIFTS:
-                # noise of an input, shifted one way only, would meet itself in the residual
+                # noise of an input, shifted one way only, would correlate with itself in the residual
                 p = h.parameter(name)
                 low, high = max(at - step, p.low), min(at + step, p.high)
                 later = residual(drive, with_values(model, [(h, {name: high})]))

@@ -1,7 +1,7 @@
 """Inputs of the simulation without their sensors' noise.
 
-What drives the simulation is compared with nothing, but its noise would be on both sides: in the residual, and in what
-an effect would take away from it. A regression then finds effects in noise.
+The inputs of the simulation are not compared with a measurement, but their noise would enter on both sides: in the
+residual and in the signature of an effect. A regression would then find effects in noise.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s
 TORQUE_BAND = (0.1, 0.2)  # of the rate at which a torque is sampled: there it is noise, pedals and tyres are slower
 LEAST_BAND_HZ = (3.0, 4.5)  # at least
 SPEED_S = 1.0  # [s] over which a measured speed is averaged: its noise must not pass for motion
-NOT_TORQUE = 15.0  # [N m] rms of a difference that is a sensor's, not the car's
+NOT_TORQUE = 15.0  # [N·m] rms of a difference that comes from a sensor, not from the car
 NOT_TORQUE_SHARE = 0.05  # of the rms of all wheels
 # of the mean power of noise: the spectrum of what is mirrored is real but for a phase, its squares have one degree of
 # freedom (D)
 MEDIAN = 0.4549
-END_S = 1.0  # [s] that tell where a signal begins and ends
+END_S = 1.0  # [s] for the values at the beginning and end of a signal
 STANDS_OUT, LEAST_EVENT = 4.0, 10.0  # standard deviations, and [N m] of an axle: braking, not noise
 BESIDE_EVENT_S = 0.5  # [s]
 LOCAL = 9  # frequencies over which a spectrum is smoothed
-OVER = 3.0  # times the noise that a frequency must have to pass: one of a thousand does by chance (D)
+OVER = 3.0  # multiple of the noise that a frequency needs to pass: one of a thousand passes by chance (D)
 
 
 def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
@@ -38,10 +38,7 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """A signal by Wiener's filter [wiener1949]: each frequency by the share of it that stands out of the white noise.
-
-    The noise is what the signal has in a band well above what drivers do. One that is not sampled fast enough to tell
-    stays as it is. Zero phase: nothing is delayed.
+    """A signal after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
 
     Parameters
     ----------
@@ -49,8 +46,8 @@ def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
     dt : float
         Step of the grid. [s]
     rate_hz : float, optional
-        At which the bus told the signal, if that is slower than the grid: between, it is a straight line, and at high
-        frequencies there is less of the noise. [Hz]
+        Rate of the signal on the bus if it is slower than the grid. Linear interpolation between its samples has less
+        noise at high frequencies. [Hz]
     """
     rate = min(rate_hz or 1.0 / dt, 1.0 / dt)
     low, high = (max(share * rate, least) for share, least in zip(TORQUE_BAND, LEAST_BAND_HZ, strict=True))
@@ -62,14 +59,14 @@ def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
 def quiet_speed(v: FloatArray, dt: float) -> FloatArray:
     """A speed without its noise, by Wiener's filter and a mean over a second; it has no delay. (n,) to (n,) [m/s]
 
-    At a constant speed what is left of the noise after a mean would be all of the motion: led along it, the car shows
-    it again, and a shift of it finds itself.
+    At constant speed the remaining noise would be the only motion. The simulated car would follow it, and a delay would
+    correlate with it.
     """
     return smooth(_filtered(v, dt, SPEED_BAND_HZ), dt, SPEED_S)
 
 
 def _filtered(x: FloatArray, dt: float, band_hz: tuple[float, float], lines: float = 0.0) -> FloatArray:
-    """The signal by the share of each frequency that stands out of the noise that the band shows.
+    """The signal with each frequency weighted by its share above the noise of the band.
 
     `lines`: time between samples that straight lines connect. [s]
     """
@@ -101,12 +98,7 @@ def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
 
 
 def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """Wheel torques (4, n) [N m] without noise; `rate_hz` as in `quiet`.
-
-    Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an axle that is
-    not driven is torque like any other: 50 N m now and then are 3 % of what slow driving takes. Of an axle that has no
-    more than that, what does not stand out is noise, whose colour no filter knows.
-    """
+    """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`."""
     out = np.empty_like(torque)
     driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     total = float(np.sqrt((torque.sum(axis=0) ** 2).mean()))
@@ -122,7 +114,7 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 
 
 def _events(x: FloatArray, dt: float) -> FloatArray:
-    """A torque where it stands out of its own scatter, with what is beside that; elsewhere the mean of the rest."""
+    """A torque where it exceeds its own scatter, with the samples next to it; elsewhere the mean of the rest."""
     off = np.abs(x - np.median(x))
     out = off > max(STANDS_OUT * 1.4826 * float(np.median(off)), LEAST_EVENT)
     out = np.convolve(out, np.ones(2 * round(BESIDE_EVENT_S / dt) + 1), "same") > 0.5

@@ -1,4 +1,4 @@
-"""What a log can tell apart, before its residual is looked at: pairs and sets of up to three rivals, and limits."""
+"""Effects that a log can distinguish, before its residual is used: pairs, sets of up to three rivals, limits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from aqualog.types import FloatArray
 __all__ = ["confusions", "limits", "reference_sizes", "separation"]
 
 POWER = 0.9
-TOLD_APART = 0.95  # probability of the right one of two from which on they count as told apart
-EXACT = 1e-3  # share of an effect's energy that an exact relation leaves at the most
-RIVALS = 10  # the likest ones, of which sets are made
+TOLD_APART = 0.95  # probability of naming the right one of two, from which they count as distinguished
+EXACT = 1e-3  # largest share of an effect's energy that an exact relation may leave
+RIVALS = 10  # most similar rivals, from which sets are formed
 
 
 def separation(gram: FloatArray, columns: Sequence[int], rivals: Sequence[int], theta: FloatArray) -> float:
@@ -41,10 +41,7 @@ def p_correct(lam: float) -> float:
 
 
 def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, threshold: float) -> FloatArray:
-    """Size of each column (K,) that is seen with a power of 0.9, or the smallest worth naming if that is larger.
-
-    NaN where no physical size would be seen.
-    """
+    """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger."""
     out = np.full(bench.count, np.nan)
     for i, columns in enumerate(bench.columns):
         for c in columns:
@@ -75,7 +72,7 @@ def limits(bench: Bench, sizes: FloatArray) -> tuple[Limit, ...]:
 def confusions(bench: Bench, gram: FloatArray, sizes: FloatArray, inflation: FloatArray) -> tuple[Confusion, ...]:
     """All pairs, and for each effect the sets of two and three rivals that imitate it much better than any one.
 
-    At the reference sizes; effects that the log does not show are left out.
+    Effects have their reference sizes; effects that the log cannot show are left out.
     """
     G = gram[:-1, :-1]
     seen = [
@@ -132,7 +129,7 @@ def _confusion(bench: Bench, G: FloatArray, i: int, rivals: tuple[int, ...], lam
 
 
 def _relation(bench: Bench, effects: Sequence[int], sizes: Sequence[float]) -> str:
-    """In words: what of the rivals looks like a certain size of the effect, on this log."""
+    """Sentence: the sizes of the rivals that look like a certain size of the effect on this log."""
     parts = []
     for i, size in zip(effects, sizes, strict=True):
         h = bench.asked[i]

@@ -1,8 +1,8 @@
-"""Catalogue of safe runs, checks and sensors that may tell causes apart, as data.
+"""Catalogue of safe runs, checks and sensors that may distinguish causes, as data.
 
-Runs stay within 3.5 m/s^2 and 130 km/h on a dry road, 90 km/h on a wet one, and last a minute. They are driven on the
-road of the log and soon after it, so that slope and wind are the same. Slopes are not among them: a hill whose height
-is not known would be one effect more.
+Runs stay within 3.5 m/s² and 130 km/h on a dry road, 90 km/h on a wet one, and last a minute. They are driven on the
+road of the log and soon after it, so that slope and wind are the same. Slopes are not among them: a hill of unknown
+height would be one more effect.
 """
 
 from __future__ import annotations
@@ -89,14 +89,14 @@ def _saw(low: float, high: float, up: float, down: float) -> Profile:
 
 _SAME = "on the same road, in the same direction and soon"
 RUNS: tuple[Run, ...] = (
-    Run("hard_acceleration", f"from 40 to 110 km/h at 3 m/s^2 and back, again and again, {_SAME}", 2.0,
+    Run("hard_acceleration", f"from 40 to 110 km/h at 3 m/s² and back, repeatedly, {_SAME}", 2.0,
         _saw(40.0, 110.0, 3.0, 1.5)),
     Run("coast_down", f"up to 120 km/h and let the car roll without drive and brakes, {_SAME}", 2.0,
         ((0.0, 100.0), (8.0, 120.0), (10.0, 120.0)), rolls=10.0),
     Run("speed_steps", f"at 40, 60, 80, 100 and 120 km/h for ten seconds each, {_SAME}", 2.0,
         ((0.0, 40.0), (10.0, 40.0), (14.0, 60.0), (22.0, 60.0), (26.0, 80.0), (34.0, 80.0), (38.0, 100.0),
          (46.0, 100.0), (50.0, 120.0), (60.0, 120.0))),
-    Run("brake_steps", f"at 100 km/h and brake to 40 km/h at 1.5, 2.5 and 3.5 m/s^2, {_SAME}", 2.0,
+    Run("brake_steps", f"at 100 km/h and brake to 40 km/h at 1.5, 2.5 and 3.5 m/s², {_SAME}", 2.0,
         ((0.0, 100.0), (4.0, 100.0), (15.1, 40.0), (25.0, 100.0), (31.7, 40.0), (42.0, 100.0), (46.8, 40.0),
          (60.0, 100.0))),
     Run("slalom", f"at 60 km/h and swing gently from side to side within the lane, {_SAME}", 2.0,
@@ -124,7 +124,7 @@ SENSORS: tuple[Sensor, ...] = (
 
 
 def fitting(effects: frozenset[str], *, wet: bool) -> tuple[Run, ...]:
-    """Runs that make sense for these effects: water only where it is at stake, the way back where it turns a sign."""
+    """Runs that make sense for these effects: water only for effects of water, the way back where it changes a sign."""
     return tuple(
         r
         for r in RUNS

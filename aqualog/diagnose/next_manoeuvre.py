@@ -1,7 +1,5 @@
-"""Which run would tell the surviving causes apart: each is simulated, and what it adds to the log is counted.
-
-Sets of effects are told apart by what one shows and the other, with its own parameters fitted anew, cannot imitate.
-Whitened inner products of the log and of a run add up, so a run is judged together with what is known already.
+"""The run that would distinguish the remaining causes: each is simulated, and its information added to the log's.
+Whitened inner products of the log and of a run add up, so a run is judged together with the information of the log.
 """
 
 from __future__ import annotations
@@ -37,8 +35,8 @@ MENTIONED = 3  # pairs in a sentence
 def resolving() -> float:
     """Separation that a run must add so that the wrong one of two sets is not credible any more in 95 % of cases.
 
-    Twice the log of the ratio of evidence is normal with mean lambda and variance 4 lambda; what the log has said is
-    known by now and does not help again.
+    Twice the log of the ratio of evidence is normal with mean lambda and variance 4 lambda; the information of the log
+    is used already and does not help again.
     """
     root = CERTAINTY + math.sqrt(CERTAINTY**2 + 2.0 * math.log(CREDIBLE))
     return root * root
@@ -71,7 +69,7 @@ class _Option:
 def next_manoeuvre(
     bench: Bench, credible: Sequence[Candidate], noises: Sequence[Noise], model: Model
 ) -> Manoeuvre | None:
-    """The run, check or sensor that tells sets apart which the log cannot.
+    """The run, check or sensor that distinguishes sets that the log cannot distinguish.
 
     Parameters
     ----------
@@ -88,9 +86,9 @@ def next_manoeuvre(
     -------
     manoeuvre : Manoeuvre or None
         None if no two sets differ in their effects. `name` is that of the run or check that decides most pairs and, of
-        those, adds most to the worst pair per minute; `sensor` if only a further signal would decide one; `none` if
-        nothing of the catalogue does. `separates` has the decided pairs, the sentence tells the others. Separations
-        are those of the worst decided pair. The same for the same input.
+        those, adds most to the worst pair per minute; `sensor` if only a further signal would decide one; `none` if the
+        catalogue has no such run. `separates` has the decided pairs, the sentence lists the others. Separations are
+        those of the worst decided pair. The same for the same input.
     """
     pairs = tuple(
         (i, j) for i, j in combinations(range(len(credible)), 2) if _effects(credible[i]) != _effects(credible[j])
@@ -108,7 +106,7 @@ def next_manoeuvre(
     first += [c for c in CHECKS if c.effect in case.effects]
     options = _options(case, log, first, case.near)
     confirmed: list[_Option] = []
-    # what decides a pair with a part of the tolerances may not do so with all of them
+    # a run that decides a pair with a part of the tolerances may not do so with all of them
     for _ in range(CONFIRMED):
         promising = [o for o in options if o.decided]
         if not promising:
@@ -130,7 +128,7 @@ def _effects(c: Candidate) -> frozenset[str]:
 
 
 def _options(case: Case, log: FloatArray, what: Sequence[Run | Check], kept: Sequence[int]) -> list[_Option]:
-    """All that can be done, so many times, judged with a part of what is forgiven."""
+    """All options and repetitions, judged with a part of the tolerances."""
     at = case.rows(kept)
     known = log[np.ix_(at, at)]
     now = case.apart(known, kept)
@@ -151,19 +149,19 @@ def _recommended(case: Case, o: _Option) -> Manoeuvre:
     often = "" if o.times == 1 else f", {o.times} times"
     text = f"Drive {o.what.how}{often}" if isinstance(o.what, Run) else o.what.how
     text += (
-        f". It tells {told} apart: the right one is named with a probability of {_percent(o.then[worst])} then, "
-        f"{_percent(o.now[worst])} now"
+        f". It distinguishes {told}: the probability of naming the right one rises from {_percent(o.now[worst])} "
+        f"to {_percent(o.then[worst])}"
     )
     rest = [p for p in range(len(case.pairs)) if p not in o.decided]
     if rest:
-        text += f". It does not tell {_told(case, rest)} apart"
+        text += f". It does not distinguish {_told(case, rest)}"
     return Manoeuvre(
         o.what.name, _pairs(case, o), f"{text}.", float(o.now[worst]), float(o.then[worst]), o.minutes
     )  # fmt: skip
 
 
 def _otherwise(case: Case, log: FloatArray) -> Manoeuvre:
-    """A sensor that decides a pair in one of the runs, or nothing."""
+    """A sensor that decides a pair in one of the runs, or the best run of all if there is none."""
     runs = [r for r in fitting(case.effects, wet=bool(case.drive.course.lanes)) if r.water is None]
     kept = case.near
     at = case.rows(kept)
@@ -184,18 +182,18 @@ def _otherwise(case: Case, log: FloatArray) -> Manoeuvre:
         worst = min(o.decided, key=lambda p: o.then[p])
         told = _told(case, o.decided)
         text = (
-            f"With these signals no run tells {told} apart; with {sensor.name} in the log, one does: drive "
-            f"{o.what.how}. The right one is named with a probability of {_percent(o.then[worst])} then, "
-            f"{_percent(o.now[worst])} now."
+            f"With these signals no run distinguishes {told}. With {sensor.name} in the log, one does: drive "
+            f"{o.what.how}. The probability of naming the right one rises from {_percent(o.now[worst])} to "
+            f"{_percent(o.then[worst])}."
         )
         return Manoeuvre("sensor", _pairs(case, o), text, float(o.now[worst]), float(o.then[worst]), o.minutes)
     everything = tuple(range(len(case.forgiven)))
     plain = max(_options(case, log, [plain.what], everything), key=lambda o: o.rank)
     worst = int(np.argmin(plain.then - plain.now))
     text = (
-        f"None of these runs decides between the causes, {_told(case, range(len(case.pairs)))}; the best of them, "
-        f"{plain.what.name.replace('_', ' ')}, would name the right one with a probability of "
-        f"{_percent(plain.then[worst])}, now {_percent(plain.now[worst])}."
+        f"No run of the catalogue decides between the causes: {_told(case, range(len(case.pairs)))}. The best of them, "
+        f"{plain.what.name.replace('_', ' ')}, would change the probability of naming the right one from "
+        f"{_percent(plain.now[worst])} to {_percent(plain.then[worst])}."
     )
     return Manoeuvre("none", (), text, float(plain.now[worst]), float(plain.then[worst]), 0.0)
 
@@ -206,7 +204,7 @@ def _percent(lam: float) -> str:
 
 
 def _apart_members(case: Case, p: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """What each set of a pair has and the other has not."""
+    """Members of each set of a pair that the other set does not hold."""
     a, b = (case.credible[i].refit.members for i in case.pairs[p])
     return [h for h in a if h not in b], [h for h in b if h not in a]
 

@@ -1,9 +1,9 @@
 """Coloured noise of residual channels: an autoregression with a long memory, whitening, and surrogates.
 
-Sensors drift, wind gusts, roads are rough: residuals hang together over time, and a test that takes their samples as
+Sensors drift, wind gusts, roads are rough: residuals are correlated over time. A test that treats their samples as
 independent finds an effect in every log. The channels are combined so that they share little noise, each combination
-follows an autoregression on its last samples and on means over ever longer stretches of its past (up to 13 s), and what
-is left of them is made uncorrelated across the combinations.
+follows an autoregression on its last samples and on means over ever longer stretches of its past (up to 13 s), and the
+remainders are made uncorrelated across the combinations.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ MEMORY = 130
 AFTER_GAP = 6  # [samples] whose past is bridged
 HUBER = 3.0  # [sd] larger innovations weigh less
 RIDGE = 1e-6
-# [m/s^2], [m/s], [N] white noise that every channel is taken to have besides: without any, whatever is smooth could be
-# foretold from its past and would pass for noise
+# [m/s^2], [m/s], [N] white noise that every channel is taken to have besides: without it, every smooth signal would be
+# predictable from its past and would count as noise
 FLOOR = 5e-3
 
 
@@ -46,7 +46,7 @@ class Noise:
 
     @property
     def surprise(self) -> float:
-        """Negative log-likelihood of the residual that the noise was fitted to, but for a constant."""
+        """Negative log-likelihood of the residual that the noise was fitted to, without a constant."""
         sharp = np.log(np.abs(np.diag(self.shaping))).sum() + np.linalg.slogdet(self.rotation)[1]
         return -float(sharp) * float((self.weights > 0.0).sum()) / len(self.taps)
 
@@ -83,7 +83,7 @@ def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
 
 
 def spectra(x: FloatArray) -> Spectra:
-    """Transforms of arrays (k, C, n), bridged. Their past before the log is taken to be their first second."""
+    """Transforms of arrays (k, C, n), bridged. Their first second replaces the unknown past before the log."""
     n = x.shape[-1]
     past = np.repeat(x[..., :10].mean(axis=-1, keepdims=True), MEMORY, axis=-1)
     size = _good_size(n + 2 * MEMORY + 1)
@@ -109,7 +109,7 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     Parameters
     ----------
     residual : array (C, n)
-        After what is known has been taken away.
+        After known effects have been subtracted.
     mask : array (n,)
         Usable samples; at least some hundreds.
     contrasts : array (C, C)
@@ -119,7 +119,7 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     -------
     Noise
         Its order is chosen per contrast by Akaike's criterion [akaike1974]; innovations beyond 3 standard deviations
-        weigh less (Huber [huber1981]), so that outliers and kerbs do not rule.
+        weigh less (Huber [huber1981]), so that outliers and kerbs do not dominate.
     """
     x = bridged(residual, mask)
     used = _settled(mask)
@@ -224,8 +224,8 @@ def whitened(x: Spectra, noise: Noise) -> FloatArray:
 def surrogate(residual: FloatArray, mask: BoolArray, rng: np.random.Generator) -> FloatArray:
     """A residual without effects that has the spectra and cross spectra of this one: Gaussian, locally smoothed.
 
-    Each frequency is a random mixture of its neighbours, the same for all channels, the constant one of the lowest
-    ones: what an effect leaves at single frequencies is spread, and so is what a fitted effect has taken away.
+    Each frequency is a random mixture of its neighbours, the same for all channels; the constant is a mixture of the
+    lowest ones. This spreads peaks that an effect leaves at single frequencies, and gaps that a fitted effect has left.
     """
     x = bridged(residual, mask)
     n = x.shape[-1]

@@ -1,4 +1,4 @@
-"""From refitted sets to a verdict: what is named, what cannot be told apart, what is left open."""
+"""From refitted sets to a verdict: named causes, causes that cannot be distinguished, open questions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from aqualog.model.term import Model
 __all__ = ["Outcome", "causes_of", "conclude", "one_per_name"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
-BEYOND_DOUBT = 1e-5  # p-value of a test that no effect and no function bears out, to be told as a finding
+BEYOND_DOUBT = 1e-5  # p-value from which a test counts as a finding although no effect and no function confirms it
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 
@@ -43,8 +43,9 @@ class Outcome(NamedTuple):
 def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_value: float) -> Outcome:
     """The verdict on refitted sets, best first; without any: `no_effect`, or `unexplained` if the test is beyond doubt.
 
-    A set is credible if the best one's evidence is less than 20 times its own. Members that every credible set has are
-    certain. Places of one effect that cannot be told apart are one cause, at the whole car if that is among them.
+    A set is credible if the best one's evidence is less than 20 times its own. Members of every credible set are
+    certain. Places of one effect that cannot be distinguished count as one cause, at the whole car if that is one of
+    them.
     """
     if not candidates:
         return Outcome("unexplained" if p_value < BEYOND_DOUBT else "no_effect", (), (), None, ())
@@ -80,22 +81,22 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
 
 
 def _other_places(bench: Bench, best: Candidate, credible: Sequence[Candidate], model: Model) -> tuple[str, ...]:
-    """What is told of the same effects at other places, which explain the log as well or nearly so."""
+    """Sentences about the same effects at other places that explain the log as well, or nearly so."""
     names = sorted(h.effect.name for h in best.refit.members)
     own = {h.key for h in best.refit.members}
     out = []
     for c in credible:
         is_near = _sharp(c) - _sharp(best) < 2.0 * math.log(CREDIBLE) * best.inflation
         if c.refit is not best.refit and is_near and sorted(h.effect.name for h in c.refit.members) == names:
-            out += [f"As well possible: {x.sentence}" for x in causes_of(bench, c, model) if x.key not in own]
+            out += [f"Equally possible: {x.sentence}" for x in causes_of(bench, c, model) if x.key not in own]
     return tuple(dict.fromkeys(out))
 
 
 def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
     """One candidate for each set of effects: the one at the whole car, unless another place is clearly better.
 
-    All tolerances together forgive a wrong place (the form of a tyre's curve takes what one wheel shows and its twin
-    does not), so places are compared where only a part of them is forgiven.
+    All tolerances together can hide a wrong place: the form of a tyre's curve absorbs a difference between left and
+    right wheel. So places are compared with only a part of the tolerances.
     """
     groups: dict[tuple[str, ...], list[Candidate]] = {}
     for c in credible:
@@ -110,7 +111,7 @@ def one_per_name(credible: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _sharp(c: Candidate) -> float:
-    """Where it was not asked: as the evidence has it."""
+    """Loss with part of the tolerances; the evidence replaces it where it was not computed."""
     return 2.0 * math.log(c.evidence_ratio) * c.inflation if math.isnan(c.sharp) else c.sharp
 
 
@@ -125,7 +126,7 @@ def _large(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...
 
 
 def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
-    """Whether a value of a member is as large as its smallest size, and its interval leaves out that it is nothing."""
+    """Whether a value of a member reaches its smallest size and its interval excludes zero effect."""
     r = candidate.refit
     h = r.members[member]
     sd = candidate.sd

@@ -1,4 +1,4 @@
-"""What a diagnosis is: the record that document, page and model file are made from."""
+"""The record of a diagnosis, from which document, page and model file are made."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = [
     "Estimate", "Gain", "Limit", "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
 ]  # fmt: skip
 
-AGREES = 0.01  # chance below which drives are said to differ
+AGREES = 0.01  # p-value below which drives are reported to differ
 
 Verdict = Literal["no_effect", "named", "compound", "cannot_tell", "unexplained", "not_testable"]
 
@@ -31,7 +31,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One effect that the measurement asks for. `explains`: residual channels whose error it takes away."""
+    """One effect that the measurement requires. `explains`: residual channels whose error it reduces."""
 
     effect: str
     where: str | None
@@ -47,8 +47,8 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class ByDrive:
-    """What one drive says of a value: by itself, and what the other drives say. `gain` [nats]: log score that the value
-    of the others wins on this drive over no effect; negative where it predicts worse.
+    """Value estimated from one drive alone. `gain` [nats, natural logarithm]: gain of the log score on this drive with
+    the value from the other drives, compared with no effect; negative where it predicts worse.
     """
 
     drive: str
@@ -82,9 +82,10 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True)
 class Significance:
-    """Family-wise test for anything at all: largest statistic, its p-value, and the level that the calibration reached.
+    """Family-wise test for any effect: largest test value, its p-value, and the level that the calibration reached.
 
-    `level` is the one asked for, `achieved` the share of surrogates without effect beyond the threshold that was used.
+    `level` is the requested level, `achieved` the share of surrogates without effect beyond the threshold that was
+    used.
     """
 
     statistic: float
@@ -111,7 +112,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """Two sets of effects and how well this log can tell them apart, before any residual was looked at.
+    """Two sets of effects and how well this log can distinguish them, before any residual is used.
 
     `separation` lambda: whitened energy of `effect` at its reference size that the `rivals` (1 to 3) cannot imitate;
     `p_correct` = Phi(sqrt(lambda) / 2). `relation`: sentence, where there is an exact relation, and the `sizes` in it:
@@ -128,7 +129,7 @@ class Confusion:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """What is left of a channel after the best set, as a function: support mask, value and simultaneous 95 % band.
+    """Unexplained part of a channel after the best set, as a function: support mask, value, simultaneous 95 % band.
 
     `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in the channel's unit; `share` of
     the channel's variance that it explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect
@@ -151,7 +152,7 @@ class Remainder:
 
 @dataclass(frozen=True, slots=True)
 class Manoeuvre:
-    """A run that would tell the surviving causes apart, or the answer that none of the catalogue does.
+    """A run that would distinguish the remaining causes, or the answer that no run of the catalogue does.
 
     `name`: of the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair.
     """
@@ -166,7 +167,8 @@ class Manoeuvre:
 
 @dataclass(frozen=True, slots=True)
 class ChannelGain:
-    """Root mean square of a residual channel before and after, one step ahead (`rmse`) and running free (`free`)."""
+    """Root mean square of a residual channel before and after, one sample ahead (`rmse`) and in free simulation
+    (`free`)."""
 
     channel: str
     unit: str
@@ -178,7 +180,7 @@ class ChannelGain:
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """What the extended model changes for a detector: false alarms and latency on drives, before and after."""
+    """Effect of the extended model on a detector: false alarms and latency on drives, before and after."""
 
     detector: str
     false_alarms_before: int
@@ -193,7 +195,7 @@ class Consequence:
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What the extended model predicts better. `log_score` on held-out drives with its 95 % interval, in nats.
+    """Gain of the extended model. `log_score` on held-out drives with its 95 % interval, in nats (natural logarithm).
 
     `heldout` names them; empty: the gain is on the diagnosed drives themselves (`in_sample`).
     """

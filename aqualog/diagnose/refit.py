@@ -17,13 +17,12 @@ from aqualog.types import FloatArray
 
 __all__ = ["KNOWN", "Metric", "Refit", "metric", "refit", "whitened_residual"]
 
-KNOWN = 0.25  # share of the tolerances that values and intervals allow for
-# times the tolerances of the laws of water: they are guesses themselves, and a name, unlike a finding, must not hang on
-# how good these are
+KNOWN = 0.25  # share of the tolerances that values and intervals take into account
+# factor on the tolerances of the water laws, which are guesses; naming a cause must not depend on their accuracy
 DOUBT = 2.0
 SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
-HOLDS = 0.1  # share by which a signature may miss what it promised before it is simulated anew
+HOLDS = 0.1  # share by which a signature may miss its predicted gain before it is simulated again
 ENOUGH = 0.3  # of twice the log-likelihood
 FREEDOM = 3.0  # degrees of the distribution of sizes: the fewest with a variance (K)
 
@@ -33,9 +32,9 @@ class Refit:
     """A set at its best values.
 
     `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
-    tolerances, and what values cost by their usual sizes; `residuals` (C, n) and `signatures` (k, C, n)
-    per drive at these values; `at_bound` if a value sits at its physical bound; `unlikely`: the share of `loss` that
-    the sizes of the values have; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
+    tolerances, plus the penalty of values beyond their usual sizes; `residuals` (C, n) and `signatures` (k, C, n) per
+    drive at these values; `at_bound` if a value sits at its physical bound; `unlikely`: the share of `loss` due to that
+    penalty; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
     """
 
     members: tuple[Hypothesis, ...]
@@ -55,7 +54,7 @@ class Refit:
 class Metric:
     """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k).
 
-    `apart` (K,): standard deviations that are not in it and come on top of the values found.
+    `apart` (K,): standard deviations that are not in the metric and are added to those of the values found.
     """
 
     noises: tuple[Noise, ...]
@@ -69,15 +68,7 @@ class Metric:
 
 
 def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
-    """The metric of `bench.tolerant` with a share of the tolerances.
-
-    With all of them sets are compared; with `KNOWN` of them values are found: what is not worth a word is more than
-    what a file is usually off by, and a fit that forgives its own effect looks for it where it hardly shows. What
-    the laws of water are off by is no matter of words: whatever the share, it counts `DOUBT` times. What the car's
-    drives have been seen to differ by counts in full: this drive is off by it, too. Of the columns `beside`, whose
-    values are sought, and of all that looks the same it comes on top of the values, which is the same (D) where a
-    signature stays what it was, and still right where it does not.
-    """
+    """Inner products under noise and a share of the tolerances, as in `bench.tolerant`."""
     apart = np.zeros(bench.count)
     apart[list(beside)] = bench.as_values[list(beside)]
     sought = {bench.kinds[c] for c in beside} - {""}
@@ -124,7 +115,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
     width = PRIOR_WIDTH * bench.prior[columns]
     J = np.concatenate(
         [whitened(p.of(columns), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1
-    )  # (k, N): what a unit takes away
+    )  # (k, N): change of the residual by one unit
     values = np.clip(base + fit.theta, low, high)
     found = _try(bench, members, names, values, noises, model)
     if found is None:
@@ -151,7 +142,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
             if not fresh:
                 break
         if won > 0.0:
-            # as good as the signature promised: it still holds here
+            # as good as the signature predicted: it is still valid here
             fresh = fresh and shrink == 1.0 and abs(won - promised) < HOLDS * promised
         elif fresh:
             break
@@ -182,8 +173,8 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
 def _unlikely(z: FloatArray) -> float:
     """Twice the negative log of how likely values are, by their usual size: Student's distribution, 0 at no deviation.
 
-    Its tails are heavy: one fault may well be large. Two large ones that happen to cancel are a rare coincidence, and
-    what near twins do to a residual is little; normal tails would rather split a large fault among twins.
+    Its tails are heavy, because a single fault may well be large. Two large faults that cancel are a rare coincidence,
+    and near twins change a residual little. Normal tails would instead split a large fault among twins.
     """
     return float((FREEDOM + 1.0) * np.log1p(z**2 / FREEDOM).sum())
 

@@ -1,9 +1,4 @@
-"""Relations among effects that hold on every log: what one of them does, two others together do as well.
-
-Beside the twins of an effect, which look like it one by one. An accelerometer reads the pull of a slope like an offset;
-the force balance does not see a slope, but it sees the offset, and that as a rolling resistance. No drive breaks such a
-relation, so that the smaller set is no better proven than the larger one.
-"""
+"""Relations among effects that hold on every log: two effects together look like a third one."""
 
 from __future__ import annotations
 
@@ -14,7 +9,8 @@ from aqualog.diagnose.hypotheses import Hypothesis
 
 __all__ = ["RELATIONS", "imitations"]
 
-# offset b of the accelerometer = slope b / g and rolling resistance -b / g, but for the slip that rolling costs (D)
+# offset b of the accelerometer = slope b / g and rolling resistance -b / g, except for the slip due to rolling
+# resistance (D)
 RELATIONS: tuple[tuple[str, str, str], ...] = (("accelerometer_bias", "road_grade", "rolling_resistance"),)
 
 

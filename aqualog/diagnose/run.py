@@ -36,17 +36,17 @@ __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
 WORTH_TELLING = 0.05  # of a channel's variance that a function must explain
-# rms of a road's slope that is named: on measured drives about 1 % was not borne out by the logged elevation
+# rms of a road's slope that is named: on measured drives the logged elevation did not confirm about 1 %
 HILLY = 0.015
-FARTHEST = 3.0  # tolerances that a deviation may be off by, to pass for one
-PARTIAL = 0.2  # of what is left beside a cause: then the cause is the nearest one, not the right one
+FARTHEST = 3.0  # number of tolerances up to which a deviation counts as one
+PARTIAL = 0.2  # share of the remainder beside a cause, above which the cause is only the most similar one
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
     """`level` of false alarms for anything at all, `surrogates` for its calibration, 0: none; `seed` of all draws.
 
-    `views`: with the residuals for a page; `consequences`: with what the model changes for the detectors.
+    `views`: with the residuals for a page; `consequences`: with the model's effect on the detectors.
     """
 
     seed: int = 1
@@ -65,21 +65,21 @@ def diagnose(
     options: Options | None = None,
     progress: Tell | None = None,
 ) -> Diagnosis:
-    """What the model gets wrong on these drives, and why.
+    """Errors of the model on these drives, with their causes.
 
     Parameters
     ----------
     drives : sequence of (name, Signals)
         Measured with the same car in the same state; each has a noise of its own.
     vehicle : Vehicle
-        The car as it is believed to be.
+        The car as described in its vehicle file.
     model : Model, optional
         Terms that are known already.
     holdout : sequence of (name, Signals)
-        Drives that are not looked at but for the gain.
+        Drives that are used only for the gain.
     options : Options, optional
     progress : callable, optional
-        Called with what is being done and the share that is done.
+        Called with the name of the step and the share that is done.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def diagnose(
     road = _road(ready, model)
     hilly = road is not None and road.rms.value >= HILLY
     if road is not None:
-        # named or not: a car pulls uphill, and the torque would pass for the cause
+        # named or not: a car needs more torque uphill, and the torque would appear to be the cause
         model = with_profile(model, road)
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
@@ -118,7 +118,7 @@ def diagnose(
     found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(bench, found.candidates, model, p_value=found.tests[0].p_value)
     outcome, agreed = _by_drive(bench, found, outcome, model)
-    tell("describing what is left", 0.8)
+    tell("describing what is not explained", 0.8)
     outcome, remainders = _remainders(bench, found, outcome, options)
     if road is not None:
         outcome = _with_road(outcome, road, named=hilly)
@@ -141,9 +141,11 @@ def diagnose(
         )  # fmt: skip
     next_run = None
     if outcome.verdict == "cannot_tell":
-        tell("looking for a run that would tell", 0.95)
+        tell("searching for a run that distinguishes the causes", 0.95)
         next_run = next_manoeuvre(bench, one_per_name(found.candidates), found.noises, model)
-    reason = f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of what was logged does"
+    reason = (
+        f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of the logged quantities does"
+    )
     return Diagnosis(
         verdict=outcome.verdict,
         sentence=verdict_sentence(
@@ -175,7 +177,7 @@ def diagnose(
 
 
 def _by_drive(bench: Bench, found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
-    """What the drives say one by one of the chosen set, whose intervals grow where they differ."""
+    """Values of the chosen set drive by drive; intervals grow where the drives differ."""
     chosen = next((c for c in found.candidates if c.refit is outcome.chosen), None)
     if chosen is None:
         return outcome, ()
@@ -219,13 +221,13 @@ def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...
     p = found.tests[0].p_value
     if outcome.verdict != "no_effect" or p > options.level:
         return ()
-    return (f"The test found more than noise (p = {p:.2g}), but no effect that is large enough to be worth naming.",)
+    return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
 def _remainders(
     bench: Bench, found: Found, outcome: Outcome, options: Options
 ) -> tuple[Outcome, tuple[Remainder, ...]]:
-    """Functions in what is left, of the longest drive; they overrule a cause that explains less than they do."""
+    """Functions in the remainder of the longest drive; they overrule a cause that explains less than they do."""
     d = max(range(len(bench.drives)), key=lambda i: bench.drives[i].used_s)
     named = outcome.verdict in ("named", "compound", "cannot_tell") and outcome.chosen is not None
     left = outcome.chosen.residuals[d] if named and outcome.chosen is not None else bench.residuals[d]
@@ -246,11 +248,11 @@ def _remainders(
 
 def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
     drive = bench.drives[d]
-    # a law of water that is off by what its sources leave open is no function without a name, nor is what the car's
+    # an error of a water law within the range of its sources is not an unexplained function, nor is what the car's
     # drives differ by
     open_ = [c for h, columns in zip(bench.asked, bench.columns, strict=True) if h.of_water for c in columns]
     left = without_deviations(bench, d, left, sorted({*open_, *np.flatnonzero(bench.spread > 0.0).tolist()}))
-    # nor is anything else that a file or a tyre may be off by
+    # nor are the usual errors of a file or a tyre
     left = without_deviations(bench, d, left, range(bench.count), farthest=FARTHEST)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
     stack = Stack(left, drive.mask, block_step(drive.dt), drive.channels, drive.coordinates, noise)
@@ -271,7 +273,7 @@ def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Op
 def _extended(outcome: Outcome, remainders: tuple[Remainder, ...], model: Model, vehicle: Vehicle) -> Model:
     extended = model
     if outcome.chosen is not None:
-        # what is too small to be named is not put into the model either
+        # effects too small to be named are not put into the model either
         named = {c.key for c in outcome.causes}
         best = outcome.chosen
         extended = with_values(model, [
@@ -312,8 +314,8 @@ def _words(drive: Drive, defect: Defect, signals: Signals) -> str:
     origin = signals.origins.get("a_x")
     channel = origin.channel if origin is not None else "a_x"
     return (
-        f"a_x (channel {channel}) is not the acceleration of the car in {drive.name}: its changes follow those of the "
-        f"speed with a correlation of {defect.correlation:.2f} and {defect.gain:.2f} times their size"
+        f"a_x (channel {channel}) is not the acceleration of the car in {drive.name}: the correlation of its changes "
+        f"with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
     )
 
 

@@ -1,4 +1,4 @@
-"""From residuals to the sets of effects that explain them: one effect more as long as there is anything left."""
+"""From residuals to the sets of effects that explain them, adding effects until the test finds no more."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from aqualog.types import FloatArray
 __all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
 
 MOST = 3  # effects in one set
-CREDIBLE = 20.0  # evidence ratio within which sets cannot be told apart
+CREDIBLE = 20.0  # evidence ratio within which sets cannot be distinguished
 REFITTED = 6  # sets that are refitted in the simulator
 # of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
 SLACK, BENT = 8.0, 0.05
-# of the threshold, for every effect beside a first one: what simulator and car differ by grows with what is hidden
+# factor on the threshold for every further effect: errors of the simulator grow with the size of the hidden effects
 FURTHER = 1.5
-# share of what the best set gains by which the form of a law of water may have misjudged another thing that water does
+# share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
-HALF = 0.5  # of what the test asks for, that a set must take away once it is refitted
+HALF = 0.5  # share of the test's threshold that a set must still gain after refitting
 PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
 
 Tell = Callable[[str, float], None]
@@ -45,8 +45,8 @@ Tell = Callable[[str, float], None]
 class Candidate:
     """A refitted set with the ratio of the best set's evidence to its own; `inflation` of the noise's variances.
 
-    `sharp`: its loss where only a part of the tolerances is forgiven, in a metric that all candidates share: what tells
-    places of one effect apart. NaN where it was not asked.
+    `sharp`: its loss with only a part of the tolerances, in a metric that all candidates share; it distinguishes places
+    of one effect. NaN where it was not computed.
     """
 
     refit: Refit
@@ -56,7 +56,7 @@ class Candidate:
 
     @property
     def sd(self) -> FloatArray:
-        """Standard deviations of the values; what drives differ by is known without the noise. (k,)"""
+        """Standard deviations of the values; the drive-to-drive spread is not scaled with the noise. (k,)"""
         variance = np.diag(self.refit.covariance)
         days = self.refit.apart**2 if self.refit.apart is not None else np.zeros_like(variance)
         return np.asarray(np.sqrt((variance - days) * self.inflation + days))
@@ -65,9 +65,8 @@ class Candidate:
 @dataclass(frozen=True, slots=True)
 class Found:
     """`tests`: one for each effect that was looked for, the last one without a finding. `gram` and `calibration` are
-    those of the first: what the log can tell at all. `candidates` best first, empty without a finding. `noises` after
-    the best set.
-    """  # fmt: skip
+    those of the first test and describe what the log can distinguish. `candidates` best first, empty without a finding.
+    `noises` after the best set. """  # fmt: skip
 
     tests: tuple[Significance, ...]
     gram: FloatArray
@@ -77,7 +76,7 @@ class Found:
 
 
 def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Bench:
-    """Residuals of the drives under a model, and what every hypothesis would take away from them."""
+    """Residuals of the drives under a model, and their change by every hypothesis."""
     residuals, all_signatures = [], []
     total = len(asked) * len(drives)
     done = [0]
@@ -96,14 +95,14 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
 def search(
     bench: Bench, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
 ) -> Found:
-    """Test, best set, refit; again beside it, until nothing more is found or three effects are in the set."""
+    """Test, best set, refit; repeated beside that set until the test finds no more or the set has three effects."""
     tests: list[Significance] = []
     first: tuple[FloatArray, Calibration] | None = None
     accepted: tuple[int, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     work = bench
     while True:
-        tell("testing for anything at all" if not accepted else "testing for one effect more", 0.3 + 0.1 * len(tests))
+        tell("testing for any effect" if not accepted else "testing for one more effect", 0.3 + 0.1 * len(tests))
         gains, gram = largest(work, work.residuals, accepted)
         if first is not None and (nothing := _surely_nothing(work, gains, first[1], level)) is not None:
             tests.append(nothing)
@@ -139,7 +138,8 @@ def _ticker(tell: Tell, start: float, surrogates: int) -> Callable[[], None]:
 
     def tick() -> None:
         done[0] += 1
-        tell(f"noise of the same colour: {done[0]} of {surrogates}", min(start + 0.1 * done[0] / surrogates, 0.95))
+        share = min(start + 0.1 * done[0] / surrogates, 0.95)
+        tell(f"simulated noise with the same spectrum: {done[0]} of {surrogates}", share)
 
     return tick
 
@@ -158,11 +158,7 @@ def _tested(
 
 
 def _surely_nothing(bench: Bench, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
-    """The test's result where not even gains that no coloured noise has inflated are beyond Bonferroni's bound.
-
-    It is a floor of every threshold: surrogates, which cost most of the time, could not make a finding of it.
-    The bound is that of [bonferroni1936].
-    """
+    """The test's result if even gains without the inflation by coloured noise stay below Bonferroni's bound."""
     statistic = float((gains / [len(x) for x in bench.columns]).max())
     p = chance(statistic, c.tested)
     if p <= level:
@@ -189,8 +185,8 @@ def _refitted(
 ) -> tuple[Candidate, ...]:
     """Sets of one effect more than `base`, refitted in the simulator, best first; those at a physical bound are out.
 
-    None if the best of them does not take away from what the known set `now` leaves what the test asks of an effect:
-    then what the test found is not of the form of any effect.
+    None if the best of them gains less over the known set `now` than the test requires: the finding then does not have
+    the form of any effect.
     """
     size = len(base) + 1
     top = best_sets(bench, gram, size, within=0.0, most=1)
@@ -215,11 +211,11 @@ def _refitted(
     large = [r for r in done if _all_there(r, model)]
     if base and not large:
         return ()
-    # what is too small to be worth a word is another effect's disguise, if that one explains as much
+    # a set with a member too small to be named is dropped if another effect explains as much
     if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
         done = large
     y = whitened_residual(bench, noises, now.residuals if now is not None else bench.residuals)[None]
-    # how unlikely known values are is in the loss of every set that has them
+    # the penalty of known values is in the loss of every set that has them
     known_loss = float(measure.inner(y, y)[0, 0]) + (now.unlikely if now is not None else 0.0)
     if known is not None and (again := refit(bench, known, measure, model)) is not None:
         known_loss = min(known_loss, again.loss)
@@ -259,7 +255,7 @@ def _refitted(
 
 
 def _twins(bench: Bench, gram: FloatArray, top: SetFit, known: set[tuple[int, ...]]) -> list[SetFit]:
-    """The best set with one member changed for a known twin of it: these are refitted whatever their signatures say."""
+    """The best set with one member replaced by its known twin: always refitted, whatever their signatures predict."""
     out = []
     for k, m in enumerate(top.members):
         for name in bench.asked[m].effect.twins:
@@ -275,10 +271,7 @@ def _twins(bench: Bench, gram: FloatArray, top: SetFit, known: set[tuple[int, ..
 
 
 def _of_water(bench: Bench, gram: FloatArray, known: set[tuple[int, ...]]) -> list[SetFit]:
-    """What water may do to the whole car or to a side: refitted on every wet log whatever the signatures say.
-
-    Near floating slip goes with one over the square of the contact that is left: a tangent there is none elsewhere.
-    """
+    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict."""
     alone = [
         (i,) for i, h in enumerate(bench.asked)
         if h.of_water and not h.allowed and h.where not in AXLES and (i,) not in known
@@ -304,7 +297,7 @@ def _imitated(
 
 
 def _usual(r: Refit) -> bool:
-    """Whether no value is beyond three times its usual size: an offset that happens to be huge is no rival."""
+    """Whether every value stays within three times its usual size; a huge offset is not a plausible rival."""
     own = [(r.members[i].parameter(n), v) for (i, n), v in zip(r.names, r.values.tolist(), strict=True)]
     return all(abs(v - p.neutral) <= UNUSUAL * p.sigma for p, v in own)
 
@@ -328,11 +321,7 @@ def _index(bench: Bench, h: Hypothesis) -> int:
 
 
 def _around(bench: Bench, best: Refit, members: Sequence[int], model: Model) -> Bench:
-    """The bench with what is known of the best set put in place: its own signatures at its own values.
-
-    Residuals are those that a linear model around these values would have had at the start, so that sets are sought
-    anew from there.
-    """
+    """The bench with the signatures of the best set at its own values."""
     columns = [c for m in members for c in bench.columns[m]]
     start = best.values - np.array([value_in(model, best.members[i], n) for i, n in best.names])
     new_signatures, new_residuals = [], []

@@ -31,7 +31,7 @@ class SetFit:
 
 
 def fit_set(bench: Bench, gram: FloatArray, members: Sequence[int]) -> SetFit | None:
-    """Least squares of one set; None if its members cannot be told apart or a value is outside its bounds."""
+    """Least squares of one set; None if its members cannot be distinguished or a value is outside its bounds."""
     if bench.barred[list(members)].any():
         return None
     columns = tuple(c for m in members for c in bench.columns[m])
@@ -52,7 +52,7 @@ def fit_set(bench: Bench, gram: FloatArray, members: Sequence[int]) -> SetFit | 
 
 
 def _cancel(bench: Bench, gram: FloatArray, pair: tuple[int, int]) -> bool:
-    """Whether two effects are known twins and alike on these drives: large ones that cancel could be anything else."""
+    """Whether two effects are known twins and alike on these drives; large twins that cancel explain nothing."""
     a, b = (bench.asked[m].effect for m in pair)
     if b.name not in a.twins and a.name not in b.twins:
         return False
@@ -81,17 +81,14 @@ def gains_on_top(bench: Bench, gram: FloatArray, base: Sequence[int]) -> FloatAr
 
 
 def compatible(bench: Bench, members: Sequence[int]) -> bool:
-    """Whether a set names nothing twice: one effect at one wheel once, one variant of it; nor a delay of every signal.
-
-    Signals are late against one another: all of them together are another start of the log's clock.
-    """
+    """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal."""
     late = {bench.asked[m].where for m in members if bench.asked[m].effect.name == "signal_delay"}
     if len(late) > 1 and late == {h.where for h in bench.asked if h.effect.name == "signal_delay"}:
         return False
     seen: set[tuple[str, str]] = set()
     for m in members:
         h = bench.asked[m]
-        # a load at the front and one taken off the rear are no two loads, but the same car with another centre of mass
+        # a load at the front and one removed at the rear are not two loads, but a shift of the centre of mass
         whole = h.where is None or h.effect.name == "payload_mass"
         places = WHEELS if whole else AXLES.get(h.where or "", (h.where or "",))
         for p in places:

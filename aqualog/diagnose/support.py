@@ -1,8 +1,4 @@
-"""Effects that act everywhere must show where there is no water.
-
-On water a residual is what the laws of water make of it: a wheel with little contact left enlarges any slip, and two
-dry effects that cancel on the dry road could stand for a law that is off. Off the water nothing of that holds.
-"""
+"""Effects that act everywhere must also show off the water."""
 
 from __future__ import annotations
 
@@ -21,14 +17,11 @@ __all__ = ["supported"]
 
 SHOWN = 4.0  # of twice the log-likelihood off the water: two standard deviations
 BESIDE_S = 1.0  # [s] after a stretch, in which the rear axle and the speed still have it
-LEAST = 300  # samples off the water below which nothing is asked of them
+LEAST = 300  # samples off the water that the check needs at the least
 
 
 def supported(bench: Bench) -> Bench:
-    """The bench with effects barred that gain nothing off the water; the same bench on dry drives.
-
-    Effects of water are not asked, and neither are drives that are wet nearly all the time.
-    """
+    """The bench without effects that have no gain off the water; the same bench on dry drives."""
     if not any(d.course.lanes for d in bench.drives):
         return bench
     dry = [_off_water(d) for d in bench.drives]

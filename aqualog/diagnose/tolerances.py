@@ -1,8 +1,8 @@
-"""What a vehicle file and a simulator are never exact about, and nobody asks for: allowed for, not named.
+"""Quantities that no vehicle file or simulator has exactly: taken into account, but never reported as causes.
 
 The geometry of curves, the height of the centre of mass, the form of a tyre's curve, offsets of steering and gyro. Each
-has the form of an effect, so that what it does to the residuals follows from simulation like everything else.
-`friction` is mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line.
+has the form of an effect, so that simulation gives its change of the residuals. `friction` is mostly the curvature of a
+tyre's curve well below its peak: laws go from a parabola to a straight line.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ TOLERANCES: tuple[Effect, ...] = (
     _of("gyro_gain", "-", 0.02, _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
 )  # fmt: skip
 
-# the torque that the model needs on a flat road, for one that nobody logged: load, wind and slopes are not in it
+# the torque that the model needs on a flat road, in place of a missing one: load, wind and slopes are not in it
 STAND_IN = _of("stand_in_torque", "-", 0.2, _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))))
 
-# The form of the water's laws; their sizes are effects and have tolerances of their own. What a source leaves open as a
-# range is taken as two standard deviations to either side.
+# The form of the water's laws; their sizes are effects and have tolerances of their own. A range given by a source
+# counts as two standard deviations to either side.
 WATER_TOLERANCES: tuple[Effect, ...] = (
-    # 4 to 6 leave of the slip slope what was measured 20 km/h below full aquaplaning (D)
+    # 4 to 6 reproduce the slip slope measured 20 km/h below full aquaplaning (D)
     _of("contact_exponent", "-", 0.5, _plant(lambda p, x: p._replace(
         contact_exponent=np.maximum(p.contact_exponent + x, 1.0)))),
-    # no vehicle file tells the tread: voids of 0.25 to 0.35 at 1.6 mm (K)
+    # no vehicle file gives the tread: voids of 0.25 to 0.35 at 1.6 mm (K)
     _of("tread_capacity", "m", 5e-5, _plant(lambda p, x: p._replace(
         tread_capacity=np.maximum(p.tread_capacity + x, 0.0)))),
     # a fraction of the texture's depth, 0.6 to 1.6 times (K)

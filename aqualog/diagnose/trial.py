@@ -114,7 +114,7 @@ def of_log(case: Case) -> FloatArray:
 
 
 def of_run(case: Case, run: Run, kept: Sequence[int], sensor: Sensor | None = None) -> FloatArray:
-    """Whitened rows of a run, simulated under the best set; without effect if nothing of it can be used."""
+    """Whitened rows of a run, simulated under the best set; empty if no sample of it can be used."""
     drive = _driven(case, run, sensor)
     n_rows = len(case.rows(kept))
     if not drive.mask.any():

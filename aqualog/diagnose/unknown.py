@@ -21,7 +21,7 @@ from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Residuals", "find_remainders"]
 
-LEAST_S = 60.0  # [s] of drive below which nothing is looked for
+LEAST_S = 60.0  # [s] of drive that the search needs at the least
 SHORTLIST = 6  # coordinates of a channel that are compared on held-out stretches
 LEAST_NOISE = 0.05  # level of the noise beside a function, over that of the whitening
 CLIP = 5.0  # standard deviations from which a whitened residual is an outlier
@@ -85,7 +85,7 @@ def find_remainders(
     seed : int
         Of the surrogates; same seed, same answer.
     surrogates : int
-        Noise series with the spectra of the residual. Nothing is taken out of the residual before: a fit leaves a hole
+        Noise series with the spectra of the residual. No effect is removed from the residual before: a fit leaves a gap
         in the spectrum just where the test looks.
     most : int
         Remainders, at most; each is tested anew with those before in the model.
@@ -93,7 +93,7 @@ def find_remainders(
     Returns
     -------
     remainders : tuple of Remainder
-        `f` is NaN where the drive was not. Empty if nothing is found, or the drive is shorter than a minute.
+        `f` is NaN where the drive was not. Empty if the test finds no function, or the drive is shorter than a minute.
     """
     if np.count_nonzero(stack.mask) * stack.dt < LEAST_S:
         return ()

@@ -16,7 +16,7 @@ BLOCK_S = 5.0  # [s] held out together: longer than the noise remembers, shorter
 BLOCKS = 60  # of a long drive
 FOLDS = 6
 SURE = 2.0  # standard errors of a gain
-LEAST = 2.0  # [nats] of a gain
+LEAST = 2.0  # [nats: natural logarithm] of a gain
 
 Blocks = npt.NDArray[np.int64]
 
@@ -35,10 +35,10 @@ class Candidate(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """The coordinates that explain it; `equals` explain it as well as far as this drive can tell, `proxies` do not.
+    """The coordinates that explain it; `equals` explain it as well on this drive, `proxies` do not.
 
     A proxy explains some of it alone and nothing once the chosen coordinates are known. `gain` on held-out stretches,
-    in nats.
+    in nats (natural logarithm).
     """
 
     names: tuple[str, ...]
@@ -126,7 +126,7 @@ def _of_one(candidates: Sequence[Candidate], among: Sequence[int], gain: Callabl
     """The coordinate that explains most."""
     totals = {i: float(gain(i).sum()) for i in among}
     best = max(totals, key=lambda i: totals[i])
-    # what does not run with time can be carried to another drive: it wins where the drive cannot tell
+    # a coordinate other than time applies to other drives too: it wins where the drive cannot distinguish them
     plain = [i for i in among if not candidates[i].along]
     if candidates[best].along and plain:
         other = max(plain, key=lambda i: totals[i])

@@ -1,4 +1,4 @@
-"""What is left over, in a sentence."""
+"""The unexplained remainder, in a sentence."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["describe"]
 
 _COORDINATES: dict[str, tuple[str, str]] = {
     "v_x": ("speed", "m/s"),
-    "torque": ("torque", "N m"),
-    "a_x": ("acceleration", "m/s^2"),
-    "a_y": ("lateral acceleration", "m/s^2"),
+    "torque": ("torque", "N·m"),
+    "a_x": ("acceleration", "m/s²"),
+    "a_y": ("lateral acceleration", "m/s²"),
     "position": ("place on the road", "m"),
     "t": ("time", "s"),
     "water_depth": ("water depth", "m"),
@@ -24,9 +24,9 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "yaw_rate": ("yaw rate", "rad/s"),
 }
 _CHANNELS: dict[str, tuple[str, str]] = {
-    "force_balance": ("force balance", "m/s^2"),
-    "kinematic": ("accelerometer against wheel acceleration", "m/s^2"),
-    "lateral": ("lateral acceleration", "m/s^2"),
+    "force_balance": ("force balance", "m/s²"),
+    "kinematic": ("accelerometer against wheel acceleration", "m/s²"),
+    "lateral": ("lateral acceleration", "m/s²"),
     "axle_slip": ("slip between the axles", "m/s"),
     "side_slip_f": ("slip between the front wheels", "m/s"),
     "side_slip_r": ("slip between the rear wheels", "m/s"),
@@ -40,13 +40,13 @@ def describe(
     channel: str, choice: Choice, x: FloatArray, f: FloatArray, low: FloatArray, high: FloatArray, share: float,
     nearest: str | None, cosine: float,
 ) -> str:  # fmt: skip
-    """What of which channel depends on what, where it is largest, what else could stand behind it, what is alike.
+    """Sentences: the coordinate that the remainder depends on, its largest value, other explanations, similar effects.
 
     `x` (k, d), `f`, `low`, `high` (k,) as in a `Remainder`: NaN where the drive was not.
     """
     title, unit = _CHANNELS.get(channel, (channel, "?"))
     of = " and ".join(_word(n) for n in choice.names)
-    text = f"What no known effect explains of the {title} depends on {of} ({share:.0%} of the variance"
+    text = f"The unexplained part of the {title} depends on {of} ({share:.0%} of the variance"
     sure = np.isfinite(f) & ((low > 0.0) | (high < 0.0))
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(f), -1.0)))
@@ -58,12 +58,12 @@ def describe(
         text += f" {_list(choice.proxies).capitalize()} {is_} only {are}."
     plain = [e for e in choice.equals if not choice.along or e not in ("t", "position")]
     if plain:
-        text += f" This drive cannot tell it from {_list(plain)}."
+        text += f" This drive cannot distinguish it from {_list(plain)}."
     if choice.along:
-        text += " Without a second pass, a place on the road and a moment in time cannot be told apart."
+        text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
     if nearest is not None:
         alike = "looks nearly the same" if cosine >= ALIKE else "is the nearest known effect"
-        text += f" {nearest} {alike} (cosine {cosine:.2f})."
+        text += f" {nearest} {alike} (similarity {cosine:.2f} of 1)."
     return text
 
 

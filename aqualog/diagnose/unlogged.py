@@ -58,10 +58,10 @@ def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
 def road_wheel_angle(
     columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float, *, most: float
 ) -> FloatArray:
-    """Angle of the front wheels, measured or what makes the model turn as the gyro says. (n,) [rad], left positive
+    """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive
 
-    `most` [m/s^2]: lateral acceleration beyond which the angle is cut; more than what is used, for the led car could
-    spin.
+    `most` [m/s^2]: lateral acceleration beyond which the angle is cut; larger than in the samples used, because the
+    simulated car could spin.
     """
     understeer = understeer_gradient(Tyre().cornering_slope)
     if "steer_angle" in columns:

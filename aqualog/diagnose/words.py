@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from string import Formatter
 
 from aqualog.diagnose.records import Cause, Estimate
+from aqualog.units import displayed_unit
 
 __all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "verdict_sentence"]
 
@@ -19,7 +20,7 @@ _PLACES = {
 
 
 def place(where: str | None) -> str:
-    """` (front left wheel)`, or nothing for the whole car."""
+    """` (front left wheel)`, or an empty string for the whole car."""
     return "" if where is None else f" ({_PLACES.get(where, where)})"
 
 
@@ -27,7 +28,7 @@ def quantity(value: float, unit: str, *, change: bool = False) -> str:
     """A value with three digits and its unit; ratios without one."""
     sign = "+" if change else ""
     text = f"{value:{sign}.3g}"
-    return text if unit == "-" else f"{text} {unit.replace('*', ' ')}"
+    return text if unit == "-" else f"{text} {displayed_unit(unit)}"
 
 
 def name_of(effect: str, where: str | None) -> str:
@@ -48,12 +49,12 @@ def cause_sentence(effect: str, where: str | None, sentence: str, parameters: Ma
     if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"
-    told = "" if unit == "-" else f" {unit.replace('*', ' ')}"
+    told = "" if unit == "-" else f" {displayed_unit(unit)}"
     return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {_span(low, high)}{told}."
 
 
 def _span(low: float, high: float) -> str:
-    """`1.095 to 1.103`: as many digits as tell the two apart."""
+    """`1.095 to 1.103`: as many digits as needed to distinguish the two."""
     half = 0.5 * abs(high - low)
     if not 0.0 < half < math.inf:
         return f"{low:.3g} to {high:.3g}"
@@ -77,16 +78,14 @@ def verdict_sentence(
 ) -> str:
     """The verdict in one sentence.
 
-    `certain`: effects that are not in doubt where others cannot be told apart; `seen`: the test's p-value where it
+    `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
     found more than noise.
     """
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect" and seen is not None:
-        return (
-            f"No effect: more than noise is left (p = {seen:.2g}), but nothing that is large enough to be worth naming."
-        )
+        return f"No effect: more than noise is left (p = {seen:.2g}), but no effect large enough to be worth naming."
     if verdict == "no_effect":
-        return f"No effect: the model predicts what was measured, at a false-alarm level of {level:g}."
+        return f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}."
     if verdict == "named":
         return causes[0].sentence
     if verdict == "compound":
@@ -95,9 +94,9 @@ def verdict_sentence(
         sure = [name_of(c.effect, c.where) for c in causes if c.effect in certain]
         open_ones = [name_of(c.effect, c.where) for c in causes if c.effect not in certain]
         if sure and open_ones:
-            return f"Certain: {listed(sure)}; beside it this log cannot tell {listed(open_ones, 'or')} apart."
-        return f"Something is different, but this log cannot tell {listed(names, 'or')} apart."
+            return f"Certain: {listed(sure)}. This log cannot distinguish the other causes: {listed(open_ones, 'or')}."
+        return f"The car differs from the model, but this log cannot distinguish {listed(names)}."
     if verdict == "unexplained":
         known = f" beside {listed(names)}" if names else ""
-        return f"Something is different{known} that no effect of the library explains{reason}."
+        return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."
     return f"Not testable: {reason}."

@@ -148,7 +148,7 @@ def test_the_record_of_a_gain():
     assert 0.0 < g.low < g.log_score < g.high
     assert g.heldout == ("a", "b")
     assert not g.in_sample
-    assert g.notes == ("the interval of the log score holds for the drives named; there are too few to tell of others",)
+    assert g.notes == ("the interval of the log score holds for the drives named; they are too few for a wider statement",)
 
 
 def test_the_record_tells_what_is_worse():

@@ -92,7 +92,7 @@ def test_without_torque_a_wandering_accelerometer_is_no_road(hilly):
     wander = np.convolve(rng.standard_normal(before.shape[1] + 200), np.hanning(201), "valid")
     assert find_profile(alone, 0.1 * (wander / wander.std())[None, : before.shape[1]]) is None
     found = find_profile(alone, before[kinematic][None])
-    assert found is None or "cannot be told apart" in found.cause.sentence
+    assert found is None or "cannot be distinguished" in found.cause.sentence
 
 
 def test_a_road_too_small_to_be_named_is_in_the_model_all_the_same(hilly):

@@ -36,7 +36,7 @@ def test_exact_twins_are_a_coin_toss_with_a_relation():
     assert one.p_correct == pytest.approx(0.5, abs=0.02)
     assert (
         one.relation
-        == "On this log road grade of +0.002 rad looks exactly like accelerometer bias (longitudinal) of +0.0196 m/s^2."
+        == "On this log road grade of +0.002 rad looks exactly like accelerometer bias (longitudinal) of +0.0196 m/s²."
     )
     assert one.sizes == pytest.approx((0.002, 0.01962), rel=1e-3)
     other = pair(found, "accelerometer_bias@a_x", "road_grade")

@@ -96,7 +96,7 @@ def test_places_of_one_effect_are_one_cause():
     o = told(candidate(tyre_radius_fl=0.01), candidate(2.0, tyre_radius_f=0.01))
     assert o.verdict == "named"
     assert names(o) == ["tyre_radius@fl"]
-    assert any(n.startswith("As well possible: ") and "front axle" in n for n in o.small)
+    assert any(n.startswith("Equally possible: ") and "front axle" in n for n in o.small)
 
 
 @pytest.mark.parametrize(("worse", "place"), [(0.0, "tyre_radius@f"), (12.0, "tyre_radius@fl")])
@@ -107,7 +107,7 @@ def test_the_place_is_where_what_is_known_speaks_for_it(worse, place):
     o = told(axle, wheel)
     assert o.verdict == "named"
     assert names(o) == [place]
-    assert any("As well possible" in n for n in o.small) == (worse == 0.0)
+    assert any("Equally possible" in n for n in o.small) == (worse == 0.0)
 
 
 def test_what_is_too_small_is_said_and_not_named():
@@ -166,9 +166,9 @@ def test_what_is_certain_is_not_called_open():
 
     causes = [Cause(n, None, {}, (), "") for n in ("payload_mass", "aero_drag", "head_wind")]
     said = verdict_sentence("cannot_tell", causes, level=0.01, certain=frozenset({"payload_mass"}))
-    assert said == "Certain: payload mass; beside it this log cannot tell aero drag or head wind apart."
+    assert said == "Certain: payload mass. This log cannot distinguish the other causes: aero drag or head wind."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
-    assert both == "Something is different, but this log cannot tell aero drag or head wind apart."
+    assert both == "The car differs from the model, but this log cannot distinguish aero drag and head wind."
 
 
 def test_what_days_differ_by_is_not_multiplied_with_the_noise():

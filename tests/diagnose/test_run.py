@@ -48,7 +48,7 @@ def keys(d):
 def test_no_effect():
     d = told()
     assert d.verdict == "no_effect"
-    assert d.sentence == "No effect: the model predicts what was measured, at a false-alarm level of 0.01."
+    assert d.sentence == "No effect: the model agrees with the measurement, at a false-alarm level of 0.01."
     assert (d.causes, d.gain, d.model) == ((), None, Model())
     assert {x.effect for x in d.limits} == {k.split("@")[0] for k in FEW}
 

@@ -142,7 +142,7 @@ def test_one_pass_cannot_tell_place_from_time():
     x, one = np.linspace(0.0, 10.0, 5)[:, None], np.ones(5)
     text = describe("kinematic", choice, x, one, 0.5 * one, 2.0 * one, 0.3, "road_grade", 0.4)
     assert "Without a second pass" in text
-    assert "road_grade is the nearest known effect (cosine 0.40)" in text
+    assert "road_grade is the nearest known effect (similarity 0.40 of 1)" in text
 
 
 @pytest.mark.parametrize("passed", [True, False])

@@ -37,7 +37,7 @@ def test_a_brake_is_left_out_of_a_log_without_torque():
     assert not d.mask[405:435].any()
     assert d.mask[50:380].all()
     assert d.mask[480:880].all()
-    assert any("what is slower than rolling out is left out" in n for n in d.notes)
+    assert any("only driving and rolling out are used" in n for n in d.notes)
 
 
 def test_a_drive_without_brakes_is_used_without_torque_too():

@@ -34,4 +34,4 @@ def test_an_interval_has_the_unit_of_the_value():
 def test_more_than_noise_and_nothing_large_is_one_sentence():
     text = verdict_sentence("no_effect", (), level=0.01, seen=0.0022)
     assert "more than noise is left (p = 0.0022)" in text
-    assert "predicts what was measured" not in text
+    assert "agrees with the measurement" not in text

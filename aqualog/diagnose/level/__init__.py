@@ -1,4 +1,4 @@
-"""What a campaign's slip slope and resistance say is wrong with the model of tyre and water."""
+"""Diagnosis of the tyre and water model from a campaign's slip slope and resistance."""
 
 from aqualog.diagnose.level.run import diagnose_campaign
 

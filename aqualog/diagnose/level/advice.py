@@ -1,4 +1,4 @@
-"""Which runs to drive next: where the causes that are left expect the most different slip and resistance."""
+"""Runs to drive next: those in which the remaining causes predict the most different slip and resistance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["advice"]
 
 RUNS = 5
 MINUTES = 3.0  # of a run with its way back (K)
-ENOUGH = 10.8  # lambda from which two causes are taken for each other less than once in twenty times
+ENOUGH = 10.8  # lambda from which two causes are confused less than once in twenty times
 SPEEDS = (60, 70, 80, 90, 100, 110)  # [km/h]
 DEPTHS = (0.6, 1.3, 2.0, 2.5)  # [mm]
 WAY = 130.0  # [m] of lane (thesis Fig. 2.25)
@@ -45,7 +45,7 @@ class _Run:
 
 
 def advice(passes: Passes, survivors: Sequence[Refit], scatter: Fit) -> Manoeuvre | None:
-    """Five runs of the catalogue that best tell the two nearest causes apart.
+    """Five runs of the catalogue that best distinguish the two most similar causes.
 
     None with fewer than two survivors. The answer is `none` where no run does.
     """
@@ -72,15 +72,15 @@ def advice(passes: Passes, survivors: Sequence[Refit], scatter: Fit) -> Manoeuvr
         if energy > most:
             best, most = run, energy
     if best is None or now + most < 2.0 * now + 1.0:
-        sentence = f"None of the runs of the catalogue tells {pair[0]} from {pair[1]}."
+        sentence = f"No run of the catalogue distinguishes {pair[0]} from {pair[1]}."
         return Manoeuvre("none", (pair,), sentence, now, now + most, 0.0)
-    sentence = f"Drive {RUNS} runs {best.words}: they would tell {pair[0]} from {pair[1]}"
-    sentence += "." if now + most >= ENOUGH else " better, but hardly for sure."
+    sentence = f"Drive {RUNS} runs {best.words}: they would distinguish {pair[0]} from {pair[1]}"
+    sentence += "." if now + most >= ENOUGH else " better, but probably not with certainty."
     return Manoeuvre(best.name, (pair,), sentence, now, now + most, RUNS * MINUTES)
 
 
 def _catalogue(passes: Passes) -> list[_Run]:
-    """Runs about the configuration that was driven most on water."""
+    """Runs around the configuration that was driven most on water."""
     wet = [t.scenario for t in passes.told if t.wet is not None]
     usual = max(wet, key=lambda s: sum(o.tyre_front is s.tyre_front and o.p_rear == s.p_rear for o in wet))
     right = usual.lanes[0].depth_right
@@ -95,7 +95,7 @@ def _catalogue(passes: Passes) -> list[_Run]:
             v = kmh / 3.6
             out += [
                 _Run(f"constant_{kmh}_{mm:g}", f"at {at}", scenario, v),
-                _Run(f"accelerated_{kmh}_{mm:g}", f"with 1 m/s^2 at {at}", scenario, v, 1.0),
+                _Run(f"accelerated_{kmh}_{mm:g}", f"with 1 m/s² at {at}", scenario, v, 1.0),
                 _Run(f"beside_track_{kmh}_{mm:g}", f"at {at} with the rear wheels beside the front ones' track",
                      scenario, v, beside=True),
                 _Run(f"rear_load_{kmh}_{mm:g}", f"at {at} with 270 kg over the rear axle",

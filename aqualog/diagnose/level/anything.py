@@ -1,4 +1,4 @@
-"""Is there anything at all: a family-wise test whose level campaigns without effect set."""
+"""Family-wise test for any effect; campaigns without effect set its level."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def anything(
         Deviation from the model.
     x : array (g, c, k)
     groups : sequence of (name, columns)
-        Columns of x that stand for one thing.
+        Columns of x that belong to one effect or function.
     surrogates : int
         Campaigns of the same runs without effect: scatter as the data say, each run's own deviation drawn anew from
         all runs' with random sign.
@@ -114,7 +114,7 @@ def _roots(road: FloatArray, found: Fit) -> FloatArray:
 
 
 def _white(y: FloatArray, road: FloatArray, nuisances: FloatArray, found: Fit) -> FloatArray:
-    """Deviations of the runs (g, c) in units of their scatter, of unit variance; what was not told is drawn as 0."""
+    """Deviations of the runs (g, c) in units of their scatter, of unit variance; missing values are drawn as 0."""
     known = np.isfinite(y)
     e = np.where(known, y - np.einsum("rck,k->rc", nuisances, found.size[: nuisances.shape[-1]]), 0.0)
     root = _roots(road, found)

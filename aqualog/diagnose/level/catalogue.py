@@ -1,4 +1,4 @@
-"""Effects that a campaign can tell, as terms of the simulator, and what each does to its runs."""
+"""Effects that a campaign can show, as terms of the simulator, and the change of its runs by each."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ class Hypothesis:
         return self.effect.parameters
 
     def goes_with(self, other: Hypothesis) -> bool:
-        """Whether both may be in one set: the whole car and one axle of the same effect say the same twice."""
+        """Whether both may be in one set; the whole car and one axle of the same effect would count the effect
+        twice."""
         return self.effect is not other.effect or (self.where is not None and other.where is not None)
 
 
@@ -61,16 +62,16 @@ class Library(NamedTuple):
 
 
 def hypotheses(passes: Passes) -> tuple[Hypothesis, ...]:
-    """What these runs may be asked about: stiffness of the driven axles, load only where it differs."""
+    """Hypotheses that these runs can test: stiffness of the driven axles, load only where it differs."""
     axles = tuple(dict.fromkeys(n[-2] for n in passes.names if n.startswith("slip_slope_")))
     found = [Hypothesis(EFFECTS[name], where) for name, places in _PLACES.items() for where in places]
     return (*found, *(Hypothesis(EFFECTS["slip_stiffness"], axle) for axle in axles))
 
 
 def untested(tested: Sequence[Hypothesis]) -> dict[str, str]:
-    """Effects of the simulator that are not asked for here, and why."""
+    """Effects of the simulator that are not tested here, with the reason."""
     names = {h.effect.name for h in tested}
-    reason = "acts alike on and off the water, which a campaign's cells take the difference of: diagnose single drives"
+    reason = "acts alike on and off the water, so a campaign's wet-dry difference cancels it: diagnose single drives"
     return {name: reason for name in EFFECTS if name not in names}
 
 
@@ -88,7 +89,7 @@ def library(passes: Passes, base: Model, tested: Sequence[Hypothesis]) -> Librar
     ----------
     passes : Passes
     base : Model
-        Terms that are taken for granted.
+        Terms that are assumed to be right.
     tested : sequence of Hypothesis
     """
     expected, road = expected_values(passes, base)
@@ -109,7 +110,7 @@ def library(passes: Passes, base: Model, tested: Sequence[Hypothesis]) -> Librar
 
 
 def _points_of_road(passes: Passes) -> FloatArray:
-    """By how much a run's mean is steadier than one point of its lane: correlation length over the way, (g, 1)."""
+    """Variance of a run's mean relative to one point of its lane: correlation length over distance, (g, 1)."""
     out = np.zeros((len(passes.told), 1))
     for r, told in enumerate(passes.told):
         if told.wet is not None:

@@ -1,4 +1,4 @@
-"""What tyre, water and car make of slip and resistance at a speed and traction: the simulator's equations, steady.
+"""Expected slip and resistance of tyre, water and car at a speed and traction: the simulator's steady equations.
 
 The simulation's right-hand side (`aqualog.model.kernel`) without its time: each wheel's water, contact and slip at the
 traction that was measured, averaged over the fluctuation of contact and water's depth instead of drawn once.
@@ -44,8 +44,8 @@ class Driven(NamedTuple):
 class Response(NamedTuple):
     """Expectation (4, n), or (n,) for the car, and variances over the fluctuation of contact and water.
 
-    `slip` [-] at the traction told, NaN where no contact carries it; `contact` L [-]; `resistance` [m/s^2]: what the
-    torques should have given and the water takes; `lost` (4, n): share of the fluctuation at which the wheel spins.
+    `slip` [-] at the given traction, NaN where the contact cannot carry it; `contact` L [-]; `resistance` [m/s²]:
+    deceleration by the water; `lost` (4, n): share of the fluctuation at which the wheel spins.
     """
 
     slip: FloatArray
@@ -69,8 +69,8 @@ def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.b
         On the water, or on dry road.
     driven : Driven
 
-    Left out: the wheels' inertia, pitch of the body, what a wheel that has stopped leaves and drags. Near full
-    aquaplaning, where `lost` is not 0, that is no longer small.
+    The equations omit the wheels' inertia, the pitch of the body, and the drag and wake of a stopped wheel. Near full
+    aquaplaning, where `lost` is not 0, these are no longer small.
     """
     plants = [flat(s.plant) for s in setups]
     cars, wheels = (np.concatenate([p[i] for p in plants]) for i in (0, 1))
@@ -99,7 +99,7 @@ _wave_drag = inlined(water.wave_drag)
 _residual_film = inlined(water.residual_film)
 _load_factor = inlined(rolling.load_factor)
 _SPIN_UP = float(hydroplaning.SPIN_UP_RATIO)
-_FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
+_FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance comes from the road, half from the wheel itself
 _CONTACT_STEP, _SHARE_STEP, _SHARE_MAX = float(_CONTACT[1]), float(_SHARE[1]), float(_SHARE[-1])
 
 

@@ -1,4 +1,4 @@
-"""What the extended model predicts better on runs that it was not fitted to: a depth, pressure or fold left out."""
+"""Gain of the extended model on runs that it was not fitted to: a depth, pressure or fold left out."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def gain(
     Returns
     -------
     Gain
-        `log_score` in nats over all runs left out, with its interval from drawing runs anew; None without wet runs.
+        `log_score` in nats (natural logarithm) over all runs left out, with a bootstrap interval over runs; None
+        without wet runs.
     """
     wet = np.flatnonzero(np.isfinite(passes.values[:, -1]))
     if wet.size < 2 * FOLDS:

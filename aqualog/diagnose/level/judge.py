@@ -1,4 +1,4 @@
-"""What a campaign can tell apart before its residual is looked at, and how small an effect it would have shown."""
+"""Effects that a campaign can distinguish before its residual is used, and the smallest effects it can show."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aqualog.types import FloatArray
 __all__ = ["confusions", "limits"]
 
 POWER = 0.9
-ALIKE = 10.8  # lambda below which two effects are taken for each other once in twenty times
+ALIKE = 10.8  # lambda below which two effects are confused more than once in twenty times
 RIVALS = 3
 
 
@@ -46,9 +46,9 @@ def limits(
 
 
 def confusions(lib: Library, nuisances: FloatArray, weight: FloatArray, y: FloatArray) -> tuple[Confusion, ...]:
-    """Whitened energy of each effect at one standard deviation of its prior that sets of one to three others leave.
+    """Whitened energy of each effect, at one prior standard deviation, that one to three others cannot imitate.
 
-    Per effect the rival that leaves least, and larger sets where they leave half of that or less.
+    Per effect: the most similar rival, and larger sets that leave half of its energy or less.
     """
     information = _parts(lib, nuisances, weight, y)
     out = []
@@ -80,4 +80,4 @@ def _left(information: FloatArray, lib: Library, i: int, rivals: Sequence[int]) 
 def _relation(key: str, rivals: Sequence[str], separation: float) -> str:
     if separation >= ALIKE:
         return ""
-    return f"These runs hardly tell {key} from {' with '.join(rivals)}."
+    return f"These runs hardly distinguish {key} from {' with '.join(rivals)}."

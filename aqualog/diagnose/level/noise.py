@@ -1,4 +1,4 @@
-"""Scatter of a campaign's runs: covariance of their channels and what the road's fluctuation adds, told by the runs.
+"""Scatter of a campaign's runs, estimated from them: covariance of their channels plus the road's fluctuation.
 
 One run is one vector of channels, independent of the others. Its deviation from the model has the covariance
 Sigma + kappa D_r, with D_r the variance of the run's means that contact and depth give along its lane, and heavier
@@ -30,7 +30,7 @@ class Scatter(NamedTuple):
 
 
 class Design(NamedTuple):
-    """A linear question to the runs: `y` (g, c) with NaN where not told, `x` (g, c, k), `road` (g, c) variances, and
+    """A linear model of the runs: `y` (g, c) with NaN where not available, `x` (g, c, k), `road` (g, c) variances, and
     `prior` (k,) precision of each column's size, 0 for free ones.
     """
 
@@ -98,7 +98,7 @@ def fit(d: Design, *, start: Scatter | None = None, rounds: int = ROUNDS) -> Fit
 
 
 def _tails(d: Design, found: Fit, known: BoolArray) -> FloatArray:
-    """How much each run counts, by how far it is."""
+    """Weight of each run by its distance from the model."""
     e = np.where(known, d.y, 0.0) - d.x @ found.size
     far = np.einsum("rc,rc->r", e, (found.weight @ e[:, :, None])[:, :, 0]) / found.tail
     counted: FloatArray = (NU + known.sum(axis=1)) / (NU + far)

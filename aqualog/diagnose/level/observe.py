@@ -30,8 +30,8 @@ Index = NDArray[np.int64]
 
 
 class _Row(NamedTuple):
-    """`late`, `grown`: what a second of delay of v_x [1/s], and what radii that grow by 1e-3 s^2/m^2 v^2, add to the
-    slip: (on dry road, on the water less dry road).
+    """`late`, `grown`: slip added by one second of delay of v_x [1/s] and by radii that grow by 1e-3 s²/m² v², each as
+    (on dry road, on water minus dry road).
     """
 
     info: RunInfo
@@ -51,8 +51,8 @@ def passes_of(data: CampaignData, base: Vehicle | None = None) -> Passes:
     base : Vehicle, optional
         In place of the runs' vehicle files, without load.
 
-    A run counts once, however many samples it has: they are averaged. Where the base model lets a wheel lose nearly all
-    of its contact, the run is left out, whatever was measured there, so that the choice does not lean on the noise.
+    A run counts once, however many samples it has: they are averaged. A run is left out where a wheel of the base model
+    loses nearly all of its contact. The measurement plays no part, so that noise does not influence the choice.
     """
     left_out: Counter[str] = Counter()
     rows = []
@@ -109,7 +109,7 @@ def _row(data: CampaignData, info: RunInfo, base: Vehicle | None) -> _Row | str:
 
 
 def _change(x: FloatArray, dry: Index, wet: Index) -> tuple[float, float]:
-    """Mean of a column on dry road, and on the water less that; 0 where it is not known."""
+    """Mean of a column on dry road, and on water minus dry road; 0 where it is not known."""
     if not np.isfinite(x[dry]).any():
         return 0.0, 0.0
     level = float(np.nanmean(x[dry]))
@@ -117,11 +117,11 @@ def _change(x: FloatArray, dry: Index, wet: Index) -> tuple[float, float]:
 
 
 def _scenario(data: CampaignData, info: RunInfo, base: Vehicle | None) -> Scenario | str:
-    """The run as the simulation would be told: car, tyres, pressures, loads and an endless lane."""
+    """The run as a scenario of the simulation: car, tyres, pressures, loads and an endless lane."""
     told = info.run.values
     tyre = TYRES.get(str(told.get("tyre", "")))
     if tyre is None:
-        return f"the model does not know the tyre {told.get('tyre', 'that is not given')}"
+        return f"tyre not known to the model: {told.get('tyre', 'not given')}"
     front, rear = (told.get(f"pressure_{axle}_bar") for axle in ("front", "rear"))
     if not isinstance(front, float) or not isinstance(rear, float):
         return "the tyre pressures are not given"

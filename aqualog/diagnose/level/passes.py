@@ -1,4 +1,4 @@
-"""A campaign's runs as the few numbers that the diagnosis compares: slip and resistance on the water against dry."""
+"""A campaign's runs as the few numbers that the diagnosis compares: slip and resistance on water against dry."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ __all__ = ["RESISTANCE", "Passes", "Told", "channels_of", "doubted", "expected_v
 RESISTANCE = "resistance"
 LOST_MAX = 0.01  # share of the fluctuation at which a wheel spins; beyond, no steady expectation holds
 STEADY = 0.015  # relative error of the steady expectation against the simulation, measured on runs without effect
-FRICTION = 0.2  # relative: "known to 10 or 20 %", and it stands for the shape of the curve too
+FRICTION = 0.2  # relative: "known to 10 or 20 %"; it also covers the shape of the curve
 CONTACT_MIN = 0.3  # [-] of any wheel; below, the passage to full aquaplaning is not steady
 
 
 class Question(NamedTuple):
-    """What the model is asked at once: samples (n,) of all runs, each with its `run`, its scenario (`which`), `wet`."""
+    """Samples (n,) of all runs, evaluated in one call of the model, each with its `run`, scenario (`which`) and
+    `wet`."""
 
     scenarios: tuple[Scenario, ...]
     run: NDArray[np.int64]
@@ -37,7 +38,7 @@ class Question(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What of a run goes into the expectation: configuration (equal ones share a plant), and how it was driven."""
+    """Inputs of a run for the expectation: configuration (equal ones share a plant) and driving state."""
 
     scenario: Scenario
     wet: Driven | None
@@ -48,11 +49,11 @@ class Told(NamedTuple):
 class Passes:
     """Observations of a campaign, one row per run.
 
-    `values` (g, c), NaN where a run does not tell it; for each driven wheel `slip_slope_<w>`: mean slip on the water
-    less that on dry road, and `dry_<w>`: mean slip on dry road [-]; `resistance`: mean of the resistance measure on the
-    water less the run's dry level [m/s^2]. `names` (c,). `told` (g,) what the model needs. `coordinates` by name (g,):
-    `v_x`, `depth` [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `infos` (g,).
-    `left_out`: runs, by reason.
+    `values` (g, c), NaN where a run has no value; for each driven wheel `slip_slope_<w>`: mean slip on water minus mean
+    slip on dry road, and `dry_<w>`: mean slip on dry road [-]; `resistance`: mean resistance measure on water minus the
+    run's dry level [m/s²]. `names` (c,). `told` (g,): inputs of the model. `coordinates` by name (g,): `v_x`, `depth`
+    [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `infos` (g,). `left_out`: runs, by
+    reason.
     """
 
     names: tuple[str, ...]
@@ -82,7 +83,7 @@ def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
 
 
 def question_of(told: Sequence[Told]) -> Question:
-    """All samples of the runs in one, so that the model is asked once."""
+    """All samples of the runs together, so that one call of the model evaluates them."""
     scenarios: dict[str, int] = {}
     kept: list[Scenario] = []
     run, which, wet, parts = [], [], [], []
@@ -105,12 +106,7 @@ def question_of(told: Sequence[Told]) -> Question:
 
 
 def doubted(passes: Passes, base: Model) -> Passes:
-    """The same runs with columns before the free ones for what the expectation itself is not sure of.
-
-    The steady expectation is good to `STEADY`, one share for all slips on the water and one for the resistance; and the
-    tyre's curve bends by a friction that is known to `FRICTION`. All are the same in all runs, with that prior
-    (`noise.prior_of`): more runs do not make an approximation true.
-    """
+    """The same runs with additional columns, before the free ones, for the uncertainty of the expectation itself."""
     expected = expected_values(passes, base)[0]
     columns = np.zeros((*expected.shape, 3))
     columns[:, :, 2] = np.nan_to_num(expected_values(passes, base, friction=1.0 + FRICTION)[0] - expected)
@@ -134,8 +130,8 @@ def steady(passes: Passes, model: Model) -> list[int]:
 
 
 def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """What a model expects of the observations (g, c), and the variances (g, c) that the road's fluctuation gives one
-    point of it. `friction`: factor on that of all wheels.
+    """Expected observations of a model (g, c), and the variances (g, c) of one point by the road's fluctuation.
+    `friction`: factor on that of all wheels.
     """
     q = passes.question
     setups = [assemble(s, model) for s in q.scenarios]

@@ -1,4 +1,4 @@
-"""What no effect of the library explains, as a function of speed, depth, pressure or load."""
+"""Deviation that no effect of the library explains, as a function of speed, depth, pressure or load."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def remainders(
     surrogates: int,
     report: Callable[[float], None] = lambda share: None,
 ) -> tuple[tuple[Remainder, ...], Anything | None]:
-    """Test whether the residual of the best set is a function of something, and describe it.
+    """Test whether the residual of the best set is a function of a coordinate, and describe it.
 
     Parameters
     ----------
@@ -136,11 +136,11 @@ def _described(
     left = e - made[:, list(s.channels)]
     share = max(1.0 - float(np.nansum(left**2) / np.nansum(e**2)), 0.0)
     nearest, cosine = _nearest(made, residual, lib, free, scatter)
-    unit = "m/s^2" if s.name == RESISTANCE else "slip"
+    unit = "m/s²" if s.name == RESISTANCE else "slip"
     word = COORDINATES[s.coordinate]
     sentence = (
         f"{s.name} departs from the model by {f.min():+.2g} to {f.max():+.2g} ({unit}) over the {word}; "
-        f"the most alike effect is {nearest} (cosine {cosine:.2f})."
+        f"the most similar effect is {nearest} (similarity {cosine:.2f} of 1)."
     )  # fmt: skip
     return Remainder(
         s.name, (s.coordinate,), share, p_value, s.knots[:, None], f, f - half, f + half, tuple(proxies), nearest,

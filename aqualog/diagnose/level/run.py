@@ -1,4 +1,4 @@
-"""A whole campaign against the model: what is wrong with tyre and water, how large, how sure."""
+"""A whole campaign against the model: errors of the tyre and water model, with size and interval."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = ["diagnose_campaign"]
 
 LEAST_RUNS = 12
 AGAIN_WITHIN = 15.0  # log evidence: sets that are fitted again where runs fell out
-SHARE = 0.1  # of a channel's change that a cause must make up to explain it
+SHARE = 0.1  # share of a channel's change that a cause needs in order to explain it
 
 Progress = Callable[[str], None]
 
@@ -47,7 +47,7 @@ def diagnose_campaign(
     model: Model | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Name what the model of tyre and water gets wrong over a campaign.
+    """Name the errors of the tyre and water model over a campaign.
 
     Parameters
     ----------
@@ -60,22 +60,22 @@ def diagnose_campaign(
     seed : int
         Of the surrogates and draws; the same seed gives the same diagnosis.
     level : float
-        Family-wise probability of finding something where nothing is.
+        Family-wise probability of a finding where no effect is present.
     surrogates : int
         Campaigns without effect that the test is calibrated with; at least 1 / level.
     model : Model, optional
-        Terms that are taken for granted.
+        Terms that are assumed to be right.
     progress : callable, optional
-        Told what is being done.
+        Called with the name of each step.
 
     Returns
     -------
     Diagnosis
-        Channels `slip_slope_<wheel>` and `resistance`. `duration_s` of the runs' driving on water and `used_s` of what
-        counted.
+        Channels `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part
+        that was used.
 
-    A run is the independent unit throughout: each is one vector of means, its slips and resistance on the water less
-    those on dry road, against the model's expectation at the speed and traction that were driven.
+    A run is the independent unit throughout: each is one vector of means, its slips and resistance on water minus those
+    on dry road. It is compared with the model's expectation at the driven speed and traction.
     """
     say = progress or (lambda what: None)
     base = model or Model()
@@ -89,7 +89,7 @@ def diagnose_campaign(
     passes = doubted(passes, base)
     say("signatures of the effects")
     lib = library(passes, base, tested)
-    say("is there anything")
+    say("testing for any effect")
     groups = [(h.key, c) for h, c in zip(lib.hypotheses, lib.columns, strict=True)]
     first = anything(
         passes.values - lib.base, lib.x, groups, lib.road, passes.nuisances, rng=rng, level=level, surrogates=surrogates
@@ -98,7 +98,7 @@ def diagnose_campaign(
     if found is not None:
         kept = steady(passes, found.sets[0].model)
         if len(kept) < len(passes.told) and len(kept) >= LEAST_RUNS:
-            say("without the runs that float by that")
+            say("repeating without runs that float in the new model")
             passes = passes.part(kept)
             lib = library(passes, base, tested)
             near = [r for r in found.tried if r.log_evidence > found.sets[0].log_evidence - AGAIN_WITHIN]
@@ -107,7 +107,7 @@ def diagnose_campaign(
 
 
 def _not_testable(data: CampaignData, passes: Passes, base: Model, wet: int) -> Diagnosis:
-    notes = (f"{wet} runs on water count, at least {LEAST_RUNS} needed", *_notes(passes))
+    notes = (f"{wet} usable runs on water, at least {LEAST_RUNS} needed", *_notes(passes))
     sentence = verdict_sentence("not_testable", (), (), (), wet)
     return Diagnosis(
         "not_testable", sentence, _names(passes), _driven_s(data), float(passes.seconds.sum()), (), (), None, (), (),
@@ -123,7 +123,7 @@ def _diagnosed(
     y = passes.values - lib.base
     scatter = found.scatter if found else whole_fit(y, lib.x, lib.road, passes.nuisances)
     best = found.sets[0] if found else None
-    say("what is left")
+    say("describing what is not explained")
     left, _ = remainders(
         passes, best.residual if best else y, best.x if best else nothing, lib, scatter, rng=rng, level=level,
         surrogates=max(surrogates // 2, math.ceil(1.0 / level)),
@@ -133,10 +133,10 @@ def _diagnosed(
     won = gain(passes, compared(found), scatter, lib.base, rng) if found else None
     notes = list(_notes(passes))
     if verdict in ("named", "compound") and won is not None and not won.low > 0.0:
-        notes.append("the effects found do not predict runs that were left out any better, and are not named")
+        notes.append("the effects found do not improve the prediction of held-out runs and are not named")
         verdict, chosen, rivals = "no_effect", None, []
     if verdict == "no_effect" and first.p_value <= level:
-        notes.append("the runs depart from the model, but no effect worth naming is 20 times likelier than none")
+        notes.append("the runs deviate from the model, but no effect worth naming is 20 times more likely than none")
     causes = _causes(chosen, passes, scatter) if chosen else ()
     others = tuple(
         Alternative(_causes(r, passes, scatter), float(np.exp(best.log_evidence - r.log_evidence)))
@@ -162,11 +162,7 @@ def _diagnosed(
 
 
 def judged(found: Found | None, left: Sequence[Remainder]) -> tuple[Verdict, Refit | None, list[Refit]]:
-    """Verdict, the set that is reported, and the credible sets beside it.
-
-    Effects that stand in every credible set are named; if no credible set consists of just these, the runs cannot tell.
-    A function that is left of the best set says that the library does not hold the cause.
-    """
+    """Verdict, the reported set, and the other credible sets."""
     if left:
         return "unexplained", None, []
     if found is None or any(not r.chosen for r in found.sets):

@@ -1,4 +1,4 @@
-"""Which sets of effects explain a campaign's deviation: the credible set of sets."""
+"""Sets of effects that explain a campaign's deviation: all credible sets."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def linear_evidence(
 
 
 class Found(NamedTuple):
-    """Credible sets, best first; the scatter that the best one leaves; every set that was fitted."""
+    """Credible sets, best first; the scatter after the best one; every set that was fitted."""
 
     sets: list[Refit]
     scatter: Fit
@@ -81,10 +81,11 @@ def credible(
     known : sequence of Refit
         Sets to begin with, from other runs of the same campaign; without them every single effect is tried.
     report : callable
-        Told what is being fitted.
+        Called with the name of each step.
 
-    The linear library shows where to look, but effects bend. So every single one is fitted in the model; about the best
-    ones the library is made anew, and the best sets that hold them, up to three effects, are fitted in the model too.
+    The linear library shows where to search, but effects are nonlinear. So every single effect is fitted in the model.
+    Around the best ones the library is computed again, and the best sets that hold them, of up to three effects, are
+    fitted in the model too.
     """
     per_effect = max(float(len(lib.hypotheses)), 2.0)
     if known:

@@ -23,7 +23,7 @@ def views(name: str, passes: Passes, before: FloatArray, after: FloatArray) -> t
         if channel.startswith("dry_"):
             continue
         is_force = channel == RESISTANCE
-        title = "resistance on the water" if is_force else f"slip of {channel[-2:]} on the water less that on dry road"
+        title = "resistance on the water" if is_force else f"slip of {channel[-2:]} on water minus slip on dry road"
         unit = "m/s^2" if is_force else "-"
         out.append(
             ResidualView(name, channel, title, unit, math.nan, coordinates, before[order, c], after[order, c])

@@ -28,17 +28,17 @@ def cause_sentence(effect: str, where: str | None, values: Sequence[tuple[str, E
         mm = f"{1e3 * first.value:+.2f} mm (95 %: {1e3 * first.low:+.2f} ... {1e3 * first.high:+.2f} mm)"
         return f"The film that the front wheels leave to the rear ones differs by {mm} from the tyre model's."
     if effect == "contact_loss":
-        return f"The water lifts {first.value:.2f} times as much of the contact of {place} {span} as the model says."
+        return f"The water lifts {first.value:.2f} times as much of the contact of {place} {span} as in the model."
     if effect == "water_drag":
-        return f"Film and bow wave drag {first.value:.2f} times as much on {place} {span} as the model says."
+        return f"Film and bow wave drag {first.value:.2f} times as much on {place} {span} as in the model."
     if effect == "uneven_water":
         more = values[1][1]
         return (
-            f"{place[0].upper()}{place[1:]} has {first.value:.2f} of the depth that the table of runs says {span}, and "
-            f"it is more irregular by {more.value:.2f} of its depth (95 %: {more.low:.2f} ... {more.high:.2f})."
+            f"{place[0].upper()}{place[1:]} has {first.value:.2f} times the depth of the table of runs {span}, and "
+            f"its irregularity is larger by {more.value:.2f} of the depth (95 %: {more.low:.2f} ... {more.high:.2f})."
         )
     if effect == "load_sensitivity":
-        return f"The slip slope follows the wheel load by {first.value:+.2f} more than the tyre model's {span}."
+        return f"The load sensitivity of the slip slope differs by {first.value:+.2f} from the tyre model's {span}."
     return f"The slip slope of {place} is {first.value:.2f} times the vehicle file's {span}."
 
 
@@ -48,20 +48,20 @@ def verdict_sentence(
 ) -> str:  # fmt: skip
     """The verdict in one or two sentences."""
     if verdict == "not_testable":
-        return "The campaign has too few runs on water and on dry road whose configuration the model knows."
+        return "The campaign has too few runs on water and on dry road with a configuration known to the model."
     if verdict == "no_effect":
-        return f"Slip slope and resistance of {runs} runs are what the model expects, within their scatter."
+        return f"Slip slope and resistance of {runs} runs agree with the model within their scatter."
     if verdict == "unexplained":
         first = remainders[0].sentence if remainders else ""
-        return f"The {runs} runs depart from the model in a way that no effect known here explains. {first}".strip()
+        return f"The {runs} runs deviate from the model in a way that no known effect explains. {first}".strip()
     if verdict == "cannot_tell":
         names = "; or ".join(" with ".join(c.key for c in a.causes) for a in alternatives)
-        return f"The {runs} runs depart from the model, and cannot tell the cause: {names}."
+        return f"The {runs} runs deviate from the model, but cannot distinguish the causes: {names}."
     text = " ".join(c.sentence for c in causes)
     places = {c.effect for c in causes} & {
         c.effect for a in alternatives for c in a.causes if c.key not in {d.key for d in causes}
     }
     if places:
         told = ", ".join(_NAMES.get(e, e) for e in sorted(places))
-        text += f" On which wheels is less sure ({told})."
+        text += f" The affected wheels are less certain ({told})."
     return text
