@@ -1,1 +1,1 @@
-"""Many drives together: results per log kept, regressions over speed, the number a tyre engineer wants."""
+"""Many drives together: stored results per log, regressions over speed, speed of full aquaplaning."""

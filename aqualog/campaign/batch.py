@@ -1,4 +1,4 @@
-"""Every log of a campaign through detection and features into its store: only what is new, whatever single logs do."""
+"""Runs detection and features for every new log of a campaign into its store; a failing log does not stop the rest."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ __all__ = [
 ]  # fmt: skip
 
 Report = Callable[[int, int, int], None]
-"""Told logs that are settled, logs in all, and failed ones so far."""
+"""Called with the numbers of finished logs, of all logs and of failed logs."""
 
-CRASHED = "its process ended without a word: out of memory, or a fault of a reading library"
-_HERE = 4  # so few logs are not worth the start of processes
+CRASHED = "its process ended without a message: out of memory, or a fault of a reading library"
+_HERE = 4  # for so few logs no processes are started
 
 
 @dataclass(frozen=True, slots=True)
 class Configured:
-    """A campaign with what its files say: vehicles and labels by path, signal map, databases, detectors' settings."""
+    """A campaign with the content of its files: vehicles and labels by path, signal map, databases, settings."""
 
     campaign: Campaign
     vehicles: Mapping[Path, Vehicle]
@@ -56,7 +56,7 @@ class Configured:
 class Job:
     """A log with the car that drove it, and the runs (by index) that it serves. `reason` if it cannot be worked on.
 
-    `seen` is the state of its files, and of the databases, for whose content `key` stands.
+    `seen` is the state of its files and databases, whose content `key` identifies.
     """
 
     key: str
@@ -68,10 +68,10 @@ class Job:
 
 
 class Fault(NamedTuple):
-    """Why a log gave nothing.
+    """Reason why a log gave no result.
 
-    `is_proven` by its content, so that only a change makes it worth another try; `ends_batch` where the store, not the
-    log, is at fault.
+    `is_proven`: its content is at fault, so that only a change of it justifies another try; `ends_batch`: the store,
+    not the log, is at fault.
     """
 
     reason: str
@@ -81,7 +81,7 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BatchOutcome:
-    """What came of a batch: logs measured now, logs that were there, and name -> reason of those that gave nothing."""
+    """Result of a batch: logs measured now, logs already there, and name -> reason of logs without result."""
 
     made: int
     kept: int
@@ -127,7 +127,7 @@ def _job(
 
 
 class Compared(NamedTuple):
-    """Jobs against the store: to measure by key, how many are there, failed before and why, and damaged files."""
+    """Jobs compared with the store: to measure (by key), already there, failed before with reasons, damaged files."""
 
     new: Mapping[str, Job]
     kept: int
@@ -136,7 +136,7 @@ class Compared(NamedTuple):
 
 
 def compared(todo: Sequence[Job], store: Store, *, force: bool) -> Compared:
-    """Which of the jobs a batch would measure, and what the store knows of the others."""
+    """Jobs that a batch would measure, and the store's state of the others."""
     done, known_failed = store.keys()
     asked = sorted(done & {j.key for j in todo})
     store.look_at(asked)
@@ -178,28 +178,28 @@ def run_batch(
     jobs : int
         Processes on this machine.
     limits : Limits
-        What one log may take.
+        Limits of one log.
     elsewhere : callable, optional
         Works on the logs in place of these processes: `aqualog.campaign.cluster.on_cluster`.
     force : bool
-        Also what is there already.
+        Measure logs again that already have results.
     report : callable
         Progress.
     told : callable
-        Told name and reason of every log that gives nothing, at once.
+        Called at once with name and reason of every log without result.
 
-    A log that fails leaves the others alone; if its content is at fault that is kept too, so that only a change of it,
-    of its configuration or of aqualog makes it be tried again. An interrupt loses nothing that is finished. A damaged
-    result counts as none. A store that is a shard's gets no tables. Where there is nothing to measure, the store may be
-    read-only or in use by another batch.
+    A log that fails does not affect the others. If its content is at fault, the failure is stored too, and the log is
+    tried again only after a change of it, of its configuration or of aqualog. An interrupt keeps all finished results.
+    A damaged result counts as missing. The store of a shard gets no tables. Where no log is left to measure, the store
+    may be read-only or in use by another batch.
 
     Raises
     ------
     ConfigError
-        If the folder is none of a store, or one that only this process sees while others are to work.
+        If the folder is not a store, or only this process sees it while others are to work.
     AqualogError
-        If it cannot be written or another batch writes there, or what other machines have written is not there; what
-        is finished stays.
+        If it cannot be written, another batch writes there, or results written by other machines are missing; finished
+        results stay.
     """
     store.check()
     if not store.is_shared and (elsewhere is not None or limits != NO_LIMITS):
@@ -219,12 +219,12 @@ def run_batch(
             _work(configured, store, plan.new, tally.record, jobs=jobs, limits=limits, elsewhere=elsewhere)
         except BaseException:
             if not store.part:
-                with suppress(AqualogError):  # what has ended the batch is what the user should know
+                with suppress(AqualogError):  # the user should see the reason that ended the batch
                     write_tables(configured, store, todo)
             raise
         if lost := tally.made - len(store.keys()[0] & plan.new.keys()):
             raise AqualogError(
-                f"{lost} results that were written are not here", where=store.name, expected="the disk of the start",
+                f"{lost} results that were written are missing", where=store.name, expected="the disk of the start",
                 hint="its mounts; the same command goes on with the rest",
             )  # fmt: skip
         if is_held and not store.part:
@@ -233,7 +233,7 @@ def run_batch(
 
 
 class _Tally:
-    """What has come of the logs so far."""
+    """State of the logs so far."""
 
     def __init__(
         self, configured: Configured, store: Store, total: int, plan: Compared, limits: Limits, report: Report,
@@ -314,7 +314,7 @@ def _work_elsewhere(
     elsewhere: WorkOn,
     record: Callable[[str, Fault | Crashed | None], None],
 ) -> None:
-    """Work on other machines, and see that what they have written is here."""
+    """Work on other machines, and check that their results are here."""
     made: set[str] = set()
 
     def taken(key: str, outcome: Fault | Crashed | None) -> None:
@@ -326,7 +326,7 @@ def _work_elsewhere(
     lost = made - store.keys()[0]
     if lost:
         raise AqualogError(
-            f"{len(lost)} results that workers have written are not here", where=store.name,
+            f"{len(lost)} results that workers have written are missing here", where=store.name,
             expected="the same store on every machine", hint="a shared disk, or a URL that means the same everywhere",
         )  # fmt: skip
 
@@ -341,7 +341,7 @@ def measure_one(
     dbc: tuple[Path, ...],
     settings: Settings,
 ) -> Fault | None:
-    """Measure one log into the store; none, or why it gave nothing."""
+    """Measure one log into the store; returns None, or the reason why it gave no result."""
     try:
         store = Store(address)
     except AqualogError as error:
@@ -353,7 +353,7 @@ def measure_one(
         found = _fault(error, logs)
     changed = change_since((*logs, *dbc), seen)
     if changed:
-        return Fault(changed)  # whatever was read, it is not what the key stands for
+        return Fault(changed)  # the content that was read does not belong to the key
     if found is not None:
         return found
     try:
@@ -366,7 +366,7 @@ def measure_one(
 
 
 def _fault(error: BaseException, logs: Sequence[Path]) -> Fault:
-    """Only what the reading itself says of a log is proven; a disk, memory or aqualog at fault may be well again."""
+    """Only faults found by reading a log are proven; faults of a disk, of memory or of aqualog may disappear."""
     behind: BaseException | None = error
     while behind is not None:
         if isinstance(behind, OSError | MemoryError):
@@ -396,6 +396,6 @@ def _measured(
 
 
 def name_of(campaign: Campaign, logs: Sequence[Path]) -> str:
-    """A drive as the campaign file names it."""
+    """Name of a drive as in the campaign file."""
     base = campaign.path.parent
     return "; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs)

@@ -28,10 +28,10 @@ ROADS = ("wet", "dry", "both")
 DEFAULT_KEYS = ("tyre", "pressure_rear_bar", "water_depth_mm", "load_front_kg", "load_rear_kg")
 DEPTH_KEYS = ("water_depth_mm", "water_depth_left_mm")
 SIDE = "side"
-_APART = 10_000_000  # between the steps of two wheels of one run, which are no neighbours
+_APART = 10_000_000  # distance between the steps of two wheels of one run, which are not neighbours
 
 Group = tuple[tuple[str, float | str | None], ...]
-"""Keys with their values; None where a run does not tell it."""
+"""Keys with their values; None where a run gives no value."""
 
 
 class Picked(NamedTuple):
@@ -71,7 +71,7 @@ class Plan:
 
     @property
     def roads(self) -> tuple[str, ...]:
-        """Roads that are told."""
+        """Roads of the table."""
         return ("wet", "dry") if self.road == "both" else (self.road,)
 
 
@@ -92,14 +92,14 @@ class Cell:
 
 
 def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0, road: str = "wet") -> Plan:
-    """Check what was said after --by, before any log is read.
+    """Check the value of --by before any log is read.
 
     Without any name: the keys of `DEFAULT_KEYS` in which the runs differ. Different cars are never put together.
 
     Raises
     ------
     ConfigError
-        On keys that no run tells, and on a road or width that makes no sense.
+        If no run has a key, or the road or width is not valid.
     """
     if road not in ROADS:
         raise ConfigError(f'--road "{road}"', expected=" ".join(ROADS))
@@ -167,7 +167,7 @@ def cells(
     wheels : callable
         Wheels of a run's car that count; `("",)` for the car as a whole.
     columns : callable
-        What of a run and a wheel is used, or why nothing. Samples with a NaN are left out.
+        Columns to use of a run and a wheel, or the reason why there are none. Samples with a NaN are left out.
     road : str
         `wet` or `dry`.
     by_speed : bool
@@ -184,7 +184,7 @@ def cells(
         samples = data.samples(info)
         on_road = road_of(samples, road)
         if np.isnan(samples.on_water).all():
-            left_out["on or off the water is not known"] += int(samples.t.size)
+            left_out["whether on or off the water is not known"] += int(samples.t.size)
         reason = samples.array("reason").astype(np.int64)
         good = on_road & (reason == 0) if only_usable else on_road
         if only_usable:

@@ -40,14 +40,14 @@ def on_cluster(
     address : str
         As dask writes it: `tcp://host:8786`.
     limits : Limits
-        What one item may take; of a step of reading what this process's environment says holds there too.
+        Limits of one item; the limits for a reading step in this process's environment hold on the workers too.
     tell : callable
-        Told how many workers there are.
+        Called with the number of workers.
 
-    Workers have each item done in a process beside them; one that ends its process is recorded as `Crashed`. A worker
-    that ends is replaced by another one: dask gives its task to the next; a task that has lost several is taken apart,
-    and the item that still loses them is recorded as `Crashed`, too. All paths of the tasks must mean the same on every
-    worker, also on those that join later.
+    Workers process each item in a separate process; an item that ends its process is recorded as `Crashed`. If a worker
+    ends, dask gives its task to another one. A task that has ended several workers is split, and the item that still
+    ends them is recorded as `Crashed`, too. All paths of the tasks must mean the same on every worker, also on those
+    that join later.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def on_cluster(
             # a client waits for ever where something else answers
             asyncio.run(asyncio.wait_for(_answer(address), 2.0 * _ANSWER_S))
             client: Any = Client(address, timeout=_ANSWER_S, set_as_default=False)
-        except Exception as error:  # what answers may say anything: dask then wants exabytes, or a web socket
+        except Exception as error:  # another kind of server may answer: dask then asks for exabytes, or a web socket
             raise ConfigError(
                 "no dask scheduler answers", where=address, expected="its address, tcp://host:8786",
                 hint="`dask scheduler` there, then `dask worker tcp://host:8786` on each machine",
@@ -82,7 +82,7 @@ def on_cluster(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep dask's own words off the terminal: what counts is told as one line."""
+    """Keep dask's own messages off the terminal; one line reports what matters."""
     names = ["asyncio", *(n for n in logging.root.manager.loggerDict if n.split(".")[0] in ("distributed", "tornado"))]
     levels = {n: logging.getLogger(n).level for n in names}
     for name in names:
@@ -100,7 +100,7 @@ async def _answer(address: str) -> None:
     Raises
     ------
     Exception
-        If not: of whatever kind dask makes of what answers.
+        If none answers; the type depends on dask and on what answers.
     """
     from distributed.comm import connect
     from distributed.security import Security
@@ -223,21 +223,21 @@ def _all(
     except (OSError, CommClosedError, FutureCancelledError) as error:
         raise _lost(address, error) from error
     except BaseException:
-        # what is in work is finished there and kept; what is not begun must not be
+        # items in work are finished and kept; items not begun must not be started
         with suppress(OSError, CommClosedError, FutureCancelledError, RuntimeError):
             client.cancel(list(held), force=True)
         raise
 
 
 class _Watch:
-    """Sees that there are workers at all: a scheduler without any keeps work for ever."""
+    """Checks that there are workers: a scheduler without workers waits for ever."""
 
     def __init__(self, client: Any, address: str) -> None:
         self._client, self._address = client, address
         self._seen = self._looked = time.monotonic()
 
     def look(self) -> None:
-        """Ask now and then.
+        """Check at intervals.
 
         Raises
         ------
@@ -253,13 +253,13 @@ class _Watch:
         elif now - self._seen > _ALONE_S:
             raise AqualogError(
                 f"has had no workers for {now - self._seen:.0f} s", where=self._address,
-                hint=f"`dask worker {self._address}` on each machine; what is done is kept, the same command "
+                hint=f"`dask worker {self._address}` on each machine; finished results are kept, the same command "
                 "goes on with the rest",
             )  # fmt: skip
 
 
 class Unfit(NamedTuple):
-    """A worker that cannot take part, and what it lacks."""
+    """A worker that cannot take part, with the reason."""
 
     worker: str
     lack: ConfigError

@@ -1,4 +1,4 @@
-"""The processes in which a dask worker has its logs read: a log that ends one costs that log, not the worker."""
+"""The processes in which a dask worker reads its logs: a log that ends its process does not end the worker."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ _IDLE_S = 30.0  # after its last log a process stays for the next task, and then
 
 
 class Bounds(NamedTuple):
-    """What the work may take: one item, and one step of reading."""
+    """Limits of the work: for one item, and for one reading step."""
 
     item: Limits
     reading: ReadLimits
 
 
 def bounds_here(asked: Bounds, memory: int | None) -> Bounds:
-    """What was asked for, else what this worker's environment says; never more memory than dask gives the worker.
+    """The requested limits, else those of this worker's environment; never more memory than dask gives the worker.
 
     Parameters
     ----------
     asked : Bounds
-        Of the command that asks; None is not set.
+        Of the command; None is not set.
     memory : int or None
         dask's limit of the worker, which it keeps for the worker's own process only. [byte]
 
     Raises
     ------
     ConfigError
-        If a variable of the environment is no number.
+        If a variable of the environment is not a number.
     """
     given = {name: value for name, value in asked.reading._asdict().items() if value is not None}
     reading = limits_from(os.environ)._replace(**given)
@@ -65,7 +65,7 @@ def hand(bounds: Bounds, folder: str | None = None) -> Iterator[Callable[..., An
     bounds : Bounds
         As of `bounds_here`.
     folder : str, optional
-        For what is temporary, in a folder of its own that goes with the process; default: the system's.
+        For temporary files, in a separate folder that is removed with the process; default: the system's.
 
     A thread at a time has a process; it is kept for a while, since its start takes longer than many a log.
     """
@@ -105,24 +105,24 @@ class _Hand:
         except BrokenProcessPool:
             seconds = time.monotonic() - began
             self.end()
-        # a process that others have used before may have been ended for what they took
+        # a process used before may have been ended for exceeding limits then
         return Crashed(seconds) if is_new else self.do(work, *task)
 
     def end(self) -> None:
-        """End the process, with what it has left behind."""
+        """End the process and remove its files."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
             shutil.rmtree(self._scratch, ignore_errors=True)
             self._pool = None
 
     def stay(self) -> None:
-        """Someone needs it."""
+        """Mark it as needed."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def leave_after(self, seconds: float) -> None:
-        """End it then, if nobody needs it."""
+        """End it at that time if it is not needed."""
         self._timer = Timer(seconds, self._leave)
         self._timer.daemon = True
         self._timer.start()
@@ -142,9 +142,9 @@ class _Hand:
 
 @contextmanager
 def _may_have_children() -> Iterator[None]:
-    """dask's workers are daemonic, and multiprocessing gives such no children: these would outlive them.
+    """Let a daemonic dask worker have child processes, which multiprocessing forbids because they might outlive it.
 
-    Ours end with their parent by themselves, and there is no public way to say so.
+    These children end with their parent by themselves, and multiprocessing has no public option for that.
     """
     config: dict[str, Any] = vars(multiprocessing.current_process()).get("_config", {})
     with _starting:

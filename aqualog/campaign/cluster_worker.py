@@ -1,4 +1,4 @@
-"""What a worker of a cluster must have in common with the machine that asks it: the code, the logs and the store."""
+"""Checks that a worker of a cluster has the same code, logs and store as the machine that gives it work."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from aqualog.io.whole import write_text
 __all__ = ["Asked", "Stamp", "asked_of", "own_stamp", "unlike"]
 
 Stamp = tuple[str, str]
-"""Version and hash of the sources behind a result."""
+"""Version and hash of the source code behind a result."""
 
 
 class Asked(NamedTuple):
-    """What is asked of a worker: to run this code, to see these files with their sizes [byte], and to reach these
-    places behind URLs, each with a mark in it.
+    """Requirements on a worker: this code, these files with their sizes [byte], and these places behind URLs, each with
+    a mark in it.
     """
 
     stamp: Stamp
@@ -37,9 +37,9 @@ def own_stamp() -> Stamp:
 
 @contextmanager
 def asked_of(tasks: Mapping[Any, tuple[Any, ...]]) -> Iterator[Asked]:
-    """What is asked before work on these tasks: a few of their files, and marks in their folders while it lasts.
+    """Requirements for these tasks: a few of their files, and marks in their folders while the work lasts.
 
-    A folder of the same name may lie on every machine; only one that is shared has the mark.
+    Every machine may have a folder of the same name; only a shared folder has the mark.
     """
     some = list(tasks.values())
     some = [some[i] for i in sorted({0, len(some) // 2, len(some) - 1})] if some else []
@@ -50,11 +50,11 @@ def asked_of(tasks: Mapping[Any, tuple[Any, ...]]) -> Iterator[Asked]:
     try:
         for url in urls:
             name = _mark()
-            with suppress(OSError, AqualogError):  # the batch's own results say so
+            with suppress(OSError, AqualogError):  # the batch's own results show it
                 place_of(url).write(name, b"seen\n")
                 places.append((url, name))
         for mark in marks:
-            with suppress(OSError):  # a source that is a folder and read-only; what cannot be written says so itself
+            with suppress(OSError):  # a read-only source folder; a folder that must be written raises its own error
                 write_text(mark, "seen\n")
         files = [p for p in (*paths, *marks) if p.is_file()]
         yield Asked(own_stamp(), tuple((p, p.stat().st_size) for p in files), tuple(places))
@@ -79,11 +79,11 @@ def _paths(values: Iterable[Any]) -> Iterator[Path]:
             yield from (v for v in value if isinstance(v, Path))
 
 
-_fit: set[Asked] = set()  # what this process has been found to have
+_fit: set[Asked] = set()  # requirements that this process was found to meet
 
 
 def unlike(asked: Asked) -> ConfigError | None:
-    """On a worker: what it has not, if anything; asked once a process, since workers may join at any time."""
+    """On a worker: the missing requirement, if any; checked once per process, since workers may join at any time."""
     if asked in _fit:
         return None
     own = own_stamp()
@@ -110,7 +110,7 @@ def unlike(asked: Asked) -> ConfigError | None:
 
 
 def _out_of_reach(url: str, name: str) -> str:
-    """Why results cannot be written there, or that it is another place than the one with the mark."""
+    """Reason why results cannot be written there, also if it is not the place with the mark."""
     try:
         place = place_of(url)
         if not place.has(name):

@@ -1,4 +1,4 @@
-"""By how much the reference velocity of a campaign is late, from dry driving at different accelerations."""
+"""Delay of a campaign's reference velocity, estimated from dry driving at different accelerations."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from aqualog.types import FloatArray
 __all__ = ["Delay", "delays", "source_of"]
 
 LEAST_RUNS = 3
-HALF_MAX = 0.03  # [s] known worse than that, the delay stays open: at 90 km/h 0.1 % of slip per m/s^2
+HALF_MAX = 0.03  # [s] half interval up to which a delay is used: at 90 km/h 0.1 % of slip per m/s^2
 LATEST = 1.0  # [s]
 U_MIN = 1e-3  # [1/s] a / v: 0.03 m/s^2 at 100 km/h
 _V_UNIT = 30.0  # [m/s]
 
 Source = tuple[str, str]
-"""Vehicle file and what the slip is against."""
+"""Vehicle file and reference of the slip."""
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
     """Delay of v_x against the wheels of one car, late positive. [s]
 
-    `value` and `ci`: NaN where not told, then `reason` says why, and a slope has to be told together with the delay.
+    `value` and `ci` are NaN without an estimate. `reason` then gives the cause, and a slope must be estimated together
+    with the delay.
     """
 
     vehicle: str
@@ -51,17 +52,17 @@ class Delay:
 
 
 def source_of(info: RunInfo) -> Source:
-    """What runs must share to have one delay."""
+    """Properties that runs with one delay share."""
     return info.run.vehicle.stem, str(info.about.get("slip_against", "none"))
 
 
 def delays(data: CampaignData) -> dict[Source, Delay]:
-    """Delays of all cars whose slip is against a measured velocity.
+    """Delays of all cars whose slip refers to a measured velocity.
 
-    v(t - tau) = v - a tau: a late reference adds tau a / v to every slip. On dry road the free wheels' slip is that and
-    an offset of the run (radii, scale of v_x), and what radii grow by with v^2. On all-wheel drive the mean slip of the
-    wheels also goes with their mean traction, and both are told together, if the data can. The noise of a / v (free
-    wheels) or of the traction is given back.
+    v(t - tau) = v - a tau: a late reference adds tau a / v to every slip. On dry road the free wheels' slip consists of
+    this delay term, an offset of the run (radii, scale of v_x), and the growth of radii with v². On all-wheel drive the
+    mean slip also depends on the mean traction; both are estimated together where the data allow. The estimate is
+    corrected for the noise of a / v (free wheels) or of the traction.
     """
     members: dict[Source, list[RunInfo]] = {}
     for info in data.done:
@@ -92,7 +93,7 @@ def _delay(data: CampaignData, name: str, infos: list[RunInfo]) -> Delay:
     c = pool.columns
     columns, scatters = [c["u"], np.ones_like(c["u"]), c["v"] ** 2], [False, True, False]
     if awd:
-        # the brush's curve, s = k mu (1 + mu / 3 mu_max ...), would pass for a delay: both grow with the acceleration
+        # the brush's curve, s = k mu (1 + mu / 3 mu_max ...), looks like a delay: both grow with the acceleration
         columns, scatters = [*columns, c["mu"], c["mu"] ** 2], [*scatters, True, False]
     noisy = tuple(i == (3 if awd else 0) for i in range(len(columns)))
     design = Design(np.stack(columns), c["slip"], pool.run, pool.step, tuple(scatters), noisy)
@@ -104,9 +105,9 @@ def _delay(data: CampaignData, name: str, infos: list[RunInfo]) -> Delay:
         reason = "no accelerations in the dry driving"
     elif not half <= HALF_MAX:
         with_slope = " apart from the slope" if awd else ""
-        reason = f"known to +-{half:.3f} s only{with_slope}: the accelerations of the dry driving differ too little"
+        reason = f"known only to ±{half:.3f} s{with_slope}: the accelerations of the dry driving differ too little"
     elif not abs(tau) <= LATEST:
-        reason = f"{tau:+.2f} s is no delay of a velocity: check the clocks (`aqualog align`)"
+        reason = f"{tau:+.2f} s is too long for the delay of a velocity: check the clocks (`aqualog align`)"
     return Delay(name, tau if not reason else math.nan, ci if not reason else NOWHERE, runs, c["u"].size, reason)
 
 

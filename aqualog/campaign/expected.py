@@ -1,4 +1,4 @@
-"""What the model of tyre and water expects of a run's wheels, and what its brush makes of a slope that was measured."""
+"""Slip slope and contact that the tyre and water model predicts, and the contact that belongs to a measured slope."""
 
 from __future__ import annotations
 
@@ -34,20 +34,21 @@ __all__ = [
     "tangent_of",
 ]
 
-LINEAR = (math.inf, math.inf)  # friction (dry, wet) of a brush that never slides: a slope is the tangent then (2.2)
+LINEAR = (math.inf, math.inf)  # friction (dry, wet) of a brush that never slides: its slope is the tangent (2.2)
 _THETA = np.linspace(0.0, 2.5, 1001)  # C |s| / (3 mu F_z); at a slope of 28 and mu 0.8 a slip of 0.2
 _L = np.linspace(0.02, 1.0, 197)
 _TOLD_BY = (
     "tyre", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm", "water_depth_left_mm", "load_front_kg",
     "load_rear_kg",
 )  # fmt: skip
-NO_WEDGE = 1e5  # [m/s] from here on there is no speed of full aquaplaning
+NO_WEDGE = 1e5  # [m/s] above it, no speed of full aquaplaning is reported
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """Of one wheel at one speed: `contact` L [-]; `slope` and `slope_dry`, slip slopes over F_z: the brush's chord over
-    the traction asked for, its tangent without one [-]; NaN and `reason` where a run does not tell enough.
+    """Of one wheel at one speed: `contact` L [-]; `slope` and `slope_dry`, slip slopes over F_z [-]: the slope of the
+    brush's regression line over the given traction range, or its tangent at zero slip without a range; NaN with a
+    `reason` where a run lacks data.
     """
 
     contact: float = float("nan")
@@ -64,28 +65,28 @@ def expected(
     Parameters
     ----------
     info : RunInfo
-        Must tell tyre (one of the model's), and on water the depth and the pressures.
+        Must give the tyre (one of the model's), and on water also the depth and the pressures.
     wheel : str
     v : float
         [m/s]
     wet : bool
         On the lane or off it.
     mu_range : (float, float), optional
-        Traction over which the measured slope was told: the slopes are then those of the brush's chord, since its curve
-        bends (E22); a fit over 0.03 to 0.26 gives a tenth less than the slope at no slip.
+        Traction over which the measured slope was estimated. The slopes are then those of a regression line over that
+        range, because the brush's curve bends (E22). A fit over 0.03 to 0.26 gives a tenth less than the slope at zero
+        slip.
 
     Returns
     -------
     Expected
 
     L = 1 - (v / v_full)^n; on the rear axle in the water that the front wheel of its side leaves. Slope: the vehicle
-    file's, times the factors of tyre, pressure and load, and L^2 (2.2). The contact does not
-    fluctuate here: the mean of L^2 over uneven water is less near full aquaplaning. Load transfer by the acceleration
-    is left out.
+    file's value times the factors of tyre, pressure and load, and L² (2.2). The contact does not fluctuate here; the
+    mean of L² over uneven water is lower near full aquaplaning. Load transfer by the acceleration is neglected.
     """
     tyre = TYRES.get(str(info.run.values.get("tyre", "")))
     if tyre is None:
-        return Expected(reason=f"the model does not know the tyre {info.run.values.get('tyre', 'that is not given')}")
+        return Expected(reason=f"tyre not known to the model: {info.run.values.get('tyre', 'not given')}")
     p = _pressure(info, wheel)
     if p is None:
         return Expected(reason="the tyre pressure is not given")
@@ -103,20 +104,19 @@ def expected(
     if isinstance(found, str):
         return Expected(slope_dry=chord_dry, reason=found)
     slope = _chord(dry, found, mu_max * tyre.wet_friction, mu_range)
-    reason = "" if np.isfinite(slope) else "the contact that is left cannot carry such a traction"
+    reason = "" if np.isfinite(slope) else "the remaining contact cannot carry such a traction"
     return Expected(found, slope, chord_dry, reason)
 
 
 def _chord(slope: float, L: float, mu_max: float, mu_range: tuple[float, float] | None) -> float:
-    """Slope of the brush between two tractions; at no slip without them. NaN where the contact cannot carry them."""
+    """Slope of the brush between two tractions; at zero slip without them. NaN where the contact cannot carry them."""
     if mu_range is None:
         return slope * float(slip_stiffness_ratio(np.array(L)))
     return slope * float(_shares(np.array([L]), mu_max, mu_range)[0])
 
 
 def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
-    """Chord of the shortened contact over the tangent of the full one, (m,); NaN where L cannot carry the traction, or
-    the range is none.
+    """Regression slope of the shortened contact over the tangent of the full one, (m,).
 
     Depends on the traction over the friction only: the brush's force over mu F_z is a function of C s / (3 mu F_z).
     """
@@ -146,12 +146,12 @@ def _carried() -> FloatArray:
 
 
 def tangent_of(chord: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
-    """Slip slope at no slip of a full contact whose regression over `mu_range` gave `chord`. [-] NaN if it slides."""
+    """Slip slope at zero slip of a full contact whose regression over `mu_range` gave `chord`. [-] NaN if it slides."""
     return np.asarray(chord / _shares(np.ones(1), mu_max, mu_range)[0], dtype=np.float64)
 
 
 def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
-    """Contact L of which the brush's chord over `mu_range` is `share` of the full contact's tangent.
+    """Contact L whose regression slope over `mu_range` is `share` times the full contact's tangent at zero slip.
 
     Parameters
     ----------
@@ -168,8 +168,9 @@ def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) 
         At least the contact that carries the traction at all. Above 1, which is scatter, L grows with sqrt(share), so
         that a mean over many is not cut. NaN where no contact carries the traction.
 
-    Inverse of the chord by a table in steps of 0.005. A brush with a rigid carcass and even friction is assumed; (2.2),
-    L^2, is its limit at small traction, since the contact that is left bends sooner than the full one (2.1).
+    Inverts the regression slope by a table in steps of 0.005. A brush with a rigid carcass and even friction is
+    assumed. (2.2), L², is its limit at small traction, since the curve of a shortened contact bends sooner than that of
+    a full one (2.1).
     """
     known = _shares(_L, mu_max, mu_range)
     good = np.isfinite(known)
@@ -181,7 +182,7 @@ def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) 
 
 def friction_of(infos: Sequence[RunInfo]) -> tuple[float, float]:
     """Friction of the tread (dry, wet), mean of the runs: the vehicle file's mu_max times the model's factors of the
-    tyre; of a tyre that the model does not know, those of its worn summer tyre. [-]
+    tyre; for a tyre unknown to the model, those of its worn summer tyre. [-]
     """
     tyres = [TYRES.get(str(i.run.values.get("tyre", "")), Tyre("unknown")) for i in infos]
     dry = [i.vehicle.mu_max * t.mu_factor for i, t in zip(infos, tyres, strict=True)]
@@ -197,7 +198,7 @@ def expected_of_runs(
     wet: bool = True,
     mu_range: tuple[float, float] | None = None,
 ) -> Expected:
-    """Mean over runs and wheels of one cell, or why not; runs of one configuration are worked out once."""
+    """Mean over runs and wheels of one cell, or the reason for none; runs of one configuration are computed once."""
     different = {
         (repr(i.vehicle), *(i.run.values.get(k) for k in _TOLD_BY)): i for i in infos
     }.values()  # fmt: skip
@@ -212,13 +213,13 @@ def expected_of_runs(
 
 
 def full_speed_of(info: RunInfo, wheel: str) -> float | str:
-    """Speed at which the model lifts a wheel off the road, or why that is not known. [m/s] Infinite without a wedge.
+    """Speed at which the model lifts a wheel off the road, or the reason for none. [m/s] Infinite without a wedge.
 
     For a rear wheel by bisection, because what the front wheel leaves depends on the speed.
     """
     tyre = TYRES.get(str(info.run.values.get("tyre", "")))
     if tyre is None:
-        return "the model does not know the tyre"
+        return "the tyre is not known to the model"
     at_top = _contact(info, wheel, 100.0, tyre)
     if isinstance(at_top, str):
         return at_top

@@ -19,15 +19,15 @@ from aqualog.types import BoolArray, FloatArray
 __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
 
 MINOR_BELOW = 20.0 * KMH  # [m/s] thesis 2.1 (C17): minor spin-downs begin so far below full aquaplaning
-MINOR_HALF = 5.0 * KMH  # [m/s] tolerance of that, taken for a 95 % interval
+MINOR_HALF = 5.0 * KMH  # [m/s] tolerance of that, treated as a 95 % interval
 DRAWS = 400
-SEED = 20_240  # of the draws; another one moves an interval's ends by a tenth of its width
+SEED = 20_240  # of the draws; another seed moves an interval's ends by a tenth of its width
 LEAST_BINS = 3
 LEAST_PASSES = 6
-LEAST_EACH = 3  # passes with and without; fewer make an interval that is too narrow
-SIGMA_MIN = 0.01  # [-] of a contact: a bin is not better than that, its water fluctuates
-CONTACT_MAX = 0.92  # [-] a contact that keeps more than that does not tell where it ends
-EXTRAPOLATED = 1.5  # times the fastest bin: beyond, the curve is a guess
+LEAST_EACH = 3  # passes with and without events; with fewer the interval is too narrow
+SIGMA_MIN = 0.01  # [-] of a contact: a bin is not more accurate than that, because its water fluctuates
+CONTACT_MAX = 0.92  # [-] a contact that stays above this does not show where it ends
+EXTRAPOLATED = 1.5  # times the fastest bin: beyond it, the curve is a guess
 _EXPONENTS = np.linspace(2.0, 8.0, 13)
 _SPEEDS = np.arange(50.0, 250.5, 0.5) * KMH
 _WIDTHS = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.5, 9.5, 14.0]) * KMH
@@ -35,18 +35,18 @@ _WIDTHS = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.5, 9.5, 14.0]) * KMH
 EVENTS = {
     "slip_slope": (
         "even contact ends",
-        "the contact L = 1 - (v / v_full)^n that the slip slopes tell reaches 0 on water as even as a bin's mean",
+        "the contact L = 1 - (v / v_full)^n estimated from the slip slopes reaches 0, on water as even as a bin's mean",
     ),
     "minor_spin_down": (
         "first loss + 20",
-        "half of the passes have a minor spin-down of a free wheel, plus the thesis' 20 +- 5 km/h",
+        "half of the passes have a minor spin-down of a free wheel, plus the thesis' 20 ± 5 km/h",
     ),
     "spin_down": (
         "half of passes stop a wheel",
-        "half of the passes have a full spin-down of a free wheel; the contact need not be 0 anywhere but there",
+        "half of the passes have a full spin-down of a free wheel; elsewhere the contact need not be 0",
     ),
 }  # fmt: skip
-"""What happens at the speed that a way tells: in short, and in full."""
+"""Event at the speed of each method: in short, and in full."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,8 @@ class FullSpeed:
 
     `way`: `slip_slope`, `minor_spin_down`, `spin_down`; the three are different `event`s, see `EVENTS`. `place` is a
     wheel, or `free` for the free wheels together.
-    `v` with `ci` [m/s]; NaN where not told, an upper end that is infinite is open. `exponent` n of the contact's curve,
-    NaN for the other ways. `rests_on`: bins or passes. `reason` why there is no value.
+    `v` with `ci` [m/s]; NaN without an estimate; an infinite upper end is open. `exponent` n of the contact's curve,
+    NaN for the other methods. `rests_on`: bins or passes used. `reason` why there is no value.
     """
 
     group: Group
@@ -70,26 +70,27 @@ class FullSpeed:
 
     @property
     def event(self) -> str:
-        """What happens at this speed, in short."""
+        """Event at this speed, in short."""
         return EVENTS[self.way][0]
 
     @property
     def defines(self) -> str:
-        """What happens at this speed, in full."""
+        """Event at this speed, in full."""
         return EVENTS[self.way][1]
 
 
 def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[FullSpeed, ...]:
-    """Of all configurations that have water, by all three ways.
+    """Speeds of all configurations with water, by all three methods.
 
     Intervals: 2.5 and 97.5 % of 400 repetitions. From slopes: the bins' slopes and the dry one, common to all of them,
-    drawn from their intervals (Student's t, so that a handful of runs is not too sure); residuals of L about the curve
-    that are larger than these intervals say widen them. From passes: the passes drawn anew.
+    drawn from their intervals (Student's t, so that few runs give wide intervals). Residuals of L about the curve that
+    exceed these intervals widen the result. From passes: bootstrap over the passes.
 
-    The slopes' way extrapolates, from a contact of 0.5 to 0.8, and assumes that v_full is one. Of a rear wheel it is
-    not: it falls with the speed, since the front wheel leaves more water. On simulated campaigns of 871 drives the
-    intervals hold five of six rear wheels' speeds, whether that at the fastest passes or that at which it is reached.
-    The other ways are events on uneven water and lie 15 to 20 km/h below the end of an even contact.
+    The method by slopes extrapolates from a contact of 0.5 to 0.8 and assumes one constant v_full. For a rear wheel
+    v_full is not constant: it falls with speed, since the front wheel leaves more water. On simulated campaigns of 871
+    drives the intervals hold five of six rear wheels' speeds, whether that at the fastest passes or that at which it is
+    reached. The other methods use events on uneven water and give speeds 15 to 20 km/h below the end of an even
+    contact.
     """
     rng = np.random.default_rng(SEED)
     by_wheel: dict[tuple[Group, str], list[SlopeRow]] = {}
@@ -136,7 +137,7 @@ def _from_slopes(
     limit = min(EXTRAPOLATED * float(v[-1]), float(_SPEEDS[-1]))
     ci = (low, high if high < limit else math.inf)
     if L.min() > CONTACT_MAX:
-        return FullSpeed(*bare, ci=(low, math.inf), rests_on=on, reason="the contact hardly falls: no end in sight")
+        return FullSpeed(*bare, ci=(low, math.inf), rests_on=on, reason="the contact falls too little to extrapolate")
     if float(best[0]) >= limit:
         reason = f"beyond {3.6 * limit:.0f} km/h: too far from the fastest bin"
         return FullSpeed(*bare, ci=(low, math.inf), rests_on=on, reason=reason)
@@ -144,14 +145,14 @@ def _from_slopes(
 
 
 def _drawn(row: SlopeRow, rng: np.random.Generator) -> FloatArray:
-    """1 / slope (b,) of a row, drawn from its interval; kept within what a tyre has."""
+    """1 / slope (b,) of a row, drawn from its interval and limited to the range of tyres."""
     low, high = 1.0 / row.slope_ci[1], 1.0 / row.slope_ci[0]
     scale = 0.5 * (high - low) / student_quantile(0.975, row.dof)
     return np.maximum(1.0 / row.slope + scale * rng.standard_t(row.dof, DRAWS), 1.0 / SLOPE_MAX)
 
 
 def _lack(v: FloatArray, L: FloatArray, sigma: FloatArray, v_full: float, n: float) -> float:
-    """Residuals of the curve over what the bins' intervals say, at least 1; two of the bins went into the curve."""
+    """Residuals of the curve relative to the bins' intervals, at least 1; the curve uses two degrees of freedom."""
     left = (L - np.maximum(1.0 - (v / v_full) ** n, 0.0)) / sigma
     return max(math.sqrt(float(left @ left) / (v.size - 2)), 1.0)
 
@@ -190,7 +191,7 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
     bare = (group, "free", way)
     v = np.array([p.v_mean for p in members])
     early = way == "minor_spin_down"
-    # a wheel that stops at once has no minor spin-downs, and is beyond their beginning all the same
+    # a wheel that stops at once has no minor spin-downs, but its speed is above their beginning
     hit = np.array([any(p.full.values()) or (early and any(p.minor.values())) for p in members])
     what = "minor or full spin-downs" if early else "full spin-downs"
     on = f"{int(hit.sum())} of {hit.size} passes with {what}, {3.6 * v.min():.0f} to {3.6 * v.max():.0f} km/h"
@@ -209,7 +210,7 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
     best = fit_half(v, hit, np.ones((1, hit.size)))
     low, high = (float(x) for x in np.nanquantile(fit_half(v, hit, times), (0.025, 0.975)))
     if not float(v.min()) - 5.0 * KMH <= float(best[0]) <= float(v.max()) + 5.0 * KMH:
-        return FullSpeed(*bare, rests_on=on, reason="half of the passes are reached outside the speeds driven")
+        return FullSpeed(*bare, rests_on=on, reason="half of the passes would have one only outside the driven speeds")
     v_half, more = float(best[0]), MINOR_HALF if early else 0.0
     ci = v_half - math.hypot(v_half - low, more) + above, v_half + math.hypot(high - v_half, more) + above
     return FullSpeed(*bare, v_half + above, ci, rests_on=on)

@@ -1,4 +1,4 @@
-"""What a stored result depends on, as one key: content of the log, car, map, settings, and the code behind it."""
+"""One key for everything that a stored result depends on: content of the log, car, map, settings, code."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def result_key(
 
 
 def code_stamp() -> str:
-    """Hash of the sources that a result rests on: after a change of an equation all is measured anew."""
+    """Hash of the source code behind a result: after a change of an equation all logs are measured again."""
     return sources_stamp(_BEHIND)
 
 

@@ -1,4 +1,4 @@
-"""The car as a run was driven: with the load that the campaign tells."""
+"""The car as a run was driven, with the load from the campaign."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["loaded", "loads_of"]
 
 
 def loads_of(run: Run) -> tuple[float, float]:
-    """Load over the front and over the rear axle that a run tells; 0 where it tells none. [kg]"""
+    """Load over the front and over the rear axle of a run; 0 where none is given. [kg]"""
     front, rear = (run.values.get(f"load_{axle}_kg", 0.0) for axle in ("front", "rear"))
     return float(front), float(rear)
 
@@ -24,7 +24,7 @@ def loaded(vehicle: Vehicle, run: Run) -> Vehicle:
     Raises
     ------
     ConfigError
-        If less than 30 % of the car would be left, or nothing on one axle.
+        If less than 30 % of the car's mass would remain, or no load on one axle.
     """
     for delta, x in zip(loads_of(run), (0.0, vehicle.wheelbase), strict=True):
         if delta == 0.0:

@@ -1,4 +1,4 @@
-"""Which logs of a campaign are there."""
+"""Finds which logs of a campaign exist."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""The test matrix: which configurations were driven how often, and which are missing.
+"""The test matrix: configurations with the number of their runs, and missing configurations.
 
-Keys of the runs are sorted into constants (one value in all runs), factors that were varied, and keys that go with a
-factor (each of its values has one value of theirs, so that their effects cannot be told apart). A configuration is one
-combination of the factors' values. A combination that was never driven is told as missing where it would close a gap:
-where neighbours (next value of one factor, all others alike) were driven along at least two factors.
+Keys of the runs are sorted into constants (one value in all runs), factors that were varied, and keys that follow a
+factor (each of its values has one value of theirs, so that their effects cannot be distinguished). A configuration is
+one combination of the factors' values. A combination that was never driven is reported as missing where it would close
+a gap: where neighbours (next value of one factor, all others alike) were driven along at least two factors.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from aqualog.campaign.records import Campaign, Run
 
 __all__ = ["FEW", "TOO_FEW", "Configuration", "Factor", "Gap", "Matrix", "campaign_matrix", "speeds_of"]
 
-TOO_FEW = 3  # runs below which an interval over runs says nothing: with two there is one degree of freedom (D)
+TOO_FEW = 3  # runs below which an interval over runs is useless: two runs have one degree of freedom (D)
 FEW = 5  # below which it is wide: t(0.975) is 4.3 with 3 runs, 2.8 with 5, 2.0 with many (D)
 
 _CONFIGURATION = (
@@ -30,7 +30,7 @@ _SPEED = "x_speed_kmh"
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """A key that was varied: its values in order, empty text where a run does not tell it, with the number of runs."""
+    """A key that was varied: its values in order, empty text where a run gives no value, with the number of runs."""
 
     key: str
     values: tuple[str, ...]
@@ -58,8 +58,8 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """What was driven. `together` maps a key to the factor that it goes with; `others` are further keys with the number
-    of their values.
+    """The driven configurations. `together` maps a key to the factor that it follows; `others` are further keys with
+    the number of their values.
     """
 
     constants: Mapping[str, str]
@@ -72,7 +72,7 @@ class Matrix:
 
 
 def speeds_of(run: Run) -> tuple[float, ...]:
-    """Speeds [km/h] that the campaign file itself tells of a run: its `x_speed_kmh`."""
+    """Speeds [km/h] of a run from the campaign file: its `x_speed_kmh`."""
     text = str(run.values.get(_SPEED, "")).replace(",", ".")
     try:
         value = float(text)
@@ -88,7 +88,7 @@ def campaign_matrix(campaign: Campaign, speeds: Callable[[int, Run], Sequence[fl
     ----------
     campaign : Campaign
     speeds : function (index of the run, run) -> speeds in km/h, optional
-        What is known of a run's speed beyond the campaign file, e.g. measured ones; default `speeds_of`.
+        Further speeds of a run, such as measured ones; default `speeds_of`.
     """
     columns = _columns(campaign.runs)
     constants = {k: c[0] for k, c in columns.items() if len(set(c)) == 1 and c[0]}
@@ -112,17 +112,17 @@ def campaign_matrix(campaign: Campaign, speeds: Callable[[int, Run], Sequence[fl
 
 
 def _columns(runs: Sequence[Run]) -> dict[str, list[str]]:
-    """The configuration keys as texts, run by run; keys that no run tells are left out."""
+    """The configuration keys as texts, run by run; keys without any value are left out."""
     groups = [r.groups for r in runs]
     columns = {k: [g.get(k, "") for g in groups] for k in _CONFIGURATION}
     return {k: c for k, c in columns.items() if any(c)}
 
 
 def _together(varied: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    """Keys that are a function of another one that is left as a factor.
+    """Keys that are a function of another key, which stays as a factor.
 
-    Tyre, depth and so on are hidden behind another key only if each tells the other: a tyre that was driven on one
-    depth alone is still a tyre.
+    Tyre, depth and similar keys are hidden behind another key only if each determines the other: a tyre that was driven
+    on one depth only is still a factor.
     """
     found: dict[str, str] = {}
     order = list(varied)
@@ -132,12 +132,12 @@ def _together(varied: Mapping[str, Sequence[str]]) -> dict[str, str]:
                 continue
             is_function = len(set(zip(theirs, column, strict=True))) == len(set(theirs))
             both_ways = is_function and len(set(theirs)) == len(set(column))
-            # of two keys that tell each other, the one that is named first stays
+            # of two keys that determine each other, the first one stays
             is_first = both_ways and order.index(key) < order.index(other)
             if is_function and not is_first and (both_ways or key in _OF_OTHERS):
                 found[key] = other
                 break
-    # a key may go with one that itself goes with another: the last of the chain is the factor
+    # a key may follow a key that follows another one: the last of the chain is the factor
     return {k: _end(o, found) for k, o in found.items()}
 
 
@@ -191,7 +191,8 @@ def _gaps(factors: Sequence[Factor], driven: set[tuple[str, ...]]) -> tuple[Gap,
 
 
 def _steps(factor: Factor) -> dict[str, tuple[str, ...]]:
-    """Neighbours of each value: the next ones of an ordered factor, any other of names; unknown has none."""
+    """Neighbours of each value: the next ones of an ordered factor, all others for names; an unknown value has no
+    neighbours."""
     known = [v for v in factor.values if v]
     if not factor.is_ordered:
         return {v: tuple(o for o in known if o != v) if v else () for v in factor.values}
@@ -200,25 +201,25 @@ def _steps(factor: Factor) -> dict[str, tuple[str, ...]]:
 
 
 def _notes(campaign: Campaign) -> tuple[str, ...]:
-    """What the runs lack, beyond configurations."""
+    """Data that the runs lack, beyond configurations."""
     runs = campaign.runs
     notes = []
-    for key, what in (("tyre", "tyres cannot be compared"), ("water_depth_mm", "neither dry nor wet is known")):
+    for key, what in (("tyre", "tyres cannot be compared"), ("water_depth_mm", "dry or wet is not known")):
         blank = sum(key not in r.values for r in runs)
         if blank:
-            notes.append(f"{_runs(blank, len(runs))} no {key}: {what}")
+            notes.append(f"{_runs(blank, len(runs))} without {key}: {what}")
     wheres = [r for r in runs if r.lane is None and r.labels is None and r.values.get("water_depth_mm") != 0.0]
     if wheres:
         notes.append(
-            f"{_runs(len(wheres), len(runs))} neither lane times nor labels: where these are on water is known only if "
-            "their logs hold the signal on_water"
+            f"{_runs(len(wheres), len(runs))} without lane times and labels: only a signal on_water in the log "
+            "can show when it was on water"
         )
     dry = {_mounted(r) for r in runs if r.values.get("water_depth_mm") == 0.0}
     wet = dict.fromkeys(_mounted(r) for r in runs if float(r.values.get("water_depth_mm", 0.0)) > 0.0)
     lacking = [" on ".join(x for x in m if x) for m in wet if m not in dry]
     if lacking:
         notes.append(
-            f"no dry run of {_listed(lacking)}: the dry slip slope comes from what is driven before and behind the lane"
+            f"no dry run of {_listed(lacking)}: the dry slip slope comes from the driving before and after the lane"
         )
     return tuple(notes)
 
@@ -229,8 +230,8 @@ def _mounted(run: Run) -> tuple[str, str]:
 
 def _runs(count: int, total: int) -> str:
     if count == total:
-        return "the runs tell"
-    return f"{count} of {total} runs tell{'s' if count == 1 else ''}"
+        return "all runs"
+    return f"{count} of {total} runs"
 
 
 def _listed(names: Sequence[str], most: int = 6) -> str:

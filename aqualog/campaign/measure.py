@@ -1,4 +1,4 @@
-"""One drive into what a campaign keeps of it: events, and samples thinned to ten a second."""
+"""One drive into its stored result: events, and samples thinned to ten a second."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ __all__ = ["REASONS", "STEP_S", "Measurement", "measure", "measure_long"]
 
 SCHEMA_VERSION = 1
 REASONS = activation.REASONS
-"""Why a sample is of no use for regressions, by its code; 0 is usable."""
+"""Reason why regressions skip a sample, by its code; 0 is usable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What is kept of one drive.
+    """The stored result of one drive.
 
     `samples` has a row per step: `t` [s], the middle of the step from the log's first sample; `v_x` [m/s]; `a_x`
-    [m/s^2] kinematic; `a_over_v` [1/s]; `delta_a_x` [m/s^2] (2.9), mean over the step, nothing taken off; `reason`
-    (index into `REASONS`); `on_water` where the log has it; per wheel `slip_*` [-] (3.13, `about["slip_against"]` says
-    against what), `slip_min_*`, `slip_max_*` [-] extremes of rim against car with radii learnt, `mu_*` [-],
-    `spin_*`, `minor_*` (detector active). Unknown is null. `about` is JSON: what was found and what was wrong.
+    [m/s^2] kinematic; `a_over_v` [1/s]; `delta_a_x` [m/s^2] (2.9), mean over the step, without corrections; `reason`
+    (index into `REASONS`); `on_water` where the log has it; per wheel `slip_*` [-] (3.13, `about["slip_against"]` names
+    the reference), `slip_min_*`, `slip_max_*` [-] extremes of rim against car with radii learnt, `mu_*` [-], `spin_*`,
+    `minor_*` (detector active). Unknown values are null. `about` is JSON: findings and faults.
     """
 
     samples: pl.DataFrame
@@ -42,7 +42,7 @@ class Measurement:
 
 
 def measure(signals: Signals, vehicle: Vehicle, *, settings: Settings | None = None) -> Measurement:
-    """Detect, and thin out what regressions over many drives need.
+    """Detect, and thin the signals that regressions over many drives need.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measure_long(
     vehicle, settings
         As of `measure`.
     faults : sequence of FileFaults
-        What the readers lost, as the first pass found.
+        Data that the readers lost in the first pass.
     rows : int
         Of a window.
 
@@ -149,7 +149,7 @@ def _event(e: Event) -> dict[str, Any]:
 
 
 def _plain(x: Any) -> Any:
-    """A value as JSON knows it; numbers with nine digits, null for what is none."""
+    """A value for JSON; numbers with nine digits, null for NaN and infinities."""
     if isinstance(x, float | np.floating):
         return float(f"{float(x):.9g}") if math.isfinite(x) else None
     if isinstance(x, np.integer):

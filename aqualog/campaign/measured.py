@@ -1,4 +1,4 @@
-"""What a store already knows of a campaign's runs, for a look at the campaign before anything is measured anew."""
+"""Information that a store already has on a campaign's runs, before any log is measured again."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Measured:
 def measured_runs(campaign: Campaign, folder: Path) -> dict[int, Measured]:
     """Runs of the campaign that the store's table holds, by index; empty without such a table.
 
-    A run is found again by its logs: the table may be older than the campaign file, and lanes do not change what a log
-    holds.
+    A run is found by its logs: the table may be older than the campaign file, and lanes do not change the content of a
+    log.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def measured_runs(campaign: Campaign, folder: Path) -> dict[int, Measured]:
     try:
         rows = pl.read_parquet(path, columns=list(columns)).rows()
     except (OSError, pl.exceptions.PolarsError) as error:
-        raise ConfigError("is no table of runs", where=str(path), hint="aqualog batch makes it anew") from error
+        raise ConfigError("is not a table of runs", where=str(path), hint="aqualog batch makes it again") from error
     known = {}
     for name, state, reason, low, high, duration in rows:
         known[name] = Measured(state, reason or "", () if low is None or high is None else (low, high), duration)
@@ -52,9 +52,9 @@ def measured_runs(campaign: Campaign, folder: Path) -> dict[int, Measured]:
 
 
 def lane_faults(campaign: Campaign, measured: dict[int, Measured], places: Sequence[str]) -> list[str]:
-    """Runs whose lane lies behind the end of their log, as far as the store knows how long that is."""
+    """Runs whose lane ends after their log, as far as the store knows its length."""
     return [
-        f"{places[i]}: lane_end_s = {run.lane[1]:g} is behind the log's end at {m.duration_s:.1f} s"
+        f"{places[i]}: lane_end_s = {run.lane[1]:g} is after the log's end at {m.duration_s:.1f} s"
         for i, run in enumerate(campaign.runs)
         if run.lane is not None
         and (m := measured.get(i))

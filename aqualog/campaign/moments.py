@@ -19,18 +19,18 @@ __all__ = [
 APART = 3  # samples between values whose noise is independent: 0.3 s of smoothing at 10 Hz
 MAD = 1.4826  # standard deviation over median absolute deviation, normal noise
 HUBER = 1.345  # residuals beyond so many standard deviations count less; 95 % efficient on normal noise
-LAGS = 30  # samples over which the errors of a run may hang together
-LEAST_TRIPLES = 10  # of a run, to tell the noise of its own traction; else that of all runs together
+LAGS = 30  # samples over which the errors of a run may be correlated
+LEAST_TRIPLES = 10  # of a run, to estimate the noise of its own traction; else that of all runs is used
 _EXPONENTS = np.linspace(-2.0, 9.0, 12)  # decades of the variance between runs over that of a run's own coefficient
 
 _Index = NDArray[np.int64]
 
 
 class Design(NamedTuple):
-    """What is fitted: `columns` (p, n), `y` (n,), and for each sample its run and its place in time.
+    """Data of a fit: `columns` (p, n), `y` (n,), and for each sample its run and its place in time.
 
-    `run` ascends; `step` ascends within a run and counts samples of the even grid, so that neighbours can be told from
-    a gap. `scatters` (p,): whether a column's coefficient differs from run to run. `noisy` (p,): whether the column is
+    `run` ascends; `step` ascends within a run and counts samples of the even grid, so that gaps are recognised.
+    `scatters` (p,): whether a column's coefficient differs from run to run. `noisy` (p,): whether the column is
     measured with noise that is independent after `APART` samples; at most one.
     """
 
@@ -53,7 +53,7 @@ class Moments(NamedTuple):
 
 
 class Working(NamedTuple):
-    """The model that the weights come from; the intervals do not rest on it being true."""
+    """The model that the weights come from; the intervals do not require it to be true."""
 
     variance: float  # of a residual within a run, times the memory
     between: FloatArray  # (p,) variance of the coefficients from run to run
@@ -87,11 +87,11 @@ def moments_of(d: Design, first: _Index, weight: FloatArray) -> Moments:
 
 
 def about_own_mean(d: Design, m: Moments, w: Working) -> Moments:
-    """The noise's moments as far as they count: what a run's own offset takes with the mean of the noise is gone.
+    """The noise's moments without the part that a run's own offset absorbs with the mean of the noise.
 
     The mean of n samples whose noise is independent after `APART` of them keeps `APART` / n of its variance, and the
-    offset takes of it the share that intercepts which scatter by T leave to the run, n T / (sigma^2 + n T). In runs of
-    30 samples with a third of the variation noise, k would be 3 % too large without.
+    offset absorbs the share n T / (sigma^2 + n T) of it, with intercepts that scatter by T. Without this, k would be 3
+    % too large in runs of 30 samples where noise is a third of the variation.
     """
     is_one = np.ptp(d.columns, axis=1) == 0.0
     if not is_one.any():
@@ -130,7 +130,7 @@ def working_model(d: Design, first: _Index, m: Moments, weight: FloatArray) -> W
 
 
 def _memory(e: FloatArray, run: _Index, step: _Index) -> float:
-    """How many neighbouring samples count as one: 1 + 2 (sum of the autocorrelation down to its first zero)."""
+    """Number of neighbouring samples that count as one: 1 + 2 (sum of the autocorrelation up to its first zero)."""
     power = float(e @ e)
     if not power > 0.0:
         return 1.0
@@ -163,10 +163,10 @@ def _between(m: Moments, variance: float, scatters: NDArray[np.bool_]) -> FloatA
 
 
 def _unlikelihood(m: Moments, variance: float, grid: FloatArray) -> FloatArray:
-    """-2 log of the restricted likelihood, but for a constant, for each row of `grid` (q, p)."""
+    """-2 log of the restricted likelihood, without a constant, for each row of `grid` (q, p)."""
     k, a, b, spread = _weighed(variance, m.h, m.c, grid)
     value = np.einsum("qij,qj->qi", np.linalg.pinv(a, rcond=1e-10, hermitian=False), b)
-    # residual sum of squares but for y'y, which is the same for all
+    # residual sum of squares without y'y, which is the same for all
     rss = -2.0 * value @ m.c.sum(axis=0) + np.einsum("qi,ij,qj->q", value, m.h.sum(axis=0), value)
     explained = _explained(k, m.h, m.c, grid, value)
     result: FloatArray = spread + np.linalg.slogdet(a)[1] + (rss - explained) / variance

@@ -1,4 +1,4 @@
-"""Where a store lies: the few operations that it needs, on a folder or behind a URL of fsspec."""
+"""Location of a store: the few operations that it needs, on a folder or behind a URL of fsspec."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aqualog.errors import ConfigError
 __all__ = ["Address", "Place", "address_of", "is_of_process", "is_orphan", "is_url", "place_of", "temporary_name"]
 
 Address = Path | str
-"""A folder, or the URL of something that fsspec knows."""
+"""A folder, or a URL that fsspec supports."""
 
 _URL = re.compile(r"([a-z][a-z0-9+.\-]+)://(.*)", re.IGNORECASE | re.DOTALL)
 _FILE = re.compile(r"(?:file|local):(?://(?:localhost(?=/))?)?(.*)", re.IGNORECASE | re.DOTALL)
@@ -31,30 +31,30 @@ class Place(Protocol):
 
     @property
     def address(self) -> Address:
-        """From which another process makes the same place."""
+        """Address from which another process opens the same place."""
 
     @property
     def name(self) -> str:
-        """As users are told, without what is secret."""
+        """Address for messages, without secrets."""
 
     @property
     def is_shared(self) -> bool:
-        """Whether other processes see it."""
+        """Whether other processes can see it."""
 
     def at(self, name: str) -> str:
-        """A file as users are told."""
+        """Address of a file for messages."""
 
     def check(self, folders: Iterable[str], files: Iterable[str]) -> bool:
-        """Whether it is there; a ConfigError if it, or one of these, is of the wrong kind."""
+        """Whether it exists; ConfigError if it, or one of these parts, is of the wrong kind."""
 
     def make(self, folders: Iterable[str]) -> None:
-        """Make it, and folders in it, as far as they are not there."""
+        """Create it and folders in it where they are missing."""
 
     def held(self, lock: str, *, together: bool = False) -> AbstractContextManager[None]:
-        """Keep others out by a lock file, as `aqualog.io.whole.only_here`, where there are locks."""
+        """Keep others out by a lock file, as `aqualog.io.whole.only_here`, where locks exist."""
 
     def names(self, folder: str = "") -> set[str]:
-        """Names of what is in a folder; none where there is no such folder."""
+        """Names in a folder; empty if there is no such folder."""
 
     def has(self, name: str) -> bool:
         """Whether there is such a file."""
@@ -63,32 +63,32 @@ class Place(Protocol):
         """A file's content."""
 
     def write(self, name: str, data: bytes | memoryview) -> None:
-        """A file, there whole or not at all."""
+        """Write a file, complete or not at all."""
 
     def remove(self, name: str) -> None:
-        """Remove a file, which need not be there."""
+        """Remove a file if it exists."""
 
     def sweep(self, folders: Iterable[str]) -> None:
-        """Remove what killed processes have left half-written."""
+        """Remove half-written files of killed processes."""
 
     def copy(self, name: str) -> Path:
-        """A file to read here, itself or a copy."""
+        """A local file to read: the file itself or a copy."""
 
     def footer(self, name: str) -> Path | io.BytesIO:
-        """Something with a Parquet file's metadata and schema, and maybe its data."""
+        """A source with a Parquet file's metadata and schema, and possibly its data."""
 
     def look_at(self, names: Sequence[str]) -> None:
-        """The footers of these are asked for next."""
+        """Announce that the footers of these are needed next."""
 
     def expect(self, names: Sequence[str]) -> None:
-        """Copies of these are asked for, probably in this order."""
+        """Announce that copies of these are needed, probably in this order."""
 
     def holds(self, path: Path) -> bool:
-        """Whether a path of this machine lies in it."""
+        """Whether a path of this machine is inside it."""
 
 
 def address_of(text: Address) -> Address:
-    """What was typed as the place of a store; `file://` is a folder.
+    """The place of a store as typed; `file://` is a folder.
 
     Raises
     ------
@@ -97,17 +97,17 @@ def address_of(text: Address) -> Address:
     """
     if isinstance(text, Path):
         return text
-    if not text:  # it would be the folder in which the user happens to be
+    if not text:  # it would mean the current folder
         raise ConfigError(
             "the name of the store is empty", expected="a folder or a URL", hint="check the shell's variables"
         )
     if _CHAIN.match(text):
         raise ConfigError(
             "is a chain of file systems", where=text.split("::")[0], expected="one, as s3://bucket/store",
-            hint="without the cache before it, which would hide what others write",
+            hint="without the cache before it, which would hide files written by others",
         )  # fmt: skip
     if file := _FILE.fullmatch(text):
-        if not file[1].startswith("/"):  # what stands there is a host; the libraries take it for a folder here
+        if not file[1].startswith("/"):  # the text is a host; the libraries would read it as a local folder
             raise ConfigError("names no folder of this machine", where=text, expected="the folder, or file:///folder")
         return Path(file[1])
     return text if _URL.fullmatch(text) else Path(text)
@@ -119,7 +119,7 @@ def is_url(text: str) -> bool:
 
 
 def is_of_process(address: Address) -> bool:
-    """Whether a place is in the memory of whoever asks for it."""
+    """Whether a place is in the memory of this process."""
     return str(address).lower().startswith("memory:")
 
 
@@ -144,11 +144,11 @@ def place_of(address: Address) -> Place:
 
 
 def temporary_name(name: str) -> str:
-    """A name beside a file's own, such as `is_orphan` knows again."""
+    """A temporary name next to a file, which `is_orphan` recognises."""
     path = Path(name)
     return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}.tmp").as_posix()
 
 
 def is_orphan(name: str) -> bool:
-    """Whether a file has such a name, as `aqualog.io.whole.write_whole` gives it too."""
+    """Whether a file has such a temporary name, as `aqualog.io.whole.write_whole` also gives."""
     return _ORPHAN.fullmatch(name) is not None

@@ -24,11 +24,11 @@ class Folder:
         self.name = str(folder)
 
     def at(self, name: str) -> str:
-        """A file as users are told."""
+        """Address of a file for messages."""
         return str(self.address / name)
 
     def check(self, folders: Iterable[str], files: Iterable[str]) -> bool:
-        """Whether it is there.
+        """Whether it exists.
 
         Raises
         ------
@@ -37,14 +37,14 @@ class Folder:
         """
         if not self.address.exists():
             if self.address.is_symlink():
-                raise ConfigError("is a link to nothing", where=self.name, expected="a folder for the results")
+                raise ConfigError("is a broken link", where=self.name, expected="a folder for the results")
             return False
         if not self.address.is_dir():
             raise ConfigError("is a file", where=self.name, expected="a folder for the results")
         for name in folders:
             path = self.address / name
             if os.path.lexists(path) and not path.is_dir():
-                raise ConfigError("is no folder", where=str(path), expected="the store's folder", hint="remove it")
+                raise ConfigError("is not a folder", where=str(path), expected="the store's folder", hint="remove it")
         for name in files:
             path = self.address / name
             if path.exists() and not path.is_file():
@@ -63,7 +63,7 @@ class Folder:
         return only_here(self.address / lock, together=together)
 
     def names(self, folder: str = "") -> set[str]:
-        """Names of what is in a folder."""
+        """Names in a folder."""
         try:
             with os.scandir(self.address / folder) as entries:
                 return {e.name for e in entries}
@@ -79,7 +79,7 @@ class Folder:
         return (self.address / name).read_bytes()
 
     def write(self, name: str, data: bytes | memoryview) -> None:
-        """A file, whole. Folders are made at the start only: one that is gone was on a disk that is."""
+        """Write a complete file. Folders are created at the start only: a missing folder means a missing disk."""
         write_whole(self.address / name, lambda temporary: _put(temporary, data), makes_folder=False)
 
     def remove(self, name: str) -> None:
@@ -87,7 +87,7 @@ class Folder:
         (self.address / name).unlink(missing_ok=True)
 
     def sweep(self, folders: Iterable[str]) -> None:
-        """Remove what is half-written; only with the lock held, or it may be in the making."""
+        """Remove half-written files; only with the lock held, because another process may be writing them."""
         for folder in folders:
             for orphan in (self.address / folder).glob(".*.tmp"):
                 if is_orphan(orphan.name):
@@ -102,13 +102,13 @@ class Folder:
         return self.address / name
 
     def look_at(self, names: Sequence[str]) -> None:
-        """Nothing to make ready."""
+        """No preparation needed."""
 
     def expect(self, names: Sequence[str]) -> None:
-        """Nothing to make ready."""
+        """No preparation needed."""
 
     def holds(self, path: Path) -> bool:
-        """Whether a path lies in it."""
+        """Whether a path is inside it."""
         return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(self.address))
 
 

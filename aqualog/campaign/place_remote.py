@@ -19,21 +19,21 @@ from aqualog.errors import AqualogError, ConfigError
 
 __all__ = ["Remote"]
 
-# a put is there whole or not at all; elsewhere a file gets a temporary name first
+# here a put is complete or absent; elsewhere a file gets a temporary name first
 _OBJECTS = frozenset(
     ["s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "oci", "oss", "tos", "r2", "memory"]
 )  # fmt: skip
 _TAIL = 32_768  # [byte] in which nearly every footer lies
 _FOOTERS = 256  # that are read together
-_AHEAD = 8  # copies that are fetched together: the way there and back takes longer than the bytes
-_OLD = timedelta(days=1)  # of a half-written file that nobody can be writing any more
+_AHEAD = 8  # copies that are fetched together: the round trip takes longer than the bytes
+_OLD = timedelta(days=1)  # age of a half-written file that nobody can still be writing
 _MAGIC = b"PAR1"
 
 
 class Remote:
     """A `Place` behind a URL. Options, as an endpoint or keys, come from the environment and fsspec's own files.
 
-    There are no locks: whoever writes beside another writes the same bytes under the same names, whole.
+    There are no locks: parallel writers write the same complete bytes under the same names.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Remote:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
     def at(self, name: str) -> str:
-        """A file as users are told."""
+        """Address of a file for messages."""
         return f"{self.name.rstrip('/')}/{name}"
 
     def check(self, folders: Iterable[str], files: Iterable[str]) -> bool:
@@ -86,18 +86,18 @@ class Remote:
         return True
 
     def make(self, folders: Iterable[str]) -> None:
-        """Make folders where there are such; a bucket is never made."""
+        """Create folders where the place has folders; a bucket is never created."""
         if not self._is_objects:
             with self._told(""):
                 for name in ("", *folders):
                     self._fs.makedirs(self._path(name), exist_ok=True)
 
     def held(self, lock: str, *, together: bool = False) -> AbstractContextManager[None]:
-        """Nothing to hold."""
+        """No lock to hold."""
         return nullcontext()
 
     def names(self, folder: str = "") -> set[str]:
-        """Names of what is in a folder."""
+        """Names in a folder."""
         with self._told(folder):
             self._fs.invalidate_cache()
             try:
@@ -123,7 +123,7 @@ class Remote:
             return bytes(self._fs.cat_file(self._path(name)))
 
     def write(self, name: str, data: bytes | memoryview) -> None:
-        """A file, whole."""
+        """Write a complete file."""
         self._footers.pop(name, None)
         with self._told(name):
             if self._is_objects:
@@ -134,7 +134,7 @@ class Remote:
                 self._fs.pipe_file(temporary, bytes(data))
                 self._fs.mv(temporary, self._path(name))
             except BaseException:
-                with suppress(Exception):  # what went wrong first is what the user should know
+                with suppress(Exception):  # the user should see the first error
                     self._fs.rm_file(temporary)
                 raise
 
@@ -145,17 +145,17 @@ class Remote:
             with self._told(name):
                 self._fs.rm_file(self._path(name))
         except OSError:
-            if self.has(name):  # some say otherwise than by a FileNotFoundError that there is none
+            if self.has(name):  # some signal a missing file by another error than FileNotFoundError
                 raise
 
     def sweep(self, folders: Iterable[str]) -> None:
-        """Remove what was half-written a day ago; what is younger may be in the making."""
+        """Remove half-written files older than a day; younger ones may still be written."""
         if self._is_objects:
             return
         for folder in folders:
             for name in filter(is_orphan, self.names(folder)):
                 path = self._path(f"{folder}/{name}" if folder else name)
-                with suppress(Exception):  # not every file system tells when, and it is gone if another sweeps
+                with suppress(Exception):  # no time on some file systems, or removed by another process
                     if datetime.now(UTC) - _aware(self._fs.modified(path)) > _OLD:
                         self._fs.rm_file(path)
 
@@ -178,7 +178,7 @@ class Remote:
         return self._copies[name]
 
     def footer(self, name: str) -> io.BytesIO:
-        """A Parquet file without its data; the whole content where that is none."""
+        """A Parquet file without its data; the whole content of any other file."""
         if name not in self._footers:
             self._look_at([name])
         return io.BytesIO(self._footers[name] if name in self._footers else self.read(name))
@@ -192,7 +192,7 @@ class Remote:
     def _look_at(self, names: Sequence[str]) -> None:
         for name, tail in zip(names, self._together(names, _TAIL), strict=True):
             if not isinstance(tail, bytes) or len(tail) < 12 or tail[-4:] != _MAGIC:
-                continue  # `footer` reads it whole, and then it is clear what is wrong
+                continue  # `footer` reads it whole, which then shows the error
             size = struct.unpack("<I", tail[-8:-4])[0] + 8
             if size > len(tail):
                 longer = self._together([name], size)[0]
@@ -201,7 +201,7 @@ class Remote:
                 self._footers[name] = _MAGIC + tail[-size:]
 
     def expect(self, names: Sequence[str]) -> None:
-        """Copies of these will be asked for; those of before are forgotten."""
+        """Announce copies needed next; earlier announcements are forgotten."""
         self._expected = list(dict.fromkeys(names))
         self._order = {n: i for i, n in enumerate(self._expected)}
         self._copies = {}
@@ -210,7 +210,7 @@ class Remote:
             self._folder = None
 
     def holds(self, path: Path) -> bool:
-        """No path of this machine lies in it."""
+        """No path of this machine is inside it."""
         return False
 
     def _path(self, name: str) -> str:
@@ -242,7 +242,7 @@ class Remote:
             ) from error  # fmt: skip
         except ValueError as error:
             raise ConfigError(
-                f"is no place that fsspec knows ({self._clean(str(error))})", where=self.name,
+                f"is not a place that fsspec supports ({self._clean(str(error))})", where=self.name,
                 expected="a folder, or a URL as s3://bucket/store or sftp://host/store",
             ) from error  # fmt: skip
         except Exception as error:

@@ -1,4 +1,4 @@
-"""What a campaign will cost, from what a sample of its logs has cost: time, memory, room, and shards."""
+"""Cost of a campaign, estimated from a sample of its logs: time, memory, disk space and shards."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = ["Estimate", "Plan", "Work", "Worker", "choose", "foretell", "makespan
 
 LEVEL = 0.9  # of the intervals
 _MOST_SHARDS = 2000
-_OWN_LINE = 3  # logs of a format from which its time over size is fitted by itself
+_OWN_LINE = 3  # logs of a format from which its time over size is fitted separately
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Logs to measure: job, format and size [byte] of each; how many are in the store, failed there, are not there."""
+    """Logs to measure: job, format and size [byte] of each; how many are in the store, failed there, or are missing."""
 
     new: tuple[tuple[Job, str, int], ...]
     kept: int
@@ -52,7 +52,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Worker:
-    """What surrounds the logs: `lead_s` of the process that leads until it looks at the logs, `start_s` of a worker,
+    """Times besides the logs: `lead_s` of the leading process until it looks at the logs, `start_s` of a worker,
     `hashing_s_per_byte`, `tables_s` per log. [s]
     """
 
@@ -64,7 +64,7 @@ class Worker:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What the logs will cost. `seconds` (n,) is the time of each log in its process; `together` how many processes
+    """Cost of the logs. `seconds` (n,) is the time of each log in its process; `together` how many processes
     work side by side; `stretch` wall-clock over computing time of a log; times in s, sizes in byte.
     """
 
@@ -91,7 +91,7 @@ class Plan:
 
 
 def work_of(configured: Configured, store: Store) -> Work:
-    """What a batch would do. No log is read for it: what was never hashed is new."""
+    """Work of a batch. No log is read for it: a log that was never hashed is new."""
     todo = plan_jobs(configured, Remembered(store.contents()))
     found = compared(todo, store, force=False)
     new, missing = [], []
@@ -108,7 +108,7 @@ def work_of(configured: Configured, store: Store) -> Work:
 def choose(new: Sequence[tuple[Job, str, int]], count: int) -> list[tuple[Job, str, int]]:
     """A sample of so many logs: every format, and within it every part of the sizes with the smallest and the largest.
 
-    A format gets one at least and more by its share of the bytes; what is no log has no share.
+    A format gets one at least and more by its share of the bytes; files that are not logs have no share.
     """
     by_form: dict[str, list[tuple[Job, str, int]]] = {}
     for entry in sorted(new, key=lambda e: (e[2], e[0].logs)):
@@ -128,25 +128,26 @@ def choose(new: Sequence[tuple[Job, str, int]], count: int) -> list[tuple[Job, s
 
 
 def _spread(n: int, k: int) -> list[int]:
-    """k of n places, ends included; of one, the last, which tells most about memory."""
+    """k of n places, ends included; a single one is the last, which shows most about memory."""
     return [n - 1] if k == 1 else sorted({round(x) for x in np.linspace(0, n - 1, k)})
 
 
 def foretell(work: Work, trial: Trial, *, processes: int, cores: int, lead_s: float, lead_cpu_s: float) -> Plan:
     """Cost of the whole from that of the sample.
 
-    Computing time is a constant and a part that grows with size, per format where there are enough logs of it;
-    wall-clock time is as many times that as over the sample, which holds the machine's other work and its disks. The
-    interval is that of the sum over all logs, from how far the sample's lie off; not of a machine that is busier later.
+    Computing time is a constant plus a part that grows with size, per format where there are enough logs of it.
+    Wall-clock time has the same ratio to it as in the sample, which includes the machine's other work and its disks.
+    The interval is that of the sum over all logs, from the scatter of the sample; it does not cover a machine that is
+    busier later.
 
     Parameters
     ----------
     work : Work
         At least one log of a known format.
     trial : Trial
-        At least one log that gave something.
+        At least one log with a result.
     processes : int
-        Asked for; no more work side by side than there are cores.
+        Requested number; no more work in parallel than there are cores.
     lead_s : float
         Time that the leading process takes to get ready; `lead_cpu_s` computing.
     """
@@ -237,7 +238,7 @@ def _over_all(
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """y = a + b x with the least relative deviations and the sum of y, a and b not negative."""
     a, b = _shape(x, y)
-    # relative deviations alone favour what is small: a sum is asked for, and must come out
+    # relative deviations alone favour small logs: the result is a sum, which must be right
     factor = float(y.sum() / (a * y.size + b * x.sum()))
     return factor * a, factor * b
 
@@ -264,7 +265,7 @@ def _stretch(good: Sequence[Tried]) -> tuple[float, float]:
 
 
 def _half_width(spread: float, sampled: int, total: int) -> float:
-    """Half the interval of a sum over all logs, relative to it; nothing is left to doubt where all were measured."""
+    """Half the interval of a sum over all logs, relative to it; 0 where all were measured."""
     if sampled < 2 or sampled >= total:
         return 0.0 if sampled >= total else 1.0
     t = student_quantile(0.5 + 0.5 * LEVEL, max(sampled - 2, 1))
@@ -272,7 +273,7 @@ def _half_width(spread: float, sampled: int, total: int) -> float:
 
 
 def _interval(value: float, half: float, around: float) -> Estimate:
-    # a sum of times is not below its share that is certain to be there
+    # a sum of times is not below its measured share
     return Estimate(value + around, value / (1.0 + half) + around, value * (1.0 + half) + around)
 
 
@@ -280,16 +281,16 @@ def _notes(work: Work, trial: Trial, logs_s: float, start_s: float) -> tuple[str
     notes = []
     failed = [t for t in trial.tried if t.reason]
     if failed:
-        notes.append(f"{len(failed)} of {len(trial.tried)} logs of the sample give nothing: {failed[0].reason}")
+        notes.append(f"{len(failed)} of {len(trial.tried)} logs of the sample give no result: {failed[0].reason}")
     unknown = sum(f == "unknown" for _, f, _ in work.new)
     if unknown:
-        notes.append(f"{unknown} file{'s are no logs; they fail' if unknown > 1 else ' is no log; it fails'} at once")
+        notes.append(f"{unknown} file{'s are not logs and fail' if unknown > 1 else ' is not a log and fails'} at once")
     met = {t.format for t in trial.tried if not t.reason}
     blind = sorted({f for _, f, _ in work.new} - met - {"unknown"})
     if blind:
-        notes.append(f"no log of format {', '.join(blind)} was measured; the others' times are taken")
+        notes.append(f"no log of format {', '.join(blind)} was measured; the times of other formats are used")
     if logs_s < 5.0 * start_s:
-        notes.append("much of the time is the start of processes, which varies more than that of logs")
+        notes.append("starting processes takes much of the time, and varies more than the logs do")
     return tuple(notes)
 
 

@@ -1,8 +1,8 @@
-"""Logs of a folder, and which of them belong to one drive.
+"""Logs of a folder, grouped by drive.
 
 Files of different drives hold the same channels, files of one drive (a logger each) hold different ones. So files are
-sorted into kinds by their channels; what varies in the names within a kind tells drives apart, and files of different
-kinds with the same such words are one drive.
+sorted into kinds by their channels; the parts of the names that vary within a kind distinguish drives, and files of
+different kinds that share these words form one drive.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def scan(
 
     Hidden files, links to folders and stores of results are left out.
 
-    A folder that is a ROS 2 bag is one log. Names that a table of runs cannot hold are told as unreadable.
+    A folder that is a ROS 2 bag is one log. Names that a table of runs cannot hold are reported as unreadable.
     """
     own = {os.path.realpath(p) for p in leave_out}
     logs: list[LogFile] = []
@@ -106,7 +106,7 @@ def scan(
 
 
 def _without_channel(name: str, notes: Sequence[str]) -> str:
-    """Why a log has no channel: raw frames that no database decodes tell of themselves."""
+    """Reason why a log has no channel, for example raw frames that no database decodes."""
     frames = next((n.removeprefix(f"{name}: ") for n in notes if "raw CAN frames" in n), "")
     return f"no channel in it; {frames}" if frames else "no channel in it"
 
@@ -124,7 +124,7 @@ def _walk(folder: Path) -> list[Path]:
 
 
 def _table_kind(path: Path) -> str:
-    """`labels` or `runs` for tables that are no logs, else empty."""
+    """`labels` or `runs` for tables that are not logs, else empty."""
     if not path.is_file():  # a pipe would never end
         return ""
     try:
@@ -139,7 +139,7 @@ def _table_kind(path: Path) -> str:
 
 
 def is_run_table(path: Path) -> bool:
-    """Whether a CSV file is a table of runs by its heading, and no log."""
+    """Whether the heading of a CSV file shows a table of runs instead of a log."""
     return _table_kind(path) == "runs"
 
 
@@ -193,7 +193,7 @@ def group_drives(
     notes: list[str] = []
     for i, own in enumerate(words):
         by_key.setdefault(tuple(w for w in own if w in telling), []).append(i)
-    if len(by_key) > 1:  # nothing in their names tells these from others: at most files of one folder are one drive
+    if len(by_key) > 1:  # their names do not distinguish them: at most, files of one folder form one drive
         rest = by_key.pop((), [])
         alone = not _share_a_word(words[i] for i in rest)
         for i in rest:
@@ -211,8 +211,8 @@ def group_drives(
         if is_one and not _share_a_word(words[i] for i in kept):
             told = ", ".join(logs[i].name for i in kept)
             notes.append(
-                f"{told} are taken for one drive by what they hold, no word is in all of their names; if they are "
-                "several, give each a line in the table of runs"
+                f"{told} are treated as one drive because of their channels, although their names share no word. If "
+                "they are several drives, give each a line in the table of runs"
             )
         for several in [kept] if is_one else [[i] for i in kept]:
             ordered = sorted(several, key=lambda i: (kinds[i], logs[i].name))

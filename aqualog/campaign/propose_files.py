@@ -1,4 +1,4 @@
-"""Texts of the proposed files: table of runs, vehicle with nothing set, campaign."""
+"""Texts of the proposed files: table of runs, vehicle file without values, campaign."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _COLUMNS = (
     "log", "tyre", "wear", "tread_depth_mm", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",
     "load_front_kg", "load_rear_kg", "manoeuvre", "lane_start_s", "lane_end_s", "labels",
 )  # fmt: skip
-_NOT_TO_FILL = ("log", "lane_start_s", "lane_end_s", "labels")  # told on their own where they are needed
+_NOT_TO_FILL = ("log", "lane_start_s", "lane_end_s", "labels")  # reported separately where they are needed
 _IF_KNOWN = ("labels", "wear", "tread_depth_mm", "load_front_kg", "load_rear_kg")
 
 
 def runs_text(drives: Sequence[Drive], table: NameTable, labels: Mapping[int, str], *, base: Path, folder: Path) -> str:
-    """The table of runs, a line per drive; columns to fill are there, blank, if names said nothing.
+    """The table of runs, a line per drive; columns that names could not fill are there, but blank.
 
     Parameters
     ----------
@@ -106,14 +106,14 @@ def _words(name: str) -> tuple[str, ...]:
 
 
 def vehicle_text(name: str) -> str:
-    """A vehicle file in which nothing is set: every key is there behind #, with unit, bounds and meaning.
+    """A vehicle file without values: every key is there behind #, with unit, bounds and meaning.
 
-    The defaults do not stand in it, so that none of them becomes a value that the user is said to have given.
+    The defaults are not in it, so that none of them counts as a value given by the user.
     """
     lines = [
-        "# Nothing of this car is known yet. Take the # away from each key that you know and write its value.",
-        "# SET marks what slip, forces and loads cannot be right without. What is left out takes the value of a",
-        "# mid-size car, and detectors that need it say so.",
+        "# No value of this car is known yet. Remove the # before each key that you know and write its value.",
+        "# SET marks keys that slip, forces and loads need in order to be right. Missing keys get the value of a",
+        "# mid-size car, and detectors that need them report that.",
         f"name = {_quoted(name)}",
         '# drivetrain = ""             # SET  "rwd", "fwd" or "awd"',
     ]

@@ -1,4 +1,4 @@
-"""Files of a folder that are no drive to look at: byte-identical copies, and logs that cannot be read."""
+"""Files of a folder that are not drives: byte-identical copies, and logs that cannot be read."""
 
 from __future__ import annotations
 

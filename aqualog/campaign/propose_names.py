@@ -1,7 +1,7 @@
-"""What names of logs say about how they were driven.
+"""Configuration of runs from the names of their logs.
 
 Names are read by rules, German and English; each guess is kept with its rule, so that the user can check it. Words that
-no rule knows and that are not the same in all names become columns of their own, so that nothing is lost.
+no rule knows and that are not the same in all names become columns of their own, so that no word is lost.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _REAR = r"(?:ha|hinten|rear|heck|kofferraum|trunk|boot)"
 
 @dataclass(frozen=True, slots=True)
 class NameTable:
-    """Columns of the table of runs, a text per name (empty: nothing said), and the rule behind each column.
+    """Columns of the table of runs, a text per name (empty: no value), and the rule behind each column.
 
     `dropped` are words that stand in all names; `notes` are doubts.
     """
@@ -38,7 +38,7 @@ class NameTable:
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """A pattern, the columns that its groups fill, and what it is to the user."""
+    """A pattern, the columns that its groups fill, and its description for the user."""
 
     pattern: re.Pattern[str]
     values: Callable[[re.Match[str]], dict[str, str] | None]
@@ -117,7 +117,7 @@ _RULES = (
     _rule(rf"\+?{_N}{_S}kg{_S}{_FRONT}{_E}", _kg("load_front_kg"), "number before kg and front"),
     _rule(rf"\+?{_N}{_S}kg{_S}{_REAR}{_E}", _kg("load_rear_kg"), "number before kg and rear"),
     _rule(rf"\+?{_N}{_S}kg{_E}", _kg("x_load_kg"),
-          "number before kg; the axle is not said: write it as load_front_kg, load_rear_kg"),
+          "number before kg; the axle is not given: write it as load_front_kg, load_rear_kg"),
     _rule(rf"{_B}(?-i:a)(\+\d+(?:[.,]\d+)?|-?\d+[.,]\d+){_E}", _acceleration,
           "a and a number with sign or decimals: acceleration"),
     _rule(rf"{_B}(?:beschl(?:eunigung)?|acc(?:el(?:eration)?)?){_S}([+-]?\d+[.,]\d+){_E}", _acceleration,
@@ -156,7 +156,7 @@ _TYRE = re.compile(r"(?:reifen|tyre|tire|pneu)([A-Za-z0-9]{0,12})", re.IGNORECAS
 def read_names(names: Sequence[str]) -> NameTable:
     """Columns from names (paths with /, with their suffix).
 
-    A value that one name tells twice is taken where it stands first; the second is left among the unknown words.
+    Of a value that is twice in one name, the first is used; the second stays among the unknown words.
     """
     told: list[dict[str, str]] = []
     rest: list[list[str]] = []

@@ -1,7 +1,8 @@
 """One signal map for all drives of a folder.
 
 A map is proposed for one or two drives of each set of loggers and channels, and the proposals are joined: channels that
-bear other names in other drives become a list in order of preference. What cannot be said in one map is told.
+bear other names in other drives become a list in order of preference. Differences that one map cannot express are
+reported.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ MOST_MISSING = 0.1  # share of drives that may lack a signal that the map names:
 
 @dataclass(frozen=True, slots=True)
 class MapProposal:
-    """A map for all drives. `needed` says whether one is: not if all channels bear canonical names.
+    """A map for all drives. `needed`: whether a map is needed; not if all channels have canonical names.
 
     `left_out` maps signals that only some drives hold to the reason; `notes` are differences between drives;
     `unmapped` are the channels, `name [unit]`, that are no signal.
@@ -90,7 +91,7 @@ def _sizes(kinds: Sequence[Sequence[Drive]]) -> str:
 
 
 def _proposals(files: Sequence[LogFile], options: ReadOptions | None) -> tuple[dict[str, Proposal], list[str]]:
-    """Proposed signals of one drive, and what is odd about their channels."""
+    """Proposed signals of one drive, and remarks on their channels."""
     with DriveLog([f.path for f in files], options) as log:
         channels: list[Channel] = list(log.read(log.channels()).values())
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
@@ -135,7 +136,7 @@ def _joined(
     notes += [f"{', '.join(symbols)}: {told}" for told, symbols in absent.items()]
     missing = [f"omega_{w}" for w in WHEELS if f"omega_{w}" not in found]
     if missing:
-        notes.insert(0, f"no channel looks like {', '.join(missing)}: aquaplaning cannot be told without")
+        notes.insert(0, f"no channel looks like {', '.join(missing)}: aquaplaning cannot be detected without")
     if not any(s.startswith("torque_") for s in found):
         notes.append(
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
@@ -146,7 +147,7 @@ def _joined(
         hint = (
             f"; {', '.join(speeds[:3])} may be it, but the file gives no unit: map it with its unit" if speeds else ""
         )
-        notes.append(f"no v_x: slip is told against the free wheels, not against the road{hint}")
+        notes.append(f"no v_x: slip refers to the free wheels, not to the road{hint}")
     return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found), unmapped)
 
 
@@ -191,7 +192,7 @@ def _is_canonical(symbol: str, entry: Entry) -> bool:
 
 
 def _one_entry(symbol: str, proposals: Sequence[Proposal], notes: list[str]) -> Entry:
-    """One line for the drives of all kinds; the most frequent kind decides where two cannot be said at once."""
+    """One line for the drives of all kinds; the most frequent kind decides where one map cannot express two."""
     first = proposals[0].entry
     channels = list(first.channel)
     unit = first.unit

@@ -18,7 +18,7 @@ GROUP_NAMES: dict[str, tuple[str, ...]] = {
     "tread": ("tread_depth_mm",),
     **{n: (n,) for n in ("tyre", "wear", "manoeuvre", "vehicle")},
 }
-"""What may be said after --by beside the keys themselves."""
+"""Words that --by accepts in addition to the keys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +61,12 @@ class Campaign:
 
 
 def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
-    """Keys behind what was said after --by.
+    """Keys behind the value of --by.
 
     Raises
     ------
     ConfigError
-        Naming all that are unknown, with the nearest ones that are there.
+        Names all unknown keys, with the most similar existing ones.
     """
     import difflib
 
@@ -79,5 +79,5 @@ def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
             wrong.append(f'"{name[:60]}"' + (f' (did you mean "{near[0]}"?)' if near and near[0] != name else ""))
         found += keys
     if wrong:
-        raise ConfigError(f"--by {', '.join(wrong)}: no run tells it", expected=", ".join(known) or "a campaign")
+        raise ConfigError(f"--by {', '.join(wrong)}: no run has this key", expected=", ".join(known) or "a campaign")
     return tuple(dict.fromkeys(found))

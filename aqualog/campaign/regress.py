@@ -25,7 +25,7 @@ from aqualog.types import FloatArray
 __all__ = ["ATTENUATION_MAX", "NOWHERE", "Design", "Estimate", "Interval", "RunParts", "estimate"]
 
 LEVEL = 0.95
-ATTENUATION_MAX = 0.30  # beyond, the correction rests on the noise more than on the data
+ATTENUATION_MAX = 0.30  # beyond it, the correction depends more on the noise than on the data
 ROUNDS = 12
 
 Interval = tuple[float, float]
@@ -34,7 +34,7 @@ _Index = NDArray[np.int64]
 
 
 class RunParts(NamedTuple):
-    """What each run adds to the normal equations, so that a fit can be repeated with runs drawn anew: `run` (g,),
+    """Contribution of each run to the normal equations, for repeated fits with bootstrapped runs: `run` (g,),
     `left` (g, p, p), `right` (g, p), `unit` (p,) of the columns.
     """
 
@@ -44,7 +44,7 @@ class RunParts(NamedTuple):
     unit: FloatArray
 
     def again(self, times: FloatArray) -> FloatArray:
-        """First coefficient (b,) if runs count `times` (b, g) each; NaN where they do not tell it."""
+        """First coefficient (b,) if runs count `times` (b, g) each; NaN where they do not determine it."""
         left = np.einsum("bg,gij->bij", times, self.left)
         right = np.einsum("bg,gi->bi", times, self.right)
         inverse = np.linalg.pinv(left, rcond=1e-10)
@@ -59,8 +59,8 @@ class Estimate:
     `value`, `half` (p,): estimates and half widths of the 95 % intervals, infinite with one run; `dof` (p,) degrees of
     freedom; `scatter` (p,) standard deviation of the coefficients from run to run; `attenuation` share of the noisy
     column's coefficient that plain least squares would have lost [-]; `noise` variance of that column's noise;
-    `spread` standard deviation of the residuals within a run; `memory` samples that count as one, since errors hang
-    together; `runs`, `samples`; `parts` for drawing the runs anew.
+    `spread` standard deviation of the residuals within a run; `memory` samples that count as one, since errors are
+    correlated; `runs`, `samples`; `parts` for the bootstrap over runs.
     """
 
     value: FloatArray
@@ -81,7 +81,7 @@ class Estimate:
 
 
 def estimate(design: Design, *, robust: bool = False) -> Estimate:
-    """Fit y = columns' coefficient with coefficients that scatter from run to run.
+    """Fit y = columns' coefficient, with coefficients that scatter from run to run.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     -------
     Estimate
 
-    Generalised least squares with V = sigma^2 I + X T X' per run: the intercepts, and the slopes if told so, scatter
-    about a mean (T by restricted likelihood), the errors within a run hang together (sigma^2 counts `memory` samples as
-    one). With p columns all of it needs X'X and X'y of each run only. What a run varies within itself and what runs
-    differ from each other both count, as far as the data say they deserve.
+    Generalised least squares with V = sigma^2 I + X T X' per run: the intercepts, and on request the slopes, scatter
+    about a mean (T by restricted likelihood), the errors within a run are correlated (sigma^2 counts `memory` samples
+    as one). With p columns all of it needs X'X and X'y of each run only. Variation within runs and differences between
+    runs both count, with weights from the data.
 
-    Noise of the traction biases k towards 0. Its moments, from second differences over `APART` samples, are taken off
-    X'X and X'y alike, so what both share stays consistent; run by run, so that the error of the noise is in the
+    Noise of the traction biases k towards 0. Its moments, from second differences over `APART` samples, are subtracted
+    from X'X and X'y alike, so that the estimate stays consistent; run by run, so that the error of the noise is in the
     intervals too.
 
     Intervals: cluster-robust variance of the runs' scores with the correction of Bell and McCaffrey (CR2 [bell2002])
@@ -125,7 +125,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
         if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
             break
     half, dof = _half_widths(moments, k, value)
-    # a residual that is cut does not answer to the coefficients, though its weight is not zero ([huber1981], chapter 7)
+    # a clipped residual does not depend on the coefficients, though its weight is not zero ([huber1981], chapter 7)
     half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
     i = d.noisy.index(True) if any(d.noisy) else -1
     noise = _noise(moments_of(d, first, weight), value, i) if i >= 0 else 0.0
@@ -156,7 +156,7 @@ def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArr
     size, axes = np.linalg.eigh(plain.sum(axis=0))
     size = np.maximum(size, 1e-12 * size[-1])
     root, unroot = (axes * size**-0.5) @ axes.T, (axes * size**0.5) @ axes.T  # M^(1/2), M^(-1/2)
-    share, turn = np.linalg.eigh(root @ plain @ root)  # how much of the whole a run is: B
+    share, turn = np.linalg.eigh(root @ plain @ root)  # share of a run in the whole: B
     share = np.clip(share, 0.0, 1.0 - 1e-6)
     grow = np.einsum("gij,gj,gkj->gik", turn, (1.0 - share) ** -0.5, turn)
     score = np.einsum("gij,gj->gi", k, m.c - m.c_noise - (m.h - m.h_noise) @ value)
@@ -185,7 +185,7 @@ def _noise(m: Moments, value: FloatArray, i: int) -> float:
 
 
 def _attenuation(m: Moments, k: FloatArray, noise: float, i: int) -> float:
-    """Share of coefficient i that would be lost if the noise were left in."""
+    """Share of coefficient i that would be lost without the correction for noise."""
     if i < 0:
         return 0.0
     a = np.einsum("gij,gjk->ik", k, m.h)

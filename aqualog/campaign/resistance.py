@@ -24,7 +24,7 @@ DRY_S = 1.0  # [s] of dry driving before the lane that a run's own level needs
 class MeanRow:
     """A cell's mean: `value` with `ci`, `scatter` standard deviation from run to run, `dof` of the interval.
 
-    `reliable`: an interval, told; `reason` why there is no value or no interval.
+    `reliable`: an interval exists; `reason` why there is no value or no interval.
     """
 
     group: Group
@@ -45,7 +45,7 @@ class MeanRow:
 
 @dataclass(frozen=True, slots=True)
 class ResistanceTable:
-    """Rows [m/s^2], whether each run's own dry level is off, samples left out by reason."""
+    """Rows [m/s²], whether each run's own dry level is subtracted, samples left out by reason."""
 
     plan: Plan
     rows: tuple[MeanRow, ...]
@@ -63,8 +63,8 @@ def resistances(
     ----------
     data, plan
     relative : bool
-        Less the run's own level on dry road before the lane (at least a second): mass, rolling resistance, grade and an
-        offset of the accelerometer fall out. Where there is none of it, the run is left out and counted.
+        Subtract the run's own level on dry road before the lane (at least a second). This removes errors of mass,
+        rolling resistance, grade and accelerometer offset. A run without such a stretch is left out and counted.
     robust : bool
         Huber's weights [huber1981].
     limits : Limits

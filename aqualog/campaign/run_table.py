@@ -39,7 +39,7 @@ def read_table(path: Path, *, key: str) -> RunTable:
     Raises
     ------
     ConfigError
-        If it cannot be read or is no table.
+        If it cannot be read or is not a table.
     """
     what = "table of runs"
     data = read_small(path, what=what, expected="a CSV file", largest=LARGEST)
@@ -99,7 +99,7 @@ def _separator(text: str, key: str) -> tuple[str, int]:
 
 
 def decimal_sign(cells: Iterable[str], separator: str) -> str:
-    """Decimal sign of a table's numbers: `.`, `,`, or `?` where it cannot be told.
+    """Decimal sign of a table's numbers: `.`, `,`, or `?` where it cannot be determined.
 
     A comma is one where no number has a point. Between commas as separators, `1,234` may also mean a thousand.
     """

@@ -1,4 +1,4 @@
-"""Results of a campaign as they are used: runs with their configuration, events, and samples that know of the water."""
+"""Results of a campaign in memory: runs with their configuration, events, and samples marked as on or off water."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _KEPT = 64  # runs whose samples stay in memory
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """One run of a campaign and what came of it.
+    """One run of a campaign with its result.
 
-    `state` is `done`, `failed` or `to do`; `vehicle` has the run's load; `about` is what `measure` found, empty unless
-    done; `water_from` says how the lane is known: `lane times`, `signal`, `labels`, `dry run`, or empty.
+    `state` is `done`, `failed` or `to do`; `vehicle` has the run's load; `about` holds the findings of `measure`, empty
+    unless done; `water_from` gives the source of the lane: `lane times`, `signal`, `labels`, `dry run`, or empty.
     """
 
     index: int
@@ -136,7 +136,7 @@ class CampaignData:
 
 
 def load_results(configured: Configured, store: Store, jobs: Sequence[Job] | None = None) -> CampaignData:
-    """What the store has of a campaign; runs without results are among the runs, and say why."""
+    """The store's results of a campaign; runs without results are included, with the reason."""
     jobs = plan_jobs(configured, Contents(store.read_json("contents.json"))) if jobs is None else jobs
     done, failed = store.keys()
     store.look_at(done & {j.key for j in jobs})

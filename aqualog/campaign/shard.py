@@ -1,4 +1,4 @@
-"""A part of a campaign for one of several machines: the same part everywhere, whatever the others do."""
+"""A part of a campaign for one of several machines; it does not depend on the others."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Shard:
 
 
 def shard_of(text: str) -> Shard:
-    """The shard that `2/8` means.
+    """The shard of a text such as `2/8`.
 
     Raises
     ------
@@ -48,15 +48,15 @@ def shard_of(text: str) -> Shard:
 def part_of(campaign: Campaign, shard: Shard) -> Campaign:
     """The campaign with the runs of one shard.
 
-    A run belongs to a shard by the names of its logs: no log must be read to know, runs on the same logs stay together,
-    and a log that comes later moves none of the others.
+    The names of its logs assign a run to a shard. So no log must be read, runs on the same logs stay together, and new
+    logs do not move others.
     """
     own = (r for r in campaign.runs if number_of(campaign, r.logs) % shard.count == shard.index - 1)
     return replace(campaign, runs=tuple(own))
 
 
 def number_of(campaign: Campaign, logs: Sequence[Path]) -> int:
-    """A number of a drive by the names of its logs, whose remainder tells its shard."""
+    """A number of a drive by the names of its logs, whose remainder gives its shard."""
     base = campaign.path.parent
     names = [p.relative_to(base) if p.is_relative_to(base) else p for p in logs]
     return zlib.crc32("\n".join(p.as_posix() for p in names).encode())

@@ -19,15 +19,15 @@ from aqualog.types import FloatArray
 
 __all__ = ["LIMITS", "Limits", "SlopeRow", "SlopeTable", "contact", "fit_slope", "slip_slopes", "too_few_runs"]
 
-S_MAX = 0.10  # [-] a wheel that slips more spins; less would cut off what a small contact shows (0.3 over 3 is 0.1)
-WIND_UP = 0.30  # [-] traction beyond which the curve bends, as `aqualog slip-slope` has it
+S_MAX = 0.10  # [-] a wheel with more slip spins; a lower limit would cut off small contacts (0.3 over 3 is 0.1)
+WIND_UP = 0.30  # [-] traction beyond which the curve bends, as in `aqualog slip-slope`
 SLOPE_MAX = 300.0  # [-] no tyre has more
-SPAN_MAX = 3.0  # [-] upper over lower end of an interval; wider ones say little more than that there is a slope
+SPAN_MAX = 3.0  # [-] upper over lower end of an interval; wider ones show little more than that a slope exists
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Least that a slope rests on: `runs` for an interval, `samples`, and `mu_range` (5 to 95 % of the traction)."""
+    """Least data for a slope: `runs` for an interval, `samples`, and `mu_range` (5 to 95 % of the traction)."""
 
     runs: int = 3
     samples: int = 20
@@ -47,16 +47,16 @@ def too_few_runs(runs: int, limits: Limits) -> str:
 class SlopeRow:
     """A cell's slope.
 
-    `slope` [-]: slope of the regression of F_x / F_z over slip within `mu_range` (5 to 95 % of the traction driven), a
-    chord: the brush bends (E22), so C_s / F_z, its tangent at no slip, is more: a tenth on dry road at the thesis'
-    tractions, a sixth on water, nearly half where little contact is left. `slope_ci`; `intercept` slip without traction
-    [-], `intercept_ci`; `r2` share of the slip's variance that the line explains; `attenuation` share of 1 / slope that
-    the noise of the traction would have taken (given back); `scatter` standard deviation of the slope from run to run,
-    relative; `dof` of the interval. `reliable`: told, with an interval that spans less than `SPAN_MAX`, by a line that
-    explains more than a constant. `reason` why there is no slope, no interval, or no reliance on it. `slope_dry` with
-    interval and runs: same configuration and wheel off the lane, all speeds, over `mu_range_dry`. `contact_ratio` L
-    [-]: see `contact`. `friction` (dry, wet) that it rests on. `expected`: the model, its chord over the same traction.
-    NaN where not told.
+    `slope` [-]: slope of the regression line of F_x / F_z over slip within `mu_range` (5 to 95 % of the traction
+    driven). The brush's curve bends (E22), so C_s / F_z, its tangent at zero slip, is larger: by a tenth on dry road at
+    the thesis' tractions, by a sixth on water, by nearly half where little contact is left. `slope_ci`; `intercept`
+    slip without traction [-], `intercept_ci`; `r2` share of the slip's variance that the line explains; `attenuation`
+    bias of 1 / slope by traction noise, as a share; it is corrected; `scatter` standard deviation of the slope from run
+    to run, relative; `dof` of the interval. `reliable`: a slope with an interval that spans less than `SPAN_MAX`, from
+    a line that explains more than a constant. `reason` why there is no slope, no interval, or no reliable one.
+    `slope_dry` with interval and runs: same configuration and wheel off the lane, all speeds, over `mu_range_dry`.
+    `contact_ratio` L [-]: see `contact`. `friction` (dry, wet) used for it. `expected`: the model's slope over the same
+    traction. NaN without an estimate.
     """
 
     group: Group
@@ -94,7 +94,7 @@ class SlopeRow:
 
     @property
     def over_dry(self) -> tuple[float, Interval]:
-        """Slope over the dry one, with interval: both as shares of their slopes, taken to be independent."""
+        """Slope over the dry one, with interval: both as shares of their slopes, assumed to be independent."""
         down, up = (
             math.hypot(math.log(self.slope_ci[i] / self.slope), math.log(self.slope_dry_ci[1 - i] / self.slope_dry))
             for i in (0, 1)
@@ -118,14 +118,14 @@ class SlopeTable:
 def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits: Limits = LIMITS) -> SlopeTable:
     """Slopes of all cells.
 
-    The dry reference of a row is that of its configuration without the water's depth: what the same runs drive before
-    and behind the lane counts too.
+    The dry reference of a row is that of its configuration without the water's depth; the same runs before and after
+    the lane count too.
 
-    A slope is told where 0 is outside the interval of 1 / slope. Where few are, they are a choice of the lucky ones: on
-    made data (`tests/campaign/slope_coverage.py`) the intervals told hold the truth in 83 of 100 cells with three runs,
-    in 92 to 95 with five where most cells are told, and in 66 where the traction hardly varies. Where the noise of the
-    traction is large, the cells told are those whose noise was small by luck, and too much is given back to them: with
-    three runs and a noise of 0.010 the slopes told are up to 15 % high.
+    A slope is reported where the interval of 1 / slope excludes 0. Where few cells meet this, they are a selection: on
+    simulated data (`tests/campaign/slope_coverage.py`) the reported intervals hold the truth in 83 of 100 cells with
+    three runs, and in 92 to 95 with five where most cells are reported. Where the traction hardly varies they hold it
+    in 66. Where the traction noise is large, reported cells are those with small noise by chance, and the correction is
+    too large for them: with three runs and a noise of 0.010 the reported slopes are up to 15 % high.
 
     Thesis: section 2.3, Figs 2.16 to 2.20; (2.2) for the contact ratio.
     """
@@ -229,11 +229,11 @@ def _told(
         reason = f"{100.0 * min(found.attenuation, 1.0):.0f} % of the variation of the traction is noise"
     elif not few and not low > 0.0 < high:
         reason = (
-            f"1 / slope is {k:.3f} with a 95 % interval of {low:.3f} ... {high:.3f}, which holds 0{open_word}"
+            f"1 / slope is {k:.3f} with a 95 % interval of {low:.3f} ... {high:.3f}, which includes 0{open_word}"
             if high > 0.0 else f"slip falls with traction (1 / slope is {k:.3f})"
         )  # fmt: skip
     elif not k > 1.0 / SLOPE_MAX:
-        reason = f"1 / slope is {k:.4f}: less than a tyre has{open_word}"
+        reason = f"1 / slope is {k:.4f}: less than any tyre has{open_word}"
     line = found.value @ np.stack(columns)
     total = float(np.sum((slip - slip.mean()) ** 2))
     r2 = 1.0 - float(np.sum((slip - line) ** 2)) / total if total > 0.0 else math.nan
@@ -249,7 +249,7 @@ def _told(
 
 
 def _doubt(span: float, r2: float) -> str:
-    """Why a slope with an interval is not to be relied on."""
+    """Reason why a slope with an interval is not reliable."""
     if span > SPAN_MAX:
         return f"the interval spans a factor of {span:.1f}, at most {SPAN_MAX:g} is reliable"
     if r2 < 0.0:
@@ -266,10 +266,10 @@ def _shared(mu: FloatArray, u: FloatArray) -> float:
 def contact(row: SlopeRow, dry: SlopeRow, slope: FloatArray, slope_dry: FloatArray) -> FloatArray:
     """Contact L of a row on water, for other values of both slopes than the rows' own too.
 
-    The L whose brush has the row's slope as its chord over the row's tractions, with the tangent that the dry slope is
-    the chord of over the dry ones. sqrt(slope / slope_dry), (2.2), would divide two chords of different bend and be
-    0.02 to 0.09 low. The friction is known to 10 or 20 % only: 20 % change L by 0.01 at 0.8 and above, by 0.02 at 0.6.
-    Arrays broadcast; see `contact_of` for limits.
+    The L of the brush whose regression line over the row's tractions has the row's slope. Its tangent at zero slip
+    follows in the same way from the dry slope over the dry tractions. sqrt(slope / slope_dry), (2.2), would divide two
+    slopes of curves that bend differently, and would be 0.02 to 0.09 low. The friction is known to 10 or 20 % only: 20
+    % change L by 0.01 at 0.8 and above, by 0.02 at 0.6. Arrays broadcast; see `contact_of` for limits.
     """
     tangent = tangent_of(slope_dry, dry.friction[0], dry.mu_range)
     return contact_of(slope / tangent, row.friction[1], row.mu_range)

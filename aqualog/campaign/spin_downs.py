@@ -15,14 +15,15 @@ from aqualog.evaluate.intervals import poisson, wilson
 
 __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 
-LEAST_S = 0.5  # [s] on the lane that make a pass
-FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; shorter dips come back by themselves
+LEAST_S = 0.5  # [s] on the lane that count as a pass
+FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller dips recover by themselves
 
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One run over the watered lane: mean speed [m/s], time and way on it, and per free wheel: `minor` spin-downs begun
-    there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against car.
+    """One run over the watered lane: mean speed [m/s], time and distance on it, and per free wheel: `minor` spin-downs
+    begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against
+    car.
     """
 
     info: RunInfo

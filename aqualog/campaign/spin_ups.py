@@ -26,13 +26,13 @@ def spin_ups(data: CampaignData, plan: Plan, *, residual: bool = False, limits: 
     ----------
     data, plan
     residual : bool
-        Less what the vehicle misses (`physics.traction.residual_traction`): what is left to push the car, a lower
-        bound. Otherwise what the torque brings less the wheel's own acceleration, which on water also turns the wheel
-        against the increased rolling resistance.
+        Subtract the missing acceleration of the vehicle (`physics.traction.residual_traction`); the rest pushes the car
+        and is a lower bound. Otherwise the traction is the torque minus the wheel's own acceleration; on water it also
+        turns the wheel against the increased rolling resistance.
     limits : Limits
 
-    Spinning is told by slip (`is_spinning`), not by the detector's events: the detector takes spin-ups below a traction
-    of 0.07 only, to leave out other slippery surfaces, and a mean over what it has found would know nothing above.
+    Slip defines spinning (`is_spinning`), not the detector's events. The detector reports spin-ups only below a
+    traction of 0.07, to exclude other slippery surfaces; a mean over its events would have no values above that.
 
     Thesis: Fig. 2.7.
     """

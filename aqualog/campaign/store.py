@@ -1,12 +1,12 @@
-"""Where a campaign's results are kept, a folder or a URL: a file per log, and tables that open by themselves.
+"""Storage of a campaign's results, a folder or a URL: a file per log, and tables for other programs.
 
-STORE/samples/KEY.parquet   samples of one log; what was found stands as JSON under "aqualog" in the file's metadata
-STORE/failed/KEY.json       why a log gave nothing; tried again when the log or its configuration changes
-STORE/runs.parquet          a row per run        (made anew by every batch)
+STORE/samples/KEY.parquet   samples of one log; findings as JSON under "aqualog" in the file's metadata
+STORE/failed/KEY.json       reason for no result; tried again when the log or its configuration changes
+STORE/runs.parquet          a row per run        (made again by every batch)
 STORE/events.parquet        a row per event      (as above)
 STORE/manifest.json         state of every log   (as above)
 STORE/contents.json         hashes of the logs by size and time of change
-STORE/lock                  held by the batch that writes here; readers need none
+STORE/lock                  held by the batch that writes here; readers do not need it
 STORE/parts/                hashes and lock of each shard, which writes samples and failures only
 """
 
@@ -38,7 +38,7 @@ _CONTENTS = "contents.json"
 _FILES = ("runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK, _LOCK)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
-# what readers of the store rely on
+# names that readers of the store rely on
 _COLUMNS = frozenset(
     ["t", "v_x", "a_x", "a_over_v", "delta_a_x", "reason"]
     + [f"{n}_{w}" for n in ("slip", "slip_min", "slip_max", "mu", "spin", "minor") for w in WHEELS]
@@ -63,7 +63,7 @@ class Store:
     Raises
     ------
     AqualogError
-        If a URL is none, lacks its package, or cannot be reached.
+        If a URL is invalid, lacks its package, or cannot be reached.
     """
 
     def __init__(self, address: Address, part: str = "") -> None:
@@ -72,25 +72,25 @@ class Store:
 
     @property
     def address(self) -> Address:
-        """From which another process makes the same store."""
+        """Address from which another process opens the same store."""
         return self._place.address
 
     @property
     def name(self) -> str:
-        """The address as users are told."""
+        """The address for messages."""
         return self._place.name
 
     @property
     def is_shared(self) -> bool:
-        """Whether other processes see it."""
+        """Whether other processes can see it."""
         return self._place.is_shared
 
     def at(self, name: str) -> str:
-        """A file of the store as users are told."""
+        """Address of a file of the store for messages."""
         return self._place.at(name)
 
     def check(self) -> None:
-        """Refuse a folder that is none of a store; one that is not there will do.
+        """Refuse a folder that is not a store; a missing folder is accepted.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class Store:
 
     @contextmanager
     def held(self, *, must: bool) -> Iterator[bool]:
-        """Make the folder ready and keep other batches out; within, whether that could be done.
+        """Prepare the folder and keep other batches out; yields whether that was possible.
 
         Behind a URL there are no locks: two batches would do the same work twice, to the same result.
 
@@ -169,7 +169,7 @@ class Store:
         return self._place.copy(name).stat().st_size if self._place.has(name) else 0
 
     def state_of(self, key: str) -> str:
-        """`done`, `failed`, or empty where nothing is known."""
+        """`done`, `failed`, or empty if unknown."""
         if self._place.has(_samples(key)):
             return "done"
         return "failed" if self._place.has(_failure(key)) else ""
@@ -192,12 +192,12 @@ class Store:
             self._place.remove(_failure(key))
 
     def put_failure(self, key: str, reason: str) -> None:
-        """Keep why a log gave nothing."""
+        """Store the reason why a log gave no result."""
         with self._told():
             self._place.write(_failure(key), (json.dumps({"reason": reason}) + "\n").encode())
 
     def failure(self, key: str) -> str:
-        """Why a log gave nothing."""
+        """Reason why a log gave no result."""
         try:
             return str(json.loads(self._place.read(_failure(key)))["reason"])
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -209,7 +209,7 @@ class Store:
             self._place.remove(_samples(key))
 
     def look_at(self, keys: Collection[str]) -> None:
-        """What was found in these logs is asked for next: behind a URL many are read together.
+        """Announce that the findings of these logs are needed next: behind a URL many are read together.
 
         Raises
         ------
@@ -220,11 +220,11 @@ class Store:
             self._place.look_at([_samples(k) for k in sorted(keys)])
 
     def expect(self, keys: Iterable[str]) -> None:
-        """Samples of these logs are asked for, probably in this order; what was read before is read anew."""
+        """Announce that samples of these logs are needed, probably in this order; earlier reads are repeated."""
         self._place.expect([_samples(k) for k in keys])
 
     def is_sound(self, key: str) -> bool:
-        """Whether a log's file can be read as far as its metadata and columns tell."""
+        """Whether a log's file is readable, judged by its metadata and columns."""
         try:
             self.about(key)
         except LogError:
@@ -232,7 +232,7 @@ class Store:
         return True
 
     def about(self, key: str) -> Mapping[str, Any]:
-        """What was found in a log.
+        """Findings of a log.
 
         Raises
         ------
@@ -316,7 +316,7 @@ class Store:
             self._write_frame(name, frame)
 
     def holds(self, path: Path) -> bool:
-        """Whether a path lies in this store."""
+        """Whether a path is inside this store."""
         return self._place.holds(path)
 
     def _write_frame(self, name: str, frame: pl.DataFrame, **options: Any) -> None:
@@ -335,7 +335,8 @@ class Store:
 
     @contextmanager
     def _reached(self) -> Iterator[None]:
-        """A store that cannot be asked says nothing of its files; a folder's faults are told as they are."""
+        """Report a store that cannot be reached, which gives no information on its files; folder errors stay as they
+        are."""
         try:
             yield
         except OSError as error:

@@ -32,7 +32,7 @@ V_LEAST = 3.0  # [m/s] below, a wheel's deviation from the car is not a slip wor
 
 _SPINS = ("spin_down", "spin_up")
 _MINOR = ("minor_spin_down",)
-# what of a drive the samples are made of
+# signals of a drive that the samples use
 _SIGNALS = ("v_x", "a_x", "on_water", "water_depth_left", "water_depth_right", *(f"torque_{w}" for w in WHEELS))
 _FEATURES = (
     "v_x_hat", "a_kin", "a_kin_slow", "a_y_slow", "yaw_rate_slow", "brake_pressure", "delta_a_x",
@@ -53,8 +53,9 @@ class Thinning:
     dt : float
         Sample time of the drive. [s]
 
-    A sample is put out once all that its means look at is there: half of a mean and a step of a gradient behind it.
-    `against` tells what slip is against and `traction` from what traction is; both hold from the first samples on.
+    A sample is complete once the data of its means are there: half of a mean and a step of a gradient after it.
+    `against` names the reference of slip and `traction` the source of traction; both are fixed from the first samples
+    on.
     """
 
     def __init__(self, vehicle: Vehicle, dt: float) -> None:
@@ -64,7 +65,7 @@ class Thinning:
         self._width = max(1, 2 * round(0.5 * (SMOOTHING / dt - 1.0)) + 1)
         self._step = max(1, round(STEP_S / dt))
         # what is looked at before a sample: half a mean and a gradient, and how long a brake counts after its release;
-        # a whole mean at least, since a piece that is shorter than one tells nothing
+        # a whole mean at least, since a shorter piece gives no value
         self._back = self._width + max(1, round(HOLD / dt)) + 1
         self._start = 0  # row of the drive where what is held begins
         self._done = 0  # samples put out
@@ -179,7 +180,7 @@ def _series(name: str, x: FloatArray | BoolArray) -> pl.Series:
 def _traction(
     f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, width: int
 ) -> tuple[dict[str, FloatArray], str]:
-    """Traction of each wheel, and from what: torque, accelerometer, or none."""
+    """Traction of each wheel, and its source: torque, accelerometer, or none."""
     n = f["v_x_hat"].size
     out = {w: np.full(n, np.nan) for w in WHEELS}
     if all(f"torque_{w}" in columns and f"v_line_{w}" in f for w in vehicle.driven):
@@ -195,7 +196,7 @@ def _traction(
 def _slips(
     f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, width: int
 ) -> tuple[dict[str, FloatArray], str, FloatArray]:
-    """Slip of each wheel, what it is against, and what a second of delay of that reference would add to it."""
+    """Slip of each wheel, its reference, and the slip added by one second of delay of that reference."""
     n = f["v_x_hat"].size
     out = {w: np.full(n, np.nan) for w in WHEELS}
     wheels = [w for w in WHEELS if f"v_line_{w}" in f]

@@ -25,11 +25,11 @@ _met: set[str] = set()  # formats that this process has met: their libraries are
 
 
 class Cost(NamedTuple):
-    """What one log cost in its process: wall-clock and computing time once everything is loaded [s].
+    """Cost of one log in its process: wall-clock and computing time once everything is loaded [s].
 
     Where the process met its format first it was measured twice, and `loading_s`, `loading_cpu_s` are what the first
     time took longer; else None. `ended` and `cpu_ended_s` are the process's own clocks afterwards, `peak_bytes` the
-    most memory that it has held so far, 0 where the system does not tell.
+    most memory that it has held so far, 0 where the system gives no value.
     """
 
     outcome: Fault | None
@@ -45,7 +45,7 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """One log of the sample; `reason` if it gave nothing."""
+    """One log of the sample; `reason` if it gave no result."""
 
     logs: tuple[Path, ...]
     format: str
@@ -58,7 +58,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What a batch of the sample cost.
+    """Cost of a batch of the sample.
 
     `hashing_s` before and `tables_s` behind the logs, in the process that leads; `start_s` and `start_cpu_s` of a
     process that meets all formats: all but the logs themselves; `ending_s` until all processes have ended; `peak_bytes`
@@ -95,7 +95,7 @@ def tried(
     processes : int
         At a time, so that they are in each other's way as in the batch.
     reporter : callable
-        Makes what is told the logs done, all, and failed.
+        Makes the callable that receives the numbers of finished, all and failed logs.
     """
     before = kept_code()
     found = _tried_once(configured, sample, processes, reporter())
@@ -150,7 +150,7 @@ def _tried_once(
 
 
 def _beside(costs: Sequence[tuple[str, Cost]], began: float, *, is_cpu: bool) -> float:
-    """What a process spends beside its logs: its start, libraries of all formats, waiting. Median of them. [s]"""
+    """Time of a process besides its logs: its start, libraries of all formats, waiting. Median. [s]"""
     loading: dict[str, list[float]] = {}
     of: dict[int, list[tuple[str, Cost]]] = {}
     for form, cost in costs:
@@ -200,7 +200,7 @@ def _measured(task: tuple[Any, ...]) -> tuple[Fault | None, float, float]:
 
 
 def peak_memory() -> int:
-    """Most memory that this process has held; 0 where the system does not tell. [byte]"""
+    """Most memory that this process has held; 0 where the system gives no value. [byte]"""
     try:
         import resource
     except ImportError:  # no such count on this system

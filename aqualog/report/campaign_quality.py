@@ -48,7 +48,7 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
             data, "limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded "
             "from figures over speed", lambda r: "" if r.water_from else "no lane",
         ),
-        _of_done(data, "limit", "lane behind the log's end", "used up to the end of the log", _lane_beyond),
+        _of_done(data, "limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
         _of_done(data, "limit", "vehicle file without the drivetrain", "rear-wheel drive is assumed",
                  lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
         _of_done(data, "limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope "

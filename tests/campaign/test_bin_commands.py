@@ -107,7 +107,7 @@ def test_resistance_as_the_contract_says(campaign, tmp_path):
 @pytest.mark.parametrize(
     ("args", "said"),
     [
-        (["--by", "tire"], "no run tells it"),
+        (["--by", "tire"], "no run has this key"),
         (["--road", "damp"], "--road"),
         (["-o", "x.xlsx"], "no format of a table"),
     ],
@@ -132,4 +132,4 @@ def test_water_that_nobody_tells_is_told(campaign, tmp_path):
     car = tmp_path / "car.toml"
     car.write_text(vehicle_toml(SEDAN))
     done = invoke("bin-resistance", *sorted(bare.iterdir()), "--vehicle", car, "--store", tmp_path / "s", "--jobs", 1)
-    assert "no samples: on or off the water is not known\ntry: water_depth_mm = 0" in done.stdout
+    assert "no samples: whether on or off the water is not known\ntry: water_depth_mm = 0" in done.stdout

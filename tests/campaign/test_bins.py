@@ -191,7 +191,7 @@ def test_sides_and_unknown_values_have_groups_of_their_own():
 
 def test_plan_refuses_what_makes_no_sense(worn):
     campaign = worn.configured.campaign
-    with pytest.raises(ConfigError, match="no run tells it"):
+    with pytest.raises(ConfigError, match="no run has this key"):
         check_plan(campaign, ["tire"])
     with pytest.raises(ConfigError, match="--road"):
         check_plan(campaign, [], road="damp")

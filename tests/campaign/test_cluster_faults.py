@@ -211,7 +211,7 @@ def test_results_that_went_elsewhere_are_missed(campaign, tmp_path):
         for key, task in tasks.items():
             record(key, work(tmp_path / "other", *task[1:]))
 
-    with pytest.raises(AqualogError, match="2 results that workers have written are not here"):
+    with pytest.raises(AqualogError, match="2 results that workers have written are missing here"):
         run_batch(configure(campaign), Store(tmp_path / "s"), elsewhere=elsewhere)
 
 

@@ -185,7 +185,7 @@ def test_strangers_among_others_are_no_drive_and_alone_they_are_told(tmp_path):
     imu(tmp_path / "unrelated.csv")
     found, notes, _ = drives(tmp_path)
     assert sorted(map(len, found)) == [2]
-    assert "taken for one drive by what they hold" in notes[0]
+    assert "treated as one drive because of their channels" in notes[0]
     for i in range(3):  # of a kind of their own, so that nothing in the two names tells them apart
         wheels(tmp_path / f"d{i}.csv", names=[f"{n}_neu" for n in WHEELS])
     found, notes, _ = drives(tmp_path)
@@ -334,7 +334,7 @@ def test_nothing_is_overwritten_without_force_and_no_log_even_with_it(tmp_path):
     before = (tmp_path / "logs" / "runs.csv").read_bytes()
     result = run(tmp_path / "logs", "-o", tmp_path / "logs" / "campaign.toml", "--force")
     assert result.exit_code == 2
-    assert "is no table of runs" in result.output
+    assert "is not a table of runs" in result.output
     assert (tmp_path / "logs" / "runs.csv").read_bytes() == before
 
 

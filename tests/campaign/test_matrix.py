@@ -116,9 +116,9 @@ def test_notes_on_dry_runs_lanes_and_blanks():
     assert "no dry run of a on car" in notes(dict(wet))
     assert "no dry run of b on car" in notes(dict(wet), {"tyre": "a", "water_depth_mm": 0}, {**wet, "tyre": "b"})
     assert notes({**wet, "lane": (1.0, 2.0)}, {"tyre": "a", "water_depth_mm": 0}) == ""
-    assert "1 of 2 runs tells neither lane times nor labels" in notes(dict(wet), {"tyre": "a", "water_depth_mm": 0})
-    assert "the runs tell no tyre" in notes({"water_depth_mm": 0})
-    assert "1 of 2 runs tells no water_depth_mm" in notes({"tyre": "a", "water_depth_mm": 0}, {"tyre": "a"})
+    assert "1 of 2 runs without lane times and labels" in notes(dict(wet), {"tyre": "a", "water_depth_mm": 0})
+    assert "all runs without tyre" in notes({"water_depth_mm": 0})
+    assert "1 of 2 runs without water_depth_mm" in notes({"tyre": "a", "water_depth_mm": 0}, {"tyre": "a"})
 
 
 def test_logs_that_are_missing_are_told_with_their_line_and_a_similar_name(tmp_path):
@@ -152,7 +152,7 @@ def test_the_command_shows_the_matrix(folder):
     for part in (
         "wet: 9 runs in 3 configurations", "all there, 0.0 MB", "car, rwd, 1500 kg", "same in all runs: vehicle = car",
         "! 1 of 3 configurations with fewer than 3 runs", "~ 1 of 3 configurations with fewer than 5 runs",
-        "5 of 9 runs tell neither lane times", "    b, 1.3\n", "car.toml does not give drivetrain, l_f, l_r, wheels.r_e_f",
+        "5 of 9 runs without lane times", "    b, 1.3\n", "car.toml does not give drivetrain, l_f, l_r, wheels.r_e_f",
     ):  # fmt: skip
         assert part in out.output, out.output
     document = json.loads(CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml"), "--json"]).stdout)
@@ -196,11 +196,11 @@ def test_what_a_batch_has_measured_is_used(folder):
     out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml")]).output
     for part in (
         "measured by a batch: 1 of 2 runs", "60 82.5", "not measured: b00.mf4: is cut",
-        "runs.csv: line 2: lane_end_s = 25 is behind the log's end at 20.0 s",
+        "runs.csv: line 2: lane_end_s = 25 is after the log's end at 20.0 s",
     ):  # fmt: skip
         assert part in out, out
     assert "line 3: lane_end_s" not in out
     (store / "runs.parquet").write_bytes(b"junk")
     out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml")])
     assert out.exit_code == 2
-    assert "is no table of runs" in out.output
+    assert "is not a table of runs" in out.output

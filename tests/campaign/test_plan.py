@@ -111,7 +111,7 @@ def test_a_log_that_took_its_process_down_and_formats_unseen_are_told():
     text = " ".join(plan.notes)
     assert "1 of 4 logs of the sample" in text
     assert "no log of format mdf" in text
-    assert "2 files are no logs" in text
+    assert "2 files are not logs" in text
     assert plan.logs_s.value == pytest.approx(2.0 * 12.0)  # what is no log takes no time
 
 

@@ -23,7 +23,7 @@ def test_a_batch_with_poison_in_it_that_is_killed_ends_as_one_that_is_not(tmp_pa
     assert plain.code == 3
     assert len(failed) == 6 + len(hooks)
     assert plain.document["made"] == count - len(failed)
-    assert all("ended without a word" in failed[f"logs/poison_{name}"] for name in hooks)
+    assert all("ended without a message" in failed[f"logs/poison_{name}"] for name in hooks)
     again = disturbed(campaign, tmp_path / "killed", env, count, 1, [signal.SIGKILL], *jobs)
     assert again.document["kept"] > 0
     assert reasons(again.document) == failed

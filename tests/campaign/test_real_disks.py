@@ -93,7 +93,7 @@ def test_a_store_whose_disk_goes_is_not_begun_anew_in_its_place(campaign, tmp_pa
                 pass
     with disk(tmp_path / "disk") as place:
         after(4, monkeypatch, lambda: gone(place))
-        expected = "3 results that were written are not here" if is_under else "is gone; expected the folder in which"
+        expected = "3 results that were written are missing" if is_under else "is gone; expected the folder in which"
         with pytest.raises(AqualogError, match=rf"disk/s: {expected}") as caught:
             run_batch(configure(campaign), Store(place / "s"))
     assert caught.value.exit_code == 1

@@ -199,7 +199,7 @@ def test_copies_are_fetched_ahead_and_go_with_the_store(plain, url):
 @pytest.mark.parametrize(
     ("address", "text"),
     [
-        ("nowhere://x/store", "is no place that fsspec knows"),
+        ("nowhere://x/store", "is not a place that fsspec supports"),
         ("simplecache::s3://bucket/store", "is a chain of file systems"),
         ("memory://", "names no place"),
         ("lakefs://bucket/store", "needs a package that is not installed (Please install lakefs-spec"),

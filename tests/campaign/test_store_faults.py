@@ -313,11 +313,11 @@ def test_entries_of_a_wrong_shape_are_none(entry):
     [
         (lambda s: (s / MARK).write_text('{"schema_version": 99}'), "schema_version 99"),
         (lambda s: (s / MARK).write_text("{"), "schema_version None"),
-        (lambda s: (shutil.rmtree(s / "samples"), (s / "samples").write_text("")), "samples: is no folder"),
+        (lambda s: (shutil.rmtree(s / "samples"), (s / "samples").write_text("")), "samples: is not a folder"),
         (lambda s: ((s / "contents.json").unlink(), (s / "contents.json").mkdir()), "contents.json: is a folder"),
         (lambda s: (shutil.rmtree(s), s.write_text("")), "campaign.store: is a file"),
-        (lambda s: (shutil.rmtree(s), s.symlink_to("nowhere")), "campaign.store: is a link to nothing"),
-        (lambda s: (shutil.rmtree(s), s.symlink_to(s)), "campaign.store: is a link to nothing"),
+        (lambda s: (shutil.rmtree(s), s.symlink_to("nowhere")), "campaign.store: is a broken link"),
+        (lambda s: (shutil.rmtree(s), s.symlink_to(s)), "campaign.store: is a broken link"),
     ],
     ids=["other version", "damaged mark", "samples a file", "contents a folder", "a file", "dangling", "loop"],
 )  # fmt: skip

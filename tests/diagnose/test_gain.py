@@ -148,7 +148,9 @@ def test_the_record_of_a_gain():
     assert 0.0 < g.low < g.log_score < g.high
     assert g.heldout == ("a", "b")
     assert not g.in_sample
-    assert g.notes == ("the interval of the log score holds for the drives named; they are too few for a wider statement",)
+    assert g.notes == (
+        "the interval of the log score holds for the drives named; they are too few for a wider statement",
+    )
 
 
 def test_the_record_tells_what_is_worse():
@@ -168,7 +170,7 @@ def test_in_sample_is_told():
 
 def test_many_drives_are_units():
     g = gain([made(str(i), seed=i) for i in range(6)], UNITS, seed=1)
-    assert g.notes == ("the interval of the log score holds for another 6 drives like these",)
+    assert g.notes == ("the interval of the log score holds for 6 other drives of this kind",)
     with pytest.raises(FitError):
         gain([], UNITS, seed=1)
 

@@ -160,7 +160,7 @@ def test_unknown_tyres_are_left_out_and_told():
     strange = [replace(i, run=replace(i.run, values={**i.run.values, "tyre": "unheard of"})) for i in data.runs[:3]]
     data.runs = (*strange, *data.runs[3:])
     passes = passes_of(data)
-    assert passes.left_out["the model does not know the tyre unheard of"] == 3
+    assert passes.left_out["tyre not known to the model: unheard of"] == 3
     assert len(passes.told) == len(data.runs) - sum(passes.left_out.values())
 
 

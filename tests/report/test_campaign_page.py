@@ -277,7 +277,7 @@ def test_command_line(tmp_path):
     page = (tmp_path / "campaign.report" / "index.html").read_text()
     assert "Configurations: water depth, manoeuvre." in page
     assert run(campaign, "-q").exit_code == 3  # its own earlier report is replaced
-    assert "no run tells it" in run(campaign, "--by", "colour").stderr
+    assert "no run has this key" in run(campaign, "--by", "colour").stderr
     wrong = run(tmp_path / "logs" / "dry.parquet")
     assert wrong.exit_code == 2
     assert "aqualog detect" in wrong.stderr
@@ -359,6 +359,6 @@ def test_a_lane_behind_the_end_of_its_log_is_a_problem(case):
     end = info.about["duration_s"]
     late = replace(info, run=replace(info.run, lane=(end + 5.0, end + 8.0)))
     data = SimpleNamespace(runs=(late,), done=(late,), keys=case.keys, configured=case.configured)
-    found = [p for p in problems_of(data, case.keys) if "behind the log's end" in p.title]
+    found = [p for p in problems_of(data, case.keys) if "after the log's end" in p.title]
     assert found[0].runs == ((info.index, f"lane from {end + 5.0:g} to {end + 8.0:g} s, the log ends at {end:.1f} s"),)
-    assert not [p for p in problems_of(case, case.keys) if "behind the log's end" in p.title]
+    assert not [p for p in problems_of(case, case.keys) if "after the log's end" in p.title]
