@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from aqualog.errors import SignalError
 
-__all__ = ["Unit", "convert", "displayed_unit", "is_unit", "parse_unit", "spellings"]
+__all__ = ["Unit", "convert", "displayed_text", "displayed_unit", "is_unit", "parse_unit", "spellings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,3 +160,12 @@ def displayed_unit(unit: str) -> str:
     if unit == "-":
         return "–"
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), unit).replace("*", "·")
+
+
+def displayed_text(text: str) -> str:
+    """A text with units as `displayed_unit` shows them: `m/s^2` -> `m/s²`, `N m` -> `N·m`, `+-` -> `±`.
+
+    Raised numbers are replaced after a letter or a bracket only, and only where they are whole.
+    """
+    text = re.sub(r"(?<=[A-Za-z)])\^(-?\d)(?![\d.])", lambda power: power[1].translate(_RAISED), text)
+    return re.sub(r"\bN[ *]m\b", "N·m", text).replace("+-", "±")

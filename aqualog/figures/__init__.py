@@ -1,1 +1,1 @@
-"""The thesis' figures, made again: each with the claims it stands for and what the runs say about them."""
+"""The thesis' figures, made again: each with its claims and their result in the runs."""

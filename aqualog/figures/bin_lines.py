@@ -1,4 +1,4 @@
-"""Slip slopes of bins as points that have an error each: how they go with speed, and by what share levels differ."""
+"""Slip slopes of bins as points with errors: change over speed, and relative difference between levels."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def _log(r: SlopeRow) -> tuple[float, float]:
 def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> list[Effect] | None:
     """Coefficients of columns (each (n,)) over the logarithms of the slopes; None with no more bins than columns.
 
-    Weights are of each bin's own error and of a scatter about the line that the bins show beyond it (DerSimonian and
-    Laird's moment [dersimonian1986], until it stands); the interval is Student's with the bins less the columns as
-    degrees of freedom. A run passes through two or three neighbouring bins, and both wheels of an axle share it; the
-    bins are taken to be independent.
+    Weights come from each bin's own error and from the additional scatter about the line (DerSimonian and Laird [dersimonian1986],
+    the moment, repeated until it converges). The interval is Student's, with bins minus columns as degrees of freedom. A
+    run passes through two or three neighbouring bins, and both wheels of an axle share it; the bins are assumed to be
+    independent.
     """
     x = np.stack(columns, axis=1)
     n, p = x.shape
@@ -76,7 +76,7 @@ def fall(rows: Sequence[SlopeRow]) -> Effect | None:
 def ratio(a: Sequence[SlopeRow], b: Sequence[SlopeRow], *, up_to_kmh: float = math.inf) -> tuple[Effect, Effect] | None:
     """Slope of b over that of a, at the speeds of bins that both have, and how the fall differs per 10 km/h (relative).
 
-    None with fewer than two such bins; with two the second is without an interval.
+    None with fewer than two such bins; with two, the second value has no interval.
     """
     first, second = ({(r.wheel, r.low_kmh): r for r in usable(rows) if r.high_kmh <= up_to_kmh} for rows in (a, b))
     keys = sorted(set(first) & set(second), key=lambda k: (k[1], k[0]))
@@ -88,7 +88,7 @@ def ratio(a: Sequence[SlopeRow], b: Sequence[SlopeRow], *, up_to_kmh: float = ma
     which = np.repeat([0.0, 1.0], len(keys))
     left = np.array([float(r.wheel.endswith("l")) for r in rows])
     columns = [np.ones(x.size), which, x, which * x]
-    # wheels of both sides may have a level each
+    # wheels of each side may have a separate level
     columns += [left] if 0.0 < left.mean() < 1.0 else []
     found = line_of_logs(rows, columns)
     if found is None:

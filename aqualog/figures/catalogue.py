@@ -1,4 +1,4 @@
-"""Which figures there are, how one asks for them, and what each is made from."""
+"""List of figures, their names on the command line, and the data of each."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def make(number: str, evidence: Evidence | None = None) -> Figure:
     Raises
     ------
     NotInCampaign
-        If the campaign has not the runs.
+        If the campaign does not have the runs.
     ConfigError
-        If the figure needs a campaign and there is none.
+        If the figure needs a campaign and no campaign is given.
     """
     if evidence is None and needs_campaign(number):
         raise ConfigError(
-            "is made from the runs of a campaign", where=f"figure {number}", expected="--campaign campaign.toml",
+            "needs the runs of a campaign", where=f"figure {number}", expected="--campaign campaign.toml",
             hint="`aqualog reproduce`, or `aqualog simulate campaign thesis -o DIR` and its campaign.toml",
         )  # fmt: skip
     if evidence is not None and number in _EITHER:

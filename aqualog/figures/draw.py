@@ -11,6 +11,7 @@ from aqualog.figures.record import Axis, Line, Note, Panel, Sheet
 from aqualog.report.theme import GRID, INK, MUTED
 from aqualog.report.wording import plot_text
 from aqualog.types import FloatArray
+from aqualog.units import displayed_text
 
 __all__ = ["PLOT_PX", "panel_figure", "rounded"]
 
@@ -33,11 +34,15 @@ def rounded(values: FloatArray) -> list[float | None]:
     return [None if math.isnan(v) else float(f"{v:.{_DIGITS}g}") for v in np.asarray(values, dtype=np.float64).tolist()]
 
 
+def _text(text: str) -> str:
+    return plot_text(displayed_text(text))
+
+
 def _line(line: Line, *, is_solid: bool) -> dict[str, Any]:
     # a line in space looks half as wide as one in the plane
     trace: dict[str, Any] = {
         "type": "scatter3d" if is_solid else "scatter",
-        "name": plot_text(line.name),
+        "name": _text(line.name),
         "mode": line.mode,
         "x": rounded(line.x),
         "y": rounded(line.y),
@@ -66,7 +71,7 @@ def _line(line: Line, *, is_solid: bool) -> dict[str, Any]:
 
 
 def _bars(lengths: FloatArray) -> list[float]:
-    """Lengths of bars; none where there is no interval, since plotly draws null as it likes."""
+    """Lengths of bars; 0 without an interval, since plotly's drawing of null is undefined."""
     return [0.0 if v is None else max(v, 0.0) for v in rounded(lengths)]
 
 
@@ -79,7 +84,12 @@ def _pale(colour: str) -> str:
 
 
 def _note(note: Note) -> dict[str, Any]:
-    words = {"x": note.x, "y": note.y, "text": note.text, "font": {"size": note.size, "color": note.colour}}
+    words = {
+        "x": note.x,
+        "y": note.y,
+        "text": displayed_text(note.text),
+        "font": {"size": note.size, "color": note.colour},
+    }
     if note.tail is None:
         return words | {"showarrow": False}
     x, y = note.tail
@@ -100,7 +110,7 @@ def _sizes(line: Line, *, is_solid: bool) -> float | list[float]:
 def _sheet(sheet: Sheet) -> dict[str, Any]:
     return {
         "type": "surface",
-        "name": plot_text(sheet.name),
+        "name": _text(sheet.name),
         "x": rounded(sheet.x),
         "y": rounded(sheet.y),
         "z": [rounded(row) for row in sheet.z],
@@ -115,7 +125,7 @@ def _sheet(sheet: Sheet) -> dict[str, Any]:
 
 def _axis(axis: Axis) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "title": {"text": plot_text(axis.title), "font": {"size": 12}},
+        "title": {"text": _text(axis.title), "font": {"size": 12}},
         "gridcolor": GRID,
         "zerolinecolor": MUTED,
         "linecolor": MUTED,
@@ -131,10 +141,10 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _legend_px(panel: Panel) -> int:
-    """Room that the legend takes: its entries set in lines as they come."""
+    """Height of the legend, with its entries set in lines."""
     rows, used = 1, 0.0
     for name in [s.name for s in panel.sheets] + [line.name for line in panel.lines if line.in_legend]:
-        width = 45.0 + 5.5 * len(plot_text(name))
+        width = 45.0 + 5.5 * len(_text(name))
         if used + width > _WIDTH_PX and used > 0.0:
             rows, used = rows + 1, 0.0
         used += width

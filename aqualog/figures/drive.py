@@ -1,4 +1,4 @@
-"""One drive under all detectors, as the panels over time ask for it."""
+"""One drive under all detectors, for the panels over time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DriveRun:
         return self.result.signals.array(name)
 
     def feature(self, name: str) -> FloatArray:
-        """A feature of the detectors, array (n,); NaN where the drive has not its signals."""
+        """A feature of the detectors, array (n,); NaN where the drive lacks its signals."""
         if name not in self.result.features.columns:
             return np.full(self.t.size, np.nan)
         return np.asarray(self.result.features[name].to_numpy(), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What the runs of a campaign have for its figures: stretches on water, and which samples count."""
+"""Data of a campaign's runs for figures: stretches on water, and usable samples."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ LEAST_SAMPLES = 5  # of 0.1 s that a run must have
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a run has. `wet` samples on water; of these `resistance`, `slope` usable for it; `v` [m/s] and `a` [m/s^2]
-    means on water, `entry` and `exit` [s] of it. NaN and 0 without water.
+    """Usable data of a run. `wet` samples on water; of these `resistance`, `slope` usable for it; `v` [m/s] and `a`
+    [m/s^2] means on water, `entry` and `exit` [s] of it. NaN and 0 without water.
     """
 
     wet: int = 0
@@ -49,7 +49,7 @@ def free_wheels(info: RunInfo) -> tuple[str, ...]:
 
 
 class Evidence:
-    """A campaign's results, as figures ask for them.
+    """A campaign's results for figures.
 
     Parameters
     ----------
@@ -66,11 +66,11 @@ class Evidence:
 
     @cached_property
     def facts(self) -> Mapping[int, Facts]:
-        """What each run that is done has, by its index."""
+        """Usable data of each finished run, by its index."""
         return {info.index: _facts(info, self.data.samples(info)) for info in self.data.done}
 
     def of(self, info: RunInfo) -> Facts:
-        """What a run has."""
+        """Usable data of a run."""
         return self.facts.get(info.index, Facts())
 
     def part(self, runs: Sequence[RunInfo]) -> CampaignData:
@@ -83,19 +83,19 @@ class Evidence:
         return samples, samples.on_water == 1.0
 
     def has_water(self, info: RunInfo) -> str:
-        """Empty if a run was on water, else why not."""
+        """Empty if a run was on water, else the reason why not."""
         f = self.of(info)
         return "" if f.wet >= LEAST_SAMPLES else f.why_no_water or "without water"
 
     def has_resistance(self, info: RunInfo) -> str:
-        """Empty if a run tells the resistance on water, else why not."""
+        """Empty if a run has a resistance on water, else the reason why not."""
         why = self.has_water(info)
         if not why and self.of(info).resistance < LEAST_SAMPLES:
             why = "without torque or acceleration, or braked or turned on the water"
         return why
 
     def has_slope(self, info: RunInfo) -> str:
-        """Empty if a run tells slip and traction of a driven wheel on water, else why not."""
+        """Empty if a run has slip and traction of a driven wheel on water, else the reason why not."""
         why = self.has_water(info)
         if not why and self.of(info).slope < LEAST_SAMPLES:
             why = "without slip or traction of a driven wheel"

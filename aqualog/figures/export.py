@@ -22,10 +22,10 @@ Cells = tuple[str, list[str]]
 
 
 def figure_csv(figure: Figure) -> str:
-    """What is drawn, side by side: columns of x and, behind them, of the lines over it; units in the header.
+    """The drawn data as columns: x, followed by the lines over it; units in the header.
 
     Lines over the same x share its column. Columns end where their line ends; a cell is empty where a line is broken.
-    Columns of one of several panels begin with its letter. The runs of a campaign that it rests on stand behind.
+    Columns of one of several panels begin with its letter. The campaign's runs used for it follow as further columns.
     """
     columns: list[Column] = []
     for i, panel in enumerate(figure.panels):
@@ -84,7 +84,8 @@ def _ends(line: Line, panel: Panel) -> list[Column]:
 def document(
     figures: Sequence[Figure], files: Sequence[str], not_made: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """Figures with their findings and runs, the files that were written, and why a figure was not made."""
+    """Figures with their findings and runs, the files that were written, and the reason for each figure that was not
+    made."""
     return {
         "schema_version": 1,
         "tool_version": __version__,

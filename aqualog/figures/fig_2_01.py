@@ -43,7 +43,7 @@ def _panel(kmh: float) -> Panel:
     edge = np.array([-a, *dry, b])
     height = np.array([0.0, *_parabola(dry, a), 0.0])
     return Panel(
-        f"{kmh:g} km/h: {100 * L:.0f} % of the contact is left, and carries {100 - 100 * carried / LOAD:.0f} % of "
+        f"{kmh:g} km/h: {100 * L:.0f} % of the contact remains and carries {100 - 100 * carried / LOAD:.0f} % of "
         "the load",
         Axis("along the patch, forward", "mm", limits=(-1.25 * a * mm, 1.25 * a * mm)),
         Axis("pressure", "bar", limits=(0.0, _TOP)),
@@ -69,12 +69,12 @@ def _shares() -> Panel:
     marks = Line(
         "shown", np.array(_SPEEDS), share(np.array(_SPEEDS) * KMH, DEPTH, P_ANCHOR), colour=INK, mode="markers"
     )
-    return Panel("Contact that is left", Axis("velocity", "km/h"), Axis("share of the contact length"), (*lines, marks))
+    return Panel("Remaining contact", Axis("velocity", "km/h"), Axis("share of the contact length"), (*lines, marks))
 
 
 def _c9() -> Finding:
     grid = np.stack([share(_GRID * KMH, 1e-3 * h, P_ANCHOR) for h in _DEPTHS])
-    # where nothing is left, nothing can fall
+    # a contact that is lost completely cannot fall further
     by_speed = bool(np.all((np.diff(grid, axis=1) < 0.0) | (grid[:, :-1] == 0.0)))
     by_depth = bool(np.all((np.diff(grid, axis=0) < 0.0) | (grid[:-1] == 0.0)))
     L = float(share(np.array([100 * KMH]), DEPTH, P_ANCHOR)[0])

@@ -94,14 +94,14 @@ def _measured(found: Slopes) -> tuple[list[Line], list[Finding]]:
         "wheel; in part: for one",
         "; ".join(f"{w} {e.words(0)} %" for w, e in falls.items()),
         judged(whole=whole, part=bool(down)),
-        "" if whole else "Not told apart from 0: " + ", ".join(w for w in falls if w not in down) + ".",
+        "" if whole else "No clear difference from 0: " + ", ".join(w for w in falls if w not in down) + ".",
         least.value, least.ci, "% per 10 km/h",
     )  # fmt: skip
     return lines, [finding]
 
 
 def make(evidence: Evidence | None = None) -> Figure:
-    """Contact length, friction and slip slope over speed at three pressures; C10; from a campaign also measured slopes.
+    """Contact length, friction and slip slope over speed at three pressures (C10), with a campaign's measured slopes.
 
     Raises
     ------

@@ -65,7 +65,7 @@ def _reason(flat: tuple[Effect, Effect] | None, rise: tuple[Effect, Effect]) -> 
     if flat is not None and not flat[1].is_none(_GRADIENT):
         words.append("the gradient changes already within the shallow waters")
     words += [
-        f"the {n} in deep water is not told apart"
+        f"the {n} in deep water does not differ significantly"
         for n, e in zip(("level", "gradient"), rise, strict=True)
         if not e.is_above
     ]

@@ -45,7 +45,7 @@ def _c48(rows: Sequence[SlopeRow]) -> list[Finding]:
             "; ".join(f"{w} {x:.2f} [{c[0]:.2f}, {c[1]:.2f}]" for w, (x, c) in told.items())
             + f" at {rows[0].low_kmh:.0f} to {rows[0].high_kmh:.0f} km/h",
             judged(whole=whole, part=bool(low)),
-            "" if whole else "Not told apart from the dry slope at " + ", ".join(w for w in told if w not in low) + ".",
+            "" if whole else "No clear difference from dry at " + ", ".join(w for w in told if w not in low) + ".",
             value, (ci[0], ci[1]), "-",
         )
     ]  # fmt: skip

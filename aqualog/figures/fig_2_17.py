@@ -17,7 +17,7 @@ __all__ = ["make"]
 NUMBER = "2.17"
 _WISH = Wish(("depth",), WORN)
 _SAME = 0.10  # of the slope: less is no clear influence
-_TOLD, _LEAST_RUNS = 0.8, 5  # share of bins with so many runs in which the method tells a slope
+_TOLD, _LEAST_RUNS = 0.8, 5  # share of bins with so many runs in which the method gives a slope
 _SLIGHT = 1.25  # times: "slightly higher"
 
 
@@ -29,7 +29,7 @@ def _c49(found: Slopes) -> list[Finding]:
     return [
         Finding(
             "C49", "Points put into bins of speed and a line through each give the slip slope.",
-            f"in {_TOLD:.0%} of the bins with at least {_LEAST_RUNS} runs a slope with an interval is told",
+            f"in {_TOLD:.0%} of the bins with at least {_LEAST_RUNS} runs, a slope with an interval exists",
             f"in {len(usable(rows))} of {len(rows)} bins", judged(whole=told >= _TOLD),
             "" if told >= _TOLD else "Elsewhere the traction varies too little, or its noise is too large a share.",
             100 * told, None, "%",
@@ -71,13 +71,13 @@ def _c51(found: Slopes) -> list[Finding]:
     whole = len(down) == len(falls)
     return [
         Finding(
-            "C51", "All curves fall with speed, as (2.2) says.",
+            "C51", "All curves fall with speed, in agreement with (2.2).",
             "the interval of the relative change per 10 km/h is below 0 at every level and wheel; in part: at half of "
             "them, and nowhere above 0",
             f"below 0 in {len(down)} of {len(falls)} curves; changes {min(e.value for e in falls.values()):.0f} to "
             f"{max(e.value for e in falls.values()):.0f} % per 10 km/h; the least certain one",
             judged(whole=whole, part=2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values())),
-            "" if whole else "Not told apart from 0: " + ", ".join(n for n in falls if n not in down) + ".",
+            "" if whole else "No clear difference from 0: " + ", ".join(n for n in falls if n not in down) + ".",
             least.value, least.ci, "% per 10 km/h",
         )
     ]  # fmt: skip
@@ -113,7 +113,7 @@ def _c52(found: Slopes) -> list[Finding]:
             + f"; left less uniform in {rougher} of {len(rough)}",
             judged(whole=is_higher and is_rougher, part=is_higher or is_rougher),
             "" if is_higher and is_rougher else
-            f"Above 1 at {len(most)} of {len(effects)} levels, told apart from it at {len(higher)}"
+            f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
             + ("." if is_rougher else "; the right wheels, on more water, scatter as much."),
             mean.value, mean.ci, "-",
         )

@@ -15,7 +15,7 @@ __all__ = ["make"]
 
 NUMBER = "2.19"
 _WISH = Wish(("tyre", "depth"), only_tyres=(WORN, ("new_winter",)))
-_NONE = 2.0  # [% per 10 km/h] a fall that is none: a tenth over the speeds driven
+_NONE = 2.0  # [% per 10 km/h] a fall that does not count: a tenth over the speeds driven
 
 
 def _c54(found: Slopes) -> Sequence[Finding]:

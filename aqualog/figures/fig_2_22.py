@@ -102,12 +102,12 @@ def _c62_course(all_runs: tuple[SceneRun, ...]) -> Finding:
         "C62 (course)",
         "Front left: slight spin-down at 18 s, short spin-up at 19 s, small spin-down at 21 to 22 s, strong spin-up at "
         "23 to 24.5 s.",
-        f"slip beyond {_SLIGHT:.0%} in the sign of each, within 0.5 s of the times told, the last spin-up beyond the "
+        f"slip beyond {_SLIGHT:.0%} in the sign of each, within 0.5 s of the given times, the last spin-up beyond the "
         f"first, in {MANY:.0%} of the runs; in part: in {SOME:.0%}",
         f"all in {in_runs(every)} runs; " + ", ".join(f"{n} {in_runs(x)}" for n, x in each.items()),
         judged(whole=every >= MANY, part=every >= SOME),
         "" if every >= MANY else
-        "The driver's pushes are at the times told; whether the wheel goes in each is the contact's fluctuation.",
+        "The driver pushes at the given times; the contact's fluctuation decides whether the wheel spins in each.",
         every,
     )  # fmt: skip
 

@@ -114,7 +114,7 @@ def _c64() -> tuple[Finding, Table]:
             "other criterion.",
             f"all {n} combinations of five criteria and gate, through the detector's own logic: warning exactly "
             "where the gate "
-            "is open and one of 1 to 4 is met; 5 is told whatever the gate is",
+            "is open and one of 1 to 4 is met; 5 is reported whatever the gate is",
             f"{agree} of {n} combinations agree; criterion 5 stands for itself: {'yes' if alone else 'no'}. Where "
             "the loss of "
             "slope does not go with speed and resistance as water's does, criterion 4 alone gives no warning, which is "

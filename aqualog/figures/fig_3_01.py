@@ -33,7 +33,7 @@ def make() -> Figure:
     snow_slopes = max(slopes["snow"], slopes["snow_on_ice"]) / min(slopes["snow"], slopes["snow_on_ice"]) - 1.0
     c81 = Finding(
         "C81",
-        "The four surfaces can clearly be told apart; both snow curves reach almost the same friction with different "
+        "The four surfaces differ clearly; both snow curves reach almost the same friction with different "
         "slopes and bends.",
         "slopes differ by > 15 % in every pair; the snow curves' friction by < 10 %, their slopes by > 25 %; in "
         "part: the first only",
@@ -41,8 +41,8 @@ def make() -> Figure:
         f"on ice: friction {100 * snows:.0f} % apart, slopes {100 * snow_slopes:.0f} %, bends at "
         f"{100 * bends['snow']:.1f} and {100 * bends['snow_on_ice']:.1f} % slip",
         judged(whole=min(ratios) > 1.15 and snows < 0.10 and snow_slopes > 0.25, part=min(ratios) > 1.15),
-        "Friction and yield of snow and ice were set after this very figure: it shows that the model can tell the "
-        "surfaces apart, not that roads are so.",
+        "Friction and yield of snow and ice were set after this very figure: it shows that the model can "
+        "distinguish the surfaces, not that real roads behave so.",
         min(ratios),
     )
 

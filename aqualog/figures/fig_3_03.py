@@ -41,11 +41,11 @@ def make() -> Figure:
         "differential slip and traction as long as the scaled slips differ.",
         "initial slope of the scaled curve within 1 % of the front one; slope between both working points within 15 "
         "%; in part: the first only",
-        f"initial slope {initial:.2f}, between the points {chord:.1f}, front tyre {_FRONT:.0f}",
+        f"initial slope {initial:.2f}, slope between the points {chord:.1f}, front tyre {_FRONT:.0f}",
         judged(whole=initial_error < 0.01 and chord_error < 0.15, part=initial_error < 0.01),
-        f"Between the points the slope is that of a chord of the bent curve, {100 * chord_error:.0f} % below the "
-        "initial one. With front and rear traction in the ratio of the slopes the differential slip is "
-        f"{100 * left:.4f} %: next to nothing to read.",
+        f"The straight line between both points of the bent curve is {100 * chord_error:.0f} % flatter than the "
+        "initial slope. With front and rear traction in the ratio of the slopes the differential slip is "
+        f"{100 * left:.4f} %, too small for an estimate.",
         chord,
     )
     first = (

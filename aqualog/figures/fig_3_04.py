@@ -36,7 +36,7 @@ def make() -> Figure:
     ratio = heights[0] / heights[1]
     c93 = Finding(
         "C93",
-        "Projected on differential slip and traction, the lines of a fixed split can clearly be told apart; their "
+        "Projected on differential slip and traction, the lines of a fixed split differ clearly; their "
         "initial slope is the slip slope.",
         "initial slope of each projected line within 1 % of the front tyre's slip slope, and the lines at least a "
         f"factor 2 apart at {100 * _AT:g} % differential slip; in part: slopes only",

@@ -45,7 +45,7 @@ def _c104_phase() -> tuple[Finding, Table]:
     in_order = mean["step"] < mean["ramp"] < min(mean["triangle"], mean["sine"])
     finding = Finding(
         "C104 (phase)",
-        "The same, whatever phase of the excitation meets the change: the thesis does not say which it shows.",
+        "The same for every phase of the excitation at the change: the thesis does not give the phase that it shows.",
         f"mean over {PHASES} phases: step within {_STEP_RANGE[0]:g} to {_STEP_RANGE[1]:g} s, the others above "
         f"{_OTHERS:g} s, the ramp first among them; in part: the order only",
         "mean (shortest to longest) at 1 m/s^2: "

@@ -34,7 +34,7 @@ def _case(wave: str, a_x: float = 1.0, nu: float = 0.6) -> Case:
 
 
 def used_share(case: Case) -> tuple[float, float]:
-    """Shares of the samples of a run that update the slope at all, and that find it told well enough to wander."""
+    """Shares of the samples of a run that update the slope, and in which the data determine it well enough to move."""
     e = estimate(case)
     return float(np.mean(is_used(e))), float(np.mean(e.status == 0.0))
 
@@ -92,12 +92,12 @@ def make() -> Figure:
         "blind split at constant speed: less than 5 % of the samples used without excitation, more than 50 % with "
         "the sine; in part: more with it",
         "; ".join(
-            f"{n}: used {100 * used[n][0]:.0f} -> {100 * used[n][1]:.0f} %, slope told {100 * told[n][0]:.0f} -> "
+            f"{n}: used {100 * used[n][0]:.0f} -> {100 * used[n][1]:.0f} %, slope determined {100 * told[n][0]:.0f} -> "
             f"{100 * told[n][1]:.0f} %"
             for n in situations
         ),
         judged(whole=used[first][0] < 0.05 and used[first][1] > 0.5, part=used[first][1] > used[first][0]),
-        "Told: the last 20 s hold enough variation to separate slope and offset. Where load transfer or another "
+        "Determined: the last 20 s hold enough variation to separate slope and offset. Where load transfer or another "
         "split lifts the differential traction above the minimum, samples are used without excitation as well, but "
         "they all lie in one place: the slope stays as it was taken.",
         used[first][1] - used[first][0],
@@ -127,7 +127,7 @@ def make() -> Figure:
         "friction",
         # the first half of the claim is out of reach here, so that the second alone cannot bear it out
         judged(whole=False, part=max(most.values()) <= _LIMIT_MU),
-        "Whether passengers feel it, no simulation can tell: the rates stand with C107.",
+        "No simulation can show whether passengers feel it: C107 gives the rates.",
         max(most.values()),
     )  # fmt: skip
     jumps = {w: _jump(w) for w in WAVES}
@@ -168,8 +168,8 @@ def make() -> Figure:
         (c105, c96, c97, c99, c107),
         (
             Table(
-                "Availability: share of the samples of a run (30 s) that are used, and whose slope is told",
-                ("situation", "used, without [%]", "used, sine [%]", "told, without [%]", "told, sine [%]"),
+                "Availability: share of the samples of a run (30 s) that are used, and that determine the slope",
+                ("situation", "used, without [%]", "used, sine [%]", "determined, without [%]", "determined, sine [%]"),
                 tuple(
                     (n, f"{100 * used[n][0]:.0f}", f"{100 * used[n][1]:.0f}", f"{100 * told[n][0]:.0f}",
                      f"{100 * told[n][1]:.0f}")

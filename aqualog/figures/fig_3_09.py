@@ -36,7 +36,7 @@ def _times(case: Case, periods: tuple[float, ...]) -> list[float]:
 
 
 def _fastest(periods: tuple[float, ...], times: list[float]) -> float:
-    """Period of the shortest detection time; NaN if nothing was found. [s]"""
+    """Period of the shortest detection time; NaN without a detection. [s]"""
     return float("nan") if np.all(np.isnan(times)) else periods[int(np.nanargmin(times))]
 
 
@@ -189,13 +189,13 @@ def _why_adaption(alarms: dict[str, list[tuple[float, float, float]]]) -> str:
     """How the adaption time goes with the differential traction at the alarm."""
     rows = [a for of in alarms.values() for a in of if not np.isnan(a[2])]
     if len(rows) < 2:
-        return "Hardly any run finds the drop: there is nothing to compare."
+        return "Hardly any run finds the drop, so a comparison is not possible."
     rows.sort(key=lambda a: a[1])
     half = len(rows) // 2
     small, large = rows[:half], rows[-half:]
     return (
-        "After the reset the filter adapts as fast as the differential traction tells it: the half of the runs with "
+        "After the reset the filter adapts as fast as the differential traction allows: the half of the runs with "
         f"the smaller one at the alarm (up to {small[-1][1]:.3f}) takes {np.mean([a[2] for a in small]):.2f} s on "
         f"average, the other half {np.mean([a[2] for a in large]):.2f} s. Without noise all are short against the "
-        "time that the drop takes to be found; the ratio says little then."
+        "time that the drop takes to be found; the ratio is then not meaningful."
     )

@@ -51,7 +51,7 @@ def cases(wave: str, kind: str) -> dict[tuple[float, float], Case]:
 
 
 def _both(verdicts: dict[str, Verdict]) -> Verdict:
-    """Verdict over both waveforms, of which the thesis does not say which it shows: in part where they differ."""
+    """Verdict over both waveforms, since the thesis does not name the one it shows: in part where they differ."""
     found = set(verdicts.values())
     return found.pop() if len(found) == 1 else IN_PART
 

@@ -20,7 +20,7 @@ from aqualog.figures.selection import FAMILIES, NotInCampaign, label, value_of
 __all__ = ["OF_LOGS", "make_from_logs"]
 
 _FRONT = ("fl", "fr")
-_TURNING = 0.1  # share of the samples on water that makes a drive a slalom, where the manoeuvre is not told
+_TURNING = 0.1  # share of the samples on water that makes a drive a slalom, where the manoeuvre is not given
 _SLALOM = ("slalom", "sine", "sinus")
 _DRIVEN = 0.1  # share of the torque below which an axle of an all-wheel-drive car counts as not driven
 _MOST_EVENTS = 40

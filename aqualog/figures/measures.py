@@ -23,10 +23,10 @@ __all__ = [
 LEAST_RUNS = 3  # for an interval
 LEAST_BIN = 3  # samples of a bin that is drawn
 _APART = 10_000_000  # between the steps of two wheels of one run, which are no neighbours
-TEN = 10 * KMH  # [m/s] the step that gradients are told over
+TEN = 10 * KMH  # [m/s] step of speed for gradients
 
 Columns = Callable[[RunInfo, RunSamples], tuple[BoolArray, FloatArray] | None]
-"""Samples of a run that count (n,), and the value at each (n,); None if it has none."""
+"""Samples of a run that count (n,), and the value at each (n,); None without any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +102,9 @@ def pool_of(evidence: Evidence, runs: Sequence[RunInfo], columns: Columns) -> Po
 
 
 def resistance_of() -> Columns:
-    """Resistance measure on water less the run's own level on the dry road before it. [m/s^2]
+    """Resistance measure on water minus the run's own level on the dry road before it. [m/s²]
 
-    A run with less than a second of dry road before the water has none, as in `campaign.resistance`.
+    A run with less than a second of dry road before the water has no value, as in `campaign.resistance`.
     """
 
     def columns(_: RunInfo, samples: RunSamples) -> tuple[BoolArray, FloatArray]:
@@ -145,7 +145,8 @@ def trend(pool: Pool) -> Effect:
 
 
 def difference(a: Pool, b: Pool) -> tuple[Effect, Effect] | None:
-    """b less a: level in the middle of the speeds that both have, and gradient per 10 km/h; None if there are none."""
+    """b minus a: level in the middle of the speeds that both have, and gradient per 10 km/h; None without common
+    speeds."""
     both = common(a, b)
     if both is None:
         return None

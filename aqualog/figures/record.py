@@ -41,7 +41,7 @@ class Axis:
 class Line:
     """One line or cloud of points, arrays (n,); NaN breaks it.
 
-    `low` and `high` (n,) are the ends of an interval about `y`, drawn as a bar; NaN where there is none. `is_filled`:
+    `low` and `high` (n,) are the ends of an interval about `y`, drawn as a bar; NaN without an interval. `is_filled`:
     the area down to zero. `z` in panels of three dimensions; `count` samples behind each point, which sets its size.
     `group` lines are shown and hidden together, `in_legend` the one that is listed.
     """
@@ -146,7 +146,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of the thesis with its findings. `caption` tells settings, in aqualog's words; `runs` those behind it,
+    """A figure of the thesis with its findings. `caption` gives the settings, in aqualog's words; `runs` the runs used,
     if it is made from a campaign.
     """
 
@@ -176,5 +176,5 @@ def judged(*, whole: bool, part: bool = False) -> Verdict:
 
 
 def seconds(t: float) -> str:
-    """A detection time; a dash where nothing was found."""
+    """A detection time; a dash without a detection."""
     return "–" if math.isnan(t) else f"{t:.2f}"

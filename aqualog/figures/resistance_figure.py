@@ -75,7 +75,7 @@ def rising(found: Resistance) -> list[Finding]:
             f"above 0 at {len(up)} of {len(told)} levels; gradients {min(e.value for e in told.values()):.3f} to "
             f"{max(e.value for e in told.values()):.3f} {PER_TEN}; the least certain one",
             judged(whole=whole, part=2 * len(up) >= len(told) and not any(e.is_below for e in told.values())),
-            "" if whole else f"Not told apart from 0: {flat}.",
+            "" if whole else f"No clear difference from 0: {flat}.",
             least.value, least.ci, PER_TEN,
         )
     ]  # fmt: skip

@@ -71,7 +71,7 @@ class SceneRun(DriveRun):
 
 @lru_cache(maxsize=8)
 def known(number: str) -> Known:
-    """What dry drives of a scene's car, on the same tyres, have told; never the wet drive.
+    """Parameters from dry drives of a scene's car on the same tyres, never from the wet drive.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def known(number: str) -> Known:
     car = replace(wet.vehicle, given=wet.vehicle.given | {"mass"})
     v = 0.5 * (_FALL + _RISE)
     steering = Steering(slalom_angle(car, wet.tyre_front, v, _A_Y), 4.0)
-    # pushes, and rolling out without the brake: else the coefficient of the longitudinal force would not be told
+    # pushes, and rolling out without the brake: they determine the coefficient of the longitudinal force
     starts = np.arange(0.0, _SLALOM_S + _ROUND_S, _ROUND_S)
     pushes = tuple((float(t + after), share * v) for t in starts for after, share in ((0.0, 0.9), (_PUSH_S, 1.1)))
     slalom = _dry(wet, car, _SLALOM_S, pushes, steering)

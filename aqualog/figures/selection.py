@@ -35,7 +35,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 """Configuration keys that are varied together: a tyre has one wear, a depth one depth on the left."""
 
 _NEAR_MM, _CLOSE_MM = 0.051, 0.31  # [mm] a water depth as the thesis has it, and one that will do
-_MOST_LEVELS = 8  # lines that can be told apart
+_MOST_LEVELS = 8  # lines that a reader can distinguish
 
 Part = tuple[float | str | None, ...]
 Value = tuple[Part, ...]
@@ -80,7 +80,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Selected:
-    """Levels with their runs; `fixed` says what all share, `is_thesis` whether that is what the thesis shared."""
+    """Levels with their runs; `fixed` names the shared configuration, `is_thesis` whether it is that of the thesis."""
 
     wish: Wish
     levels: tuple[Level, ...]
@@ -95,7 +95,7 @@ class Selected:
         return tuple(r for level in self.levels for r in level.runs)
 
     def used(self, shown: Mapping[int, str] | None = None) -> RunsUsed:
-        """For the figure's page; `shown` says for an index what a run is shown as, if not as its level."""
+        """For the figure's page; `shown` gives the label of a run by its index, if it is not its level."""
         rows = tuple(
             (r.name, (shown or {}).get(r.index, level.name or "all")) for level in self.levels for r in level.runs
         )
@@ -108,7 +108,7 @@ def keys_of(families: Sequence[str]) -> tuple[str, ...]:
 
 
 def value_of(info: RunInfo, family: str) -> Part:
-    """Values of a family's keys; None where a run does not tell one. No load told is no load, as in the batch."""
+    """Values of a family's keys; None where a run has no value. A missing load counts as no load, as in the batch."""
     if family == "car":
         return (info.run.vehicle.stem,)
     none: float | None = 0.0 if family == "load" else None

@@ -42,7 +42,7 @@ class Slopes:
 
 
 def measured_slopes(evidence: Evidence, wish: Wish, number: str, needs: str) -> Slopes:
-    """Choose runs and tell their slopes, with dry references of the same configuration wherever the campaign has them.
+    """Choose runs and estimate their slopes, with dry references of the same configuration where the campaign has them.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def measured_slopes(evidence: Evidence, wish: Wish, number: str, needs: str) -> 
     slopes = Slopes(selected, found, table, wheels)
     if not slopes.levels:
         why = next((r.reason for x in found.values() for r in x if r.reason), "no bin of speed has enough samples")
-        raise NotInCampaign(f"needs {needs}: no slope can be told ({why})", where=f"figure {number}")
+        raise NotInCampaign(f"needs {needs}: no slope can be estimated ({why})", where=f"figure {number}")
     return slopes
 
 
@@ -88,7 +88,7 @@ def _dry(evidence: Evidence, selected: Selected) -> list[RunInfo]:
 
 
 def slope_line(name: str, rows: Sequence[SlopeRow], style: Style, *, shift: float) -> Line:
-    """Slopes that are told, with intervals where there are some."""
+    """Slopes with an estimate, with their intervals where available."""
     colour, dash, symbol = style
     told = sorted((r for r in rows if r.told), key=lambda r: r.low_kmh)
     low, high = (np.array([r.slope_ci[i] if r.reliable else np.nan for r in told]) for i in (0, 1))

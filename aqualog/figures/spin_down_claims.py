@@ -1,4 +1,4 @@
-"""What passes over the water say about minor and full spin-downs: claims of Figures 2.3 and 2.4."""
+"""Claims of Figures 2.3 and 2.4 on minor and full spin-downs, judged from passes over the water."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def exponential(found: Sequence[Pass]) -> list[Finding]:
             f"{100 * line:.2f} % of slip ({v.size} passes)",
             judged(whole=whole, part=rate.is_above),
             "" if whole else "The slip rises, but not faster than a straight line." if rate.is_above else
-            "No rise is told apart from the scatter.",
+            "No rise exceeds the scatter.",
             rate.value, rate.ci, "% per 10 km/h",
         )
     ]  # fmt: skip

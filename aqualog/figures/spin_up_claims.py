@@ -112,7 +112,7 @@ def far_below(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Finding]:
             "passes spin up",
             judged(whole=is_far and is_driven, part=is_far or is_driven),
             "" if is_far and is_driven else
-            "The influence of the torque is not told apart from the scatter." if is_far else
+            "The influence of the torque does not exceed the scatter." if is_far else
             "Spin-ups begin close to full aquaplaning.",
             None if by_torque is None else by_torque.value, None if by_torque is None else by_torque.ci,
             "per 0.01" if by_torque is not None else "",
@@ -172,7 +172,7 @@ def falling_traction(pools: dict[str, Pool]) -> list[Finding]:
     return [
         Finding(
             "C22",
-            "The mean traction coefficient in spin-ups falls with speed, as (2.1) says.",
+            "The mean traction coefficient in spin-ups falls with speed, in agreement with (2.1).",
             "the interval of its gradient is below 0 for every driven wheel; in part: for one",
             "per 10 km/h: " + "; ".join(f"{w} {e.words(4)}" for w, e in effects.items()),
             judged(whole=whole, part=bool(down)),
@@ -188,7 +188,7 @@ def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
         return f"It rises at {', '.join(rising)}."
     words = (f"{w}: {p.runs} runs at {p.columns['v_x'].min() / KMH:.0f} to {p.columns['v_x'].max() / KMH:.0f} km/h"
              for w, p in pools.items())  # fmt: skip
-    return f"The spin-ups are too few or cover too little speed to tell ({'; '.join(words)})."
+    return f"The spin-ups are too few or cover too small a range of speed ({'; '.join(words)})."
 
 
 def sides_differ(pools: dict[str, Pool]) -> list[Finding]:
@@ -206,7 +206,7 @@ def sides_differ(pools: dict[str, Pool]) -> list[Finding]:
             f"left less right {level.words(4)}",
             judged(whole=level.is_above, part=level.value > 0.0),
             "" if level.is_above else
-            "The two sides are not told apart." if level.low <= 0.0 <= level.high else
+            "The two sides do not differ significantly." if level.low <= 0.0 <= level.high else
             "The right wheel carries more.",
             level.value, level.ci, "-",
         )

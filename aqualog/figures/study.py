@@ -111,7 +111,7 @@ def estimate(case: Case) -> Estimate:
 
 
 def first_alarm(d: Drive, e: Estimate) -> float:
-    """Detection time: the first drop found after the change; NaN if there is none. [s]"""
+    """Detection time: the first drop found after the change; NaN without a detection. [s]"""
     found = d.t[(e.alarm > 0.0) & (d.t > 0.0)]
     return float(found[0]) if found.size else float("nan")
 

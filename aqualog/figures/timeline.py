@@ -84,7 +84,7 @@ def estimate_lines(
 
 
 def detection_time(case: Case) -> float:
-    """Time from the change to the first drop found; NaN if there is none. [s]"""
+    """Time from the change to the first drop found; NaN without a detection. [s]"""
     return first_alarm(drive(case), estimate(case))
 
 
@@ -99,7 +99,7 @@ def slope_after(case: Case, t: float) -> float:
 
 
 def told(case: Case) -> str:
-    """Detection time in words: seconds, or that nothing was found until the end of the run."""
+    """Detection time in words: seconds, or no detection until the end of the run."""
     t = detection_time(case)
     return f"not within {case.t_end:g} s" if np.isnan(t) else f"{seconds(t)} s"
 

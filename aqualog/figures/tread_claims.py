@@ -46,7 +46,7 @@ def tread_claims(found: Resistance, claim: str) -> Sequence[Finding]:
             f"{names}: {told}",
             judged(whole=len(low) == len(rows), part=bool(low)),
             "" if len(low) == len(rows) else
-            "Too few runs, or too little water, to tell the tyres apart in the others.",
+            "Too few runs, or too little water, to distinguish the tyres in the others.",
             worst[3].value, worst[3].ci, UNIT,
         ),
         Finding(

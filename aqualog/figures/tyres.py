@@ -1,4 +1,4 @@
-"""Which of two tyres is the worn one, by what a campaign tells of them."""
+"""Finds the worn one of two tyres from a campaign's data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WEAR = {"very_worn": 0.0, "worn": 1.0, "new": 2.0}
 
 
 def wear_rank(tyre: Part) -> float | None:
-    """The less, the more worn: depth of the tread, else the wear that is told; None where neither is."""
+    """A smaller value is more worn: depth of the tread, else the given wear; None without both."""
     name, wear, tread = tyre
     if isinstance(tread, float):
         return tread
@@ -24,7 +24,7 @@ def wear_rank(tyre: Part) -> float | None:
 
 
 def is_winter(tyre: Part) -> bool:
-    """Whether its name says so."""
+    """Whether its name marks it as such."""
     return "winter" in str(tyre[0]).lower()
 
 

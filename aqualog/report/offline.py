@@ -15,6 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from aqualog.report.wording import readable
+from aqualog.units import displayed_text
 
 __all__ = [
     "PLOTLY_HERE", "TEMPLATES", "content_policy", "environment", "json_island", "plotly_js", "with_plotly",
@@ -25,8 +26,11 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 @cache
 def environment(*folders: Path) -> Environment:
-    """Templates of folders, compiled once; what is put into one is escaped and made readable unless it is Markup."""
-    return Environment(
+    """Templates of folders, compiled once; what is put into one is escaped and made readable unless it is Markup.
+
+    The filter `units` shows units in a text one way.
+    """
+    found = Environment(
         loader=FileSystemLoader(folders),
         autoescape=True,
         finalize=_shown,
@@ -35,6 +39,8 @@ def environment(*folders: Path) -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    found.filters["units"] = displayed_text
+    return found
 
 
 def _shown(value: Any) -> Any:

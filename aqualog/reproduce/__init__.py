@@ -1,1 +1,1 @@
-"""What the thesis claims, claim by claim, and what aqualog finds about it."""
+"""The thesis' claims, one by one, with aqualog's findings."""

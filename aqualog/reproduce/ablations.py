@@ -1,4 +1,4 @@
-"""Alarm bits of a drive as the detectors make them, and as they would be with one of their conditions left out."""
+"""Alarm bits of a drive with all conditions of the detectors, and with single conditions left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The claims of the thesis as data: what is said, and where."""
+"""The claims of the thesis as data: statement and place."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def read(raw: dict[str, Any]) -> dict[str, Claim]:
     Raises
     ------
     ConfigError
-        If a claim is missing, unknown, or says nothing.
+        If a claim is missing, unknown, or empty.
     """
     wanted = [f"C{n}" for n in range(1, COUNT + 1)]
     if list(raw) != wanted:

@@ -1,4 +1,4 @@
-"""One check of one claim: criterion, what was found with its uncertainty, verdict."""
+"""One check of one claim: criterion, finding with its uncertainty, verdict."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _CLAIM = re.compile(r"(C\d{1,3})(?: \((.+)\))?")
 class Check:
     """A check of a claim.
 
-    `claim` as C7; `part` names what is checked where a claim has several checks; `statement` what this check takes the
-    claim to say, empty for the claim's own. `criterion` is fixed before anything is computed; `found` says in words and
-    numbers what came out, under which conditions. `value` is the number judged, `ci95` its 95 % interval or its range
-    over what was varied, `unit` of both. `source`: what it was computed from.
+    `claim` as C7; `part` names the checked part where a claim has several checks; `statement` is this check's reading
+    of the claim, empty for the claim's own words. `criterion` is fixed before any computation; `found` gives the result
+    in words and numbers, with its conditions. `value` is the number judged, `ci95` its 95 % interval or its range over
+    what was varied, `unit` of both. `source`: what it was computed from.
 
     Raises
     ------
     ConfigError
-        If a check that is not reproduced does not say why (`reason`), or the number or interval mean nothing.
+        If a check that is not reproduced lacks a `reason`, or the number or interval is invalid.
     """
 
     claim: str
@@ -46,13 +46,13 @@ class Check:
     def __post_init__(self) -> None:
         where = f"check of {self.claim}" + (f" ({self.part})" if self.part else "")
         if not re.fullmatch(r"C\d{1,3}", self.claim):
-            raise ConfigError(f'"{self.claim}" is no claim', where=where, expected="C1 to C118")
+            raise ConfigError(f'"{self.claim}" is not a claim', where=where, expected="C1 to C118")
         if self.verdict != REPRODUCED and not self.reason:
             raise ConfigError(f"{self.verdict}, without a reason", where=where, expected="what differs, and why")
         if self.ci95 is not None and not self.ci95[0] <= self.ci95[1]:
-            raise ConfigError(f"interval {self.ci95} is none", where=where, expected="(low, high)")
+            raise ConfigError(f"interval {self.ci95} is not valid", where=where, expected="(low, high)")
         if self.value is not None and math.isnan(self.value):
-            raise ConfigError("the number judged is NaN", where=where, expected="a number, or None where there is none")
+            raise ConfigError("the number judged is NaN", where=where, expected="a number, or None")
 
 
 Checks = tuple[Check, ...]
@@ -63,7 +63,7 @@ class Plan:
     """How checks are made.
 
     `seeds` of the simulated drives: those that the figures reported are from; `jobs` processes at most; `tell` gets a
-    sentence now and then.
+    sentence on the progress at times.
     """
 
     seeds: Sequence[int]
@@ -82,7 +82,7 @@ Maker = Callable[[Plan], Checks]
 def from_finding(finding: Finding, figure: str) -> Check:
     """The check that a figure's finding is; `figure` its number.
 
-    A finding in part that gives no reason has its criterion to say what is missing.
+    For a finding in part without a reason, its criterion shows what is missing.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def from_finding(finding: Finding, figure: str) -> Check:
             f'the finding "{finding.claim}" of figure {figure} is not about a claim', expected="C1, or C1 (part)"
         )
     verdict = of_figure(finding.verdict)
-    reason = finding.reason or ("" if verdict == REPRODUCED else "The criterion is not met as a whole; see the number.")
+    reason = finding.reason or ("" if verdict == REPRODUCED else "The criterion is met only in part; see the number.")
     value = finding.value if finding.value is not None and math.isfinite(finding.value) else None
     return Check(
         claim=match[1], part=match[2] or "", statement=finding.thesis, criterion=finding.criterion,

@@ -38,9 +38,10 @@ _EVERY = 10  # rows between points of a regression: 10 ms
 
 @dataclass(frozen=True, slots=True)
 class PassFigures:
-    """What claims read off one pass; NaN or infinite times where nothing happens.
+    """Quantities of one pass that claims use; NaN or infinite times without an event.
 
-    Times are from the entry [s]; `rl` and `rr` are the rear wheels; slips are (omega r_e - v) / v unless said.
+    Times are from the entry [s]; `rl` and `rr` are the rear wheels; slips are (omega r_e - v) / v unless stated
+    otherwise.
     """
 
     dips: int  # of both front wheels below `DIP`

@@ -57,12 +57,12 @@ def make_all(data: CampaignData, *, jobs: int, report: Report) -> Made:
     jobs : int
         Processes.
     report : callable
-        Told tasks done and tasks in all.
+        Called with the numbers of finished tasks and of all tasks.
 
     Raises
     ------
     ConfigError
-        If a check fails to be made: a claim must not lose its verdict in silence.
+        If a check fails to run: a claim must not lose its verdict silently.
     """
     apart = [t for t in _tasks() if t[1] not in catalogue.WITH_PROCESSES]
     together = [t for t in _tasks() if t[1] in catalogue.WITH_PROCESSES]

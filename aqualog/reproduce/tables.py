@@ -88,12 +88,12 @@ def spread_over(work: Callable[[Item], Result], items: Sequence[Item], plan: Pla
     items : sequence
         Picklable.
     plan : Plan
-        Its `tell` hears how many of `what` are done.
+        Its `tell` gets the number of finished items of `what`.
 
     Raises
     ------
     ConfigError
-        If a process ends without a word.
+        If a process ends without a message.
     """
     if plan.jobs < 2 or len(items) < _WORTH:
         return [work(item) for item in items]

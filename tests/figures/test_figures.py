@@ -132,7 +132,7 @@ def test_numbers_that_are_asked_for():
     for wrong in ("2.26", "2.0"):
         with pytest.raises(ConfigError, match=rf"no figure '{wrong}'.*2\.1 to 2\.25 and 3\.1 to 3\.11"):
             catalogue.chosen([wrong])
-    with pytest.raises(ConfigError, match=r"2\.3: is made from the runs of a campaign.*--campaign"):
+    with pytest.raises(ConfigError, match=r"2\.3: needs the runs of a campaign.*--campaign"):
         catalogue.make("2.3")
     for wrong in ("3.12", "3.", "", "4", "3.0006", "3.6;", "3.\u0666"):
         with pytest.raises(ConfigError, match=r"expected all, 2, 3 or one of 2\.1 to"):

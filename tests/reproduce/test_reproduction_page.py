@@ -63,7 +63,7 @@ def test_a_claim_that_nothing_judges_is_an_error():
 def test_page_has_all_claims_numbers_and_missing_figures(page):
     for name in claims():
         assert f'id="{name}"' in page
-    assert "1.5 [1, 2] m/s^2" in page
+    assert "1.5 [1, 2] m/s²" in page
     assert 'href="#figure_2_03"' in page
     assert page.count("<script>") == 3
     assert "no runs &lt;/script&gt;" in page

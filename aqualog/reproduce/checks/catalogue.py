@@ -1,4 +1,4 @@
-"""Which modules of checks there are, which claims they are about, and how they are run."""
+"""List of the modules of checks, their claims, and how they are run."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def run(
     Parameters
     ----------
     only : collection of str, optional
-        Claims that are asked for; a function that checks others too is run as a whole.
+        Requested claims; a function that also checks others is run as a whole.
     modules : sequence of str
     jobs : int
         Processes at most.

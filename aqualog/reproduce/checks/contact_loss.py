@@ -85,8 +85,8 @@ def _c4(table: Table) -> Checks:
         ),
         Check(
             "C4",
-            "kicks of 1000 and 2000 N m at 70 to 136 km/h: of the rear spin-ups (+10 %) 80 % begin with contact left "
-            f"(beyond {CONTACT_FULL:g}); force asked beyond the residual friction for {OVERLOAD_S:g} s tells the "
+            "kicks of 1000 and 2000 N·m at 70 to 136 km/h: of the rear spin-ups (+10 %) 80 % begin with contact left "
+            f"(beyond {CONTACT_FULL:g}); requested force beyond the residual friction for {OVERLOAD_S:g} s separates "
             "passes that spin up from the others, balanced accuracy 0.9; with a difference: the former",
             f"{k} of {n} begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} passes, found "
             f"{hit:.3f}, spared {spared:.3f}",
@@ -94,7 +94,7 @@ def _c4(table: Table) -> Checks:
             part="partial", value=k / n if n else None, ci95=wilson(k, n),
             reason="A wheel that spins up is judged, not the stability of the car."
             if ok and balanced >= 0.9
-            else "Spin-up and force asked do not go together as closely as that.",
+            else "Spin-up and requested force are not related that closely.",
             source=SOURCE,
         ),
     )  # fmt: skip

@@ -133,7 +133,7 @@ def _output_equation(plan: Plan) -> Checks:
         move = np.zeros((3, 1))
         move[axis] = step
         worst = max(worst, float(np.abs(H[axis] - (h(states + move) - h(states - move)) / (2.0 * step)).max()))
-    # both forms: what the front form says of the pair of wheel speeds, the rear form says too
+    # both forms give the same statement on the pair of wheel speeds
     rho = x["v_R"] / x["v_F"]
     ratio = x["C_R"] / x["C_F"]
     front = differential.predicted_differential_slip(
@@ -191,7 +191,7 @@ def _one_driven_axle(_: Plan) -> Checks:
             judged(whole=whole, part=worst < 0.15),
             value=worst,
             ci95=(min(errors), max(errors)),
-            reason="" if whole else "The brush bends; a line through its points is flatter than its tangent.",
+            reason="" if whole else "The brush's curve bends; a line through its points is flatter than its tangent.",
             source="half-car of 3.3, noise-free",
         ),
     )

@@ -1,4 +1,4 @@
-"""Rules of the slip-slope estimator: each by what noise makes of it, and of the estimator without it."""
+"""Rules of the slip-slope estimator: each checked under noise, with the rule and without it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _linear_tyre(plan: Plan) -> Checks:
         Check(
             "C83",
             "up to a traction of 0.2 the line leaves less of the brush's slip than a road's noise of "
-            f"{ROAD_NOISE:g}; with radii wrong by 0.3 % (rms) the slope is told within 10 % with the offset, and not "
+            f"{ROAD_NOISE:g}; with radii wrong by 0.3 % (rms) the slope is found within 10 % with the offset, and not "
             "without (half of the middle 68 %); in part: the first",
             f"at most {left:.1e} of slip left; slope within {100 * spread[True]:.1f} % with the offset, "
             f"{100 * spread[False]:.0f} % without ({len(plan.seeds)} runs of 200 points)",
@@ -59,7 +59,7 @@ def _linear_tyre(plan: Plan) -> Checks:
 def _common_drop(plan: Plan) -> Checks:
     """C85: what a slow ratio is for, by making it as fast as the slope."""
     found: dict[str, list[tuple[float, float, float]]] = {"slow": [], "fast": []}
-    # as free as the slope: neither slow by its process noise nor held where the data do not tell it
+    # as free as the slope: neither slowed by its process noise nor held where the data do not determine it
     fast = TUNING._replace(q_beta=1e-4, sd_beta=0.3, told_beta=np.inf)
     d = drive(Case("sine", 0.05, "mu", 4.0, a_x=0.3, nu=0.3, low_mu=1.0))
     s_delta, mu_i, rho_mu_j = inputs(d)
@@ -135,7 +135,7 @@ def _change_detection(plan: Plan) -> Checks:
                 lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1])),
             ),
             reason="As printed, 3.24 has neither a clamp at zero nor a reset after an alarm: without cause it falls "
-            "for ever, and a change is found the later the longer there was none. Both are added here."
+            "for ever, and a change after a long time without change is found late. Both are added here."
             if right
             else "See the numbers.",
             source="half-car of 3.3 with the slip noise of a road",

@@ -210,7 +210,7 @@ def _joint_check(
 
     more = all(total(name) > total(d) for d in singles)
     keen = all(own.partial.share >= s.partial.share for s in singles.values())
-    # one that finds nothing is quiet as well
+    # a detector without any detection is quiet as well
     calm = all(
         own.false_alarms.count <= s.false_alarms.count for s in singles.values() if s.partial.share >= HALF
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rules of the joint detectors: each by what happens on drawn drives when it is left out."""
+"""Rules of the joint detectors: each checked on drawn drives, with the rule and without it."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def _spin_down(plan: Plan) -> Checks:
             ci95=ratio_of_counts(with_.false, without.false),
             reason=""
             if whole
-            else "What is left is no braking: a driven wheel that spins on snow after the stop "
-            "takes the velocity along, and the free wheels look slow.",
+            else "The remaining ones are not due to braking: a driven wheel that spins on snow after the stop "
+            "raises the velocity estimate, and the free wheels look slow.",
             source="drawn situations",
         ),
     )
@@ -113,7 +113,7 @@ def _minor(plan: Plan) -> Checks:
             f"false alarms with all conditions and without {'; '.join(words)}; without difference and sign {together}",
             judged(whole=whole, part=sum(x >= 2.0 for x in factors) >= 2),
             value=min(factors),
-            reason="" if whole else "Difference and sign are each asked sharply enough to make up for the other.",
+            reason="" if whole else "The conditions on difference and sign are each sharp enough to replace the other.",
             source="drawn situations",
         ),
     )
@@ -187,8 +187,8 @@ def _slope(plan: Plan) -> Checks:
             ci95=ratio_of_counts(calm.false, uncalm.false),
             reason=""
             if fewer
-            else "The estimator's own gates leave out the wheels that shake: on none of these roads is a drop reported "
-            "that is not there, with the condition or without it."
+            else "The estimator's own gates leave out the wheels that shake: on these roads no false drop is reported, "
+            "with the condition or without it."
             if calm.false == uncalm.false == 0
             else "The condition interrupts a report, which then begins again.",
             source="drawn situations",
@@ -220,7 +220,7 @@ def _resistance(plan: Plan) -> Checks:
             judged(whole=whole, part=found >= 0.5 * episodes > 0),
             value=found / max(episodes, 1),
             ci95=wilson(found, episodes),
-            reason="" if whole else "Where the resistance finds it, a wheel or the slope does too.",
+            reason="" if whole else "Where the resistance detects it, a wheel or the slope does too.",
             source="drawn situations",
         ),
     )

@@ -53,9 +53,9 @@ def _sum(plan: Plan) -> Checks:
         worst = max(worst, abs(ours - by_hand))
     exact = worst < 1e-12
     reason = (
-        "The third term is the CUSUM of the rolling resistance, as the text says; printed is one of the variance, "
-        "which would stand twice. The fourth term is clipped below too, since as printed it becomes negative; every "
-        "term is clipped at 1; the largest wheel or side counts, which 2.11 leaves open."
+        "The third term is the CUSUM of the rolling resistance, as in the text; the printed equation has one of the "
+        "variance, which would appear twice. The fourth term is clipped below too, since as printed it becomes "
+        "negative. Every term is clipped at 1. The largest wheel or side counts, which 2.11 leaves open."
     )
     return (
         Check(

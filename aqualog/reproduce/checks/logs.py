@@ -1,4 +1,4 @@
-"""What a log must tell beside its signals: the drivetrain, by giving detectors a wrong one."""
+"""Information that a log needs besides its signals: the drivetrain, checked with a wrong one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _found(d: Taken, bits: BoolArray) -> tuple[int, int]:
 
 
 def _drivetrains(plan: Plan) -> Checks:
-    """C6: every drivetrain is served, and by a vehicle file that says which one it is."""
+    """C6: every drivetrain works, with a vehicle file that states it."""
     by_drivetrain: dict[str, list[Taken]] = {"rwd": [], "fwd": [], "awd": []}
     for d in drives(WATER, plan, _PER_WATER):
         by_drivetrain[d.vehicle.drivetrain].append(d)

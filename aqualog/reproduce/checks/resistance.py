@@ -49,7 +49,7 @@ CONFIGURATIONS: Mapping[str, Pass] = {
     "new winter 2.0 mm": replace(WINTER, h=2.0e-3),
 }
 DEPTHS = (0.6e-3, 0.8e-3, 1.1e-3, 1.3e-3, 2.0e-3)  # [m]
-OUTER = (0.6e-3, 1.3e-3, 2.0e-3)  # those whose gradients are told
+OUTER = (0.6e-3, 1.3e-3, 2.0e-3)  # those whose gradients are compared
 THRESHOLD = 0.2  # [m/s^2]
 THRESHOLD_SPEEDS = tuple(range(78, 118, 4))
 V_FULL = 113.0  # [km/h] below full aquaplaning of the anchor, 118 km/h
@@ -110,7 +110,7 @@ def _c12(table: Table) -> Checks:
             judged(whole=grows and mainly, part=grows), value=shift, ci95=ci, unit="mm",
             reason="That the wedge carries its load in front is assumed. The torque holds the drag of the film that "
             "the tread throws, too."
-            + ("" if grows and mainly else " Not all of depth, speed, pressure and load rank as said."),
+            + ("" if grows and mainly else " Not all of depth, speed, pressure and load rank as claimed."),
             source=SOURCE + ", very worn summer tyres",
         ),
     )  # fmt: skip
@@ -205,7 +205,7 @@ def _c44(table: Table) -> Checks:
         ),
         Check(
             "C44",
-            "0.2 m/s^2 tells passes with partial aquaplaning (contact of a wheel below 0.7 for 1 s) from those "
+            "0.2 m/s^2 separates passes with partial aquaplaning (contact of a wheel below 0.7 for 1 s) from those "
             "without, balanced accuracy 0.8 over 78 to 114 km/h; with a difference: 0.65",
             f"balanced accuracy {told(accuracy, span, 2)}: {sides}" if there else "all passes are alike",
             judged(whole=there and accuracy >= 0.8, part=there and accuracy >= 0.65), part="partial aquaplaning",

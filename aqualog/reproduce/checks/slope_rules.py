@@ -63,7 +63,7 @@ def _history(plan: Plan) -> Checks:
             n += 1
             dry = _drive(gain, seed, None, seconds=_DRY_S)
             rules: tuple[Rule, ...] = ("max", "robust")
-            # the file's own slope is taken away, so that the first drive tells the slope of these tyres by itself
+            # the file's own slope is removed, so that the first drive alone determines the slope of these tyres
             learnt = _learn(gain, seed)
             memories: dict[str, Memory | None] = {"file": None, **{r: Memory(learnt, rule=r) for r in rules}}
             false["file"] += int(_drops(dry))
@@ -125,7 +125,7 @@ def _not_unique(plan: Plan) -> Checks:
             ci95=wilson(drops, n),
             reason=""
             if whole
-            else "On a steady drive the traction is too even to tell a slope, so that the drop is "
+            else "On a steady drive the traction is too even to estimate a slope, so that the drop is "
             "often not seen; what is seen is not taken for water.",
             source="drawn situations",
         ),

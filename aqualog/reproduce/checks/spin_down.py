@@ -67,7 +67,7 @@ def _c14(table: Table) -> Checks:
         Check(
             "C14", "dips of the front wheels below -2 % at 89 km/h: more than none over all passes",
             f"{dips.mean():.2f} per pass, in {k} of {n} passes", judged(whole=k > 0), value=k / n, ci95=wilson(k, n),
-            reason=SHAPE + (" In the other passes there is none." if k else " The first ones come at a higher speed."),
+            reason=SHAPE + (" The other passes have no spin-down." if k else " The first ones come at a higher speed."),
             source=SOURCE,
         ),
     )  # fmt: skip

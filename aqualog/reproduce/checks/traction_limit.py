@@ -111,7 +111,7 @@ def _traction_limit(plan: Plan) -> Checks:
             ci95=wilson(caught, n),
             reason=""
             if whole
-            else "Wet ice holds less than 0.07 itself, so that the limit cannot tell it from water. On snow a "
+            else "Wet ice holds less than 0.07 itself, so that the limit cannot distinguish it from water. On snow a "
             "wheel that goes from braking to driving while the driver catches the car passes the limit for a moment.",
             source="drawn situations with extra torque",
         ),

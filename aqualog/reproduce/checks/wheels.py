@@ -149,8 +149,8 @@ def _summed_up(plan: Plan) -> Checks:
             reason=""
             if whole
             else "Simulated wheels without contact leave the car's speed far faster than those on any dry road here, "
-            "so that a direct threshold set with hindsight tells them as well; what noise there is has been "
-            "low-passed over 0.03 s before either. Where neither has a false alarm, nothing is decided.",
+            "so that a direct threshold chosen afterwards works as well; the noise has been low-passed over 0.03 s "
+            "before either. Where neither has a false alarm, the check decides nothing.",
             source="drawn situations",
         ),
     )
