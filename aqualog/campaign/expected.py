@@ -118,6 +118,8 @@ def _chord(slope: float, L: float, mu_max: float, mu_range: tuple[float, float] 
 def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
     """Regression slope of the shortened contact over the tangent of the full one, (m,).
 
+    NaN where L cannot carry the traction, or the range is empty.
+
     Depends on the traction over the friction only: the brush's force over mu F_z is a function of C s / (3 mu F_z).
     """
     low, high = mu_range

@@ -171,7 +171,11 @@ def led_by(drive: Drive, model: Model) -> Drive:
 
 
 def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
-    """The course with a target speed that makes the simulated speed meet the measured one without delay."""
+    """The course with a target speed that makes the simulated speed meet the measured one without delay.
+
+    The simulation follows its target with a lag. A lagging copy of the measured speed's noise would look like a delayed
+    signal.
+    """
     nudge = follow(vehicle, course, model)["nudge"]
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
 
@@ -185,7 +189,11 @@ def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
 
 
 def _as_known(vehicle: Vehicle, signals: Signals) -> Vehicle:
-    """The vehicle without radii where the log gives wheel speeds in km/h."""
+    """The vehicle without radii where the log gives wheel speeds in km/h.
+
+    The control unit converted with its own radii. The vehicle file's radii convert back to wheel speeds, whatever their
+    values.
+    """
     wheels = [o for n, o in signals.origins.items() if n.startswith("omega_")]
     if not any(is_unit(o.unit) and parse_unit(o.unit).dimension == "speed" for o in wheels):
         return vehicle

@@ -1,4 +1,9 @@
-"""Samples in which a wheel floats or nearly floats, and whose residual is not judged."""
+"""Samples in which a wheel floats or nearly floats, and whose residual is not judged.
+
+A wheel that has lost its grip is bistable. Unknown differences of the water decide whether and when it spins down in a
+puddle, and when it recovers. Its speed can then be tens of m/s away from the simulation. This is chance, not an error
+of the model, and it also happens in drives without any hidden effect.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 """The road's profile: a slope angle over position that two channels show independently of each other.
 
+The accelerometer measures a slope, and so does the balance of wheels against torque. They share no slow sensor error:
+
     kinematic                  = g sin(theta(s)) + b    accelerometer minus dv/dt, b its drift
     kinematic - force_balance  = g sin(theta(s)) + w    torque minus dv/dt, w wind and torque error
 

@@ -252,7 +252,11 @@ def signatures(
     tick: Callable[[], None] = lambda: None,
     each: bool = False,
 ) -> list[FloatArray]:
-    """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, around a model."""
+    """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, around a model.
+
+    Computed from differences of simulations along the drive. To first order, a hypothesis of a whole axle or car is the
+    sum of its wheels; unless `each` is set, it is not simulated again.
+    """
 
     def one(h: Hypothesis) -> FloatArray:
         out = []

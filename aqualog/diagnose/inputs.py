@@ -40,6 +40,9 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
     """A signal after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
 
+    The noise is estimated in a band well above the frequencies of drivers' actions. A signal sampled too slowly for
+    that stays unchanged. Zero phase: no delay.
+
     Parameters
     ----------
     x : array (n,)
@@ -98,7 +101,12 @@ def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
 
 
 def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`."""
+    """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`.
+
+    Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an undriven
+    axle is torque like any other: 50 N·m now and then are 3 % of the torque in slow driving. On an axle with no other
+    torque, everything below that level is noise of unknown spectrum.
+    """
     out = np.empty_like(torque)
     driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     total = float(np.sqrt((torque.sum(axis=0) ** 2).mean()))

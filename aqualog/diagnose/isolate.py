@@ -41,7 +41,10 @@ def p_correct(lam: float) -> float:
 
 
 def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, threshold: float) -> FloatArray:
-    """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger."""
+    """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger.
+
+    NaN where no physical size would be detected.
+    """
     out = np.full(bench.count, np.nan)
     for i, columns in enumerate(bench.columns):
         for c in columns:

@@ -1,4 +1,7 @@
 """The run that would distinguish the remaining causes: each is simulated, and its information added to the log's.
+
+Sets of effects are distinguished by the part of one that the other, with its own parameters fitted again, cannot
+imitate.
 Whitened inner products of the log and of a run add up, so a run is judged together with the information of the log.
 """
 

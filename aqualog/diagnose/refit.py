@@ -68,7 +68,17 @@ class Metric:
 
 
 def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
-    """Inner products under noise and a share of the tolerances, as in `bench.tolerant`."""
+    """Inner products under noise and a share of the tolerances, as in `bench.tolerant`.
+
+    Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
+    by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. The
+    tolerances of the water laws always count `DOUBT` times, whatever the share. The car's drive-to-drive spread counts
+    in full, because this drive deviates by it too.
+
+    The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
+    Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
+    ways agree as long as a signature does not change with its value (D). Only the second stays right if it does.
+    """
     apart = np.zeros(bench.count)
     apart[list(beside)] = bench.as_values[list(beside)]
     sought = {bench.kinds[c] for c in beside} - {""}

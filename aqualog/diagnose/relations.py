@@ -1,4 +1,9 @@
-"""Relations among effects that hold on every log: two effects together look like a third one."""
+"""Relations among effects that hold on every log: two effects together look like a third one.
+
+They come in addition to the twins of an effect, which look like it one by one. An accelerometer reads a slope like an
+offset. The force balance does not respond to a slope; it responds to the offset like to a rolling resistance. No drive
+breaks such a relation, so the smaller set has no better evidence than the larger one.
+"""
 
 from __future__ import annotations
 

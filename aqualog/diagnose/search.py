@@ -158,7 +158,11 @@ def _tested(
 
 
 def _surely_nothing(bench: Bench, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
-    """The test's result if even gains without the inflation by coloured noise stay below Bonferroni's bound."""
+    """The test's result if no gain reaches Bonferroni's bound [bonferroni1936], even without coloured noise.
+
+    The bound is the minimum of every threshold. Surrogates, which take most of the time, could not turn this into a
+    finding.
+    """
     statistic = float((gains / [len(x) for x in bench.columns]).max())
     p = chance(statistic, c.tested)
     if p <= level:
@@ -271,7 +275,11 @@ def _twins(bench: Bench, gram: FloatArray, top: SetFit, known: set[tuple[int, ..
 
 
 def _of_water(bench: Bench, gram: FloatArray, known: set[tuple[int, ...]]) -> list[SetFit]:
-    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict."""
+    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict.
+
+    Near floating, slip is proportional to one over the square of the remaining contact, so a linear signature is valid
+    only locally.
+    """
     alone = [
         (i,) for i, h in enumerate(bench.asked)
         if h.of_water and not h.allowed and h.where not in AXLES and (i,) not in known
@@ -321,7 +329,11 @@ def _index(bench: Bench, h: Hypothesis) -> int:
 
 
 def _around(bench: Bench, best: Refit, members: Sequence[int], model: Model) -> Bench:
-    """The bench with the signatures of the best set at its own values."""
+    """The bench with the signatures of the best set at its own values.
+
+    Residuals are those that a linear model around these values would have had at the start, so that the search for sets
+    can begin again from there.
+    """
     columns = [c for m in members for c in bench.columns[m]]
     start = best.values - np.array([value_in(model, best.members[i], n) for i, n in best.names])
     new_signatures, new_residuals = [], []

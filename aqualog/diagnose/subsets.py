@@ -81,7 +81,10 @@ def gains_on_top(bench: Bench, gram: FloatArray, base: Sequence[int]) -> FloatAr
 
 
 def compatible(bench: Bench, members: Sequence[int]) -> bool:
-    """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal."""
+    """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal.
+
+    Delays are relative: a delay of all signals only shifts the start of the log's clock.
+    """
     late = {bench.asked[m].where for m in members if bench.asked[m].effect.name == "signal_delay"}
     if len(late) > 1 and late == {h.where for h in bench.asked if h.effect.name == "signal_delay"}:
         return False

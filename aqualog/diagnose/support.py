@@ -1,4 +1,8 @@
-"""Effects that act everywhere must also show off the water."""
+"""Effects that act everywhere must also show off the water.
+
+On water, errors of the water laws shape the residual. A wheel with little contact amplifies any slip, and two dry
+effects that cancel on dry road could replace a wrong water law. Neither is possible off the water.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +25,10 @@ LEAST = 300  # samples off the water that the check needs at the least
 
 
 def supported(bench: Bench) -> Bench:
-    """The bench without effects that have no gain off the water; the same bench on dry drives."""
+    """The bench without effects that have no gain off the water; the same bench on dry drives.
+
+    Effects of water are exempt, and so are drives that are wet nearly all the time.
+    """
     if not any(d.course.lanes for d in bench.drives):
         return bench
     dry = [_off_water(d) for d in bench.drives]

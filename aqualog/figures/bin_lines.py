@@ -32,10 +32,10 @@ def _log(r: SlopeRow) -> tuple[float, float]:
 def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> list[Effect] | None:
     """Coefficients of columns (each (n,)) over the logarithms of the slopes; None with no more bins than columns.
 
-    Weights come from each bin's own error and from the additional scatter about the line (DerSimonian and Laird [dersimonian1986],
-    the moment, repeated until it converges). The interval is Student's, with bins minus columns as degrees of freedom. A
-    run passes through two or three neighbouring bins, and both wheels of an axle share it; the bins are assumed to be
-    independent.
+    Weights come from each bin's own error and from the additional scatter about the line. The scatter is DerSimonian
+    and Laird's moment [dersimonian1986], repeated until it converges. The interval is Student's, with bins minus
+    columns as degrees of freedom. A run passes through two or three neighbouring bins, and both wheels of an axle share
+    it; the bins are assumed to be independent.
     """
     x = np.stack(columns, axis=1)
     n, p = x.shape

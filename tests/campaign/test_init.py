@@ -334,7 +334,7 @@ def test_nothing_is_overwritten_without_force_and_no_log_even_with_it(tmp_path):
     before = (tmp_path / "logs" / "runs.csv").read_bytes()
     result = run(tmp_path / "logs", "-o", tmp_path / "logs" / "campaign.toml", "--force")
     assert result.exit_code == 2
-    assert "is not a table of runs" in result.output
+    assert "is no table of runs" in result.output
     assert (tmp_path / "logs" / "runs.csv").read_bytes() == before
 
 

@@ -106,7 +106,12 @@ def question_of(told: Sequence[Told]) -> Question:
 
 
 def doubted(passes: Passes, base: Model) -> Passes:
-    """The same runs with additional columns, before the free ones, for the uncertainty of the expectation itself."""
+    """The same runs with additional columns, before the free ones, for the uncertainty of the expectation itself.
+
+    The steady expectation is accurate to `STEADY`: one share for all slips on water and one for the resistance. The
+    tyre's curve depends on a friction known to `FRICTION`. These errors are the same in all runs, with that prior
+    (`noise.prior_of`), so that more runs do not reduce them.
+    """
     expected = expected_values(passes, base)[0]
     columns = np.zeros((*expected.shape, 3))
     columns[:, :, 2] = np.nan_to_num(expected_values(passes, base, friction=1.0 + FRICTION)[0] - expected)

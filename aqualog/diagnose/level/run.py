@@ -162,7 +162,11 @@ def _diagnosed(
 
 
 def judged(found: Found | None, left: Sequence[Remainder]) -> tuple[Verdict, Refit | None, list[Refit]]:
-    """Verdict, the reported set, and the other credible sets."""
+    """Verdict, the reported set, and the other credible sets.
+
+    Effects in every credible set are named. If no credible set consists of just these, the runs cannot distinguish the
+    causes. A function that remains after the best set means that the library does not hold the cause.
+    """
     if left:
         return "unexplained", None, []
     if found is None or any(not r.chosen for r in found.sets):
