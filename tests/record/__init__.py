@@ -1,0 +1,1 @@
+"""What every command prints and writes, kept so that two versions can be compared."""
