@@ -52,7 +52,7 @@ def test_table_written_by_a_german_spreadsheet(tmp_path):
 
 def test_every_command_has_a_case():
     named = {c.line.split()[0] for c in CASES}
-    assert set(COMMANDS) <= named
+    assert set(COMMANDS) - {"help"} <= named
     assert len({c.name for c in CASES}) == len(CASES)
 
 
