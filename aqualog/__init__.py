@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
+    from aqualog.face.calibrate import Calibration, calibrate
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
     from aqualog.face.detect import Detection, detect
@@ -37,11 +38,13 @@ _FACE = {
     "slip_slope": "aqualog.face.slip_slope",
     "convert": "aqualog.face.convert",
     "Campaign": "aqualog.face.campaign",
+    "calibrate": "aqualog.face.calibrate",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
     "Model": "aqualog.model.term",
     "Detection": "aqualog.face.detect",
+    "Calibration": "aqualog.face.calibrate",
     "SlipSlope": "aqualog.face.slip_slope",
     "physics": "aqualog.physics",
     "AqualogError": "aqualog.errors",
@@ -49,6 +52,7 @@ _FACE = {
 
 __all__ = [
     "AqualogError",
+    "Calibration",
     "Campaign",
     "Detection",
     "Drive",
@@ -57,6 +61,7 @@ __all__ = [
     "SlipSlope",
     "Vehicle",
     "__version__",
+    "calibrate",
     "convert",
     "detect",
     "physics",

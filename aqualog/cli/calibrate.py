@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,13 +20,6 @@ from aqualog.cli.options import (
     Signals,
     Verbose,
 )  # fmt: skip
-
-if TYPE_CHECKING:
-    from aqualog.calibrate.records import Calibration
-    from aqualog.cli.console import Steps
-    from aqualog.cli.setup import Setup
-    from aqualog.types import Signals as SignalTable
-    from aqualog.vehicle import Vehicle as VehicleRecord
 
 __all__ = ["calibrate"]
 
@@ -108,9 +99,11 @@ def _calibrate(
     verbose: bool,
     progress: str,
 ) -> int:
-    from aqualog.cli.console import clean, clean_line
+    from aqualog.cli.console import told_if_interrupted
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.calibrate import calibrate
+    from aqualog.face.drives import NothingUsableError, grouped
 
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: which axle is driven, radii, axle distances")
@@ -118,121 +111,27 @@ def _calibrate(
     targets = [_target(name, option) for name, option in ((out_name, "-o"), (page_name, "--page")) if name is not None]
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file, cached=cached,
+        progress=progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
     )  # fmt: skip
-    drives = _drives(logs)
-    with setup.console.steps() as steps:
-        from aqualog.cli.console import told_if_interrupted
-
-        with told_if_interrupted("nothing was written"):
-            loaded, failed = _load_all(drives, setup, dbc, rate, steps)
-            steps("estimating")
-            result = _estimated(loaded, failed, setup.vehicle, fixed)
-    for line in failed:
-        sys.stderr.write(f"error: {clean_line(line)}\n")
-    if result is None:
+    try:
+        with setup.console.hearing() as hear, told_if_interrupted("nothing was written"):
+            result = calibrate(grouped(logs, setup.drive), setup.vehicle, fix=fixed, progress=hear)
+    except NothingUsableError:  # each reason was reported
         return int(ExitCode.NOTHING_USABLE)
-    drives = [(name, paths) for name, paths in drives if name in loaded]
-    changes = setup.changes()
-    notes = (*(_of(name, paths, n) for name, paths in drives for n in loaded[name].quality.notes), *changes)
     if out_name is not None:
-        from aqualog.config.vehicle_edit import calibrated_toml
-        from aqualog.face.paths import write_text
-
-        write_text(Path(out_name), calibrated_toml(setup.vehicle, result))
+        result.write_vehicle(out_name, force=True)
     if page_name is not None:
-        from aqualog.face.paths import write_whole
-        from aqualog.report.calibration_page import write_calibration_page
-
-        title = f"{result.vehicle_name}, {len(drives)} drives"
-        write_whole(Path(page_name), lambda p: write_calibration_page(result, p, title=title, notes=notes))
-    from aqualog.report.calibration_document import calibration_document, calibration_text
-
-    if as_json:
-        document = calibration_document(result, logs=[str(p) for _, paths in drives for p in paths], notes=notes)
-        sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
-    else:
-        sys.stdout.write(clean(calibration_text(result)))
-    for text in (*notes, *result.notes):
+        result.write_page(page_name, force=True)
+    setup.console.data(result, as_json=as_json)
+    for text in result.notes:
         setup.console.note(text)
     for path in targets:
         setup.console.note(f"written: {path}")
-    lossy = any(s.quality.truncated or s.quality.lost_in_files for s in loaded.values())
-    is_partial = lossy or failed or changes or len(result.drives) < len(drives)
-    return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)
-
-
-def _load_all(
-    drives: list[tuple[str, list[Path]]], setup: Setup, dbc: list[Path], rate: float | None, steps: Steps
-) -> tuple[dict[str, SignalTable], list[str]]:
-    """Drives by name, and a line for each that cannot be read."""
-    from aqualog.errors import AqualogError, ConfigError
-
-    loaded: dict[str, SignalTable] = {}
-    failed: list[str] = []
-    for name, paths in drives:
-        try:
-            loaded[name] = _load(name, paths, setup, dbc, rate, steps)
-        except ConfigError:  # of the options, which are those of all drives
-            raise
-        except (AqualogError, OSError) as error:
-            line = error.line() if isinstance(error, AqualogError) else str(error)
-            failed.append(_of(name, paths, line))
-    return loaded, failed
-
-
-def _of(name: str, paths: list[Path], text: str) -> str:
-    """The text with the drive's name before it, unless the drive is one file that the text names already."""
-    is_file = len(paths) == 1 and name in (paths[0].name, str(paths[0]))
-    return text if is_file and name in text else f"{name}: {text}"
-
-
-def _estimated(
-    loaded: dict[str, SignalTable], failed: list[str], vehicle: VehicleRecord, fixed: dict[str, float]
-) -> Calibration | None:
-    """The calibration; drives that lack a signal leave `loaded` for a line in `failed`; None if all do."""
-    from aqualog.calibrate.run import calibrate as run
-    from aqualog.errors import SignalError
-
-    while loaded:
-        try:
-            return run(list(loaded.values()), list(loaded), vehicle, fixed)
-        except SignalError as error:
-            if error.where not in loaded:
-                raise
-            del loaded[error.where]
-            failed.append(error.line())
-    return None
-
-
-def _load(name: str, paths: list[Path], setup: Setup, dbc: list[Path], rate: float | None, steps: Steps) -> SignalTable:
-    from aqualog.align.load import load_signals
-
-    return load_signals(
-        paths, vehicle=setup.vehicle, signal_map=setup.signal_map, dbc=dbc, rate_hz=rate,
-        report=lambda step: steps(f"{name}: {step}"), cache=setup.cache,
-    )  # fmt: skip
-
-
-def _drives(logs: list[str]) -> list[tuple[str, list[Path]]]:
-    """Files by drive: a folder's belong together, those of a glob or a list do not; the same file counts once."""
-    from aqualog.face.paths import expand
-
-    drives: list[tuple[str, list[Path]]] = []
-    seen: set[Path] = set()
-    for argument in logs:
-        paths = [p for p in expand([argument]) if p.resolve() not in seen]
-        seen |= {p.resolve() for p in paths}
-        if Path(argument).is_dir():
-            drives += [(Path(argument).name or argument, paths)] if paths else []
-        else:
-            drives += [(p.name, [p]) for p in paths]
-    names = [n for n, _ in drives]
-    return [(n if names.count(n) == 1 else str(paths[0]), paths) for n, paths in drives]
+    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
 
 
 def _fixed(texts: list[str]) -> dict[str, float]:
-    """`mass=1400` to a mapping; names and bounds are checked by the estimator."""
+    """Return `mass=1400` as a mapping; the estimator checks names and bounds."""
     from aqualog.calibrate.derive import check_fixed
     from aqualog.errors import ConfigError
 

@@ -88,6 +88,13 @@ class Result(ABC):
             write_whole(out / name, write)
         return tuple(out / name for name in files)
 
+    def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
+        """Write the file that `save` calls `name` to a path of the user's choice."""
+        target = Path(path)
+        refuse_existing([target], force=force, sources=self.sources)
+        write_whole(target, self.files()[name])
+        return target
+
     def __repr__(self) -> str:
         lines = self.headline().rstrip("\n").split("\n")
         shown = lines[:_REPR_LINES] + (["..."] if len(lines) > _REPR_LINES else [])

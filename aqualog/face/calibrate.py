@@ -1,0 +1,223 @@
+"""`aq.calibrate`: what detectors must know of a car, from its dry drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.face.drive import Drive, vehicle_needed
+from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
+from aqualog.face.listener import Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.calibrate.records import Calibration as Found
+    from aqualog.types import Signals
+
+__all__ = ["Calibration", "calibrate"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
+    """Parameters of a car with 95 % intervals, and what the drives do not determine.
+
+    `found` holds the records, `drives` the drives that were used, `before` the vehicle that was given.
+    """
+
+    drives: tuple[Drive, ...]
+    before: Vehicle
+    found: Found
+    file_notes: tuple[str, ...] = ()
+    has_loss: bool = False
+    sources: tuple[Path, ...] = ()
+
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """The car with the calibrated values, as `write_vehicle` writes it."""
+        from aqualog.calibrate.apply import calibrated
+
+        return calibrated(self.before, self.found.parameters, self.found.transfers, self.found.spread)
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Sentences on the logs and on the calibration."""
+        return (*self.file_notes, *self.found.notes)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog calibrate`."""
+        from aqualog.report.calibration_document import calibration_document
+
+        logs = [str(p) for d in self.drives for p in d.paths]
+        return calibration_document(self.found, logs=logs, notes=self.file_notes)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`parameters`, `drives` and `residuals`.
+
+        `residuals` are those of the force balance in windows: drive, v [m/s], force [N], before and after [m/s²].
+        """
+        import polars as pl
+
+        pairs = {"ci95": ("low", "high")}
+        parameters = [_flat(p, pairs) for p in self.document["parameters"]]
+        drives = [_flat({k: v for k, v in d.items() if k != "left_out_s"}, pairs) for d in self.document["drives"]]
+        residuals = [
+            pl.DataFrame({n: getattr(d, n) for n in ("v", "force", "before", "after")}).select(
+                pl.lit(d.name).alias("drive"), pl.all()
+            )
+            for d in self.found.drives
+        ]
+        return {
+            "parameters": pl.DataFrame(parameters, infer_schema_length=None),
+            "drives": pl.DataFrame(drives, infer_schema_length=None),
+            "residuals": pl.concat(residuals),
+        }
+
+    def text(self) -> str:
+        """Return parameters, drives and polynomials, and what could not be estimated."""
+        from aqualog.report.calibration_document import calibration_text
+
+        return calibration_text(self.found)
+
+    def headline(self) -> str:
+        """Return the estimated parameters, and the names of those that the drives do not determine."""
+        from aqualog.report.calibration_document import parameter_cells
+
+        found = self.found
+        rows = [parameter_cells(p) for p in found.parameters if p.identified]
+        values = [f"{name} {value}{f' {unit}' if unit != '-' else ''} ({interval or 'given'})"
+                  for name, value, interval, unit, *_ in rows]  # fmt: skip
+        not_found = ", ".join(p.name for p in found.parameters if not p.identified)
+        return "\n".join(
+            [
+                f"{found.vehicle_name}: {len(rows)} of {len(found.parameters)} parameters estimated from "
+                f"{len(found.drives)} drives; value (95 %)",
+                *("  " + "; ".join(values[i : i + 2]) for i in range(0, len(values), 2)),
+                *([f"  not determined: {not_found}"] if not_found else []),
+            ]
+        )
+
+    def plot(self) -> go.Figure:
+        """Return the residual of the force balance before and after, over speed and over wheel force."""
+        from aqualog.report.figures.balance_residual import balance_residuals
+        from aqualog.report.standalone import side_by_side
+
+        return side_by_side(balance_residuals(self.found))
+
+    def files(self) -> Writers:
+        """Return `calibration.json`, `calibrated.toml` and `calibration.html`."""
+        from aqualog.config.vehicle_edit import calibrated_toml
+        from aqualog.report.calibration_page import write_calibration_page
+
+        title = f"{self.found.vehicle_name}, {len(self.drives)} drives"
+        return {
+            "calibration.json": text_file(lambda: self.to_json() + "\n"),
+            "calibrated.toml": text_file(lambda: calibrated_toml(self.before, self.found)),
+            "calibration.html": lambda path: write_calibration_page(
+                self.found, path, title=title, notes=self.file_notes
+            ),
+        }
+
+    def write_vehicle(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the vehicle file with the calibrated values, each with its interval and where it comes from.
+
+        Raises
+        ------
+        ConfigError
+            If the file exists and `force` is not given, or it is a source of this result.
+        """
+        return self._write_as("calibrated.toml", path, force=force)
+
+    def write_page(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page with tables and residuals (HTML).
+
+        Raises
+        ------
+        ConfigError
+            If the file exists and `force` is not given, or it is a source of this result.
+        """
+        return self._write_as("calibration.html", path, force=force)
+
+
+def _flat(entry: Mapping[str, Any], pairs: Mapping[str, tuple[str, str]], stem: str = "") -> dict[str, Any]:
+    """Return a row of a table: intervals become two columns, an inner mapping columns with its name before theirs."""
+    row: dict[str, Any] = {}
+    for name, value in entry.items():
+        if isinstance(value, Mapping):
+            row |= _flat(value, pairs, f"{name}_")
+        elif name in pairs:
+            row |= {f"{stem}{end}": x for end, x in zip(pairs[name], value, strict=True)}
+        else:
+            row[stem + name] = value
+    return row
+
+
+def calibrate(
+    drives: DrivesLike,
+    vehicle: PathLike | Vehicle | None = None,
+    *,
+    fix: Mapping[str, float] | None = None,
+    progress: Progress = None,
+) -> Calibration:
+    """Estimate what detectors must know of a car from its dry drives.
+
+    Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
+    rods and steering. The drives must be dry and with the same load; four or more show how drives differ.
+
+    Parameters
+    ----------
+    drives : Drive, Signals, str, Path or several
+        Each `Drive` and each file is a drive; the files of a folder are one drive. A drive that cannot be read is left
+        out, and `progress` hears why.
+    vehicle : Vehicle, str or Path
+        Without it that of the first drive; one of them must be given, for it says which axle is driven.
+    fix : mapping, optional
+        Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-].
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    LogError, SignalError, FitError, ConfigError
+        SignalError if no drive can be used, FitError if none has straight, unbraked, dry driving.
+
+    Examples
+    --------
+    >>> r = aq.calibrate(["dry1.mf4", "dry2.mf4"], "car.toml", fix={"mass": 1482.0})
+    >>> r.write_vehicle("calibrated.toml")
+    >>> aq.detect("wet.mf4", r.vehicle)
+    """
+    from aqualog.calibrate.derive import check_fixed
+
+    hear = listener(progress)
+    fixed = dict(fix or {})
+    check_fixed(fixed)
+    (all_drives,) = with_own_names(drives_of(drives))
+    car = vehicle_needed(vehicle, all_drives[0] if all_drives else None)
+    loaded = load_drives(all_drives, car, hear)
+    hear("estimating")
+
+    def work(signals: dict[str, Signals]) -> Found:
+        from aqualog.calibrate.run import calibrate as run
+
+        return run(list(signals.values()), list(signals), car, fixed)
+
+    found = loaded.tried(work, hear)
+    changes = loaded.changes
+    used = loaded.used
+    has_loss = loaded.has_loss or bool(changes) or len(found.drives) < len(used)
+    files = dict.fromkeys(p for d in all_drives for p in d.sources)
+    own = (*files, *(Path(x) for x in (vehicle,) if isinstance(x, str | Path)))
+    return Calibration(tuple(used), car, found, (*loaded.notes, *changes), has_loss, own)
