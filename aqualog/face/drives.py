@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -189,6 +190,10 @@ def with_own_names(*groups: Sequence[Drive]) -> tuple[list[Drive], ...]:
     return tuple([own(d) for d in drives] for drives in groups)
 
 
+def _step(hear: Listener, name: str, step: str) -> None:
+    hear(f"{name}: {step}")
+
+
 def load_drives(drives: Sequence[Drive], vehicle: Vehicle, hear: Listener) -> Loaded:
     """Read all drives. One that cannot be read is left out with its reason; the others go on.
 
@@ -201,7 +206,7 @@ def load_drives(drives: Sequence[Drive], vehicle: Vehicle, hear: Listener) -> Lo
     for drive in drives:
         name = drive.label
         try:
-            loaded.signals[name] = drive.load(vehicle, report=lambda step, name=name: hear(f"{name}: {step}"))
+            loaded.signals[name] = drive.load(vehicle, report=partial(_step, hear, name))
         except ConfigError:
             raise
         except (AqualogError, OSError) as error:
