@@ -51,7 +51,7 @@ class Source:
     """A work that code or a page leans on.
 
     `used` is what aqualog takes from it, `checked` how its title, numbers and DOI were looked at, `names` words by
-    which a text can name it. `doi` and `url` are empty where there is none or where it was not confirmed.
+    which a text can name it. `doi` and `url` are empty where missing or not confirmed.
     """
 
     key: str

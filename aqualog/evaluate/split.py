@@ -24,7 +24,7 @@ def split_runs(groups: Sequence[Mapping[str, str]]) -> Split:
     Parameters
     ----------
     groups : sequence of mapping
-        Configuration of each drive; `vehicle` and `tyre` are looked at.
+        Configuration of each drive; its `vehicle` and `tyre` are used.
 
     Returns
     -------

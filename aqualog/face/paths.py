@@ -132,6 +132,6 @@ def _check_folder(path: Path) -> None:
     """The nearest folder above a result that exists: it must be one, and be writable."""
     folder = next((p for p in path.absolute().parents if os.path.lexists(p)), None)  # also a link that leads nowhere
     if folder is None or not folder.is_dir():
-        raise ConfigError("cannot be made", where=str(path), expected=f"a folder, and {folder} is none")
+        raise ConfigError("cannot be made", where=str(path), expected=f"a folder; {folder} is no folder")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise ConfigError("cannot be written", where=str(path), hint=f"the permissions of {folder}")

@@ -44,7 +44,7 @@ _GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # as good a fracti
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column as its header and its sampled cells show it; `text_share` is the share of cells that say nothing.
+    """One column by its header and its sampled cells; `text_share` is the share of cells that are no value.
 
     `name` is unique in the file, `header` what stands above it.
     """
@@ -61,7 +61,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Everything that is needed to read the cells.
+    """The layout that is needed to read the cells.
 
     `width` is the number of cells in a whole row: that of the header, or more if every row ends with separators.
     `first_line` counts from 1; `twice` are names of several columns; `unproven` is a cell that may be a fraction or
@@ -112,7 +112,7 @@ def find_layout(data: bytes | TextFile, *, where: str, told: CsvFormat = _NONE_T
     where : str
         Named in an error.
     told : CsvFormat
-        What the user says of the file: nothing else is tried.
+        Layout given by the user: no other is tried.
 
     Raises
     ------
@@ -312,7 +312,7 @@ def _told_styles(columns: Sequence[_Cells], decimal: str) -> tuple[Style, ...]:
 
 
 def _unproven_cell(cells: Sequence[_Cells], columns: Sequence[Column]) -> str:
-    """A cell of a number that is as good a fraction as it is thousands, if all with a decimal sign are such."""
+    """Return a cell that may be a fraction or thousands, if all cells with a decimal sign are such."""
     signed = [
         x for c, column in zip(cells, columns, strict=True) if column.kind == "number"
         for x in c.cells if column.style.decimal in x
@@ -321,7 +321,7 @@ def _unproven_cell(cells: Sequence[_Cells], columns: Sequence[Column]) -> str:
 
 
 class _Cells:
-    """The filled cells of a column that were looked at, each judged once in each style."""
+    """The sampled filled cells of a column, each judged once in each style."""
 
     def __init__(self, cells: tuple[str, ...]) -> None:
         self.cells = cells

@@ -30,7 +30,7 @@ class CsvFormat:
 
 
 def format_fault(key: str, value: object) -> str:
-    """What is wrong with one of these keys; empty if nothing is."""
+    """Say what is wrong with one of these keys; empty if it is valid."""
     if not isinstance(value, str) or not value:
         return f"{key} = {str(value)[:40]!r} is no text"
     if key == "separator":

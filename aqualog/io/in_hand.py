@@ -21,8 +21,8 @@ __all__ = ["InHand", "bound_memory", "bounded", "memory_bound", "reading", "unfi
 
 
 class InHand(NamedTuple):
-    """The log that is read, if any, how long this step may take in seconds (0: as long as it likes), the size of
-    the log, which step it is, and files or folders to be removed if the process ends now.
+    """State of the reading: the log (if any), the limit of this step in seconds (0: no limit), the size of the log, and
+    which step it is. Also files or folders to be removed if the process ends now.
     """  # fmt: skip
 
     log: str = ""

@@ -377,7 +377,7 @@ class MdfReader:
             )
 
     def _values_of(self, about: Any) -> tuple[int, int]:
-        """Number of values of variable length in a group that holds nothing else, and what they take. [bytes]"""
+        """Return the number of values of variable length in a group of such values alone, and their size. [bytes]"""
         owner = self._inner._cn_data_map.get(about.address)
         if owner is None:
             return 0, 0
@@ -853,7 +853,7 @@ def _comment(channel: Any) -> str:
 
 
 def _xml_text(text: str) -> str:
-    """What an XML comment says; nothing where it is no XML, has definitions of its own, or is as long as no comment."""
+    """Return the content of an XML comment; empty if it is no XML, has definitions of its own, or is too long."""
     if len(text) > _LARGEST_XML or "<!" in text.replace("<![CDATA[", "").replace("<!--", ""):
         return ""
     found = str(extract_xml_comment(text))

@@ -488,7 +488,7 @@ class _Walk(Walk):
     # --- records ---
 
     def _signal_data(self, block: _Block) -> None:
-        """Values of variable length: what is missing of them is empty."""
+        """Check values of variable length: missing ones are read as empty."""
         at = block.links[5]
         if at + 4 <= self._size and self._data[at : at + 4] in (b"##CG", b"##AT"):
             return
@@ -557,7 +557,7 @@ class _Walk(Walk):
             )  # fmt: skip
 
     def _chain(self, place: int, at: int, record: int, *, is_last: bool = False) -> _Records:
-        """Follow a link to data; what is missing is not linked any more. A plain block ends with a whole record."""
+        """Follow a link to data, and unlink missing blocks. A plain block ends with a whole record."""
         out = _Records()
         if not at:
             return out

@@ -54,7 +54,7 @@ class Survey:
     `inferred`: groups whose records were reconstructed from their channels, by address; valid only if their time goes
     up. `zeros`: what such a file ends in behind the records of these groups. [bytes]
     `deflated`: addresses of deflated blocks of data.
-    `inflated`: what the records of a group take when they are inflated, by address of the group. [bytes]
+    `inflated`: size of the inflated records of a group, by address of the group. [bytes]
     """
 
     size: int
@@ -77,7 +77,7 @@ class Survey:
         self.patches[at] = struct.pack(layout, *values)
 
     def lost(self, what: str, broken: BlockError, samples: int = 0) -> None:
-        """Something is left out because of a block."""
+        """Note a part that is left out because of a block."""
         self.truncated = True
         self.lost_samples += samples
         self.remark(f"{what} is lost: {broken}")
@@ -90,7 +90,7 @@ class Survey:
             self.notes.append("more blocks are damaged than are listed here")
 
     def hopeless(self, path: Path, broken: BlockError) -> LogError:
-        """The error where nothing can be read."""
+        """Return the error for a file without any readable part."""
         if broken.is_cut:
             return LogError(f"file is cut: {broken}", where=str(path), expected=_COMPLETE, hint=_COPY_AGAIN)
         return LogError(f"file is damaged: {broken}", where=str(path), hint=_OWN_TOOL)

@@ -43,7 +43,7 @@ __all__ = [
 ]  # fmt: skip
 
 SAMPLES = 8
-"""Messages per topic that are looked at to learn its fields."""
+"""Messages per topic that are read to learn its fields."""
 
 _MAX_ELEMENTS = 16
 _MAX_LEAVES = 4096
@@ -135,7 +135,7 @@ class Stream:
 class Source(Protocol):
     """One file of recorded messages.
 
-    `truncated`: something is lost, and how much is not known; `unassigned`: lost messages of no known topic;
+    `truncated`: an unknown amount is lost; `unassigned`: lost messages of no known topic;
     `unfinalised`: the recorder has not written the index that ends a file.
     """
 

@@ -66,7 +66,7 @@ class SoundRows:
 
     @property
     def bad(self) -> frozenset[int]:
-        """Row groups that are left out, as far as they were looked at."""
+        """Return the row groups that are left out, among those checked so far."""
         return frozenset(self._bad)
 
     def collect(self, columns: Sequence[str], at: int, rows: int) -> pl.DataFrame:

@@ -1,6 +1,6 @@
 """Write MDF 4.10: measured channels, and raw CAN frames for bus logging.
 
-Everything is written to the very path that is given; renaming from a temporary name is the caller's business.
+Everything is written to the given path; the caller renames it from a temporary name.
 """
 
 from __future__ import annotations

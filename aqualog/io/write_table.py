@@ -1,6 +1,6 @@
 """Write a table of signals as CSV or Parquet.
 
-Everything is written to the very path that is given; renaming from a temporary name is the caller's business.
+Everything is written to the given path; the caller renames it from a temporary name.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class TableColumn:
 
 
 def write_csv(path: Path, columns: Sequence[TableColumn], *, decimal_comma: bool = False) -> None:
-    """Write CSV in UTF-8 with headers `name [unit]`; what is missing is blank.
+    """Write CSV in UTF-8 with headers `name [unit]`; missing values are blank.
 
     Parameters
     ----------
