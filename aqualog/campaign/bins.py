@@ -167,7 +167,7 @@ def cells(
     wheels : callable
         Wheels of a run's car that count; `("",)` for the car as a whole.
     columns : callable
-        Columns to use of a run and a wheel, or the reason why there are none. Samples with a NaN are left out.
+        Columns to use of a run and a wheel, or the reason for a missing column. Samples with a NaN are left out.
     road : str
         `wet` or `dry`.
     by_speed : bool

@@ -66,7 +66,7 @@ def _size(path: Path) -> int | None:
 
 
 def near_name(path: Path) -> str:
-    """A file beside a missing one with a similar name, empty if there is none."""
+    """A file beside a missing one with a similar name, or an empty string."""
     try:
         names = [n.name for n in os.scandir(path.parent)]
     except OSError:

@@ -31,7 +31,7 @@ class Measurement:
     """The stored result of one drive.
 
     `samples` has a row per step: `t` [s], the middle of the step from the log's first sample; `v_x` [m/s]; `a_x`
-    [m/s^2] kinematic; `a_over_v` [1/s]; `delta_a_x` [m/s^2] (2.9), mean over the step, without corrections; `reason`
+    [m/s²] kinematic; `a_over_v` [1/s]; `delta_a_x` [m/s²] (2.9), mean over the step, without corrections; `reason`
     (index into `REASONS`); `on_water` where the log has it; per wheel `slip_*` [-] (3.13, `about["slip_against"]` names
     the reference), `slip_min_*`, `slip_max_*` [-] extremes of rim against car with radii learnt, `mu_*` [-], `spin_*`,
     `minor_*` (detector active). Unknown values are null. `about` is JSON: findings and faults.

@@ -279,7 +279,7 @@ def _on_water(course: Course) -> BoolArray:
 
 
 def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """How fast the drive's share of the acceleration changes, over 0.1 s. (n,) [m/s^3]"""
+    """How fast the drive's share of the acceleration changes, over 0.1 s. (n,) [m/s³]"""
     a = torque.sum(axis=0) / (vehicle.mass * vehicle.r_l("fl"))
     k = max(1, round(0.5 * JERK_S / dt))
     padded = np.pad(a, k, mode="edge")

@@ -32,7 +32,7 @@ class HeldOut:
 
     `before`, `after`: residual channel -> array (n,), one step ahead; `mask` (n,) where they count; `free_before`,
     `free_after`: the same of simulations that run free, where there are any. `scores_before`, `scores_after`: log
-    scores (b,) of blocks of the drive [nats: natural logarithm], as `block_scores` gives them.
+    scores (b,) of blocks of the drive [nats (natural logarithm)], as `block_scores` gives them.
     """
 
     name: str
@@ -46,7 +46,7 @@ class HeldOut:
 
 
 class LogScoreGain(NamedTuple):
-    """Gain of the log score over all drives together, with its 95 % interval. [nats: natural logarithm]"""
+    """Gain of the log score over all drives together, with its 95 % interval. [nats (natural logarithm)]"""
 
     value: float
     low: float
@@ -121,7 +121,7 @@ def block_scores(
     -------
     scores : array (b,)
         Sum of -z^2 / 2 - log_scale over the samples of a block; at least one block. A constant, log(2 pi) / 2 a sample,
-        is left out. [nats: natural logarithm]
+        is left out. [nats (natural logarithm)]
     """
     z = np.atleast_2d(np.asarray(whitened, dtype=np.float64))
     scale = np.broadcast_to(np.atleast_1d(np.asarray(log_scale, dtype=np.float64)), (z.shape[0],))
@@ -140,7 +140,7 @@ def log_score_gain(
     Parameters
     ----------
     before, after : sequence of arrays (b,)
-        Log scores of the same blocks of each drive. [nats: natural logarithm]
+        Log scores of the same blocks of each drive. [nats (natural logarithm)]
     seed : int
         Of the bootstrap.
     draws : int

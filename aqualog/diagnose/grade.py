@@ -103,7 +103,7 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
     ----------
     drive : Drive
     residual : array (C, n)
-        Of the drive's channels under the model at hand [m/s^2].
+        Of the drive's channels under the model at hand [m/s²].
 
     Returns
     -------

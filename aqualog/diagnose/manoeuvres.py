@@ -78,7 +78,7 @@ class Sensor:
 
 
 def _saw(low: float, high: float, up: float, down: float) -> Profile:
-    """Speeds up and down between two [km/h] at two accelerations [m/s^2], until the minute is over."""
+    """Speeds up and down between two [km/h] at two accelerations [m/s²], until the minute is over."""
     out, t, v = [(0.0, low), (3.0, low)], 3.0, low
     while t < LENGTH_S:
         v = high if v == low else low

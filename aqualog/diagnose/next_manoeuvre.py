@@ -164,7 +164,7 @@ def _recommended(case: Case, o: _Option) -> Manoeuvre:
 
 
 def _otherwise(case: Case, log: FloatArray) -> Manoeuvre:
-    """A sensor that decides a pair in one of the runs, or the best run of all if there is none."""
+    """A sensor that decides a pair in one of the runs, or else the best run of all."""
     runs = [r for r in fitting(case.effects, wet=bool(case.drive.course.lanes)) if r.water is None]
     kept = case.near
     at = case.rows(kept)

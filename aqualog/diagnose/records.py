@@ -47,7 +47,7 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class ByDrive:
-    """Value estimated from one drive alone. `gain` [nats, natural logarithm]: gain of the log score on this drive with
+    """Value estimated from one drive alone. `gain` [nats (natural logarithm)]: gain of the log score on this drive with
     the value from the other drives, compared with no effect; negative where it predicts worse.
     """
 
@@ -214,7 +214,7 @@ class Gain:
 class ResidualView:
     """A residual channel for the page: arrays (n,) at `dt`; NaN where masked.
 
-    `coordinates`: `t` [s], `v_x` [m/s], `torque` [N m], `position` [m], `a_x` [m/s^2] ... (n,) each; `before` and
+    `coordinates`: `t` [s], `v_x` [m/s], `torque` [N·m], `position` [m], `a_x` [m/s²] ... (n,) each; `before` and
     `after` the residual with the vehicle file alone and with the extended model.
     """
 

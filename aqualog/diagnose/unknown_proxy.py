@@ -16,7 +16,7 @@ BLOCK_S = 5.0  # [s] held out together: longer than the noise remembers, shorter
 BLOCKS = 60  # of a long drive
 FOLDS = 6
 SURE = 2.0  # standard errors of a gain
-LEAST = 2.0  # [nats: natural logarithm] of a gain
+LEAST = 2.0  # [nats (natural logarithm)] of a gain
 
 Blocks = npt.NDArray[np.int64]
 

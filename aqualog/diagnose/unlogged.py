@@ -38,13 +38,13 @@ HOLDS_BRAKES = -300.0  # [N m] of all wheels, where the brakes are pressed hard
 
 
 def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
-    """How fast the car of the file slows down on a flat dry road without torque. (n,) [m/s] to [m/s^2], positive"""
+    """How fast the car of the file slows down on a flat dry road without torque. (n,) [m/s] to [m/s²], positive"""
     drag = 0.5 * vehicle.air_density * vehicle.drag_area * v * v / vehicle.mass
     return drag + G * vehicle.rolling_resistance
 
 
 def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N m], >= 0
+    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N·m], >= 0
 
     None where the car slows down faster than it rolls out: brakes are on all wheels, and the engine's share of that
     deceleration alone would lock an axle. At most for `A_MOST`.
@@ -60,7 +60,7 @@ def road_wheel_angle(
 ) -> FloatArray:
     """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive
 
-    `most` [m/s^2]: lateral acceleration beyond which the angle is cut; larger than in the samples used, because the
+    `most` [m/s²]: lateral acceleration beyond which the angle is cut; larger than in the samples used, because the
     simulated car could spin.
     """
     understeer = understeer_gradient(Tyre().cornering_slope)

@@ -61,6 +61,6 @@ class DriveRun:
         return [e.start_s for e in self.result.events if e.detector == detector and wheel in (None, e.wheel)]
 
     def after_entry(self, bits: BoolArray) -> float:
-        """Time from the entry to the first sample on the lane in which a bit is set; NaN if there is none. [s]"""
+        """Time from the entry to the first sample on the lane in which a bit is set; NaN without one. [s]"""
         at = np.flatnonzero(bits & self.on_lane())
         return float(self.t[at[0]] - self.entry) if at.size else float("nan")

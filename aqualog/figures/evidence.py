@@ -25,7 +25,7 @@ LEAST_SAMPLES = 5  # of 0.1 s that a run must have
 @dataclass(frozen=True, slots=True)
 class Facts:
     """Usable data of a run. `wet` samples on water; of these `resistance`, `slope` usable for it; `v` [m/s] and `a`
-    [m/s^2] means on water, `entry` and `exit` [s] of it. NaN and 0 without water.
+    [m/s²] means on water, `entry` and `exit` [s] of it. NaN and 0 without water.
     """
 
     wet: int = 0

@@ -79,7 +79,7 @@ def make() -> Figure:
     return Figure(
         NUMBER,
         "spin-down of a front and spin-up of a rear wheel, with detection",
-        f"Rear-wheel drive, worn summer tyres, low pressure, 0.8 mm right and less left, 118 km/h with 0.5 m/s^2 from "
+        f"Rear-wheel drive, worn summer tyres, low pressure, 0.8 mm right and less left, 118 km/h with 0.5 m/s² from "
         f"the entry at {r.entry:g} s on. Drawn: seed {r.seed}; judged over seeds {all_runs[0].seed} to "
         f"{all_runs[-1].seed}, which differ in sensor noise and in how the contact fluctuates along the lane.",
         panels(r),

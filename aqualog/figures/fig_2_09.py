@@ -74,7 +74,7 @@ def _c33(all_runs: tuple[SceneRun, ...]) -> tuple[Finding, Table]:
         "C33",
         "At the entry a series of spin-downs of the front right wheel begins at once, the rear one slips only slightly "
         "more; the front variance rises strongly shortly after, the difference follows it.",
-        f"front variance beyond {_LIMITS.var_min:g} (m/s^2)^2 within {_SOON:g} s, difference over it beyond "
+        f"front variance beyond {_LIMITS.var_min:g} (m/s²)² within {_SOON:g} s, difference over it beyond "
         f"{_RATIO:g} (median where it is), rear slip above dry and below {_REAR:.0%}, all in {MANY:.0%} of the runs; "
         f"in part: the difference follows in {MANY:.0%}",
         f"all in {in_runs(every)} runs: rise within {_SOON:g} s {in_runs(float(np.mean(soon)))}, after {spread(rises)} "
@@ -143,10 +143,10 @@ def _c32(rough: tuple[SceneRun, ...]) -> Finding:
         "C32",
         "The absolute variance depends on the ground (gravel, rough snow); minor spin-downs come on one axle, so the "
         "difference is selective.",
-        f"broken asphalt at the same speed: front variance beyond its limit of {_LIMITS.var_min:g} (m/s^2)^2, "
+        f"broken asphalt at the same speed: front variance beyond its limit of {_LIMITS.var_min:g} (m/s²)², "
         f"difference below {_ROUGH_RATIO:g} of it (medians), in every run, and no minor spin-down in any; in part: no "
         "minor spin-down in any",
-        f"in {len(rough)} runs: front variance {spread(level)} (m/s^2)^2, difference over it {spread(ratio)}; without "
+        f"in {len(rough)} runs: front variance {spread(level)} (m/s²)², difference over it {spread(ratio)}; without "
         f"an alarm {round(quiet * len(rough))} of {len(rough)}",
         judged(whole=high and small and quiet == 1.0, part=quiet == 1.0),
         "" if high and small and quiet == 1.0 else

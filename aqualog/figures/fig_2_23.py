@@ -70,9 +70,9 @@ def _c63(all_runs: tuple[SceneRun, ...]) -> tuple[Finding, Table]:
     rest = float(np.mean([all(v for n, v in f.items() if n != "right more") for f in found]))
     finding = Finding(
         "C63",
-        "Slalom of up to 2 m/s^2: forces match except at 23 s (short spin-downs of both, the right rod deviates "
+        "Slalom of up to 2 m/s²: forces match except at 23 s (short spin-downs of both, the right rod deviates "
         "especially), from 26 s on (left, slightly) and shortly after 27 s (both, control lost, both rods strongly).",
-        f"dry slalom: {_EXPLAINED:.0%} of the variance explained at no more than {_A_Y:g} m/s^2; at 23 s spin-downs "
+        f"dry slalom: {_EXPLAINED:.0%} of the variance explained at no more than {_A_Y:g} m/s²; at 23 s spin-downs "
         f"and residuals beyond {_TIMES:g} dry scatters of both, the right one more; from 26 s on the left one, after "
         f"27 s both; the lateral acceleration below {_FALL:.0%} of before: all in {MANY:.0%} of the runs; in part: all "
         f"but the right one more, in {SOME:.0%}",
@@ -134,7 +134,7 @@ def make() -> Figure:
     return Figure(
         NUMBER,
         "tie-rod forces in a slalom, single wheels and both aquaplane",
-        f"All-wheel drive with 2 % of the torque in front, slalom of 2 m/s^2 and 4 s at 112 km/h; water at 23 s, left "
+        f"All-wheel drive with 2 % of the torque in front, slalom of 2 m/s² and 4 s at 112 km/h; water at 23 s, left "
         f"from 26 s on, both from 27.1 to 29 s. The polynomial is from a dry slalom of the same car at another speed. "
         f"Drawn: seed {r.seed}; judged over seeds {all_runs[0].seed} to {all_runs[-1].seed}, which differ in sensor "
         f"noise and in how the contact fluctuates along the lane.",

@@ -76,7 +76,7 @@ def _loss(r: SceneRun, wheel: str) -> FloatArray:
 
 
 def _resistance(r: SceneRun) -> float:
-    """Median resistance measure on the lane. [m/s^2]"""
+    """Median resistance measure on the lane. [m/s²]"""
     return float(np.nanmedian(r.feature("delta_a_x")[r.on_lane()]))
 
 
@@ -184,7 +184,7 @@ def _c76(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Finding:
         f"criterion 5 after {spread(five)} s; order in {in_runs(order)} runs ("
         + ", ".join(f"{n} {in_runs(_share(x))}" for n, x in pairs.items()) + ")",
         judged(whole=whole, part=in_time or order >= MANY),
-        "" if whole else f"The water takes {spread([_resistance(r) for r in all_runs])} m/s^2 (median on the lane), "
+        "" if whole else f"The water takes {spread([_resistance(r) for r in all_runs])} m/s² (median on the lane), "
         f"which the default threshold, a sum of {DEFAULT.resistance:g} m/s beyond the drift, finds sooner than the "
         "thesis' robust tuning, which is not given.",
         _value(_median(five)),

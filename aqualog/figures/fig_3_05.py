@@ -87,7 +87,7 @@ def make() -> Figure:
         f"{'not found' if np.isnan(found) else f'found after {seconds(found)} s'}, slope {slope:.1f} after 8 s on 10",
         judged(whole=vanishes and unseen, part=vanishes),
         f"It is the rear axle's share of the load, {LOAD_REAR}, while the slopes are alike. Load transfer moves it: "
-        "at 1 m/s^2 the same split is no longer quite blind.",
+        "at 1 m/s² the same split is no longer quite blind.",
         blind[1],
     )
 

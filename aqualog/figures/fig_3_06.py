@@ -35,7 +35,7 @@ def _case(wave: str, a_x: float) -> Case:
 
 
 def phase_times(wave: str) -> list[float]:
-    """Detection times at 1 m/s^2 with the change at eight phases of the excitation. [s]"""
+    """Detection times at 1 m/s² with the change at eight phases of the excitation. [s]"""
     return [detection_time(replace(_case(wave, 1.0), phase=k / PHASES)) for k in range(PHASES)]
 
 
@@ -48,7 +48,7 @@ def _c104_phase() -> tuple[Finding, Table]:
         "The same for every phase of the excitation at the change: the thesis does not give the phase that it shows.",
         f"mean over {PHASES} phases: step within {_STEP_RANGE[0]:g} to {_STEP_RANGE[1]:g} s, the others above "
         f"{_OTHERS:g} s, the ramp first among them; in part: the order only",
-        "mean (shortest to longest) at 1 m/s^2: "
+        "mean (shortest to longest) at 1 m/s²: "
         + ", ".join(f"{w} {mean[w]:.2f} ({min(times[w]):.2f} to {max(times[w]):.2f}) s" for w in reversed(WAVES)),
         judged(
             whole=in_order and _STEP_RANGE[0] <= mean["step"] <= _STEP_RANGE[1] and mean["ramp"] > _OTHERS,
@@ -59,7 +59,7 @@ def _c104_phase() -> tuple[Finding, Table]:
         None if np.isnan(mean["step"]) else mean["step"],
     )
     table = Table(
-        "Detection time [s] at 1 m/s^2 over the phase at the change",
+        "Detection time [s] at 1 m/s² over the phase at the change",
         ("phase [period]", *WAVES),
         tuple((f"{k}/{PHASES}", *(seconds(times[w][k]) for w in WAVES)) for k in range(PHASES)),
     )
@@ -67,7 +67,7 @@ def _c104_phase() -> tuple[Finding, Table]:
 
 
 def make() -> Figure:
-    """Estimates at 1 m/s^2 (caption) and at constant speed (text, E20)."""
+    """Estimates at 1 m/s² (caption) and at constant speed (text, E20)."""
     times = {w: detection_time(_case(w, 1.0)) for w in WAVES}
     still = {w: detection_time(_case(w, 0.0)) for w in WAVES}
     false = false_alarms_of(_case(w, a) for w in WAVES for a in (0.0, 1.0))
@@ -80,7 +80,7 @@ def make() -> Figure:
         "C104",
         "The step finds the drop after about 1 s, the others above 2 s, the ramp slightly faster than triangle and "
         "sine.",
-        f"at 1 m/s^2: step within {_STEP_RANGE[0]:g} to {_STEP_RANGE[1]:g} s, the others above {_OTHERS:g} s each, "
+        f"at 1 m/s²: step within {_STEP_RANGE[0]:g} to {_STEP_RANGE[1]:g} s, the others above {_OTHERS:g} s each, "
         "the ramp first among them; in part: the order only",
         "at 1 m/s^2 " + ", ".join(f"{w} {seconds(times[w])} s" for w in ("step", "ramp", "sine", "triangle"))
         + "; at constant speed " + ", ".join(f"{w} {seconds(still[w])}" for w in ("step", "ramp", "sine", "triangle"))
@@ -88,9 +88,9 @@ def make() -> Figure:
         judged(
             whole=in_order and _STEP_RANGE[0] <= step <= _STEP_RANGE[1] and ramp > _OTHERS, part=in_order
         ),
-        "The text says constant speed as well, the caption 1 m/s^2 only. At constant speed the same 250 N make a "
+        "The text says constant speed as well, the caption 1 m/s² only. At constant speed the same 250 N make a "
         f"prediction error of {1e3 * swing:.1f}e-3 at its peak; the drift takes {1e3 * TUNING.zeta:.1f}e-3 of it, and "
-        f"what is left gets smaller as the filter follows by itself (sine: {late:.1f} at {_END:g} s). Under 1 m/s^2 "
+        f"what is left gets smaller as the filter follows by itself (sine: {late:.1f} at {_END:g} s). Under 1 m/s² "
         f"the tangent of the tyre's curve is flatter ({slope:.1f} at a traction of {mu:.2f}; the estimate settles at "
         f"{estimated:.1f}) and load transfer sets both axles apart.",
         None if np.isnan(step) else step,

@@ -50,7 +50,7 @@ def _jump(wave: str) -> float:
 
 
 def _left_over(wave: str) -> tuple[float, float]:
-    """What the excitation leaves in the acceleration, against the run without: before and after the change. [m/s^2]"""
+    """What the excitation leaves in the acceleration, against the run without: before and after the change. [m/s²]"""
     d, plain = drive(_case(wave)), drive(_case(""))
     difference = np.abs(d.a_x - plain.a_x)
     before = (d.t >= _SETTLED) & (d.t < 0.0)
@@ -107,7 +107,7 @@ def make() -> Figure:
     c97 = Finding(
         "C97",
         "What one axle gains the other loses: the acceleration stays what the driver asked for.",
-        f"all four waveforms leave less than {_LIMIT_A:g} m/s^2 against the run without excitation, on the dry road; "
+        f"all four waveforms leave less than {_LIMIT_A:g} m/s² against the run without excitation, on the dry road; "
         "in part: all but the step",
         "dry: " + ", ".join(f"{w} {1e3 * left[w][0]:.1f}" for w in WAVES) + "e-3 m/s^2; after the change: "
         + ", ".join(f"{1e3 * left[w][1]:.1f}" for w in WAVES) + "e-3",
@@ -121,7 +121,7 @@ def make() -> Figure:
         "C99",
         "Amplitude and rate stay so small that passengers feel nothing and the friction is not used critically (mu "
         "<= 0.2).",
-        f"largest traction coefficient of both axles at most {_LIMIT_MU} under every waveform at 1 m/s^2, "
+        f"largest traction coefficient of both axles at most {_LIMIT_MU} under every waveform at 1 m/s², "
         "and a passenger to ask; in part: the first only",
         ", ".join(f"{w} {most[w]:.3f}" for w in WAVES) + f"; on the low surface {max(most.values()) / 0.4:.0%} of its "
         "friction",

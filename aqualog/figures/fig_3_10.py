@@ -156,7 +156,7 @@ def _c111(times: dict[str, dict[tuple[float, float], float]], causes: dict[float
         "C111",
         "With an amplitude fixed as a traction coefficient the response does not depend on the acceleration; axle "
         "forces may become negative.",
-        "longest over shortest detection time at 0, 0.5 and 1 m/s^2 below 1.3 for 0.07 and for 0.03; in part: below "
+        "longest over shortest detection time at 0, 0.5 and 1 m/s² below 1.3 for 0.07 and for 0.03; in part: below "
         "2 for both",
         "; ".join(
             f"{w} of {A:g}: {listed([times[w][A, a] for a in MU_A])} s, ratio {_number(r)}"
@@ -179,7 +179,7 @@ def _c112(times: dict[str, list[float]]) -> Finding:
     return Finding(
         "C112",
         "Even a traction coefficient of 0.03 allows detection in less than 2 s.",
-        "below 2 s at 0, 0.5 and 1 m/s^2; in part: at 1 m/s^2 only",
+        "below 2 s at 0, 0.5 and 1 m/s²; in part: at 1 m/s² only",
         "; ".join(f"{w}: {listed(ts)} s" for w, ts in times.items()) + f"{_whose(verdicts)}",
         verdict,
         "" if verdict == BORNE_OUT else
@@ -212,13 +212,13 @@ def _c113(times: dict[str, list[float]]) -> Finding:
         "C113",
         "With 0.07 the detection time is already just 1 s, and the slope is almost right within 2 s.",
         f"found within {_RANGE[0]:g} to {_RANGE[1]:g} s and slope within 15 % of {LOW_SLOPE:.0f} after 2 s at 0, 0.5 "
-        "and 1 m/s^2; in part: at some",
+        "and 1 m/s²; in part: at some",
         "; ".join(
             f"{w}: {listed(times[w])} s, slope {' / '.join(f'{s:.1f}' for s in slopes[w])} after 2 s" for w in WAVES
         ) + f"{_whose(verdicts)}",
         verdict,
         "" if verdict == BORNE_OUT else
-        f"Under 1 m/s^2 the slope that can be seen is the tangent of the curve, {tangent:.1f} at a traction of "
+        f"Under 1 m/s² the slope that can be seen is the tangent of the curve, {tangent:.1f} at a traction of "
         f"{mu:.2f} (the estimate settles at {estimated:.1f}): below {LOW_SLOPE:.0f} by more than 15 %, as the tyre is "
         "there. At constant speed the slope is right and the drop found a little later.",
         _known(times["sine"][-1]),

@@ -54,11 +54,11 @@ class Effect:
         return self.high < 0.0
 
     def is_none(self, most: float) -> bool:
-        """No effect that matters: the interval holds 0, or does not leave +-most."""
+        """No effect that matters: the interval holds 0, or does not leave ±most."""
         return self.low <= 0.0 <= self.high or self.is_within(most)
 
     def is_within(self, most: float) -> bool:
-        """Whether the whole interval is within +-most."""
+        """Whether the whole interval is within ±most."""
         return -most <= self.low and self.high <= most
 
     def mapped(self, of: Callable[[float], float]) -> Effect:
@@ -86,7 +86,7 @@ class Means:
 
 
 def pool_of(evidence: Evidence, runs: Sequence[RunInfo], columns: Columns) -> Pool | None:
-    """Samples of runs as `y` over `v_x` [m/s]; None if there are none."""
+    """Samples of runs as `y` over `v_x` [m/s]; None without samples."""
     pieces = []
     for info in sorted(runs, key=lambda r: r.index):
         samples = evidence.data.samples(info)

@@ -39,7 +39,7 @@ GATE_OFF = TUNING._replace(mu_min=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run: excitation (waveform "" for none), acceleration [m/s^2], tuning, and what may be switched off."""
+    """One run: excitation (waveform "" for none), acceleration [m/s²], tuning, and what may be switched off."""
 
     waveform: str = "sine"
     amplitude: float = 250.0

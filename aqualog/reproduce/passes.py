@@ -42,8 +42,8 @@ _GAP_S = 0.1  # [s] dips closer than this are one
 class Pass:
     """One pass: speed in the middle of the lane [km/h], tyre, pressure [Pa], depth in the right track [m], loads [kg].
 
-    `a` [m/s^2]: speed rises through the pass; `wiggles`: drive torque that varies by 250 N m with 1 s, for a slope to
-    be regressed; `kick` [N m]: extra drive torque for 0.7 s on the lane; `even`: both tracks alike; `scatter` scales
+    `a` [m/s²]: speed rises through the pass; `wiggles`: drive torque that varies by 250 N·m with 1 s, for a slope to
+    be regressed; `kick` [N·m]: extra drive torque for 0.7 s on the lane; `even`: both tracks alike; `scatter` scales
     the fluctuation of the contact. A depth of 0 is a dry road.
     """
 
@@ -110,7 +110,7 @@ def events(t: FloatArray, x: FloatArray, level: float, gap: float = _GAP_S) -> l
 
 
 def resistance(t: FloatArray, c: Mapping[str, FloatArray], scenario: Scenario) -> FloatArray:
-    """Resistance measure (2.9) with the vehicle's own dry parameters and load, array (n,). [m/s^2]"""
+    """Resistance measure (2.9) with the vehicle's own dry parameters and load, array (n,). [m/s²]"""
     car = scenario.vehicle
     mass = car.mass + scenario.load_front + scenario.load_rear
     l_f = (car.mass * car.l_f + scenario.load_rear * car.wheelbase) / mass

@@ -22,7 +22,7 @@ def test_all_118_claims_in_their_order():
     found = claims()
     assert [number_of(c) for c in found] == list(range(1, 119))
     assert found["C44"].where == "2.2"
-    assert "0.2 m/s^2" in found["C44"].statement
+    assert "0.2 m/s²" in found["C44"].statement
     assert found["C117"].kind == "M"
 
 

@@ -32,7 +32,7 @@ _PRIMES = (2, 3, 5, 7)
 
 
 class Driven(NamedTuple):
-    """How samples (n,) were driven: `v` [m/s], `a` specific force forward [m/s^2], and `mu` (4, n), the traction of
+    """How samples (n,) were driven: `v` [m/s], `a` specific force forward [m/s²], and `mu` (4, n), the traction of
     each wheel that its torque gives [-] (`physics.traction`): of a wheel without torque minus the rolling resistance.
     """
 

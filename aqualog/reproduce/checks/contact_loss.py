@@ -54,7 +54,7 @@ def _c3(table: Table) -> Checks:
     return (
         Check(
             "C3",
-            "speeds reached by half of the passes: resistance 0.2 m/s^2 and slope -20 % < first dip < stop within 0.5 "
+            "speeds reached by half of the passes: resistance 0.2 m/s² and slope -20 % < first dip < stop within 0.5 "
             "s; with a difference: all three below the last",
             "; ".join(f"{k} {said(f, n)}" for k, f in at.items()) + f" km/h; first dip after both by {told(lead, ci)} "
             "km/h",

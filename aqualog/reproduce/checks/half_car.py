@@ -52,7 +52,7 @@ def _half_car(_: Plan) -> Checks:
         Check(
             "C98",
             "balance of forces and loads within 1e-6 N, of energy within 1e-4; estimated slopes within 15 % of 30 "
-            "before and 10 after the change under every excitation at 0, 0.5 and 1 m/s^2; in part: the balances",
+            "before and 10 after the change under every excitation at 0, 0.5 and 1 m/s²; in part: the balances",
             f"forces {worst_force:.1e} N, loads {worst_load:.1e} N, energy {worst_energy:.1e}; slopes "
             f"{high.min():.1f} to {high.max():.1f} and {low.min():.1f} to {low.max():.1f} ({len(slopes)} runs)",
             judged(whole=balanced and bias < 0.15, part=balanced),

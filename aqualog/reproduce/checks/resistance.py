@@ -62,12 +62,12 @@ def at_speeds(p: Pass, speeds: Sequence[float] = SLOW) -> list[Pass]:
 
 
 def level_at(table: Table, p: Pass) -> float:
-    """Mean resistance of a pass over the seeds. [m/s^2]"""
+    """Mean resistance of a pass over the seeds. [m/s²]"""
     return mean(table[p].of("delta_a"))
 
 
 def gradient_of(table: Table, p: Pass) -> Statistic:
-    """Gradient of the mean resistance over `SLOW`. [m/s^2 per km/h]"""
+    """Gradient of the mean resistance over `SLOW`. [m/s² per km/h]"""
     values = cells_of(table, at_speeds(p), "delta_a")
     return lambda rows: float(np.polyfit(SLOW, values[:, rows].mean(axis=1), 1)[0])
 
@@ -124,9 +124,9 @@ def _c37(table: Table) -> Checks:
     return (
         Check(
             "C37",
-            "94 km/h, 1.3 mm, very worn: resistance on the lane at least 0.1 m/s^2 above that before it, and half of "
+            "94 km/h, 1.3 mm, very worn: resistance on the lane at least 0.1 m/s² above that before it, and half of "
             f"it reached within {RISE_S:g} s, every pass; with a difference: higher in every pass",
-            f"{dry.mean():+.3f} before, {wet.mean():.3f} m/s^2 on the lane: {told(step, ci, 3)} more; half of it after "
+            f"{dry.mean():+.3f} before, {wet.mean():.3f} m/s² on the lane: {told(step, ci, 3)} more; half of it after "
             f"{np.median(rise):.2f} s (at most {rise.max():.2f} s)",
             judged(whole=whole, part=bool((wet > dry).all())), value=step, ci95=ci, unit="m/s^2", reason=SHAPE,
             source=SOURCE + ", very worn summer tyres, low pressure",
@@ -150,7 +150,7 @@ def _c38(table: Table) -> Checks:
             "94 km/h, very worn: levels of 0.6 to 1.3 mm within the scatter of the passes, 2 mm beyond it above them; "
             "with a difference: the latter",
             ", ".join(f"{1e3 * h:.1f} mm: {x:.3f}" for h, x in level.items())
-            + f" m/s^2, scatter {noise:.3f}; 2 mm above the others by {told(value, ci, 3)}; gradients "
+            + f" m/s², scatter {noise:.3f}; 2 mm above the others by {told(value, ci, 3)}; gradients "
             + ", ".join(f"{1e3 * h:.1f} mm: {x}" for h, x in g.items()) + " 1e-3 m/s^2 per km/h",
             judged(whole=deep and flat, part=deep), value=value, ci95=ci, unit="m/s^2",
             reason=SHAPE if deep and flat else
@@ -198,14 +198,14 @@ def _c44(table: Table) -> Checks:
     sides = f"{above[partial].mean():.2f} of the partial ones reach it, {above[~partial].mean():.2f} of the others"
     return (
         Check(
-            "C44", f"0.2 m/s^2 reached by half of the passes below {V_FULL:g} km/h", f"at {told(v, ci)} km/h",
+            "C44", f"0.2 m/s² reached by half of the passes below {V_FULL:g} km/h", f"at {told(v, ci)} km/h",
             judged(whole=v < V_FULL), part="speed", value=v if np.isfinite(v) else None,
             ci95=ci if np.isfinite(ci).all() else None, unit="km/h", reason=SHAPE,
             source=SOURCE + ", worn summer tyres, low pressure, 1.3 mm",
         ),
         Check(
             "C44",
-            "0.2 m/s^2 separates passes with partial aquaplaning (contact of a wheel below 0.7 for 1 s) from those "
+            "0.2 m/s² separates passes with partial aquaplaning (contact of a wheel below 0.7 for 1 s) from those "
             "without, balanced accuracy 0.8 over 78 to 114 km/h; with a difference: 0.65",
             f"balanced accuracy {told(accuracy, span, 2)}: {sides}" if there else "all passes are alike",
             judged(whole=there and accuracy >= 0.8, part=there and accuracy >= 0.65), part="partial aquaplaning",

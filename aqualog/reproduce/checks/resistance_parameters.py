@@ -109,7 +109,7 @@ def _most_important(plan: Plan) -> Checks:
             "C36",
             "of what changes in operation (300 kg; rolling resistance 30 %, drag area 10 %, radius 0.3 %, air 5 %) "
             "mass and rolling resistance move the measure most; in part: the larger one of them is first",
-            f"in 0.01 m/s^2 at 80 km/h, at 120 km/h and at 80 km/h under 1 m/s^2: {words}",
+            f"in 0.01 m/s² at 80 km/h, at 120 km/h and at 80 km/h under 1 m/s²: {words}",
             judged(whole=first, part=order[0] in ("mass", "rolling_resistance")),
             part="sensitivity",
             value=min(size["mass"], size["rolling_resistance"]),
@@ -121,7 +121,7 @@ def _most_important(plan: Plan) -> Checks:
             "C36",
             "dry drives with unknown load and tyres: learning on dry road at least halves the mean error of the "
             "measure",
-            f"mean error {off['as in the file']:.3f} m/s^2 with the file's parameters, {off['learnt']:.3f} with the "
+            f"mean error {off['as in the file']:.3f} m/s² with the file's parameters, {off['learnt']:.3f} with the "
             f"dry offset learnt; alarms of the resistance {alarms['as in the file'].false} and "
             f"{alarms['learnt'].false} in {alarms['learnt'].dry_s / 3600.0:.1f} h",
             judged(whole=helps, part=off["learnt"] < off["as in the file"]),

@@ -33,7 +33,7 @@ _NOISY = ("gear_shifts", "rough_asphalt", "kerbs_and_holes", "hilly", "motorway"
 
 
 def _measure(scenario: Scenario, model: Model = Model(), believed: Vehicle | None = None) -> FloatArray:  # noqa: B008
-    """Resistance measure of a drive, settled. [m/s^2]"""
+    """Resistance measure of a drive, settled. [m/s²]"""
     car = believed or scenario.vehicle
     signals = as_signals(simulate(scenario, model), vehicle=car, truth=False)
     result = detect_drive(signals, car, settings=Settings(learns_offset=False))
@@ -58,10 +58,10 @@ def _sign(plan: Plan) -> Checks:
     return (
         Check(
             "C34",
-            "known torques of -5 to 80 N m against every wheel: measure over what they should make, slope 1 within 2 "
-            "%, every one within 0.01 m/s^2; in part: the sign",
-            f"slope {gain:.4f}, offset {offset:+.4f} m/s^2, largest deviation {left:.4f} m/s^2 over {len(found)} "
-            f"pairs of drives ({min(wanted):+.2f} to {max(wanted):.2f} m/s^2)",
+            "known torques of -5 to 80 N·m against every wheel: measure over what they should make, slope 1 within 2 "
+            "%, every one within 0.01 m/s²; in part: the sign",
+            f"slope {gain:.4f}, offset {offset:+.4f} m/s², largest deviation {left:.4f} m/s² over {len(found)} "
+            f"pairs of drives ({min(wanted):+.2f} to {max(wanted):.2f} m/s²)",
             judged(whole=whole, part=gain > 0.0),
             value=float(gain),
             ci95=bootstrap(np.column_stack([wanted, found]), lambda x: float(np.polyfit(x[:, 0], x[:, 1], 1)[0])),
@@ -102,8 +102,8 @@ def _balance(plan: Plan) -> Checks:
         Check(
             "C35",
             "formula within 1e-12 of a sum by hand; on dry, hilly drives without wind and with ideal sensors the "
-            "measure stays below 0.03 m/s^2 (rms) in every one; as printed, for the claim as a whole",
-            f"{worst:.1e} over {n} random states; rms {np.mean(rms):.4f} m/s^2 (largest {max(rms):.4f}) over "
+            "measure stays below 0.03 m/s² (rms) in every one; as printed, for the claim as a whole",
+            f"{worst:.1e} over {n} random states; rms {np.mean(rms):.4f} m/s² (largest {max(rms):.4f}) over "
             f"{len(rms)} drives with grades of up to 8 %; without the wheels' inertia, as printed, "
             f"{100 * np.mean(spin):.1f} % of the acceleration would show",
             judged(whole=False, part=right),
@@ -120,7 +120,7 @@ def _balance(plan: Plan) -> Checks:
 
 
 def _trusted(d: Taken) -> FloatArray:
-    """The measure that the detector sums up: without its dry offset, nothing under braking. (n,) [m/s^2]"""
+    """The measure that the detector sums up: without its dry offset, nothing under braking. (n,) [m/s²]"""
     result = detected(d)
     track = next(t for t in result.tracks if t.detector == "resistance")
     f = result.features
@@ -165,8 +165,8 @@ def _not_directly(plan: Plan) -> Checks:
             "C46",
             "episodes of partial aquaplaning; each at its largest threshold with the recall that the sum has at 0.2 "
             "m/s: the sum has at most half of the false alarms of a direct threshold; in part: fewer",
-            f"sum, beyond {limit_sum:.2f} m/s: {g.in_words()}; direct, beyond {limit:.2f} m/s^2: {plain.in_words()}; "
-            f"direct at 0.2 m/s^2: {at_thesis.false} false alarms",
+            f"sum, beyond {limit_sum:.2f} m/s: {g.in_words()}; direct, beyond {limit:.2f} m/s²: {plain.in_words()}; "
+            f"direct at 0.2 m/s²: {at_thesis.false} false alarms",
             judged(whole=whole, part=g.false < plain.false),
             value=g.false / max(plain.false, 1),
             ci95=ratio_of_counts(g.false, plain.false),

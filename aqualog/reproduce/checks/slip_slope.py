@@ -37,7 +37,7 @@ DRY_VERY_WORN = Pass(80, tyre="very_worn_summer", h=0.0, wiggles=True)
 FALLING = ("very worn", "very worn 0.6 mm", "very worn 2.0 mm", "worn", "worn medium", "worn high")
 DEPTHS = (0.8e-3, 1.1e-3, 1.3e-3, 2.0e-3)  # [m]
 RAMPS = tuple(Pass(v, a=1.0, wiggles=True) for v in (78, 94))
-SOURCE = "truth of simulated passes, rear-wheel drive, drive torque varied by 250 N m"
+SOURCE = "truth of simulated passes, rear-wheel drive, drive torque varied by 250 N·m"
 STOPPING, TENTH = 0.2, 0.1
 BIN_ERROR, BIN_SAMPLES = 0.15, 200
 BELOW_FULL, BELOW_TOLERANCE = 20.0, 5.0  # [km/h]
@@ -65,7 +65,7 @@ def _c48(table: Table) -> Checks:
         Check(
             "C48",
             "100 km/h, 0.8 mm, very worn: slope of the rear right wheel below 0.8 of the dry one with its whole "
-            f"interval, and full aquaplaning {BELOW_FULL:g} km/h +- {BELOW_TOLERANCE:g} higher; with a difference: the "
+            f"interval, and full aquaplaning {BELOW_FULL:g} km/h ± {BELOW_TOLERANCE:g} higher; with a difference: the "
             "slope below that of dry road",
             f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
             "higher",
@@ -109,7 +109,7 @@ def _c49(table: Table) -> Checks:
     return (
         Check(
             "C49",
-            "points of slip and traction of all passes at 70 to 102 km/h and of accelerated ones (1 m/s^2), 1.3 mm, in "
+            "points of slip and traction of all passes at 70 to 102 km/h and of accelerated ones (1 m/s²), 1.3 mm, in "
             f"bins of 10 km/h: slope regressed in each against the true one of its samples, rms relative error below "
             f"{BIN_ERROR:.0%} and below half of that of one regression over all speeds; with a difference: below that",
             f"rms error {told(100 * value, (100 * ci[0], 100 * ci[1]))} % in bins, "

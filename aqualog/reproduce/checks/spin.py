@@ -62,7 +62,7 @@ def _c20(table: Table) -> Checks:
     return (
         Check(
             "C20",
-            "speed at which half of the passes spin up (+10 %) on a kick of 500, 1000, 1500, 2000 N m falls each time; "
+            "speed at which half of the passes spin up (+10 %) on a kick of 500, 1000, 1500, 2000 N·m falls each time; "
             "with a difference: from the first to the last",
             ", ".join(f"{T:.0f} N m: "
             f"{said(f, n)}" for T, f in at.items()) + f" km/h; {told(fall, ci)} km/h sooner in all",
@@ -89,7 +89,7 @@ def _c21(table: Table) -> Checks:
     return (
         Check(
             "C21",
-            "accelerated passes (2 to 4 m/s^2, 90 to 138 km/h, high pressure): speeds at which a rear wheel passes +5 "
+            "accelerated passes (2 to 4 m/s², 90 to 138 km/h, high pressure): speeds at which a rear wheel passes +5 "
             f"% spread over {SPREAD_KMH:g} km/h (10 to 90 % of them), and in {IRREGULAR} cases of speed and "
             "acceleration some passes spin up (+10 %) and others not; with a difference: one of both",
             f"{int(spun.sum())} of {spun.size} passes spin up; speeds spread over {told(value, ci)} km/h; {mixed} of "
@@ -160,7 +160,7 @@ def _c23(table: Table) -> Checks:
             "mean traction in spin-ups left minus right in bins of speed: its interval leaves out 0 where the left "
             "track has 0.6 of the water, less evenly, and it is beyond three times that of a lane alike on both "
             "sides; with a difference: the former",
-            f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s^2, 102 to 126 km/h)",
+            f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s², 102 to 126 km/h)",
             judged(whole=whole, part=apart),
             value=a if np.isfinite(a) else None, ci95=ci if np.isfinite(a) else None,
             reason=SHAPE + " That the left track has less water is put in."

@@ -184,7 +184,7 @@ def _c18(table: Table) -> Checks:
     return (
         Check(
             "C18",
-            "front slip (3.13, 5 % quantile on the lane), 70 to 110 km/h, constant and 0.5 m/s^2, passes in which no "
+            "front slip (3.13, 5 % quantile on the lane), 70 to 110 km/h, constant and 0.5 m/s², passes in which no "
             f"front wheel stops: Akaike's criterion of -c exp(v / v0) better than a line's by {AIC_SURE:g}, its "
             "interval above 0; with a difference: better",
             f"better by {told(gain, ci)} over {int(rolling.sum())} of {v.size} passes, v0 = {said(part(2), n)} km/h",

@@ -46,14 +46,14 @@ def _acceleration_difference(plan: Plan) -> Checks:
     return (
         Check(
             "C24",
-            "wheels that run away from the car at up to 15 m/s^2 while it accelerates at up to 2: difference within "
-            "0.3 m/s^2 of the true one 0.3 s later; in part: within 1",
-            f"largest deviation {worst:.3f} m/s^2 over {4 * cases} wheels",
+            "wheels that run away from the car at up to 15 m/s² while it accelerates at up to 2: difference within "
+            "0.3 m/s² of the true one 0.3 s later; in part: within 1",
+            f"largest deviation {worst:.3f} m/s² over {4 * cases} wheels",
             judged(whole=worst < 0.3, part=worst < 1.0),
             value=worst,
             unit="m/s^2",
             reason="a_x is taken to be the kinematic acceleration: an accelerometer would show a grade of 5 % as 0.49 "
-            "m/s^2 on every wheel."
+            "m/s² on every wheel."
             if worst < 0.3
             else "The estimate of the car's acceleration leans on wheels that leave it.",
             source="straight lines of speed",
@@ -141,7 +141,7 @@ def _summed_up(plan: Plan) -> Checks:
             "both with the sign of the speed difference, episodes of full aquaplaning; each at its largest threshold "
             f"with the recall that the sum has at {threshold:g} m/s: the sum has at most half of the false alarms of "
             "the direct threshold; in part: fewer",
-            f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}; direct, beyond {limit:.1f} m/s^2: "
+            f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}; direct, beyond {limit:.1f} m/s²: "
             f"{direct.in_words()}",
             judged(whole=whole, part=by_sum.false < direct.false),
             value=by_sum.false / max(direct.false, 1),
