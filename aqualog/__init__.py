@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
     from aqualog.face.detect import Detection, detect
+    from aqualog.face.doctor import doctor
     from aqualog.face.drive import Drive, read
+    from aqualog.face.evaluate import evaluate
+    from aqualog.face.inspect import inspect
     from aqualog.face.slip_slope import SlipSlope, slip_slope
     from aqualog.model.term import Model
     from aqualog.types import Signals
@@ -39,6 +42,9 @@ _FACE = {
     "convert": "aqualog.face.convert",
     "Campaign": "aqualog.face.campaign",
     "calibrate": "aqualog.face.calibrate",
+    "doctor": "aqualog.face.doctor",
+    "evaluate": "aqualog.face.evaluate",
+    "inspect": "aqualog.face.inspect",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
@@ -64,6 +70,9 @@ __all__ = [
     "calibrate",
     "convert",
     "detect",
+    "doctor",
+    "evaluate",
+    "inspect",
     "physics",
     "read",
     "slip_slope",

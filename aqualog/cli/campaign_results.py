@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from aqualog.cli.apart import is_command
 from aqualog.cli.console import Console, clean_line, told_if_interrupted
-from aqualog.cli.evaluate_inputs import is_campaign
 from aqualog.errors import ConfigError, ExitCode
+from aqualog.face.campaign import is_campaign
 from aqualog.face.paths import expand, list_files, refuse_existing
 from aqualog.face.progress import Progress
 from aqualog.places import has_kept_code

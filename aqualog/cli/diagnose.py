@@ -114,8 +114,8 @@ def diagnose(
 
     with guarded(debug=debug):
         from aqualog.cli.diagnose_results import Targets, target
-        from aqualog.cli.evaluate_inputs import is_campaign
         from aqualog.errors import ConfigError
+        from aqualog.face.campaign import is_campaign
 
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
         if surrogates is not None and not bootstrap:

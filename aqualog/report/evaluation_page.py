@@ -32,7 +32,7 @@ from aqualog.report.offline import TEMPLATES, content_policy, environment, json_
 from aqualog.report.wording import number
 from aqualog.rivals.catalogue import RIVALS
 
-__all__ = ["render_evaluation_page", "write_evaluation_page"]
+__all__ = ["evaluation_figures", "render_evaluation_page", "write_evaluation_page"]
 
 
 def write_evaluation_page(evaluation: Evaluation, path: Path, *, title: str, by: Sequence[str] = ()) -> None:
@@ -53,7 +53,7 @@ def render_evaluation_page(evaluation: Evaluation, *, title: str, by: Sequence[s
     """
     records = evaluation.records
     scores = score_all(records)
-    plots = _plots(evaluation)
+    plots = evaluation_figures(evaluation)
     cells = confusion(records)
     names = list(dict.fromkeys(n for row in cells.values() for n in row))
     tuning = evaluation.tuning
@@ -90,7 +90,8 @@ def _situations(records: Sequence[RunRecord]) -> set[str]:
     return {r.groups.get("manoeuvre", "") for r in records}
 
 
-def _plots(evaluation: Evaluation) -> dict[str, Any]:
+def evaluation_figures(evaluation: Evaluation) -> dict[str, Any]:
+    """Return the figures of the page by name: `data` and `layout` of plotly."""
     plots = {
         "recall-matrix": recall_matrix(evaluation.records),
         "alarm-matrix": alarm_matrix(evaluation.records),

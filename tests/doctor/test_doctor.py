@@ -10,12 +10,12 @@ from conftest import ROOT
 from aqualog.align.freezes import longest_stop
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap, SourceClock
-from aqualog.cli.doctor import exit_code
 from aqualog.cli.main import app
 from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
 from aqualog.doctor.records import Examination, FileState, Finding
+from aqualog.face.doctor import exit_code
 from aqualog.io.write_mdf import MdfGroup, write_mf4
 
 SAMPLES = ROOT / "sample_logs"

@@ -19,7 +19,7 @@ from aqualog.evaluate.labels import Label
 from aqualog.face.paths import expand, list_files
 from aqualog.vehicle import Vehicle
 
-__all__ = ["Inputs", "campaign_inputs", "is_campaign", "log_inputs"]
+__all__ = ["Inputs", "campaign_inputs", "log_inputs"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,20 +30,6 @@ class Inputs:
     sources: tuple[LogSource, ...]
     keys: tuple[str, ...]
     files: tuple[Path, ...]
-
-
-def is_campaign(inputs: Sequence[str]) -> bool:
-    """Whether a campaign file is named, and nothing else.
-
-    Raises
-    ------
-    ConfigError
-        If one stands among other inputs.
-    """
-    named = [i for i in inputs if i.lower().endswith(".toml")]
-    if named and len(inputs) > 1:
-        raise ConfigError("stands among other inputs", where=named[0], expected="one campaign file, or logs only")
-    return bool(named)
 
 
 def campaign_inputs(
