@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
+    from aqualog.face import thesis
     from aqualog.face.calibrate import Calibration, calibrate
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
@@ -53,8 +54,11 @@ _FACE = {
     "Calibration": "aqualog.face.calibrate",
     "SlipSlope": "aqualog.face.slip_slope",
     "physics": "aqualog.physics",
+    "thesis": "aqualog.face.thesis",
     "AqualogError": "aqualog.errors",
 }
+
+_MODULES = ("physics", "thesis")
 
 __all__ = [
     "AqualogError",
@@ -76,6 +80,7 @@ __all__ = [
     "physics",
     "read",
     "slip_slope",
+    "thesis",
 ]
 
 
@@ -98,7 +103,7 @@ def __getattr__(name: str) -> Any:
     if name not in _FACE:
         raise AttributeError(f"module 'aqualog' has no attribute {name!r}")
     module = import_module(_FACE[name])
-    found = module if module.__name__ == f"aqualog.{name}" else getattr(module, name)
+    found = module if name in _MODULES else getattr(module, name)
     globals()[name] = found
     return found
 
