@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
     from aqualog.face import thesis
+    from aqualog.face.cache import cache
     from aqualog.face.calibrate import Calibration, calibrate
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
@@ -53,6 +54,7 @@ _FACE = {
     "Detection": "aqualog.face.detect",
     "Calibration": "aqualog.face.calibrate",
     "SlipSlope": "aqualog.face.slip_slope",
+    "cache": "aqualog.face.cache",
     "physics": "aqualog.physics",
     "thesis": "aqualog.face.thesis",
     "AqualogError": "aqualog.errors",
@@ -71,6 +73,7 @@ __all__ = [
     "SlipSlope",
     "Vehicle",
     "__version__",
+    "cache",
     "calibrate",
     "convert",
     "detect",

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from aqualog.face.bins import BinnedResistance, BinnedSlopes
     from aqualog.face.matrix import Matrix
     from aqualog.face.plan import BatchPlan
+    from aqualog.face.propose import Proposal
     from aqualog.workers import Limits, WorkOn
 
 __all__ = ["Campaign", "CampaignRuns", "is_campaign", "names_of"]
@@ -111,6 +112,40 @@ class Campaign:
         self.inputs = tuple(names)
         self.configured: Configured = found
         self._store = None if store is None else str(store)
+
+    @staticmethod
+    def propose(
+        folder: PathLike,
+        out: PathLike = "campaign.toml",
+        *,
+        vehicle: PathLike | None = None,
+        dbc: PathLike | Sequence[PathLike] = (),
+        force: bool = False,
+        progress: Progress = None,
+    ) -> Proposal:
+        """Look at every log in a folder and below it, and propose a campaign file; `Proposal.write` writes it.
+
+        Parameters
+        ----------
+        folder : str or Path
+            With logs in it or below it.
+        out : str or Path
+            The campaign file; runs.csv, map.toml and vehicle.toml go beside it.
+        vehicle : str or Path, optional
+            Vehicle file of all runs; without it one to fill is proposed.
+        dbc : paths, optional
+            CAN databases for raw frames.
+        force : bool
+            Overwrite files that exist.
+
+        Raises
+        ------
+        ConfigError
+            If no log can be read, or a file is in the way.
+        """
+        from aqualog.face.propose import propose
+
+        return propose(folder, out, vehicle=vehicle, dbc=dbc, force=force, progress=progress)
 
     @property
     def name(self) -> str:

@@ -1,0 +1,326 @@
+"""`aq.Campaign.propose`: from a folder of logs to a campaign file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.errors import ConfigError
+from aqualog.face.campaign import Campaign
+from aqualog.face.listener import Progress, listener
+from aqualog.face.paths import refuse_existing, write_text
+from aqualog.face.result import PathLike, Result, Writers, text_file
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.campaign.propose_drives import Drive, Found, LogFile
+    from aqualog.campaign.propose_names import NameTable
+    from aqualog.campaign.propose_signals import MapProposal
+
+__all__ = ["Proposal", "propose"]
+
+MOST_ROWS = 20  # drives that are printed; the table of runs has all
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Proposal(Result):
+    """A campaign file and what belongs beside it, as guessed from names, units and data: read it before you use it.
+
+    `texts` maps each file to its text; the campaign file comes last.
+    """
+
+    out: Path
+    texts: Mapping[Path, str]
+    found: Found
+    drives: tuple[Drive, ...]
+    names: NameTable
+    signals: MapProposal
+    remarks: tuple[str, ...]
+    label_notes: tuple[str, ...]
+    dbc: tuple[Path, ...] = ()
+    sources: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def has_loss(self) -> bool:  # type: ignore[override]
+        """Whether a log cannot be read."""
+        return bool(self.found.bad)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog campaign init`."""
+        return _document(self.out, self.texts, self.found, self.drives, self.names, self.signals, self.remarks)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`drives`: files and what their names say."""
+        import polars as pl
+
+        rows = [{"files": "; ".join(d["files"]), **d["values"]} for d in self.document["drives"]]
+        return {"drives": pl.DataFrame(rows, infer_schema_length=None)}
+
+    def text(self) -> str:
+        """Return what the command prints."""
+        notes = (*self.remarks, *self.label_notes)
+        return _text(self.out, self.texts, self.found, self.drives, self.names, self.signals, notes, self.dbc)
+
+    def headline(self) -> str:
+        """Return how many drives there are, and what to do next."""
+        return "\n".join([self.text().split("\n")[0], *_next(self.out, self.texts, self.dbc)])
+
+    def plot(self) -> go.Figure:
+        """Return how many drives have each value that the names say."""
+        import plotly.graph_objects as go
+
+        made = go.Figure()
+        for column, values in self.names.columns.items():
+            known = [v for v in values if v]
+            kinds = sorted(set(known))
+            made.add_bar(x=[f"{column}: {k}" for k in kinds], y=[known.count(k) for k in kinds], name=column)
+        made.update_layout(title=str(self.out), template="plotly_white")
+        made.update_yaxes(title="drives")
+        return made
+
+    def files(self) -> Writers:
+        """Return the campaign file and the files beside it, by name."""
+        return {p.name: text_file(partial(str, text)) for p, text in self.texts.items()}
+
+    def write(self) -> Campaign:
+        """Write the files where `propose` was asked to put them, and return the campaign.
+
+        Raises
+        ------
+        ConfigError
+            With all that is left to fill in.
+        """
+        self.write_files()
+        return Campaign(self.out, dbc=self.dbc)
+
+    def write_files(self) -> None:
+        """Write the files where `propose` was asked to put them; the campaign file last."""
+        for path, text in self.texts.items():
+            write_text(path, text)
+
+
+def propose(
+    folder: PathLike,
+    out: PathLike = "campaign.toml",
+    *,
+    vehicle: PathLike | None = None,
+    dbc: PathLike | Sequence[PathLike] = (),
+    force: bool = False,
+    progress: Progress = None,
+) -> Proposal:
+    """Look at every log in a folder and below it, and propose a campaign file; see `Campaign.propose`."""
+    from aqualog.config.vehicle import load_vehicle
+    from aqualog.face.campaign import names_of
+
+    hear, place, target = listener(progress), Path(folder), Path(out)
+    car = None if vehicle is None else Path(vehicle)
+    databases = tuple(Path(p) for p in names_of(dbc))
+    if not place.is_dir():
+        raise ConfigError("is no folder", where=str(place), expected="a folder with logs")
+    if target.suffix.lower() != ".toml":
+        raise ConfigError("-o is no .toml", where=str(out), expected="the name of the campaign file to write")
+    targets = {n: target.parent / n for n in ("runs.csv", "map.toml", "vehicle.toml")}
+    if car is not None:
+        load_vehicle(car)
+        del targets["vehicle.toml"]
+    refuse_existing([target, *targets.values()], force=force, sources=[*databases, *([car] if car else [])])
+
+    from aqualog.campaign.propose_drives import Drive, drive_name, group_drives, is_run_table, kinds_of, scan
+    from aqualog.campaign.propose_files import labels_of, relative
+    from aqualog.campaign.propose_left import broken_logs, without_twins
+    from aqualog.campaign.propose_names import read_names
+    from aqualog.campaign.propose_signals import measures_wheels, propose_signals
+    from aqualog.io.base import ReadOptions
+
+    way = relative(place, target.parent)
+    if ";" in way or not way.isprintable():
+        raise ConfigError(f"{way!r}: a ; parts the files of a drive", where=str(place), hint="-o in that folder")
+    options = ReadOptions(dbc=databases)
+    if targets["runs.csv"].exists() and not is_run_table(targets["runs.csv"]):
+        raise ConfigError(
+            "is no table of runs", where=str(targets["runs.csv"]), hint="another folder for the campaign file (-o)"
+        )
+    found = scan(place, options=options, leave_out=[target, *targets.values()], report=hear)
+    if not found.logs:
+        reasons = "; ".join(f"{name}: {why}" for name, why in found.bad[:5])
+        raise ConfigError(f"no log that can be read{f' ({reasons})' if reasons else ''}", where=str(place))
+    hear("looking for copies")
+    logs, twins = without_twins(found.logs)
+    kinds, count = kinds_of(logs)
+    hear("grouping files into drives")
+    wheels = [measures_wheels(logs[kinds.index(k)], options) if count > 1 else True for k in range(count)]
+    drives, notes = group_drives(logs, kinds, lambda a, b: wheels[a] and wheels[b])
+    signals = propose_signals(drives, options, hear)
+    broken = broken_logs(place, found.bad)
+    notes = (*twins, *notes, *_broken_notes(found, broken))
+    # a broken log is a run that failed: with its row every batch says so
+    drives = tuple(sorted((*drives, *(Drive((f,), (0,)) for f in broken)), key=lambda d: d.files[0].name))
+    table = read_names([drive_name(d) for d in drives])
+    labels = labels_of(drives, found.labels)
+    texts = _texts(place, target, car, drives, table, labels, signals)
+    kept: tuple[str, ...] = ()
+    if force and not signals.needed and targets["map.toml"].exists():
+        kept = (f"{targets['map.toml']} exists from before and is not used",)
+    own = (*databases, *([car] if car else []), *(f.path for d in drives for f in d.files))
+    return Proposal(
+        target, texts, found, drives, table, signals, notes, tuple(_labels_notes(found.labels, labels)), databases,
+        own, kept,
+    )  # fmt: skip
+
+
+def _texts(
+    folder: Path,
+    out: Path,
+    vehicle: Path | None,
+    drives: tuple[Drive, ...],
+    table: NameTable,
+    labels: dict[int, str],
+    signals: MapProposal,
+) -> dict[Path, str]:
+    """What is to be written; the campaign file last, so that it never names a file that is not there."""
+    from aqualog.campaign.propose_files import campaign_text, relative, runs_text, unmapped_text, vehicle_text
+    from aqualog.config.signal_map import map_text
+
+    base = out.parent
+    name = folder.resolve().name or "campaign"
+    texts = {base / "runs.csv": runs_text(drives, table, labels, base=base, folder=folder)}
+    if signals.needed:
+        comments = [f"proposed for {len(drives)} drives in {name}: check every line"]
+        comments += [f"not in all drives, so left out: {s} = {why}" for s, why in signals.left_out.items()]
+        texts[base / "map.toml"] = map_text(signals.signal_map, comments=comments, remarks=signals.remarks)
+        texts[base / "map.toml"] += unmapped_text(signals.unmapped)
+    if vehicle is None:
+        texts[base / "vehicle.toml"] = vehicle_text(name)
+        car = "vehicle.toml"
+    else:
+        car = relative(vehicle, base)
+    texts[out] = campaign_text(name, car, "map.toml" if signals.needed else None, "runs.csv")
+    return texts
+
+
+def _broken_notes(found: Found, broken: tuple[LogFile, ...]) -> list[str]:
+    kept = {f.name for f in broken}
+    return [
+        *(f"cannot be read, but is in runs.csv (failed in a batch): {n}: {why}" for n, why in found.bad if n in kept),
+        *(f"left out: {n}: {why}" for n, why in found.bad if n not in kept),
+    ]
+
+
+def _labels_notes(names: tuple[str, ...], used: dict[int, str]) -> list[str]:
+    left = [n for n in names if n not in used.values()]
+    return [f"labels files that no drive's name fits: {', '.join(left[:5])}"] if left else []
+
+
+def _text(
+    out: Path,
+    texts: Mapping[Path, str],
+    found: Found,
+    drives: tuple[Drive, ...],
+    table: NameTable,
+    signals: MapProposal,
+    notes: tuple[str, ...],
+    dbc: Sequence[Path],
+) -> str:
+    from aqualog.campaign.propose_files import blanks
+    from aqualog.report.text import table as text_table
+
+    several = sum(len(d.files) > 1 for d in drives)
+    unreadable = f", {len(found.bad)} cannot be read" if found.bad else ""
+    heading = f"logs: {len(found.logs) + len(found.bad)}{unreadable}; drives: {len(drives)}"
+    lines = [heading + (f", {several} of several files" if several else "")]
+    columns = list(table.columns)
+    rows = [
+        (_short(" + ".join(f.name for f in d.files)), *(table.columns[c][i] or "-" for c in columns))
+        for i, d in enumerate(drives[:MOST_ROWS])
+    ]
+    lines.append(text_table(("drive", *columns), rows))
+    lines += [f"and {len(drives) - len(rows)} more, all in runs.csv"] if len(drives) > len(rows) else []
+    lines += ["", "read from the names:"] if columns else ["", "the names say nothing about how the car was driven"]
+    lines += [f"  {c}: {rule}" for c, rule in table.rules.items()]
+    lines += [f"  same in all names, left out: {', '.join(table.dropped)}"] if table.dropped else []
+    empty = blanks(table, len(drives))
+    lines += ["", "to fill in:", *(f"  {c}: {n} of {len(drives)} blank" for c, n in empty.items())] if empty else []
+    if signals.needed:
+        lines += ["", "signals (map.toml):"]
+        for symbol, entry in signals.signal_map.entries.items():
+            unit = f" [{entry.unit}]" if entry.unit else ""
+            lines.append(f"  {symbol} = {' or '.join(entry.channel)}{unit}  ({signals.remarks[symbol]})")
+    own = [s for s in signals.found if s not in signals.signal_map.entries]
+    lines += ["", f"signals with their canonical names: {', '.join(own)}"] if own else []
+    lines += [f"  not in all drives, left out: {s} = {why}" for s, why in signals.left_out.items()]
+    lines += ["", _unmapped_line(signals)] if signals.unmapped else []
+    remarks = [*signals.notes, *notes, *table.notes]
+    if "on_water" not in signals.found:
+        remarks.append(
+            "no signal on_water: fill in lane_start_s and lane_end_s, or labels, of wet runs, "
+            "or map the channel that says it: on_water = ..."
+        )
+    lines += ["", "notes:", *(f"  {n}" for n in remarks)] if remarks else []
+    lines += ["", f"written: {', '.join(str(p) for p in texts)}", *_next(out, texts, dbc)]
+    return "\n".join(lines) + "\n"
+
+
+def _unmapped_line(signals: MapProposal) -> str:
+    names = signals.unmapped
+    if signals.needed:
+        return f"channels that are not mapped: {len(names)}, named at the end of map.toml"
+    return f"channels that are no signal: {len(names)} ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''})"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 70 else f"{text[:30]}...{text[-37:]}"
+
+
+def _next(out: Path, texts: Mapping[Path, str], dbc: Sequence[Path]) -> list[str]:
+    names = {p.name: p for p in texts}
+    edits = [f"{names['vehicle.toml']} (every line marked SET)"] if "vehicle.toml" in names else []
+    edits += [f"{names['map.toml']} (check channels, units, signs)"] if "map.toml" in names else []
+    edits.append(f"{names['runs.csv']} (fill in what is blank)")
+    return [
+        "next:",
+        f"  1. edit {', '.join(edits)}",
+        f"  2. aqualog inspect {out}",
+        f"  3. aqualog report {out}{''.join(f' --dbc {d}' for d in dbc)} -o report",
+    ]
+
+
+def _document(
+    out: Path,
+    texts: Mapping[Path, str],
+    found: Found,
+    drives: tuple[Drive, ...],
+    table: NameTable,
+    signals: MapProposal,
+    notes: tuple[str, ...],
+) -> dict[str, Any]:
+    from aqualog import __version__
+    from aqualog.campaign.propose_files import blanks
+
+    return {
+        "schema_version": 1,
+        "tool_version": __version__,
+        "campaign": str(out),
+        "written": [str(p) for p in texts],
+        "drives": [
+            {"files": [f.name for f in d.files], "values": {c: v[i] for c, v in table.columns.items() if v[i]}}
+            for i, d in enumerate(drives)
+        ],
+        "rules": dict(table.rules),
+        "signals": {
+            s: {"channel": list(e.channel), "unit": e.unit, "scale": e.scale, "reason": signals.remarks[s]}
+            for s, e in signals.signal_map.entries.items()
+        },
+        "canonical": [s for s in signals.found if s not in signals.signal_map.entries],
+        "blank": blanks(table, len(drives)),
+        "unmapped": list(signals.unmapped),
+        "left_out": {**dict(found.bad), **signals.left_out},
+        "notes": [*signals.notes, *notes, *table.notes],
+    }
