@@ -2,7 +2,7 @@
 
 Each row first checks that both sides give the same, then measures them in turns and prints the ratio of their costs,
 minimum / median / maximum. Without a name all groups are run: some minutes; `--full`, with logs of 100 h and batches of
-10,000 logs: hours, and 10 GB of disk. `--table` writes the table of all groups into the README. A row whose peer is not
+10,000 logs: hours, and 10 GB of disk. `--table` writes the table of all groups into the book. A row whose peer is not
 installed is told and left out.
 """
 
@@ -55,7 +55,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(GROUPS))
     parser.add_argument("--full", action="store_true", help="logs of 100 h, batches of 10,000 logs")
-    parser.add_argument("--table", action="store_true", help="write the table into the README")
+    parser.add_argument(
+        "--table", action="store_true", help="write the table into aqualog/docs/validation/benchmarks.md"
+    )
     given = parser.parse_args(arguments)
     unknown = set(given.names) - set(GROUPS)
     if unknown:
@@ -66,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
     print(f"{about}\n\n{HEAD}", flush=True)
     lines, code = run(given.names or list(GROUPS), FULL if given.full else STANDARD)
     if given.table:
-        table.put(table.README, about, lines)
+        table.put(table.PAGE, about, lines)
     return code
 
 

@@ -36,7 +36,9 @@ def _filter(scale: Scale) -> list[Row]:
 
     alone = "the filter on both sides"
     scalar = f"{alone}; the peer's loop is scalar, in the shortest form, and gains no more than about 40 when compiled"
-    more = "beside the filter ours judges what can be told, carries two sums and gates; the peer has the filter alone"
+    more = (
+        "beside the filter ours judges what can be estimated, carries two sums and gates; the peer has the filter alone"
+    )
     return [
         row("filter", "plain Python", 100.0, ekf.filter_slopes, ekf.python_slopes, scalar),
         row("filter", "filterpy", 1000.0, ekf.filter_slopes, ekf.filterpy_slopes, alone, "filterpy"),

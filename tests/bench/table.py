@@ -1,4 +1,4 @@
-"""The README's table of benchmarks: between its two marks, and nothing else of the file."""
+"""The book's table of benchmarks: between its two marks, and nothing else of the page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathlib import Path
 from tests.bench.child import ROOT
 from tests.bench.compare import HEAD
 
-__all__ = ["BEGIN", "END", "README", "conditions", "put"]
+__all__ = ["BEGIN", "END", "PAGE", "conditions", "put"]
 
-README = ROOT / "README.md"
+PAGE = ROOT / "aqualog" / "docs" / "validation" / "benchmarks.md"
 BEGIN, END = "<!-- benchmarks -->", "<!-- /benchmarks -->"
 PEERS = ("asammdf", "rosbags", "pandas", "scipy", "filterpy", "plotly", "polars", "numba")
 BUSY = 0.3  # load per processor, before anything was run, from which on a machine is not idle
@@ -28,8 +28,8 @@ def conditions() -> str:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     found = ", ".join(f"{n} {v}" for n in PEERS if (v := _version(n)))
     return (
-        f"Measured on {datetime.now(UTC):%Y-%m-%d}, {cores} {platform.machine()} processors, {memory:.0f} GB, {state}; "
-        f"Python {platform.python_version()}, {found}."
+        f"Measured on {datetime.now(UTC):%Y-%m-%d} on {cores} {platform.machine()} processors with {memory:.0f} GB, {state}. "
+        f"Python {platform.python_version()}. Libraries: {found}."
     )
 
 
@@ -40,7 +40,7 @@ def _version(name: str) -> str:
         return ""
 
 
-def put(readme: Path, about: str, lines: Sequence[str]) -> None:
+def put(page: Path, about: str, lines: Sequence[str]) -> None:
     """Replace what stands between the marks by `about` and the rows.
 
     Raises
@@ -48,12 +48,12 @@ def put(readme: Path, about: str, lines: Sequence[str]) -> None:
     ValueError
         If the file has not both marks, once each.
     """
-    text = readme.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
     if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ValueError(f"{readme.name} must have {BEGIN} and {END}, once each")
+        raise ValueError(f"{page.name} must have {BEGIN} and {END}, once each")
     head, rest = text.split(BEGIN)
     table = "\n".join([HEAD, *lines])
     whole = f"{head}{BEGIN}\n{about}\n\n{table}\n{END}{rest.split(END)[1]}"
-    draft = readme.with_name(readme.name + ".new")
+    draft = page.with_name(page.name + ".new")
     draft.write_text(whole, encoding="utf-8")
-    draft.replace(readme)
+    draft.replace(page)

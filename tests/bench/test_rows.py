@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
 from tests.bench import __main__ as bench
 from tests.bench import batching, child, detecting, logs, messages, paging, recursions, regressing, script, table
@@ -131,19 +130,19 @@ def test_batches_leave_no_store(tmp_path):
 
 
 def test_the_table_goes_between_the_marks(tmp_path):
-    readme = tmp_path / "README.md"
-    readme.write_text(f"before\n{table.BEGIN}\nold\n{table.END}\nafter\n", encoding="utf-8")
-    table.put(readme, "about", ["| a |", "| b |"])
-    text = readme.read_text(encoding="utf-8")
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{table.BEGIN}\nold\n{table.END}\nafter\n", encoding="utf-8")
+    table.put(page, "about", ["| a |", "| b |"])
+    text = page.read_text(encoding="utf-8")
     assert text.startswith(f"before\n{table.BEGIN}\nabout\n\n| benchmark ")
     assert text.endswith(f"| a |\n| b |\n{table.END}\nafter\n")
-    readme.write_text("no marks", encoding="utf-8")
+    page.write_text("no marks", encoding="utf-8")
     with pytest.raises(ValueError, match="must have"):
-        table.put(readme, "about", [])
-    assert readme.read_text(encoding="utf-8") == "no marks"
+        table.put(page, "about", [])
+    assert page.read_text(encoding="utf-8") == "no marks"
 
 
-def test_the_readme_has_the_marks_and_the_groups_exist():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_page_has_the_marks_and_the_groups_exist():
+    text = table.PAGE.read_text(encoding="utf-8")
     assert text.count(table.BEGIN) == text.count(table.END) == 1
     assert "processors" in table.conditions()
