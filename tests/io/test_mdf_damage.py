@@ -432,7 +432,7 @@ def test_an_invalidation_bit_outside_of_the_record_costs_its_channel(tmp_path, b
     assert list(found) == (["group0.x"] if kept else [])
     assert faults.lost_samples == (0 if kept else 200)
     if not kept:
-        assert f"its invalidation bit {bit} is none of the 8 of its records" in faults.notes[0]
+        assert f"its invalidation bit {bit} is not among the 8 of its records" in faults.notes[0]
 
 
 def test_an_invalidation_bit_where_records_have_none_is_told(tmp_path):
@@ -606,7 +606,7 @@ def test_records_that_are_told_of_and_not_there_take_nothing(tmp_path):
     found, faults = read_bytes(tmp_path, numbers_at(data, at + 8, "<Q", 2**62))
     np.testing.assert_array_equal(found["group0.x"], X)
     assert faults.truncated
-    assert "tells of 4.6e+18 records" in faults.notes[0]
+    assert "declares 4.6e+18 records" in faults.notes[0]
     found, faults = read_bytes(tmp_path, numbers_at(data, at + 24, "<I", 1 << 29))
     assert not found
     assert faults.lost_samples == 200
