@@ -38,7 +38,7 @@ _DOI = re.compile(r"10\.\d{4,9}/[^\s\"<>]+[^\s\"<>.,;]")
 _CITED = re.compile(
     rf"(?<![\w)\]])\[(?P<keys>{_KEY}(?:, {_KEY})*)\](?!\()"
     r"|(?<![\w)\]])(?P<numbers>(?:\[\d{1,2}\])+)(?:(?:-|–|\.\.\.| to )\[(?P<number_to>\d{1,2})\])?(?![\w(])"
-    r"|(?<![\w.$#/\"'=^&{\-–])(?<!BMW )(?P<letter>E(?! ?\d{3})|C)"
+    r"|(?<![\w.$#\"'=^&{\-–])(?:(?<!/)|(?<=\d/))(?<!BMW )(?P<letter>E(?! ?\d{3})|C)"
     r"(?:(?P<first>\d{1,3})| (?P<apart>\d{1,3}))(?![\w^=(\[]|\.\d)"
     r"(?:(?:-|–| to )(?P=letter) ?(?P<to>\d{1,3})(?!\w))?"
 )
@@ -123,7 +123,7 @@ def register() -> Register:
 
 
 def _source(key: str, table: dict[str, Any]) -> Source:
-    lists = {name: tuple(table[name]) for name in ("authors", "names") if name in table}
+    lists: dict[str, Any] = {name: tuple(table[name]) for name in ("authors", "names") if name in table}
     return Source(key, **{**table, **lists})
 
 

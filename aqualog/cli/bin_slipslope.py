@@ -36,7 +36,7 @@ BinWidth = Annotated[
     float, typer.Option("--bin-width", help="Width of the speed bins.", min=1.0, max=100.0, metavar="KMH")
 ]
 Road = Annotated[str, typer.Option("--road", help="wet, dry or both.", metavar="ROAD")]
-Robust = Annotated[bool, typer.Option("--robust", help="Weigh outliers down (Huber).")]
+Robust = Annotated[bool, typer.Option("--robust", help="Weigh outliers down (Huber [huber1981]).")]
 TableOut = Annotated[
     Path | None, typer.Option("-o", "--out", help="Table of the rows: FILE.csv or FILE.parquet.", metavar="FILE")
 ]

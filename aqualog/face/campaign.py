@@ -472,7 +472,7 @@ class CampaignRuns(Result):
         road : str
             `wet`, `dry` or `both`.
         robust : bool
-            Weigh outliers down (Huber).
+            Weigh outliers down (Huber [huber1981]).
 
         Raises
         ------

@@ -14,9 +14,10 @@ __all__ = ["text"]
 
 _SUMMARY = "Names, units and ranges of all signals, and the spellings of units that aqualog understands."
 _HOW = """
-aqualog works in SI units and radians. Axes follow ISO 8855: x forward, y to the left, z up. The wheels are `fl`, `fr`,
-`rl` and `rr`. A channel that bears a name of this page needs no entry in a [signal map](map.md). Every signal is
-optional; [`aqualog doctor`](commands.md) reports which detector lacks which signal.
+aqualog works in SI units and radians. Axes follow ISO 8855 [iso8855_2011]: x forward, y to the left, z up.
+The wheels are `fl`, `fr`, `rl` and `rr`. A channel that bears a name of this page needs no entry in a
+[signal map](map.md). Every signal is optional; [`aqualog doctor`](commands.md) reports which detector lacks which
+signal.
 
 A sample outside the range counts as a fault. aqualog leaves it out, counts it and reports it.
 """
