@@ -153,9 +153,9 @@ def _blanked(text: str, what: re.Pattern[str]) -> str:
 
 
 def names_without_key(text: str, known: Register | None = None) -> list[Citation]:
-    """Names of sources in a text that cites no work of that name; `key` is the name."""
+    """Names of sources in a text that cites no work of that name; `key` is the name. Headings and links are free."""
     known = register() if known is None else known
-    prose, cited = _blanked(text, _CODE), {c.key for c in citations(text)}
+    prose, cited = _blanked(_blanked(text, _CODE), _LINK), {c.key for c in citations(text)}
     missing = []
     for name, keys in _names(known).items():
         if not cited & keys:

@@ -200,7 +200,7 @@ def test_names_need_their_key():
     assert not names_without_key("by Gengenbach [gengenbach1968]")
     assert not names_without_key("Gustafsson's filter [gustafsson2000]")
     assert not names_without_key("Gustafsson, reference [15]")
-    assert not names_without_key("`Gengenbach`")
+    assert not names_without_key("# By Gengenbach\n\n`Gengenbach`, [Gengenbach](a.md)")
 
 
 def test_links():
