@@ -112,7 +112,10 @@ ONE_DRIVE = (
         "--traction accelerometer --mu-max 0.5 --json -o {o}/out",
     ),
     Case("calibrate", f"calibrate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --json -o {{o}}/car.toml"),
-    Case("calibrate_text", f"calibrate {S}/loaded_monday.parquet {CAR} --fix mass=1890 --page {{o}}/page.html"),
+    Case(
+        "calibrate_text",
+        f"calibrate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --fix mass=1890 --page {{o}}/page.html",
+    ),
     Case(
         "calibrate_bmw",
         f"calibrate {BMW}/TripA05.csv {BMW}/TripA10.csv {BMW}/TripA11.csv {BMW}/TripB26.csv {BMW_RAW} --json "
@@ -147,8 +150,8 @@ ONE_DRIVE = (
 )
 
 PROGRAMMES = (
-    Case("simulate_situations", "simulate campaign situations -o situations --jobs 2 --json"),
-    Case("simulate_thesis", "simulate campaign thesis -o thesis --jobs 2 --json"),
+    Case("simulate_situations", "simulate campaign situations -o situations --jobs 2"),
+    Case("simulate_thesis", "simulate campaign thesis -o thesis --jobs 2"),
 )
 
 CAMPAIGNS = (
