@@ -48,7 +48,7 @@ class LogFile:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a folder holds: logs, files that could not be read with the reason, and labels files."""
+    """Content of a folder: logs, unreadable files with the reason, and labels files."""
 
     logs: tuple[LogFile, ...]
     bad: tuple[tuple[str, str], ...]
@@ -176,7 +176,7 @@ def tokens(name: str) -> tuple[str, ...]:
 def group_drives(
     logs: Sequence[LogFile], kinds: Sequence[int], rivals: Callable[[int, int], bool]
 ) -> tuple[tuple[Drive, ...], tuple[str, ...]]:
-    """Drives in the order of their names, and notes on what was put together or left out.
+    """Drives in the order of their names, and notes on files that were joined or left out.
 
     Parameters
     ----------

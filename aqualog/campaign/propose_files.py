@@ -78,7 +78,7 @@ def unmapped_text(unmapped: Sequence[str]) -> str:
 def relative(path: Path, base: Path) -> str:
     """A path as seen from a folder, with /; absolute on another drive letter.
 
-    Links to folders are followed first: what is above a link is not what is above the folder that it names. A name that
+    Links to folders are followed first: the parent of a link differs from the parent of its target folder. A name that
     a spreadsheet would take for a formula gets `./` before it.
     """
     real = Path(os.path.realpath(path.parent)) / path.name

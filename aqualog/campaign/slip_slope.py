@@ -222,7 +222,7 @@ def _told(
     k = float(found.value[0])
     half = math.hypot(float(found.half[0]), late_half)
     low, high = k - half, k + half
-    open_word = ", the delay of v_x being open" if is_open else ""
+    open_word = ", because the delay of v_x is not known" if is_open else ""
     few = found.runs < limits.runs
     reason = ""
     if found.attenuation > ATTENUATION_MAX:

@@ -64,10 +64,10 @@ class Thinning:
         self._dt = dt
         self._width = max(1, 2 * round(0.5 * (SMOOTHING / dt - 1.0)) + 1)
         self._step = max(1, round(STEP_S / dt))
-        # what is looked at before a sample: half a mean and a gradient, and how long a brake counts after its release;
+        # rows needed before a sample: half a mean and a gradient, and how long a brake counts after its release;
         # a whole mean at least, since a shorter piece gives no value
         self._back = self._width + max(1, round(HOLD / dt)) + 1
-        self._start = 0  # row of the drive where what is held begins
+        self._start = 0  # row of the drive at which the held data begin
         self._done = 0  # samples put out
         self._columns: _Arrays = {}
         self._features: _Arrays = {}

@@ -1,4 +1,4 @@
-"""A batch of a few logs, with what each cost: in worker processes and into a store as the whole batch would run."""
+"""A batch of a few logs with the cost of each, run in worker processes and into a store like the whole batch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Residuals and signatures of all drives, weighed by their noise: what every test and fit works on."""
+"""Residuals and signatures of all drives, weighted by their noise: the data of every test and fit."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ class _Columns:
 
 
 def _undo_sensors(measured: _Columns, sensors: Sensors) -> None:
-    """Take off what sensors do to a signal: gain, bias and drift, then its delay and a clock that runs off.
+    """Remove sensor errors from a signal: gain, bias and drift, then its delay and the drift of its clock.
 
     A late signal is moved by whole samples. Interpolated samples would have less noise than the detectors of wheel
     vibration expect.

@@ -18,8 +18,8 @@ LEAST_BAND_HZ = (3.0, 4.5)  # at least
 SPEED_S = 1.0  # [s] over which a measured speed is averaged: its noise must not pass for motion
 NOT_TORQUE = 15.0  # [N·m] rms of a difference that comes from a sensor, not from the car
 NOT_TORQUE_SHARE = 0.05  # of the rms of all wheels
-# of the mean power of noise: the spectrum of what is mirrored is real but for a phase, its squares have one degree of
-# freedom (D)
+# of the mean power of noise: the spectrum of a mirrored signal is real apart from a phase, and its squares have one
+# degree of freedom (D)
 MEDIAN = 0.4549
 END_S = 1.0  # [s] for the values at the beginning and end of a signal
 STANDS_OUT, LEAST_EVENT = 4.0, 10.0  # standard deviations, and [N m] of an axle: braking, not noise

@@ -90,7 +90,7 @@ def confusions(bench: Bench, gram: FloatArray, sizes: FloatArray, inflation: Flo
     inner = G[np.ix_(c, c)]
     energy = np.diag(inner)
     theta = sizes[c] / np.sqrt(inflation[index])
-    # what row i keeps when column j may imitate it
+    # energy of row i that column j cannot imitate
     pairs = np.maximum((energy[:, None] - inner**2 / energy[None, :]) * theta[:, None] ** 2, 0.0)
     out = []
     for k, i in enumerate(index):

@@ -43,7 +43,7 @@ class Run:
     """A run of one minute. `speed` (t [s], v [km/h]) that the driver keeps to; `minutes` with the way there and back.
 
     `how` completes "Drive ...". `rolls` from this time on without drive or brakes [s]. `water`: how it differs from the
-    log's speed on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, as `speed` says.
+    log's speed on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, with the given `speed`.
     """
 
     name: str

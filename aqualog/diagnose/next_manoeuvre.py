@@ -64,7 +64,8 @@ class _Option:
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Pairs that it decides, then what it adds to the worst of them (of all, if none) per minute."""
+        """Pairs that it decides, then the gain per minute for the worst of them (or of all pairs if it decides
+        none)."""
         worth = self.then - self.now
         return len(self.decided), float(min(worth[list(self.decided)] if self.decided else worth)) / self.minutes
 
@@ -226,7 +227,7 @@ def _told(case: Case, pairs: Sequence[int]) -> str:
 
 
 def _pairs(case: Case, o: _Option) -> tuple[tuple[str, str], ...]:
-    """Keys of what the two sets of each decided pair have for themselves."""
+    """Keys of the effects that only one of the two sets of each decided pair has."""
 
     def keys(members: Sequence[Hypothesis]) -> str:
         return " + ".join(h.key for h in members)

@@ -100,7 +100,7 @@ class Significance:
 class Limit:
     """Smallest size of an effect that this log shows with a power of 0.9, in the unit of its first parameter.
 
-    NaN where the log does not show it at any physical size. `smallest` is what is worth naming.
+    NaN where the log does not show it at any physical size. `smallest` is the smallest size worth naming.
     """
 
     effect: str

@@ -44,7 +44,7 @@ PARTIAL = 0.2  # share of the remainder beside a cause, above which the cause is
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """`level` of false alarms for anything at all, `surrogates` for its calibration, 0: none; `seed` of all draws.
+    """`level` of false alarms for any effect, `surrogates` for its calibration, 0: none; `seed` of all draws.
 
     `views`: with the residuals for a page; `consequences`: with the model's effect on the detectors.
     """

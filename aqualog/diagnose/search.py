@@ -28,7 +28,7 @@ __all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
 MOST = 3  # effects in one set
 CREDIBLE = 20.0  # evidence ratio within which sets cannot be distinguished
 REFITTED = 6  # sets that are refitted in the simulator
-# of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of what it gains
+# of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of its gain
 SLACK, BENT = 8.0, 0.05
 # factor on the threshold for every further effect: errors of the simulator grow with the size of the hidden effects
 FURTHER = 1.5

@@ -22,7 +22,7 @@ CANDIDATES = 40  # hypotheses that sets of three and more are made of
 
 @dataclass(frozen=True, slots=True)
 class SetFit:
-    """Hypotheses `members`, values `theta` of their columns and twice the log-likelihood gained, prior taken off."""
+    """Hypotheses `members`, values `theta` of their columns and twice the log-likelihood gained, without the prior."""
 
     members: tuple[int, ...]
     columns: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""A run or a check on trial: what it would show of each set of effects, weighed by the noise of the log."""
+"""Simulated trial of a run or check: separation of the sets of effects, weighted by the noise of the log."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ASSUMED_SPEED = 0.05  # [m/s] of all others
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is to be decided: the sets, pairs of them, and all that is forgiven, (hypothesis, parameter, its sd)."""
+    """The decision to make: the sets, their pairs, and all tolerances as (hypothesis, parameter, its sd)."""
 
     bench: Bench
     credible: tuple[Candidate, ...]
@@ -39,7 +39,7 @@ class Case:
     model: Model
     pairs: tuple[tuple[int, int], ...]
     forgiven: tuple[tuple[Hypothesis, str, float], ...]
-    like: int  # the drive whose signals, noise and water a run is taken to have
+    like: int  # the drive whose signals, noise and water a run is assumed to have
 
     @property
     def drive(self) -> Drive:
@@ -53,17 +53,17 @@ class Case:
 
     @property
     def near(self) -> tuple[int, ...]:
-        """What is forgiven of the effects in question, and what every vehicle file is off by."""
+        """Tolerances of the effects in question, and those of every vehicle file."""
         names = self.effects
         return tuple(i for i, (h, _, _) in enumerate(self.forgiven) if h.allowed or h.effect.name in names)
 
     def rows(self, kept: Sequence[int]) -> list[int]:
-        """Rows of the sets, of what a run misses, and those of a part of what is forgiven."""
+        """Rows of the sets, of the simulation's error in a run, and of a part of the tolerances."""
         first = len(self.credible) + sum(len(c.refit.values) for c in self.credible) + 1
         return [*range(first), *(first + i for i in kept)]
 
     def apart(self, gram: FloatArray, kept: Sequence[int]) -> FloatArray:
-        """Separation of each pair by inner products of rows with a part of what is forgiven; the lesser of two ways."""
+        """Separation of each pair by inner products of rows with a part of the tolerances; the smaller of two ways."""
         k = len(gram) - len(kept) + np.arange(len(kept))
         inner = gram[np.ix_(k, k)] + np.diag([self.forgiven[i][2] ** -2.0 for i in kept])
         gram = gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :])
@@ -75,7 +75,7 @@ class Case:
             [
                 _certain(gram, (a, b, at), own[b]) / max(self.credible[a].inflation, 1.0)
                 for a, b in ((i, j), (j, i))
-                # what holds the truth and more imitates it always
+                # a set that holds the truth and more can always imitate it
                 if any(h not in self.credible[b].refit.members for h in self.credible[a].refit.members)
             ]
             for i, j in self.pairs
@@ -84,10 +84,10 @@ class Case:
 
 
 def _certain(gram: FloatArray, rows: tuple[int, int, int], rivals: Sequence[int]) -> float:
-    """Separation of a truth from its rivals, less what the simulation's own miss `rows[2]` may take from it.
+    """Separation of a truth from its rivals, reduced by the possible influence of the simulation's own error `rows[2]`.
 
-    The difference d of two sets meets noise and the miss e: twice the log of the ratio of evidence has mean
-    d^2 - 2 |e d| and variance 4 d^2. What is given back is the separation that is as sure without a miss.
+    The difference d of two sets is disturbed by noise and the error e: twice the log of the ratio of evidence has mean
+    d^2 - 2 |e d| and variance 4 d^2. The result is the separation that is equally certain without an error.
     """
     plain = separation(gram, rows, rivals, np.array([-1.0, 1.0, 0.0]))
     if plain <= 0.0:
@@ -100,7 +100,7 @@ def _certain(gram: FloatArray, rows: tuple[int, int, int], rivals: Sequence[int]
 
 
 def of_log(case: Case) -> FloatArray:
-    """Inner products of what each set leaves of the log, its columns, and all that is forgiven."""
+    """Inner products of the remainders of the log after each set, its columns, and all tolerances."""
     bench = case.bench
     forgiven = np.flatnonzero(bench.forgiven > 0.0).tolist()
     total: FloatArray | float = 0.0
@@ -165,7 +165,7 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
     count = len(case.drive.channels)
     noise = for_mask(case.noises[case.like], drive.mask)
     out = whitened(spectra(bridged(rows[:, :count], drive.mask)), noise)
-    # what the simulation along the run misses of the set that was driven counts as noise: it will be there
+    # the simulation's error for the driven set counts as noise, because a real run has it too
     of_channels = out.reshape(len(out), count, -1)
     missed = (of_channels[0] ** 2).sum(axis=-1) / max(int(drive.mask.sum()), 1)
     out = (of_channels / np.sqrt(1.0 + missed)[:, None]).reshape(len(out), -1)
@@ -177,7 +177,7 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
 
 
 def of_check(case: Case, check: Check, kept: Sequence[int]) -> FloatArray:
-    """One column: what each set leaves of the reading, and what its parameters take away."""
+    """One column: the remainder of the reading after each set, and the change by its parameters."""
 
     def meant(h: Hypothesis, name: str) -> bool:
         return h.effect.name == check.effect and h.where in check.where and name == check.parameter

@@ -1,7 +1,7 @@
-"""Is what is left of a residual a function of something, and of what?
+"""Test whether the remainder of a residual is a function of a coordinate, and find that coordinate.
 
-Additive penalised splines on the whitened residual, a family-wise test over all channels and coordinates, and then the
-question which coordinate it really is.
+Additive penalised splines on the whitened residual, a family-wise test over all channels and coordinates, followed by a
+comparison of the coordinates.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CLIP = 5.0  # standard deviations from which a whitened residual is an outlier
 
 
 class Residuals(Protocol):
-    """What is looked at: `residual` (C, n) at `dt` [s], `mask` (n,) of the samples that count, `coordinates` (n,) each.
+    """Input of the test: `residual` (C, n) at `dt` [s], `mask` (n,) of the samples that count, `coordinates` (n,) each.
 
     `whitened` is linear: it turns a residual-shaped array (C, n) into a flat one (C n,), in the same order, whose inner
     products are twice log-likelihoods under the noise; samples that do not count are zero.
@@ -79,7 +79,7 @@ def find_remainders(
     stack : Residuals
         Left by the best set of known effects.
     signatures : mapping of (C, n)
-        What known effects would look like in the residual, at any size, to name the nearest one.
+        Signatures of known effects in the residual, at any size, to name the nearest one.
     level : float
         Chance that noise alone gives a remainder, over all channels and coordinates; at least 1 / (surrogates + 1).
     seed : int
@@ -88,7 +88,7 @@ def find_remainders(
         Noise series with the spectra of the residual. No effect is removed from the residual before: a fit leaves a gap
         in the spectrum just where the test looks.
     most : int
-        Remainders, at most; each is tested anew with those before in the model.
+        Remainders, at most; each is tested with the earlier ones in the model.
 
     Returns
     -------
@@ -205,7 +205,7 @@ def _choice(
 
 
 def _fit(group: _Group, constants: FloatArray, taken: FloatArray, row: FloatArray, shape: tuple[int, int]) -> _Fit:
-    """Function with a constant of its own channel, under what was taken out before."""
+    """Function with a constant of its own channel, after the earlier functions."""
     columns = group.columns.astype(np.float64)
     weight, level = _smoothing(group, taken, row, shape)
     others = (

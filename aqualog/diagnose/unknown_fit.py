@@ -19,7 +19,7 @@ _SINGULAR = 1e-9
 class Parts(NamedTuple):
     """Directions (K, P) of the coefficients in which data and penalty are both diagonal.
 
-    A direction has unit information; `stiffness` (P,) is its penalty, zero for what costs nothing (a straight line).
+    A direction has unit information; `stiffness` (P,) is its penalty, zero for a straight line.
     """
 
     directions: FloatArray
@@ -27,7 +27,7 @@ class Parts(NamedTuple):
 
 
 def parts_of(gram: FloatArray, penalty: FloatArray) -> Parts:
-    """Of whitened columns with this Gram matrix; directions that the data do not see are left out."""
+    """Of whitened columns with this Gram matrix; directions without information in the data are left out."""
     values, vectors = np.linalg.eigh(gram)
     seen = values > _SINGULAR * max(float(values[-1]), 1e-300)
     white = vectors[:, seen] / np.sqrt(values[seen])

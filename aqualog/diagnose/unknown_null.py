@@ -1,4 +1,4 @@
-"""What noise alone would do to a fit: surrogates of a residual, and scores calibrated by them."""
+"""Fits of noise alone: surrogates of a residual, and scores calibrated by them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ SLOPED = 60  # lines whose power may follow a power law
 def noise_like(rows: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
     """Gaussian noise (count, C, n) with the smoothed spectra and cross-spectra of a whitened residual (C, n).
 
-    Spectra are averaged over neighbouring frequencies, so that what an effect leaves at some of them is not taken for
-    noise; below `SLOPED` along a power law, for what long-lived noise the whitening has left. Samples at which all
-    rows are zero stay zero.
+    Spectra are averaged over neighbouring frequencies, so that peaks of an effect do not count as noise; below `SLOPED`
+    they follow a power law, for long-lived noise that the whitening has left. Samples at which all rows are zero stay
+    zero.
     """
     used = (rows != 0.0).any(axis=0)
     x = rows[:, used]
@@ -66,8 +66,8 @@ def _averaged(cross: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
 def noise_level(part: FloatArray, rows: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """Energy of each whitened series (N, m) beside a function, per dimension: (m,), 1 under white unit noise.
 
-    Over the frequencies at which the function lives and their neighbours, of what the function leaves there. What it
-    explains is to stand out from this: then neither a residual's own colour nor an effect in it sets the scale.
+    Uses the remainder after the function, over the frequencies of the function and their neighbours. The explained part
+    is compared with this energy, so that neither the residual's own spectrum nor an effect in it sets the scale.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def null_scores(ratios: FloatArray) -> FloatArray:
     -------
     scores : (..., 1 + S)
         Logarithms (Fisher's z [fisher1924], K) by mean and standard deviation of the surrogates'. Each surrogate is
-        judged by the others, as the residual is: else the residual would be the odd one out.
+        judged by the others, in the same way as the residual.
     """
     z = np.log(np.maximum(ratios, 1e-300))
     null = z[..., 1:] - z[..., 1:].mean(axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Which coordinate it really is: does each still help on held-out stretches of the drive once the other is known?"""
+"""Choice of the coordinate: does each improve held-out stretches of the drive when the other is in the model?"""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _CARRIED: dict[tuple[str, tuple[str, ...]], str] = {
     ("force_balance", ("v_x",)): "unexplained_force",
     ("kinematic", ("position",)): "unexplained_grade",
 }
-TAPER = 0.08  # of the range: the function falls to nothing over so much beyond what was driven
+TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
 ROUGH = 0.15  # of the band's half width: knots that change the function by less are left out
 SHORT_HOLE = 4  # points; a longer stretch without data is nominal
 
@@ -32,13 +32,13 @@ def as_term(remainder: Remainder, *, mass: float, response: float | None = None)
     mass : float
         Of the car in the model. [kg]
     response : float, optional
-        What one unit of the term (1 N against the motion, 1 rad uphill) does to the channel. Without: -1 / mass for a
+        Change of the channel by one unit of the term (1 N against the motion, 1 rad uphill). Without: -1 / mass for a
         force on the acceleration (Newton), g for a slope angle on an accelerometer.
 
     Returns
     -------
     term : Term or None
-        With the function where the drive was, and nothing elsewhere: it falls to zero over a short way beyond. None if
+        The function within the driven range; outside it falls to zero over a short distance. None if
         the model has no table for this channel over these coordinates, or the function is beyond physical bounds.
     """
     name = _CARRIED.get((remainder.channel, remainder.depends_on))

@@ -1,4 +1,4 @@
-"""What a log does not hold: torque and steering that stand in, and brakes that nobody logged."""
+"""Quantities missing in a log: replacements for torque and steering, and brakes that were not logged."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ __all__ = [
 ]
 
 STEER_S = 0.5  # [s]
-V_MIN = 4.0  # [m/s] slower, creeping, clutch and standstill rule
-A_MOST = 3.0  # [m/s^2] of standing-in torque beyond resistance: with more a led car spins in a curve
+V_MIN = 4.0  # [m/s] below it, creeping, clutch and standstill dominate
+A_MOST = 3.0  # [m/s^2] of replaced torque beyond resistance: with more, the simulated car spins in a curve
 UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
 OFTEN = 0.01  # share of the driving
 LEAST_S = 20.0  # [s] of usable driving
 BRAKE_PRESSURE = 0.5e5  # [Pa]
-HOLDS_BRAKES = -300.0  # [N m] of all wheels, where the brakes are pressed hard
+HOLDS_BRAKES = -300.0  # [N·m] of all wheels, where the brakes are pressed hard
 
 
 def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
@@ -46,8 +46,8 @@ def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
 def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N·m], >= 0
 
-    None where the car slows down faster than it rolls out: brakes are on all wheels, and the engine's share of that
-    deceleration alone would lock an axle. At most for `A_MOST`.
+    None where the car slows down faster than it rolls out: brakes are on all wheels, and one axle alone would lock at
+    that deceleration. At most for `A_MOST`.
     """
     inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
     force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
@@ -84,7 +84,7 @@ def brakes_in_torque(pressure: FloatArray, torque: FloatArray) -> bool:
 
 
 def brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
-    """Whether the car often slows down much more than torque and resistance explain off the water: somebody brakes."""
+    """Whether the car often slows down much more than torque and resistance explain off the water, so by braking."""
     a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
     explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.r_l("fl") * vehicle.mass) - roll_out(v, vehicle)
     moving = (v > V_MIN) & ~wet

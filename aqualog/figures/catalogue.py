@@ -17,7 +17,7 @@ __all__ = ["NUMBERS", "OF_CAMPAIGN", "WITHOUT", "chosen", "make", "needs_campaig
 OF_CAMPAIGN = ("2.3", "2.4", "2.5", "2.6", "2.7", *(f"2.{n}" for n in range(10, 21)))
 """Made from many runs only."""
 _EITHER = ("2.8", "2.9", "2.21", "2.22", "2.23", "2.25")  # from simulated scenes, or from a campaign's own logs
-_MORE = ("2.2",)  # computed, with what a campaign measured beside it
+_MORE = ("2.2",)  # computed, with measurements of a campaign for comparison
 NUMBERS = (*(f"2.{n}" for n in range(1, 26)), *(f"3.{n}" for n in range(1, 12)))
 WITHOUT = tuple(n for n in NUMBERS if n not in OF_CAMPAIGN)
 """Made without a campaign too."""
@@ -29,7 +29,7 @@ def needs_campaign(number: str) -> bool:
 
 
 def make(number: str, evidence: Evidence | None = None) -> Figure:
-    """Make a figure anew: its runs, panels and findings.
+    """Make a figure: its runs, panels and findings.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def make(number: str, evidence: Evidence | None = None) -> Figure:
 
 
 def chosen(asked: Sequence[str]) -> tuple[str, ...]:
-    """Numbers behind what was typed, in the order of the thesis, each once.
+    """Figure numbers for the typed names, in the order of the thesis, each once.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def _c9() -> Finding:
     return Finding(
         "C9",
         "A wedge of water shortens the patch from its front, the more the faster and the deeper.",
-        f"in the simulator's tyre what is left of the contact falls with speed at {', '.join(map(str, _DEPTHS))} mm, "
+        f"in the simulator's tyre the remaining contact falls with speed at {', '.join(map(str, _DEPTHS))} mm, "
         "and with depth "
         f"at all speeds from {_GRID[0]:g} to {_GRID[-1]:g} km/h; in part: one of both",
         f"falls with speed: {'yes' if by_speed else 'no'}, with depth: {'yes' if by_depth else 'no'}; "

@@ -1,4 +1,4 @@
-"""Figure 2.2: contact length over speed, and what it leaves of friction and slip slope."""
+"""Figure 2.2: contact length over speed, and the remaining friction and slip slope."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["make"]
 NUMBER = "2.2"
 _WISH = Wish((), WORN, "lowest", 1.3)
 _V = np.arange(0.0, 160.5, 1.0)  # [km/h]
-_LOST = 0.9  # of the dry value: what has fallen below it has begun to fall
+_LOST = 0.9  # of the dry value: below it, a curve has begun to fall
 
 
 def _first_below(y: FloatArray) -> float:
@@ -123,7 +123,7 @@ def make(evidence: Evidence | None = None) -> Figure:
         said = f" Points: slip slope on water over that on dry road, {found.selected.fixed}, with 95 % intervals."
     return Figure(
         NUMBER,
-        "contact length over speed, and what it leaves of friction and slip slope",
+        "contact length over speed, with the remaining friction and slip slope",
         f"Computed from the simulator's physics for a front wheel with a worn summer tyre and {LOAD:g} N in "
         f"{DEPTH * 1e3:g} mm; "
         f"full aquaplaning at " + ", ".join(f"{full_speed(DEPTH, p) / KMH:.0f}" for p in PRESSURES.values())

@@ -26,7 +26,7 @@ _MU = Axis("traction coefficient")
 
 
 def _lower_bound(evidence: Evidence, spun: Sequence[RunInfo]) -> list[Line]:
-    """Means of what is left to push the car."""
+    """Means of the traction that is left to push the car."""
     rows = [r for r in spin_ups(evidence.part(spun), Plan(()), residual=True) if math.isfinite(r.value)]
     lines = []
     for i, wheel in enumerate(dict.fromkeys(r.place for r in rows)):

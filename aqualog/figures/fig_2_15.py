@@ -29,7 +29,7 @@ def _c45(found: Resistance) -> Sequence[Finding]:
         Finding(
             "C45",
             "Additional load, in front or at the rear, and pressure lower the resistance measure.",
-            "one line over speed for all, to which load and pressure each add: the intervals of what they add are "
+            "one line over speed for all, to which load and pressure each add: the intervals of both contributions are "
             "below "
             f"0; in part: one of them; value: {names[0]}",
             "; ".join(f"{n}: {e.words()} {UNIT}" for n, e in effects.items()),

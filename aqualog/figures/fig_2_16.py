@@ -52,7 +52,7 @@ def _c48(rows: Sequence[SlopeRow]) -> list[Finding]:
 
 
 def _cloud(evidence: Evidence, found: Slopes, row: SlopeRow, *, is_wet: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Slip [%] and traction of the samples behind a slope, the delay of v_x taken off."""
+    """Slip [%] and traction of the samples behind a slope, corrected for the delay of v_x."""
     late = {d.vehicle: d.value for d in found.table.delays if d.told}
     s, m = [], []
     for info in found.selected.runs:

@@ -148,7 +148,7 @@ def _c74(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Finding:
         f"wheel in {in_runs(right)}, whose slope could be judged for {spread(judged_s)} s on the lane",
         judged(whole=whole, part=found >= SOME),
         "" if whole else "The right slope falls at once, but is hardly ever judged: it is that of a pair of wheels, "
-        "and the criterion asks for calm wheels, which the front right one with its minor spin-downs is not. What is "
+        "and the criterion needs calm wheels, which the front right one with its minor spin-downs is not. What is "
         "found is the left wheel's, on less water.",
         _value(_median(four)),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Figure 3.2: what the change detection sums up, prediction error or prediction error in the slip's direction."""
+"""Figure 3.2: input of the change detection, prediction error or prediction error in the slip's direction."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def make() -> Figure:
     initial = float(scaled_mu[1] / scaled_s[1])
     s_delta, mu_delta = s_f - rho * s_r, _POINTS[0] - rho * _POINTS[1] / _RATIO
     chord = mu_delta / s_delta
-    # the same slip on both axles: what is left to read a slope from
+    # the same slip on both axles: the remaining slip for an estimate of the slope
     s_r_equal = float(slip_of_traction(np.array([_EQUAL * _RATIO]), slope=_REAR, mu_max=_MU)[0])
     s_f_equal = float(slip_of_traction(np.array([_EQUAL]), slope=_FRONT, mu_max=_MU)[0])
     rho_equal = (1.0 - s_f_equal) / (1.0 - s_r_equal)

@@ -112,7 +112,7 @@ def make() -> Figure:
         "3.5",
         "torque splits on the surface of differential traction",
         "Dry road of figure 3.4. Lines of a fixed split from front drive (nu = 0) to rear drive (nu = 1), and of a "
-        "fixed sum of the forces with the split varied. (c) What a force shows as differential slip, over the split.",
+        "fixed sum of the forces with the split varied. (c) Differential slip of a force, over the split.",
         (
             Panel("Surface and lines of fixed splits", FRONT_SLIP, DIFFERENCE, tuple(solid), TRACTION, (sheet(DRY),)),
             Panel("Projection", DIFFERENCE, TRACTION, tuple(flat)),
@@ -131,7 +131,7 @@ def make() -> Figure:
                 ),
             ),
             Table(
-                "Runs over the change at t = 0 (slope 30 to 10), a minimum of differential traction asked for",
+                "Runs over the change at t = 0 (slope 30 to 10), with a required minimum of differential traction",
                 ("run", "drop found [s]", "slope after 8 s [-]", "false alarms"),
                 tuple((n, seconds(t), f"{s:.1f}", str(k)) for n, t, s, k in runs),
             ),

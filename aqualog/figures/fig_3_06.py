@@ -90,7 +90,7 @@ def make() -> Figure:
         ),
         "The text says constant speed as well, the caption 1 m/s² only. At constant speed the same 250 N make a "
         f"prediction error of {1e3 * swing:.1f}e-3 at its peak; the drift takes {1e3 * TUNING.zeta:.1f}e-3 of it, and "
-        f"what is left gets smaller as the filter follows by itself (sine: {late:.1f} at {_END:g} s). Under 1 m/s² "
+        f"the rest gets smaller as the filter follows by itself (sine: {late:.1f} at {_END:g} s). Under 1 m/s² "
         f"the tangent of the tyre's curve is flatter ({slope:.1f} at a traction of {mu:.2f}; the estimate settles at "
         f"{estimated:.1f}) and load transfer sets both axles apart.",
         None if np.isnan(step) else step,

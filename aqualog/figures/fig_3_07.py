@@ -1,4 +1,4 @@
-"""Figure 3.7: the same with a minimum of differential traction; what excitation gives and what it costs."""
+"""Figure 3.7: the same with a minimum of differential traction; benefit and cost of excitation."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def _jump(wave: str) -> float:
 
 
 def _left_over(wave: str) -> tuple[float, float]:
-    """What the excitation leaves in the acceleration, against the run without: before and after the change. [m/s²]"""
+    """Remaining influence of the excitation on the acceleration, against the run without: before and after the change.
+    [m/s²]"""
     d, plain = drive(_case(wave)), drive(_case(""))
     difference = np.abs(d.a_x - plain.a_x)
     before = (d.t >= _SETTLED) & (d.t < 0.0)
@@ -106,13 +107,13 @@ def make() -> Figure:
     smooth_left = max(left[w][0] for w in _SMOOTH)
     c97 = Finding(
         "C97",
-        "What one axle gains the other loses: the acceleration stays what the driver asked for.",
+        "One axle gains what the other loses: the acceleration stays as the driver requested.",
         f"all four waveforms leave less than {_LIMIT_A:g} m/s² against the run without excitation, on the dry road; "
         "in part: all but the step",
         "dry: " + ", ".join(f"{w} {1e3 * left[w][0]:.1f}" for w in WAVES) + "e-3 m/s^2; after the change: "
         + ", ".join(f"{1e3 * left[w][1]:.1f}" for w in WAVES) + "e-3",
         judged(whole=max(left[w][0] for w in WAVES) < _LIMIT_A, part=smooth_left < _LIMIT_A),
-        "That the sum stays is how the torques are made; what is left is the wheels' inertia when their slips change, "
+        "That the sum stays is how the torques are made; the remainder is the wheels' inertia when their slips change, "
         "under the step a short blip.",
         smooth_left,
     )  # fmt: skip

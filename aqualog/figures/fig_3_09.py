@@ -180,7 +180,7 @@ def _spread(best: dict[str, float]) -> float:
 
 
 def _spread_of(values: list[float]) -> float:
-    """Largest over smallest of those that are there; infinite if one of them is zero or none is there."""
+    """Largest over smallest of the available ones; infinite if one of them is zero or all are missing."""
     known = [v for v in values if not np.isnan(v)]
     return max(known) / min(known) if known and min(known) > 0.0 else float("inf")
 

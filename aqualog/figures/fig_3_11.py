@@ -33,7 +33,7 @@ _DASHES = ("dot", "solid", "dash")
 
 
 def _case(q: float, h: float) -> Case:
-    """The tuning with its process noise and threshold scaled; what is known after an alarm stays as it is."""
+    """The tuning with its process noise and threshold scaled; the uncertainty after an alarm stays as it is."""
     return replace(_CASE, tuning=TUNING._replace(q_k=q * TUNING.q_k, h=h * TUNING.h))
 
 
@@ -64,8 +64,8 @@ def make() -> Figure:
         judged(
             whole=by_q_near > _CHANGE and by_h > _CHANGE, part=by_h > _CHANGE and by_q > _CHANGE
         ),
-        f"As tuned, {TUNING.q_k:g} per second, the slope hardly wanders in the seconds that count: what the filter "
-        "still follows by itself, it does by the uncertainty that it began with. With none left (sd_k = 0) the drop "
+        f"As tuned, {TUNING.q_k:g} per second, the slope hardly moves in the decisive seconds: the filter "
+            "follows only through its initial uncertainty. With none left (sd_k = 0) the drop "
         f"is found after {told(known)}, as tuned after {told(_CASE)}. Only from a thousand times that noise on does "
         f"the filter follow faster ({slope_after(_case(1e4, 1.0), 2.0):.1f} after 2 s at 10000 times, "
         f"{slope_after(_CASE, 2.0):.1f} as tuned), and takes the error from the sum. The thesis does not print its "

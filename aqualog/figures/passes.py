@@ -1,4 +1,4 @@
-"""Passes over the water as points: what happens from which speed on, and how that goes with other things."""
+"""Passes over the water as points: the speed from which events occur, and its relation to other quantities."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def begins(p: Pass) -> bool:
 
 
 def half_speeds(found: Sequence[Pass], events: Sequence[Callable[[Pass], bool]]) -> list[tuple[float, FloatArray]]:
-    """For each kind of event: speed at which half of the passes have one, and the same with the passes drawn anew,
+    """For each kind of event: speed at which half of the passes have one, and the same for bootstrapped passes,
     array (400,). [m/s] NaN where the passes are of one kind.
     """
     v = np.array([p.v_mean for p in found])

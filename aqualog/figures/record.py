@@ -1,4 +1,4 @@
-"""What a figure is: panels of lines, the claims that it stands for, and what was found about them."""
+"""Records of a figure: panels of lines, its claims, and their findings."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A claim of the thesis, the criterion it is judged by, and what was found.
+    """A claim of the thesis, its criterion, and the finding.
 
     `value` is the number judged, if one, `ci95` its interval with the run as the unit, `unit` that of both.
     """

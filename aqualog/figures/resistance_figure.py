@@ -1,4 +1,4 @@
-"""Mean resistance measure over speed, level by level: what Figures 2.11 to 2.15 share."""
+"""Mean resistance measure over speed, level by level: common parts of Figures 2.11 to 2.15."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ SEEDS = tuple(range(3001, 3021))
 """The first one is drawn; claims are judged over all."""
 
 DRY_SEED = 3000
-MANY, SOME = 0.8, 0.5  # shares of the runs: what mostly happens, and what happens at least in every other run
+MANY, SOME = 0.8, 0.5  # shares of the runs for "mostly" and for "at least in every other run"
 _SLALOM_S, _DRY_S = 80.0, 80.0
 _PUSH_S, _ROUND_S, _CHANGE_S = 5.0, 20.0, 12.0  # pushes of 1 m/s^2 and rolling out; changes of speed in the dry drive
 _SETTLED_S = 5.0  # after which a drive has settled
@@ -45,7 +45,7 @@ _FALL, _RISE = 70 * KMH, 110 * KMH  # [m/s] between which the dry drive varies
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known of a car before the wet drive.
+    """Known parameters of a car before the wet drive.
 
     `vehicle` with the tie-rod polynomial of a dry slalom, `memory` with the slip slopes of a dry drive, `explained` the
     share of the variance of the dry rods that the polynomial explains. [-]
@@ -108,7 +108,7 @@ def _dry(wet: Scenario, car: Vehicle, duration_s: float, speed: Speed, steering:
 
 
 def run(number: str, seed: int) -> SceneRun:
-    """A scene driven with other noise and another fluctuation of the contact, and what the detectors make of it."""
+    """A scene driven with other noise and another fluctuation of the contact, with the detectors' results."""
     return run_of(replace(scene(number), seed=seed), known(number))
 
 

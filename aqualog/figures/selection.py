@@ -1,4 +1,4 @@
-"""Which runs of a campaign a figure shows: what varies, what is held, and which of several choices the thesis made."""
+"""Runs of a campaign that a figure shows: varied and fixed keys, and the choice nearest to the thesis."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class NotInCampaign(FitError):  # noqa: N818 - what is lacking, not what failed
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What a figure shows.
+    """The selection of a figure.
 
     `varies` are families; of several the first is compared, within each value of the others, or with `any_one` each of
-    them. What the thesis has, where the campaign has it too: `tyre` words for the tyre or its wear, best first;
+    them. Values of the thesis, used where the campaign has them too: `tyre` words for the tyre or its wear, best first;
     `pressure` `lowest` or `highest` of the campaign's; `depth_mm`. Always: no load, rear-wheel drive. `only_tyres`:
     words of the tyres that are shown, if there is one for each; `only_lowest_pressures`: how many.
     """
@@ -67,7 +67,7 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One value of what varies, in words, with its runs."""
+    """One value of the varied key, in words, with its runs."""
 
     name: str
     value: Value
@@ -157,7 +157,7 @@ def choose(
     is_of_use : callable
         Empty if a run has the data, else why not.
     needs : str
-        What the figure needs, in words.
+        Requirements of the figure, in words.
 
     Returns
     -------
@@ -284,7 +284,7 @@ def _match(family: str, part: Part, wish: Wish, usable: Sequence[RunInfo], one: 
 
 
 def _order(wish: Wish, value: Value) -> tuple[tuple[tuple[int, float, str], ...], ...]:
-    """Numbers by size, words by the alphabet, what is not given last."""
+    """Numbers by size, words by the alphabet, missing values last."""
     return tuple(
         tuple(
             (2, 0.0, "") if x is None else (0, x, "") if isinstance(x, float) else (1, 0.0, x)

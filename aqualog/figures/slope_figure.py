@@ -1,4 +1,4 @@
-"""Slip slope of driven wheels over speed, level by level: what Figures 2.17 to 2.20 share."""
+"""Slip slope of driven wheels over speed, level by level: common parts of Figures 2.17 to 2.20."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _group(info: RunInfo, keys: Sequence[str]) -> tuple[tuple[str, float | str |
 
 
 def _dry(evidence: Evidence, selected: Selected) -> list[RunInfo]:
-    """Other runs of the same cars, tyres, pressures and loads: what they drive on dry road is a reference too."""
+    """Other runs of the same cars, tyres, pressures and loads: their driving on dry road is a reference too."""
     dry_keys = [f for f in _FAMILIES if f != "depth"]
     wanted = {tuple(value_of(r, f) for f in dry_keys) for r in selected.runs}
     return [

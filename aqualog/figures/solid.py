@@ -1,4 +1,4 @@
-"""Surface of differential traction with lines of fixed torque splits on it: what figures 3.4 and 3.5 have in common."""
+"""Surface of differential traction with lines of fixed torque splits on it: common parts of figures 3.4 and 3.5."""
 
 from __future__ import annotations
 

@@ -64,7 +64,8 @@ def _like(info: RunInfo) -> tuple[object, ...]:
 
 
 def spins(evidence: Evidence, info: RunInfo) -> bool:
-    """Whether a driven wheel spins up on the water: by its slip, since the detector leaves out what still holds."""
+    """Whether a driven wheel spins up on the water: by its slip, since the detector leaves out wheels that still have
+    grip."""
     samples, wet = evidence.wet(info)
     return any(int(np.count_nonzero(wet & is_spinning(samples, w))) >= _LEAST_STEPS for w in info.vehicle.driven)
 

@@ -21,7 +21,7 @@ __all__ = [
 
 HIGH_SLOPE, LOW_SLOPE = 30.0, 10.0  # C_s / F_z on both axles before and after the change (thesis 3.3) [-]
 HIGH_MU, LOW_MU = 1.0, 0.4  # [-] thesis Fig. 3.4
-REAR_SHARE = 0.6  # of the load and of the torque: both axles slip alike, which is what excitation is to cure (C95)
+REAR_SHARE = 0.6  # of the load and of the torque: both axles slip alike, which excitation must change (C95)
 RATE_HZ = 100.0
 STEP_S = 1e-3
 T_START = -10.0  # the change is at t = 0 and the excitation's phase zero there
@@ -95,7 +95,7 @@ def _drive(
 
 
 def inputs(d: Drive, car: HalfCar = SUV) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Differential slip, mu_F and rho mu_R: what the estimator formulated at the front axle takes, (3.18). [-]"""
+    """Differential slip, mu_F and rho mu_R: input of the estimator formulated at the front axle, (3.18). [-]"""
     v_f, v_r = car.r_e_f * d.omega_f, car.r_e_r * d.omega_r
     return differential_slip(v_f, v_r), d.mu_f, speed_ratio(v_f, v_r) * d.mu_r
 

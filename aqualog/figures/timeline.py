@@ -37,7 +37,7 @@ _FROM = -2.0  # [s] of the dry road that is drawn
 
 
 def true_slope(t_end: float) -> Line:
-    """What the road's slope is: the step at t = 0."""
+    """The road's slope: a step at t = 0."""
     return Line(
         "true", np.array([_FROM, 0.0, 0.0, t_end]), np.array([HIGH_SLOPE, HIGH_SLOPE, LOW_SLOPE, LOW_SLOPE]),
         colour=MUTED, dash="dot", width=1.5,
@@ -55,7 +55,7 @@ def estimate_lines(
     case : Case
     colour, dash : str
     t_end : float
-        End of what is drawn. [s]
+        End of the drawn time. [s]
     is_split : bool
         Thin and light where the estimator does not work, as in the thesis' figures 3.7 and on.
     """
@@ -105,7 +105,7 @@ def told(case: Case) -> str:
 
 
 def listed(times: Sequence[float]) -> str:
-    """Detection times, a dash for none."""
+    """Detection times, a dash for a missing one."""
     return " / ".join(seconds(t) for t in times)
 
 

@@ -1,4 +1,4 @@
-"""What deeper tread does to the resistance: claims that Figures 2.12 and 2.13 share."""
+"""Influence of deeper tread on the resistance: common claims of Figures 2.12 and 2.13."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact of one tyre on water as the simulator's physics has it: what Figures 2.1 and 2.2 show."""
+"""Contact of one tyre on water in the simulator's physics, for Figures 2.1 and 2.2."""
 
 from __future__ import annotations
 

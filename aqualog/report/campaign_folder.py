@@ -66,7 +66,7 @@ def check_folder(folder: Path, *, force: bool) -> None:
 def write_report(data: CampaignData, findings: Findings, folder: Path, *, report: Report = lambda *_: None) -> int:
     """Write the report; number of files. `check_folder` must have been asked before.
 
-    Each file is there whole or not at all, and the page comes last, so that what it links to is there. Pages of an
+    Each file is complete or absent, and the page comes last, so that its links work. Pages of an
     earlier report that have no run any more are removed; files that are not of a report stay.
     """
     pages = page_names([r.name for r in data.runs])

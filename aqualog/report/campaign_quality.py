@@ -38,7 +38,7 @@ _Test = Callable[[RunInfo], str]
 def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
     """All kinds of problems that occur, losses first, then by number of runs."""
     found = [
-        _all(data.runs, "loss", "without results", "in no result", lambda r: "" if r.is_done else _why(r)),
+        _all(data.runs, "loss", "without results", "not in any result", lambda r: "" if r.is_done else _why(r)),
         _of_done(data, "loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
         _of_done(data, "loss", "samples lost in damaged files", "", lambda r: _count(r, "lost_in_files", "lost")),
         _of_done(data, "loss", "samples dropped", "not used", lambda r: _count(r, "dropped_samples", "dropped")),

@@ -53,7 +53,7 @@ def slope_text(
     ]
     if speeds:
         rows = [_speed_cells(f) for f in speeds]
-        header = (*keys, "wheel", "from", "event", "km/h", "95 %", "rests on")
+        header = (*keys, "wheel", "from", "event", "km/h", "95 %", "based on")
         blocks += ["Speed of full aquaplaning, estimated from three kinds of events", table(header, rows)]
     if spin_ups:
         header = (*keys, "wheel", "km/h", "runs", "samples", "mu", "95 %", "without resistance")

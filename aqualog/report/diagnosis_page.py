@@ -36,7 +36,7 @@ def render_diagnosis_page(document: Mapping[str, Any], views: Sequence[ResidualV
     document : mapping
         As `diagnosis_document` makes it, or as it was read back from JSON.
     views : sequence of ResidualView
-        What the pictures before and after are drawn from.
+        Residuals for the pictures before and after.
     title : str
         Names the drives; may hold anything, it is escaped.
     """

@@ -33,7 +33,7 @@ def coordinate_axis(name: str) -> tuple[str, float, float]:
 
 
 def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> dict[str, Any]:
-    """What the page's script draws.
+    """Data that the page's script draws.
 
     Parameters
     ----------

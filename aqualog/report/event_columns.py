@@ -15,7 +15,7 @@ def event_columns(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
     -------
     dict
         `detectors`, `places` (with the colour of the wheel) and `severities`, into which `detector`, `place` and
-        `severity` are indices; `peak` and `evidence` as text, `ratio` what the peak is sorted by; `speed` in km/h, -1
+        `severity` are indices; `peak` and `evidence` as text, `ratio` the sort key of the peak; `speed` in km/h, -1
         where it is unknown.
     """
     detectors = _Index()

@@ -58,7 +58,7 @@ def make_plan(events: Sequence[Event], n: int, dt: float) -> Plan:
     done = 0
     for event in events:
         grown = merge_spans(np.vstack([windows, _windows_of(event, n, dt)]))
-        # several detectors report one incident; what lies in or beside a window that is there costs little or nothing
+        # several detectors report one incident; an event in or next to an existing window costs little
         if len(grown) <= MAX_WINDOWS and _size(grown) <= DETAIL_SAMPLES:
             windows, done = grown, done + 1
     return Plan(n, windows, done)

@@ -28,7 +28,7 @@ class Verdict:
 
 
 def by_importance(events: Sequence[Event]) -> list[Event]:
-    """Full before partial, what happened without braking first, joint detectors before single ones, then by time."""
+    """Full before partial, events without braking first, joint detectors before single ones, then by time."""
     return sorted(
         events,
         key=lambda e: (

@@ -23,7 +23,7 @@ class Check:
     `claim` as C7; `part` names the checked part where a claim has several checks; `statement` is this check's reading
     of the claim, empty for the claim's own words. `criterion` is fixed before any computation; `found` gives the result
     in words and numbers, with its conditions. `value` is the number judged, `ci95` its 95 % interval or its range over
-    what was varied, `unit` of both. `source`: what it was computed from.
+    what was varied, `unit` of both. `source`: the data behind it.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class Check:
         if not re.fullmatch(r"C\d{1,3}", self.claim):
             raise ConfigError(f'"{self.claim}" is not a claim', where=where, expected="C1 to C118")
         if self.verdict != REPRODUCED and not self.reason:
-            raise ConfigError(f"{self.verdict}, without a reason", where=where, expected="what differs, and why")
+            raise ConfigError(f"{self.verdict}, without a reason", where=where, expected="the difference and its cause")
         if self.ci95 is not None and not self.ci95[0] <= self.ci95[1]:
             raise ConfigError(f"interval {self.ci95} is not valid", where=where, expected="(low, high)")
         if self.value is not None and math.isnan(self.value):

@@ -32,7 +32,7 @@ _GAP_S = 1.0  # alarms closer than that are one
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One drive as detectors see it, with what a judge knows.
+    """One drive as detectors see it, with the truth for the judgement.
 
     `signals` has no truth; `truth` the true slip and contact of each wheel, `slip_fl`, `contact_fl`, arrays (n,) [-];
     `t` (n,) [s]; `dry` the stretches outside water and the second after it.
@@ -121,7 +121,7 @@ def score(
 ) -> Score:
     """Score an alarm bit of drives on water (episodes of `effect`, "full" or "partial") and of all others.
 
-    False alarms are those of the others: a car that has spun on water is no measure of what a dry road does.
+    False alarms are those of the others: a car that has spun on water says little about a dry road.
     """
     found = episodes = false = 0
     seconds = 0.0

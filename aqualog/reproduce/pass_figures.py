@@ -1,4 +1,4 @@
-"""What claims read off a simulated pass."""
+"""Quantities that claims use from a simulated pass."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class PassFigures:
 
 
 def figures_of(p: Pass, seed: int) -> PassFigures:
-    """Drive a pass and read off it what the claims need; the same pass and seed give the same figures."""
+    """Drive a pass and compute the quantities of the claims; the same pass and seed give the same values."""
     t, c, scenario = drive_pass(p, seed)
     on = (t > ENTRY) & (t < EXIT)
     # the wheels settle at both ends, and the rear axle comes later
@@ -151,7 +151,7 @@ def _spins(c: Mapping[str, FloatArray], wheel: str, spinning: BoolArray) -> Floa
 
 
 def _demand(c: Mapping[str, FloatArray], wheel: str, scenario: Scenario) -> FloatArray:
-    """Drive force less the water's resistance, over what the remaining contact can hold, array (n,). [-]"""
+    """Drive force minus the water's resistance, over the limit of the remaining contact, array (n,). [-]"""
     force = (c[f"torque_{wheel}"] - c[f"true_water_torque_{wheel}"]) / scenario.vehicle.r_l(wheel)
     residual = c[f"true_mu_max_{wheel}"] * c[f"true_load_{wheel}"]
     return np.asarray(force / np.maximum(residual, 1.0), dtype=np.float64)

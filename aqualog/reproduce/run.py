@@ -24,7 +24,7 @@ __all__ = ["Conclusion", "Made", "conclude", "make_all"]
 Report = Callable[[int, int], None]
 
 _FROM_CAMPAIGN = ("2.2", *figure_catalogue.OF_CAMPAIGN)
-"""Scenes of single drives are simulated anew: twenty seeds of each judge their claims, a campaign has one or three."""
+"""Scenes of single drives are simulated again: their claims need twenty seeds, and a campaign has one or three."""
 
 _Task = tuple[str, str, int]  # "figure", number, 0; or "checks", module, index of its maker
 
@@ -71,7 +71,7 @@ def make_all(data: CampaignData, *, jobs: int, report: Report) -> Made:
     found: dict[_Task, Figure | Checks | str] = {}
 
     def record(task: _Task, result: Figure | Checks | str | Crashed) -> None:
-        found[task] = "its process ended without a word" if isinstance(result, Crashed) else result
+        found[task] = "its process ended without a message" if isinstance(result, Crashed) else result
         report(len(found), total)
 
     report(0, total)

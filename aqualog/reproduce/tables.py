@@ -1,4 +1,4 @@
-"""Passes over seeds: made once, by several processes, and what is computed from them with its uncertainty."""
+"""Passes over seeds, made once by several processes, and results from them with their uncertainty."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def spread_over(work: Callable[[Item], Result], items: Sequence[Item], plan: Pla
     def record(start: int, results: list[Result] | Crashed) -> None:
         if isinstance(results, Crashed):
             raise ConfigError(
-                f"a process that made {what} ended without a word",
+                f"a process that made {what} ended without a message",
                 expected="memory for every process",
                 hint="fewer jobs",
             )

@@ -29,7 +29,7 @@ _OF_FIGURES: dict[FigureVerdict, Verdict] = {
 
 
 def of_figure(verdict: FigureVerdict) -> Verdict:
-    """The same in the words of the reproduction: borne out, in part, not borne out."""
+    """A figure's verdict (borne out, in part, not borne out) in the words of the reproduction."""
     return _OF_FIGURES[verdict]
 
 
@@ -41,7 +41,7 @@ def judged(*, whole: bool, part: bool = False) -> Verdict:
 def combined(verdicts: Iterable[Verdict]) -> Verdict:
     """One verdict on a claim from those of all its checks.
 
-    Reproduced only if every check is; not reproduced only if none of those that could be made is, not even with a
+    Reproduced only if every check is; not reproduced only if none of the possible checks is, not even with a
     difference; needing measured data only if no check could be made. A claim of which one half is reproduced and the
     other needs measured data is reproduced with a stated difference.
 

@@ -115,7 +115,7 @@ def crash(item):
 
 
 def test_a_process_that_ends_without_a_word_is_an_error():
-    with pytest.raises(ConfigError, match="without a word"):
+    with pytest.raises(ConfigError, match="without a message"):
         spread_over(crash, range(41), Plan((1,), 2), "passes")
 
 

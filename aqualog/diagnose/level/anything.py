@@ -65,10 +65,10 @@ def anything(
     groups : sequence of (name, columns)
         Columns of x that belong to one effect or function.
     surrogates : int
-        Campaigns of the same runs without effect: scatter as the data say, each run's own deviation drawn anew from
-        all runs' with random sign.
+        Campaigns of the same runs without effect: scatter estimated from the data, with each run's own deviation drawn
+        from all runs' with random sign.
 
-    The scatter is estimated in each surrogate as it was in the data, so that its own uncertainty counts.
+    Each surrogate estimates the scatter in the same way as the data, so that its uncertainty counts.
     """
     null = whole_fit(y, np.zeros((*y.shape, 0)), road, nuisances)
     whole = whole_fit(y, x, road, nuisances)

@@ -51,7 +51,8 @@ class Hypothesis:
 class Library(NamedTuple):
     """Hypotheses and `x` (g, c, k): change of the observations by one prior standard deviation of each parameter.
 
-    `columns` says which of the k each hypothesis has; `base` (g, c) is the model's expectation, `road` its variances.
+    `columns` lists which of the k belong to each hypothesis; `base` (g, c) is the model's expectation, `road` its
+    variances.
     """
 
     hypotheses: tuple[Hypothesis, ...]

@@ -32,7 +32,7 @@ def gain(
     ----------
     passes : Passes
     sets : sequence of Refit
-        Among which the choice is made anew in each fold, in the linear model about each set.
+        Sets among which each fold chooses, in the linear model about each set.
     scatter : Fit
     base : array (g, c)
         Expectation of the model without any effect.

@@ -25,7 +25,7 @@ from aqualog.vehicle import Vehicle
 __all__ = ["passes_of"]
 
 LEAST_S = 1.0  # [s] of usable driving on the water, and off it
-THINNED = 3  # samples between those at which the model is asked: slip and traction are means over 0.3 s
+THINNED = 3  # samples between evaluations of the model: slip and traction are means over 0.3 s
 Index = NDArray[np.int64]
 
 

@@ -125,7 +125,7 @@ def _matrix(records: Sequence[RunRecord], value: Any, title: str) -> dict[str, A
 
 
 def _line(name: str, names: Sequence[str]) -> dict[str, Any]:
-    """What a detector's line looks like: its colour among its own kind, dotted for a rival."""
+    """Style of a detector's line: its colour within its kind, dotted for a rival."""
     is_rival = name in RIVALS
     kind = [n for n in names if (n in RIVALS) == is_rival]
     colour = _COLOURS[kind.index(name) % len(_COLOURS)]

@@ -24,7 +24,7 @@ def lanes(result: DriveResult) -> list[Row]:
         found.append(Lane("On water (label)", VEHICLE, WATER, water))
     if not found:
         return []
-    caption = "a bar where the detector reports an event; an empty lane was judged, without event"
+    caption = "bars: the detector reports; an empty lane was judged, without event"
     return [Row("Detections", caption, "", lanes=tuple(found), height=18 * len(found) + 8)]
 
 

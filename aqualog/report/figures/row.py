@@ -25,7 +25,7 @@ VEHICLE = "vehicle"  # group of everything that belongs to no wheel
 class Line:
     """One signal over time. Lines of one `group` are shown and hidden together.
 
-    `units` are the values' and the axis's: only what is drawn of a long drive is converted.
+    `units` are the values' and the axis's: of a long drive only the drawn values are converted.
     """
 
     label: str

@@ -27,7 +27,7 @@ TOP, BOTTOM = 58, 44  # [px] above the first row stand its title, the upper time
 
 
 def stack(rows: Sequence[Row], plan: Plan, dt: float) -> dict[str, Any]:
-    """Figure, samples and what the script must know of the rows.
+    """Figure, samples and the rows' data for the script.
 
     Returns
     -------

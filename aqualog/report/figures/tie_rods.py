@@ -1,4 +1,4 @@
-"""Tie-rod forces, or the steering torque, beside what a dry road would make of them."""
+"""Tie-rod forces, or the steering torque, beside the expectation for a dry road."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ WITH_PROCESSES = (
 
 
 def makers(module: str) -> tuple[tuple[tuple[str, ...], Maker], ...]:
-    """What a module can check: claims and function."""
+    """Checks of a module: claims and function."""
     found: tuple[tuple[tuple[str, ...], Maker], ...] = import_module(f"aqualog.reproduce.checks.{module}").CHECKS
     return found
 

@@ -1,4 +1,4 @@
-"""Contact patch: residual friction and slip stiffness by integration, and what noise leaves of a friction estimate."""
+"""Contact patch: residual friction and slip stiffness by integration, and a friction estimate under noise."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ SEEDS = range(11000, 11200)
 
 
 def _linear_tyre(plan: Plan) -> Checks:
-    """How far the line of 3.14 is off on the brush, and what its offset is for."""
+    """Error of the line of 3.14 on the brush, and the purpose of its offset."""
     mu = np.linspace(-0.2, 0.2, 401)
     s = np.linspace(-0.03, 0.03, 20001)
     force = brush_force(s, np.ones(1), mu=1.0, C_s=HIGH_SLOPE)
@@ -57,7 +57,7 @@ def _linear_tyre(plan: Plan) -> Checks:
 
 
 def _common_drop(plan: Plan) -> Checks:
-    """C85: what a slow ratio is for, by making it as fast as the slope."""
+    """C85: purpose of a slow ratio, shown with a ratio as fast as the slope."""
     found: dict[str, list[tuple[float, float, float]]] = {"slow": [], "fast": []}
     # as free as the slope: neither slowed by its process noise nor held where the data do not determine it
     fast = TUNING._replace(q_beta=1e-4, sd_beta=0.3, told_beta=np.inf)
@@ -97,7 +97,7 @@ def _common_drop(plan: Plan) -> Checks:
 
 
 def _change_detection(plan: Plan) -> Checks:
-    """C89: identity of the sums, and what the detection is for, by leaving it out."""
+    """C89: identity of the sums, and purpose of the detection, shown without it."""
     rng = np.random.default_rng(plan.seeds[0])
     nu = rng.normal(0.0, 2e-3, 3000) + np.where(np.arange(3000) > 1500, 3e-3, -2e-3)
     p = cusum.CusumParams(1e-3, np.inf, np.inf, DT)
@@ -144,7 +144,7 @@ def _change_detection(plan: Plan) -> Checks:
 
 
 def _activation(plan: Plan) -> Checks:
-    """C91: what the gates are for, by leaving them out: a spinning wheel, hard traction, braking, standing still."""
+    """C91: purpose of the gates, shown without them: a spinning wheel, hard traction, braking, standing still."""
     seeds = plan.first(60)
     wrong = {"with": 0, "without": 0}
     off: dict[str, list[float]] = {"with": [], "without": []}

@@ -1,4 +1,4 @@
-"""Active excitation: waveforms against their definitions, forces that cancel, and what negative forces are for."""
+"""Active excitation: waveforms against their definitions, forces that cancel, and the purpose of negative forces."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _sums(plan: Plan) -> Checks:
 
 
 def _negative_forces(_: Plan) -> Checks:
-    """C116: constant speed asks for little force; what positive forces alone can excite, and what negative ones can."""
+    """C116: constant speed needs little force; excitation with positive forces alone and with negative ones."""
     rows = {}
     for kind, amplitude in (("relative", 1.0), ("mu", 0.05)):
         case = Case("sine", amplitude, kind, 8.0, a_x=0.0)

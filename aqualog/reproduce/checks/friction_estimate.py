@@ -1,4 +1,4 @@
-"""What noise leaves of an estimate of the maximum friction."""
+"""Accuracy of an estimate of the maximum friction under noise."""
 
 from __future__ import annotations
 

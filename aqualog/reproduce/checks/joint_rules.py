@@ -197,7 +197,7 @@ def _slope(plan: Plan) -> Checks:
 
 
 def _resistance(plan: Plan) -> Checks:
-    """C69: what the resistance adds to criteria 1 to 4."""
+    """C69: contribution of the resistance to criteria 1 to 4."""
     found = added = episodes = 0
     for d in drives(WATER, plan, _PER_WATER):
         v = variants(d.name, d.seed)

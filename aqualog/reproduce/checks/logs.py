@@ -58,7 +58,7 @@ def _drivetrains(plan: Plan) -> Checks:
             reason=""
             if served and matters
             else "With the wrong axle the driven wheels are watched, and on water they dip "
-            "too; what is lost is a part of the episodes, not half.",
+            "too; a part of the episodes is lost, but not half.",
             source="drawn situations; tyres, pressures and depths of a campaign are its columns",
         ),
     )

@@ -1,4 +1,4 @@
-"""Which parameters the resistance measure depends on, and what an estimate on dry road is worth."""
+"""Parameters that the resistance measure depends on, and the benefit of an estimate on dry road."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _most_important(plan: Plan) -> Checks:
             judged(whole=helps, part=off["learnt"] < off["as in the file"]),
             part="dry estimate",
             value=off["learnt"] / off["as in the file"],
-            reason="" if helps else "What is learnt is one offset, not the parameters themselves.",
+            reason="" if helps else "Only one offset is learnt, not the parameters themselves.",
             source="drawn situations with load and rolling resistance",
         ),
     )

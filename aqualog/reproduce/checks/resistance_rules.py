@@ -72,7 +72,7 @@ def _sign(plan: Plan) -> Checks:
 
 
 def _balance(plan: Plan) -> Checks:
-    """C35: formula by hand, and what it leaves on dry drives with everything known."""
+    """C35: formula by hand, and its remainder on dry drives with all parameters known."""
     rng = np.random.default_rng(plan.seeds[0])
     n = 2000
     T, F_z = rng.uniform(-500.0, 800.0, (4, n)), rng.uniform(2e3, 6e3, (4, n))

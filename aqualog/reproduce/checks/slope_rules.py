@@ -1,4 +1,4 @@
-"""Slip slope as a sign of water: what it is compared with, and what else lowers it."""
+"""Slip slope as a sign of water: its reference, and other causes of a drop."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ _YIELDING = ("snow_entry", "snow", "deep_snow", "gravel")
 
 
 def _not_unique(plan: Plan) -> Checks:
-    """C57: roads that yield lower the slope; what the drop alone and the joint detector make of them."""
+    """C57: roads that yield lower the slope; results of the drop alone and of the joint detector."""
     rows = {}
     for name in _YIELDING:
         found = [variants(d.name, d.seed) for d in drives((name,), plan, 6 if name == "snow_entry" else 3)]
@@ -126,7 +126,7 @@ def _not_unique(plan: Plan) -> Checks:
             reason=""
             if whole
             else "On a steady drive the traction is too even to estimate a slope, so that the drop is "
-            "often not seen; what is seen is not taken for water.",
+            "often not seen; a drop that is seen is not reported as water.",
             source="drawn situations",
         ),
     )
@@ -165,7 +165,7 @@ def _unchanged(plan: Plan) -> Checks:
             "the simulator's damp road and dry ice have the slope of the dry one by assumption",
             NEEDS_DATA,
             part="road",
-            reason="What a road does to a tyre's slope is measured, not computed: drives of one tyre over dry, damp "
+            reason="The influence of a road on a tyre's slope needs measurements: drives of one tyre over dry, damp "
             "and icy stretches at the same temperature.",
             source="none",
         ),

@@ -76,7 +76,7 @@ def _spun_when_kicked(item: tuple[str, int]) -> tuple[bool, bool, bool]:
 
 
 def _traction_limit(plan: Plan) -> Checks:
-    """C27: spin-ups on snow and ice with and without the limit, and what the limit costs on water."""
+    """C27: spin-ups on snow and ice with and without the limit, and the cost of the limit on water."""
     rows: dict[str, tuple[int, int, int]] = {}
     for name in _SLIPPERY:
         found = spread_over(_spun_when_kicked, [(name, seed) for seed in plan.first(_KICKED)], plan, "drives")

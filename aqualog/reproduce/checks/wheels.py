@@ -188,7 +188,7 @@ def _moving_variance(plan: Plan) -> Checks:
 
 
 def _variance_difference(plan: Plan) -> Checks:
-    """C31: against two variances taken apart; what both axles see alike; and on a rough road."""
+    """C31: comparison with two separate variances, a disturbance of both axles, and a rough road."""
     rng = np.random.default_rng(plan.seeds[0])
     p = minor_spin_down.MinorParams.make(_DT)._replace(var_min=np.inf)
 
