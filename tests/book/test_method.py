@@ -168,7 +168,7 @@ def rows():
         yield "../validation/rivals", f"| `{name}` |"
 
 
-@pytest.mark.parametrize(("name", "row"), rows(), ids=str)
+@pytest.mark.parametrize(("name", "row"), list(rows()), ids=str)
 def test_numbers_are_those_of_the_code(name, row):
     assert row in page(name)
 
