@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,11 +15,16 @@ __all__ = ["generated", "main"]
 def generated() -> dict[Path, str]:
     """Every generated file with its text."""
     from aqualog.book import reference
+    from aqualog.book.documents import DOCUMENTS
+    from aqualog.book.documents.fields import schema
     from aqualog.book.reference import commands_page
     from aqualog.cli.commands import loaded
 
     found = {DOCS / "reference" / "commands.md": commands_page.text(loaded())}
     found |= {DOCS / "reference" / f"{n}.md": reference.page(n) for n in reference.PAGES if n != "commands"}
+    for name, document in DOCUMENTS.items():
+        text = json.dumps(schema(document), indent=1, ensure_ascii=False) + "\n"
+        found[DOCS / "schemas" / f"{name}.schema.json"] = text
     if find_spec("aqualog.book.sources"):
         from importlib import import_module
 

@@ -7,7 +7,7 @@ from importlib import import_module
 __all__ = ["PAGES", "page"]
 
 PAGES = (
-    "commands", "signals", "map", "vehicle", "campaign", "scenario", "thresholds", "effects", "exit_codes",
+    "commands", "signals", "map", "vehicle", "campaign", "scenario", "thresholds", "effects", "documents", "exit_codes",
     "environment", "python",
 )  # fmt: skip
 

@@ -1,0 +1,182 @@
+"""`aqualog diagnose --json`."""
+
+from __future__ import annotations
+
+from aqualog.book.documents.fields import (
+    HEAD,
+    Document,
+    by_name,
+    count,
+    flag,
+    interval,
+    mapping,
+    number,
+    obj,
+    or_null,
+    rows,
+    several,
+    text,
+)
+from aqualog.book.documents.shared import TERMS
+
+__all__ = ["DOCUMENT"]
+
+_PARAMETER = (
+    number("value", "unit of the parameter", "estimate", null=True),
+    interval("ci95", "unit of the parameter", "95 % interval"),
+    text("unit", "unit"),
+)
+_CAUSE = (
+    text("effect", "name of the effect, see the page of effects"),
+    text("where", "its place; null for the whole car", null=True),
+    text("key", "`effect` or `effect@where`"),
+    by_name("parameters", "each parameter", _PARAMETER),
+    several("explains", "channels that it explains"),
+    text("sentence", "the cause in words"),
+)
+_RATES = (
+    text("detector", "detector"),
+    count("false_alarms_before", "false alarms on simulated dry drives, without the causes", null=True),
+    count("false_alarms_after", "the same with them", null=True),
+    *or_null(
+        number("distance_km", "km", "length of these drives"),
+        number("per_100km_before", "1/(100 km)", "rate without the causes"),
+        number("per_100km_after", "1/(100 km)", "rate with them"),
+        number("latency_before_s", "s", "time to the warning on simulated wet drives, without the causes"),
+        number("latency_after_s", "s", "the same with them"),
+    ),
+    count("found_before", "wet passes found without the causes", null=True),
+    count("found_after", "the same with them", null=True),
+    count("passes", "wet passes", null=True),
+)
+_ERRORS = (
+    text("unit", "unit of the channel"),
+    *or_null(
+        number("rmse_before", "unit of the channel", "error one step ahead, of the base"),
+        number("rmse_after", "unit of the channel", "the same with the causes"),
+        number("rmse_change", "-", "relative change, negative where the error falls"),
+        number("free_before", "unit of the channel", "error after half a minute of free running, of the base"),
+        number("free_after", "unit of the channel", "the same with the causes"),
+        number("free_change", "-", "relative change"),
+    ),
+)
+
+DOCUMENT = Document(
+    "diagnose",
+    "aqualog diagnose --json",
+    "What the simulation gets wrong: the cause, its size, how sure, and what it gains.",
+    (
+        *HEAD,
+        text("vehicle", "name of the car"),
+        several("logs", "the logs as they were named"),
+        several("drives", "the drives that were used"),
+        number("duration_s", "s", "their length", null=True),
+        number("used_s", "s", "time used", null=True),
+        text("verdict", "all six are results", ("no_effect", "named", "compound", "cannot_tell", "unexplained",
+             "not_testable")),
+        text("sentence", "the verdict in words"),
+        rows("causes", "the causes; with `cannot_tell` the set that the log cannot separate", _CAUSE),
+        several("alternatives", "keys of other sets of causes that explain it about as well", several("", "")),
+        rows("alternative_sets", "the same with their estimates", (
+            rows("causes", "the causes of the set", _CAUSE),
+            number("evidence_ratio", "-", "evidence of the verdict's set over this one", null=True),
+        )),
+        rows("agreement", "of several drives: whether each by itself agrees", (
+            text("key", "cause"),
+            text("parameter", "parameter"),
+            number("p_value", "-", "probability of such differences by chance", null=True),
+            flag("holds", "whether the drives agree"),
+            rows("drives", "each drive", (
+                text("drive", "drive"),
+                *_PARAMETER,
+                number("from_others", "unit of the parameter", "estimate from the other drives", null=True),
+                number("log_score_gain", "nats", "gain on this drive with the estimate from the others", null=True),
+            )),
+        )),
+        rows("unexplained", "what no effect of the library explains", (
+            text("channel", "residual"),
+            several("depends_on", "signals that it is a function of"),
+            number("share", "-", "share of the residual's variance", null=True),
+            number("p_value", "-", "probability by chance", null=True),
+            several("x", "values of these signals, a row per point", several("", "", number("", "", "", null=True))),
+            several("f", "the function there", number("", "unit of the channel", "", null=True)),
+            several("low", "lower end of its band", number("", "unit of the channel", "", null=True)),
+            several("high", "upper end of its band", number("", "unit of the channel", "", null=True)),
+            several("proxies", "signals that go along with them"),
+            text("nearest", "the effect that looks most like it; null without one", null=True),
+            number("cosine", "-", "how much it looks like it, 0 to 1", null=True),
+            text("sentence", "the same in words"),
+        )),
+        obj("gain", "what the causes gain in the model; null without causes", (
+            by_name("channel", "errors by residual", _ERRORS),
+            number("heldout_log_score_gain", "nats", "gain on held-out drives; null without them", null=True),
+            interval("ci95", "nats", "95 % interval"),
+            number("in_sample_log_score_gain", "nats", "gain on the diagnosed drives; null with held-out ones",
+                   null=True),
+            interval("in_sample_ci95", "nats", "95 % interval"),
+            text("unit", "unit of the gains"),
+            several("heldout", "the held-out drives"),
+            flag("in_sample", "whether the gain is on the diagnosed drives themselves"),
+            rows("consequences", "what it means for the detectors", _RATES),
+            several("notes", "sentences on the gain"),
+        ), null=True),
+        number("false_alarm_level", "-", "level of the test for any effect at all; null if it was not made", null=True),
+        obj("significance", "that test; null if it was not made", (
+            *or_null(
+                number("statistic", "-", "statistic"),
+                number("threshold", "-", "its threshold"),
+                number("p_value", "-", "probability by chance"),
+                number("level", "-", "level of the test"),
+                number("achieved_level", "-", "level that so many surrogates can resolve"),
+            ),
+            count("surrogates", "surrogates of the noise", null=True),
+        ), null=True),
+        mapping("detection_limits", "smallest size that would have been found, by cause, in words",
+                text("", "", null=True)),
+        rows("limits", "the same as numbers", (
+            text("key", "cause"),
+            text("effect", "effect"),
+            text("where", "place", null=True),
+            number("size", "unit", "smallest size found with a probability of 0.9", null=True),
+            text("unit", "unit"),
+            number("smallest_worth_naming", "unit", "smallest size that is worth naming", null=True),
+            number("ratio", "-", "one over the other", null=True),
+        )),
+        rows("isolability", "causes that this log cannot distinguish", (
+            text("effect", "cause"),
+            several("rivals", "causes that look like it"),
+            number("separation", "-", "distance of their signatures", null=True),
+            number("p_correct", "-", "probability of the right name", null=True),
+            text("relation", "how their sizes go together; empty without a relation"),
+            several("sizes", "sizes at which they are compared", number("", "", "", null=True)),
+        )),
+        obj("isolability_pairs", "probability of the right name for each pair", (
+            several("effects", "causes, in the order of rows and columns"),
+            several("p_correct", "rows of the table; null on the diagonal",
+                    several("", "", number("", "-", "", null=True))),
+        )),
+        obj("next_manoeuvre", "what to drive next; null where no drive would help", (
+            text("name", "manoeuvre"),
+            several("separates", "pairs of causes that it separates", several("", "")),
+            text("sentence", "the same in words"),
+            *or_null(
+                number("separation_now", "-", "distance of the signatures in this log"),
+                number("separation_then", "-", "distance with the manoeuvre"),
+                number("p_correct_now", "-", "probability of the right name in this log"),
+                number("p_correct_then", "-", "probability with the manoeuvre"),
+                number("minutes", "min", "time that it takes"),
+            ),
+        ), null=True),
+        text("extended_model", "model file that was written; null without `-o`", null=True),
+        rows("model", "terms of the extended model", TERMS),
+        several("channels", "residuals that were judged"),
+        mapping("channel_units", "their units", text("", "")),
+        mapping("untested", "effects that were not tested, and why", text("", "")),
+        obj("criteria", "probabilities behind the words", (
+            number("interval", "-", "level of all intervals"),
+            number("power", "-", "probability at the detection limits"),
+            number("told_apart", "-", "probability of the right name from which two causes count as distinguished"),
+        )),
+        several("notes", "sentences on the logs and on the diagnosis"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,228 @@
+"""Columns of the tables that aqualog writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aqualog.book.documents.fields import Field, count, flag, number, text
+from aqualog.book.documents.shared import FAULT_COUNTS
+
+__all__ = ["TABLES", "Table"]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: its file, who writes it, and its columns. `WHEEL` in a name stands for each wheel."""
+
+    name: str
+    source: str
+    summary: str
+    columns: tuple[Field, ...]
+
+
+_RUNS = Table(
+    "runs.parquet",
+    "`aqualog batch` into the store",
+    "A row per run of the campaign.",
+    (
+        count("run", "index from 0, in the order of the campaign file"),
+        text("name", "log, or logs with ; between them"),
+        text("key", "name of its files in the store"),
+        text("state", "done, failed or to do"),
+        text("reason", "why it failed"),
+        text("vehicle", "vehicle file"),
+        text("tyre", "key of the run"),
+        text("wear", "key of the run"),
+        text("manoeuvre", "key of the run"),
+        number("tread_depth_mm", "mm", "key of the run"),
+        number("pressure_front_bar", "bar", "key of the run"),
+        number("pressure_rear_bar", "bar", "key of the run"),
+        number("water_depth_mm", "mm", "key of the run"),
+        number("water_depth_left_mm", "mm", "key of the run"),
+        number("load_front_kg", "kg", "key of the run"),
+        number("load_rear_kg", "kg", "key of the run"),
+        number("lane_start_s", "s", "key of the run"),
+        number("lane_end_s", "s", "key of the run"),
+        text("x_...", "keys of your own"),
+        count("start_ns", "absolute time of the first sample since 1970", "ns"),
+        number("duration_s", "s", "length"),
+        number("distance_m", "m", "way"),
+        number("v_min_kmh", "km/h", "least speed"),
+        number("v_max_kmh", "km/h", "greatest speed"),
+        number("sample_rate_hz", "Hz", "rate of the common time grid"),
+        text("slip_against", "what the slip is measured against"),
+        text("traction", "source of the traction"),
+        count("events_DETECTOR", "events of each detector; null where it could not run"),
+        text("unavailable", "detectors that could not run"),
+        flag("truncated", "whether a file ends before its end"),
+        count("dropped_samples", "samples that were left out"),
+        count("time_jumps", "jumps of the time"),
+        count("lost_in_files", "samples that the reader lost"),
+        *FAULT_COUNTS,
+        text("notes", "sentences on the log"),
+    ),
+)
+_EVENTS = Table(
+    "events.parquet",
+    "`aqualog batch` into the store",
+    "A row per event of all runs.",
+    (
+        count("run", "index of the run"),
+        text("name", "log"),
+        text("key", "name of its files in the store"),
+        text("detector", "detector"),
+        text("wheel", "wheel; null where it does not apply"),
+        text("side", "side; null where it does not apply"),
+        number("start_s", "s", "begin, from the log's first sample"),
+        number("end_s", "s", "end"),
+        text("severity", "partial or full"),
+        number("peak", "unit of the statistic", "greatest value of the statistic"),
+        number("threshold", "unit of the statistic", "its threshold"),
+        number("v_x", "m/s", "speed at the begin"),
+        number("slip_min", "-", "least slip"),
+        text("decided_by", "detectors that decided, of a joint one"),
+    ),
+)
+_SAMPLES = Table(
+    "samples/KEY.parquet",
+    "`aqualog batch` into the store",
+    "Ten samples a second of one drive: what the regressions need.",
+    (
+        number("t", "s", "middle of the step, from the log's first sample"),
+        number("v_x", "m/s", "speed"),
+        number("a_x", "m/s^2", "acceleration from the speed"),
+        number("a_over_v", "1/s", "acceleration over speed"),
+        number("delta_a_x", "m/s^2", "resistance measure (2.9), mean over the step, with no offset taken off"),
+        number("on_water", "-", "label of the log"),
+        number("water_depth_left", "m", "measured depth"),
+        number("water_depth_right", "m", "measured depth"),
+        number("slip_WHEEL", "-", "slip (3.13)"),
+        number("slip_min_WHEEL", "-", "least deviation of the wheel from the car"),
+        number("slip_max_WHEEL", "-", "greatest deviation"),
+        number("mu_WHEEL", "-", "traction coefficient"),
+        flag("spin_WHEEL", "whether a spin-down or spin-up is going on"),
+        flag("minor_WHEEL", "whether a minor spin-down is going on"),
+        count("reason", "0: the sample counts for the regression; else why it does not"),
+    ),
+)
+_SIGNALS = Table(
+    "signals.parquet",
+    "`aqualog detect -o DIR`; `--write FILE` has the same as channels",
+    "Signals, statistics and detection bits of one drive on the common time grid.",
+    (
+        number("t", "s", "time from the log's first sample"),
+        number("SIGNAL", "SI", "every signal of the drive, see the page of signals"),
+        number("DETECTOR_PLACE", "unit of the statistic", "statistic of a detector at a wheel or side"),
+        number("DETECTOR_PLACE_bit", "-", "1 while the detector is active, else 0"),
+    ),
+)
+_SLOPES = Table(
+    "slip_slope.csv",
+    "`aqualog slip-slope -o DIR`",
+    "A line per place over the whole drive, and one per part of it.",
+    (
+        text("place", "side or axle"),
+        number("start_s", "s", "begin"),
+        number("end_s", "s", "end"),
+        number("used_s", "s", "time used"),
+        count("samples", "samples"),
+        number("slope", "-", "slip slope C_s / F_z"),
+        number("slope_low", "-", "lower end of the 95 % interval"),
+        number("slope_high", "-", "upper end"),
+        number("offset", "-", "offset of the slip"),
+        number("offset_low", "-", "lower end of the 95 % interval"),
+        number("offset_high", "-", "upper end"),
+        text("reason", "why there is no slope"),
+    ),
+)
+_CLAIMS = Table(
+    "claims.csv",
+    "`aqualog reproduce -o DIR`",
+    "A line per check of a claim.",
+    (
+        text("claim", "C1 to C118"),
+        text("where", "place in the thesis"),
+        text("kind", "what kind of claim"),
+        text("statement", "what the thesis says"),
+        text("verdict", "verdict of the claim"),
+        text("part", "part of the claim"),
+        text("criterion", "what must come out"),
+        text("found", "what came out"),
+        number("value", "unit", "the same as a number"),
+        number("low", "unit", "lower end of the interval"),
+        number("high", "unit", "upper end"),
+        text("unit", "unit"),
+        text("check_verdict", "verdict of the check"),
+        text("reason", "why it differs"),
+        text("source", "drives and seeds, or the figure"),
+    ),
+)
+_PLACE = (text("KEY", "grouping keys of `--by`"), text("place", "wheel or side; of the resistance empty"))
+_BIN = (
+    number("v_low_kmh", "km/h", "lower end of the bin of speed"),
+    number("v_high_kmh", "km/h", "upper end"),
+    number("v_mean_kmh", "km/h", "mean speed"),
+)
+_REGRESSION = (
+    number("ci95_low", "", "lower end of the 95 % interval"),
+    number("ci95_high", "", "upper end"),
+    count("runs", "runs"),
+    count("samples", "samples of 0.1 s"),
+    flag("reliable", "see the document of the command"),
+    number("expected", "", "what the model gives"),
+    number("dry", "", "the same off the water"),
+    number("dry_ci95_low", "", "lower end of its interval"),
+    number("dry_ci95_high", "", "upper end"),
+    text("reason", "why there is none"),
+)
+_REPORT = "`aqualog report -o DIR`"
+_REPORT_SLOPE = Table(
+    "data/slip_slope.csv",
+    _REPORT,
+    "Slip slope over speed, as on the page.",
+    (*_PLACE, *_BIN, number("slope", "-", "slip slope"), *_REGRESSION),
+)
+_REPORT_RESISTANCE = Table(
+    "data/resistance.csv",
+    _REPORT,
+    "Resistance over speed, as on the page.",
+    (*_PLACE, *_BIN, number("delta_a_x", "m/s^2", "mean resistance measure"), *_REGRESSION),
+)
+_REPORT_SPEED = Table(
+    "data/full_aquaplaning.csv",
+    _REPORT,
+    "Speeds of full aquaplaning, as on the page.",
+    (
+        *_PLACE,
+        text("way", "how it was found"),
+        number("v_kmh", "km/h", "speed"),
+        number("ci95_low_kmh", "km/h", "lower end of the 95 % interval"),
+        number("ci95_high_kmh", "km/h", "upper end"),
+        text("rests_on", "what it rests on"),
+        text("reason", "why there is none"),
+    ),
+)
+_REPORT_RUNS = Table(
+    "data/runs.csv",
+    _REPORT,
+    "All runs, as on the page.",
+    (
+        count("run", "number from 1"),
+        text("log", "log"),
+        text("page", "page of the run"),
+        text("state", "done, failed or to do"),
+        text("reason", "why it failed"),
+        text("vehicle", "vehicle file"),
+        text("KEY", "every key that the runs have"),
+        number("duration_s", "s", "length"),
+        number("lane_v_kmh", "km/h", "mean speed on the water"),
+        number("lane_s", "s", "time on the water"),
+        number("dry_km", "km", "way off the water"),
+        count("events_DETECTOR", "events of each detector"),
+    ),
+)
+
+TABLES = (
+    _SIGNALS, _SLOPES, _RUNS, _EVENTS, _SAMPLES, _REPORT_RUNS, _REPORT_SLOPE, _REPORT_RESISTANCE, _REPORT_SPEED,
+    _CLAIMS,
+)  # fmt: skip
