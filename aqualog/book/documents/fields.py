@@ -138,12 +138,11 @@ def paths(fields: Sequence[Field], before: str = "") -> Iterator[tuple[str, Fiel
     for field in fields:
         path = f"{before}{field.name}"
         yield path, field
-        step = {"list": "[].", "by name": ".NAME.", "object": "."}.get(field.kind, ".")
-        yield from paths(field.fields, path + step)
-        item = field.item
-        while item is not None:
-            yield from paths(item.fields, path + step)
-            item = item.item
+        inner: Field | None = field
+        while inner is not None:
+            path += {"list": "[].", "by name": ".NAME."}.get(inner.kind, ".")
+            yield from paths(inner.fields, path)
+            path, inner = path.removesuffix("."), inner.item
 
 
 def schema(document: Document) -> dict[str, Any]:

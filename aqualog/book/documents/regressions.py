@@ -93,7 +93,7 @@ SLIP_SLOPE = Document(
             _ci("delay_s_ci95", "s"),
             count("runs", "runs behind it"),
             count("samples", "samples behind it"),
-            text("reason", "why there is none; null if there is", null=True),
+            text("reason", "why there is no value; null if there is one", null=True),
         )),
         rows("full_aquaplaning", "speed of full aquaplaning, in up to three ways", (
             *_WHEELS,
@@ -104,7 +104,7 @@ SLIP_SLOPE = Document(
             _ci("v_full_ci95_kmh", "km/h"),
             number("exponent", "-", "exponent of the contact's fall over speed", null=True),
             text("rests_on", "what the speed rests on; null if it does not", null=True),
-            text("reason", "why there is none; null if there is", null=True),
+            text("reason", "why there is no value; null if there is one", null=True),
         ), keys=PLACE_KEYS),
         rows("spin_ups", "traction coefficient of spinning wheels", (
             *_PLACE, *BIN,
@@ -112,7 +112,7 @@ SLIP_SLOPE = Document(
             number("mu_residual", "-", "least traction coefficient while it spins", null=True),
             _ci("mu_residual_ci95", "-"),
             flag("reliable", "3 runs or more"),
-            text("reason", "why there is none; null if there is", null=True),
+            text("reason", "why there is no value; null if there is one", null=True),
         ), keys=PLACE_KEYS),
         rows("minor_spin_downs", "minor spin-downs by wheel and bin of speed", (
             *_PLACE,
@@ -143,7 +143,7 @@ RESISTANCE = Document(
             number("scatter", "m/s^2", "scatter of the runs", null=True),
             number("dof", "-", "degrees of freedom (Satterthwaite)", null=True),
             flag("reliable", "3 runs or more and an interval"),
-            text("reason", "why there is none; null if there is", null=True),
+            text("reason", "why there is no value; null if there is one", null=True),
         ), keys=PLACE_KEYS),
     ),
 )  # fmt: skip

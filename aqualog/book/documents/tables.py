@@ -173,7 +173,7 @@ _REGRESSION = (
     number("dry", "", "the same off the water"),
     number("dry_ci95_low", "", "lower end of its interval"),
     number("dry_ci95_high", "", "upper end"),
-    text("reason", "why there is none"),
+    text("reason", "why there is no value"),
 )
 _REPORT = "`aqualog report -o DIR`"
 _REPORT_SLOPE = Table(
@@ -199,7 +199,7 @@ _REPORT_SPEED = Table(
         number("ci95_low_kmh", "km/h", "lower end of the 95 % interval"),
         number("ci95_high_kmh", "km/h", "upper end"),
         text("rests_on", "what it rests on"),
-        text("reason", "why there is none"),
+        text("reason", "why there is no value"),
     ),
 )
 _REPORT_RUNS = Table(

@@ -18,8 +18,12 @@ not available is null; NaN and infinity never appear. `[]` marks a list, `NAME` 
 each document lies in `aqualog/docs/schemas`; aqualog's own tests hold every document against it. New fields may be
 added without a new `schema_version`.
 
+Gains of a log score are in nats (natural logarithm of a likelihood ratio).
+
 Names of detectors: see [thresholds](thresholds.md). Names of effects: see [effects](effects.md).
 """
+_LONG = 4
+_STEP = {"list": "[].", "by name": ".NAME."}
 _TABLES = """
 Tables are Parquet files, which polars, pandas and DuckDB open as they are, or CSV files with commas and decimal points.
 """
@@ -56,8 +60,28 @@ def _document(document: Document) -> list[str]:
 
 
 def _rows(document: Document) -> Iterable[tuple[str, str, str, str]]:
+    """Every field; fields that stood before, as those of a score, are named by where."""
+    shown: dict[tuple[Field, ...], str] = {}
+    before = ""
     for path, field in paths(document.fields):
-        yield code(path), _type(field), field.unit, _meaning(field)
+        if before and path.startswith(before):
+            continue
+        before = ""
+        meaning = _meaning(field)
+        inner = _inner(field)
+        if inner in shown and len(inner) >= _LONG:
+            meaning = f"{meaning}; fields as those of `{shown[inner]}`"
+            before = f"{path}{_STEP.get(field.kind, '.')}"
+        elif inner:
+            shown[inner] = path
+        yield code(path), _type(field), field.unit, meaning
+
+
+def _inner(field: Field) -> tuple[Field, ...]:
+    """The fields of an object, or of what a list or table of objects holds."""
+    while field.item is not None:
+        field = field.item
+    return field.fields
 
 
 def _type(field: Field) -> str:

@@ -104,7 +104,7 @@ def _signature(x: Any, most: int = _MOST) -> str:
         if p.kind is p.KEYWORD_ONLY and not has_star:
             parts.append("*")
         has_star = has_star or p.kind in (p.KEYWORD_ONLY, p.VAR_POSITIONAL)
-        star = {p.VAR_POSITIONAL: "*", p.VAR_KEYWORD: "**"}.get(p.kind, "")
+        star = "*" if p.kind is p.VAR_POSITIONAL else "**" if p.kind is p.VAR_KEYWORD else ""
         parts.append(f"{star}{name}{_annotation(p.annotation, ': ')}{_default(p.default)}")
     end = "" if inspect.isclass(x) else _annotation(signature.return_annotation, " -> ")
     line = f"({', '.join(parts)}){end}"

@@ -1,0 +1,227 @@
+"""Every JSON document is as its schema says, the schemas come from the field tables, and the reference has every field."""
+
+import json
+from types import SimpleNamespace
+
+import polars as pl
+import pytest
+from conftest import ROOT
+from typer.testing import CliRunner
+
+from aqualog.book.documents import DOCUMENTS
+from aqualog.book.documents.fields import number, obj, paths, rows, schema, text
+from aqualog.book.documents.tables import TABLES
+from aqualog.book.topics import DOCS
+from aqualog.cli.main import app
+
+jsonschema = pytest.importorskip("jsonschema")
+
+SAMPLES = ROOT / "sample_logs"
+CAR = ("--vehicle", str(SAMPLES / "vehicle.toml"))
+MF4 = str(SAMPLES / "lane_drive.mf4")
+MONDAY, FRIDAY = (str(SAMPLES / f"loaded_{day}.parquet") for day in ("monday", "friday"))
+PAGE = (DOCS / "reference" / "documents.md").read_text(encoding="utf-8")
+
+
+def complaints(name, document):
+    stored = json.loads((DOCS / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8"))
+    validator = jsonschema.Draft202012Validator(stored)
+    return [f"{'.'.join(map(str, e.absolute_path))}: {e.message[-200:]}" for e in validator.iter_errors(document)]
+
+
+def printed(*arguments):
+    result = CliRunner().invoke(app, list(map(str, arguments)))
+    assert result.exit_code in (0, 3), result.stderr
+    return json.loads(result.stdout)
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_schemas_are_schemas(name):
+    jsonschema.Draft202012Validator.check_schema(schema(DOCUMENTS[name]))
+
+
+def test_no_schema_is_left_over():
+    assert {p.name for p in (DOCS / "schemas").iterdir()} == {f"{n}.schema.json" for n in DOCUMENTS}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS.values(), ids=lambda d: d.name)
+def test_every_field_is_explained_in_the_reference(document):
+    entry = PAGE.split(f"\n## `{document.source}`\n")[1].split("\n## ")[0]
+    for path, field in paths(document.fields):
+        assert field.meaning, path
+        assert f"{field.name}` |" in entry, path
+        assert all(f"`{v}`" in entry for v in field.values if v)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda t: t.name)
+def test_every_column_is_explained_in_the_reference(table):
+    entry = PAGE.split(f"\n## `{table.name}`\n")[1].split("\n## ")[0]
+    assert all(f"| `{c.name}` |" in entry and c.meaning for c in table.columns)
+
+
+def test_what_is_not_in_the_table_is_an_error():
+    one = SimpleNamespace(
+        source="x", summary="y", fields=(number("a", "m", "b"), rows("r", "c", (text("t", "d", ("u",)),)))
+    )
+    validator = jsonschema.Draft202012Validator(schema(one))
+    assert not list(validator.iter_errors({"a": 1.5, "r": [{"t": "u"}]}))
+    for wrong in ({"a": 1.5, "r": [], "z": 0}, {"a": None, "r": []}, {"r": []}, {"a": 1, "r": [{"t": "v"}]}):
+        assert list(validator.iter_errors(wrong))
+
+
+def test_paths_name_lists_and_tables():
+    fields = (obj("a", "m", (rows("b", "m", (text("c", "m"),)),)),)
+    assert [p for p, _ in paths(fields)] == ["a", "a.b", "a.b[].c"]
+
+
+DRIVES = {
+    "detect": ("detect", MF4, *CAR),
+    "slip_slope": ("slip-slope", MONDAY, *CAR),
+    "inspect": ("inspect", MF4),
+    "doctor": ("doctor", MF4, *CAR),
+    "cache": ("cache",),
+    "calibrate": ("calibrate", MONDAY, FRIDAY, *CAR),
+}
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_documents_of_drives(name):
+    assert complaints(name, printed(*DRIVES[name], "--json")) == []
+
+
+def test_document_of_clocks(tmp_path):
+    late = pl.read_parquet(MONDAY).select((pl.col("t") + 0.3).alias("t [s]"), pl.col("v_x").alias("v_x [m/s]"))
+    late.write_csv(tmp_path / "late.csv")
+    assert complaints("align", printed("align", MONDAY, tmp_path / "late.csv", "--quantity", "speed", "--json")) == []
+
+
+def test_documents_that_are_files(tmp_path):
+    printed(
+        "detect",
+        MF4,
+        *CAR,
+        "--json",
+        "-o",
+        tmp_path / "out",
+        "--history",
+        tmp_path / "slopes.json",
+        "--configuration",
+        "x",
+    )
+    assert complaints("detect", json.loads((tmp_path / "out" / "events.json").read_text())) == []
+    assert complaints("history", json.loads((tmp_path / "slopes.json").read_text())) == []
+    known = {c.name for t in TABLES if t.name == "signals.parquet" for c in t.columns}
+    assert known == {"t", "SIGNAL", "DETECTOR_PLACE", "DETECTOR_PLACE_bit"}
+    printed("slip-slope", MONDAY, *CAR, "--json", "-o", tmp_path / "slope")
+    assert complaints("slip_slope", json.loads((tmp_path / "slope" / "slip_slope.json").read_text())) == []
+    heading = (tmp_path / "slope" / "slip_slope.csv").read_text().splitlines()[0].split(",")
+    assert heading == columns("slip_slope.csv")
+
+
+def columns(name):
+    return [c.name for t in TABLES if t.name == name for c in t.columns]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Four simulated drives as a campaign, with results."""
+    folder = tmp_path_factory.mktemp("campaign")
+    scenario = (
+        (SAMPLES / "scenario.toml").read_text().replace('"vehicle.toml"', f'"{(SAMPLES / "vehicle.toml").as_posix()}"')
+    )
+    lines = ["log,tyre,water_depth_mm,x_driver,lane_start_s,lane_end_s"]
+    for seed in (1, 2, 3, 4):
+        (folder / "s.toml").write_text(scenario.replace("seed = 7", f"seed = {seed}"))
+        document = printed("simulate", folder / "s.toml", "-o", folder / f"worn_1.3mm_{seed}.parquet", "--json")
+        assert complaints("simulate", document) == []
+        lines.append(f"worn_1.3mm_{seed}.parquet,worn_summer,1.3,{'ab'[seed % 2]},8,16")
+    (folder / "runs.csv").write_text("\n".join(lines) + "\n")
+    car = (SAMPLES / "vehicle.toml").as_posix()
+    (folder / "campaign.toml").write_text(f'name = "c"\nvehicle = "{car}"\nruns = "runs.csv"\n')
+    assert (
+        complaints("plan", printed("plan", folder / "campaign.toml", "--jobs", "1", "--within", "1h", "--json")) == []
+    )
+    assert complaints("batch", printed("batch", folder / "campaign.toml", "--jobs", "1", "--json")) == []
+    return folder
+
+
+CAMPAIGNS = {
+    "inspect_campaign": ("inspect",),
+    "plan": ("plan",),
+    "batch": ("batch",),
+    "bin_slipslope": ("bin-slipslope", "--by", "tyre,x_driver"),
+    "bin_resistance": ("bin-resistance",),
+    "evaluate": ("evaluate", "--by", "tyre,x_driver", "--rivals"),
+}
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_documents_of_campaigns(name, campaign):
+    command, *options = CAMPAIGNS[name]
+    assert complaints(name, printed(command, campaign / "campaign.toml", *options, "--json")) == []
+
+
+def test_document_of_a_proposed_campaign(campaign, tmp_path):
+    document = printed("campaign", "init", campaign, "-o", tmp_path / "new" / "campaign.toml", "--json")
+    assert complaints("campaign_init", document) == []
+
+
+def test_tables_of_a_store(campaign):
+    store = campaign / "campaign.store"
+    assert complaints("manifest", json.loads((store / "manifest.json").read_text())) == []
+    for name, given in (
+        ("events.parquet", store / "events.parquet"),
+        ("samples/KEY.parquet", next((store / "samples").iterdir())),
+    ):
+        told = [
+            n.replace("WHEEL", w) for n in columns(name) for w in (("fl", "fr", "rl", "rr") if "WHEEL" in n else ("",))
+        ]
+        assert set(pl.read_parquet_schema(given)) <= set(told)
+    told = set(columns("runs.parquet"))
+    there = {f"events_{'DETECTOR'}" if c.startswith("events_") else "x_..." if c.startswith("x_") else c
+             for c in pl.read_parquet_schema(store / "runs.parquet")}  # fmt: skip
+    assert there == told
+
+
+def test_tables_of_a_report(campaign, tmp_path):
+    assert (
+        CliRunner()
+        .invoke(app, ["report", str(campaign / "campaign.toml"), "-o", str(tmp_path / "r"), "--by", "tyre"])
+        .exit_code
+        == 0
+    )
+    for name in (t.name for t in TABLES if t.name.startswith("data/")):
+        heading = (tmp_path / "r" / name).read_text().splitlines()[0].split(",")
+        keys = {"tyre", "water_depth_mm", "x_driver", "lane_start_s", "lane_end_s"}
+        shown = ["KEY" if h in keys else "events_DETECTOR" if h.startswith("events_") else h for h in heading]
+        assert set(shown) <= set(columns(name)), name
+        assert set(columns(name)) - set(shown) <= {"place", "KEY"}, name
+
+
+def test_document_of_figures(tmp_path):
+    document = printed("figures", "2.25", "3.6", "-o", tmp_path / "f", "--format", "csv", "--json")
+    assert complaints("figures", document) == []
+
+
+def test_document_of_a_reproduction():
+    from aqualog.figures.record import Figure
+    from aqualog.reproduce.catalogue import Claim
+    from aqualog.reproduce.check import Check
+    from aqualog.reproduce.document import document
+    from aqualog.reproduce.run import Conclusion
+
+    checks = (
+        Check("C7", "above 0", "1.5", "reproduced", value=1.5, ci95=(1.0, 2.0), unit="s"),
+        Check("C7", "above 0", "none", "reproduced"),
+    )
+    conclusions = (Conclusion(Claim("C7", "2.1", "it is", "N"), checks, "reproduced"),)
+    figure = Figure("2.25", "title", "", (), ())
+    made = document(conclusions, [figure], {"2.3": "no runs"}, {"conditions": ["so"]})
+    assert complaints("reproduce", json.loads(json.dumps(made))) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("inputs", ["drive", "campaign"])
+def test_document_of_a_diagnosis(inputs, campaign):
+    given = (MONDAY, *CAR, "--holdout", FRIDAY) if inputs == "drive" else (campaign / "campaign.toml",)
+    assert complaints("diagnose", printed("diagnose", *given, "--json")) == []
