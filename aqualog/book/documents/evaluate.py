@@ -24,7 +24,7 @@ _RECALL = (
     count("episodes", "episodes of that effect"),
     count("found", "episodes found in time: full within 0.5 s, partial within 2 s"),
     number("recall", "-", "share", null=True),
-    interval("ci95", "-", "95 % interval (Wilson)"),
+    interval("ci95", "-", "95 % interval (Wilson [wilson1927])"),
     *or_null(
         number("warned_before", "-", "share in which the warning was there before"),
         number("latency_median_s", "s", "median time to the warning; null: never"),
