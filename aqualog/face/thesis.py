@@ -239,7 +239,7 @@ def check_formats(formats: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     ConfigError
-        If one is not known, or there is none.
+        If one is unknown, or the list is empty.
     """
     asked = [f.strip().lower() for f in formats if f.strip()]
     if not asked or set(asked) - set(FORMATS):
