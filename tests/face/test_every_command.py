@@ -111,8 +111,8 @@ def test_doctor(tmp_path):
 
 
 def test_doctor_of_a_cut_log(tmp_path):
-    cut = tmp_path / "cut.mf4"
-    cut.write_bytes(LOG.read_bytes()[:300_000])
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((ROOT / "sample_logs" / "lane_drive.mcap").read_bytes()[:200_000])
     result = aq.doctor(cut, CAR)
     assert result.has_loss
     assert result.exit_code == 3
@@ -260,7 +260,7 @@ def test_names_from_logs_are_harmless(tmp_path):
 def test_errors_say_what_to_give(tmp_path):
     with pytest.raises(aq.AqualogError, match="no such file"):
         aq.read(tmp_path / "none.mf4")
-    with pytest.raises(aq.AqualogError, match="0.1 to 100000"):
+    with pytest.raises(aq.AqualogError, match=r"0\.1 to 100000"):
         aq.read(LOG, rate_hz=0.0)
-    with pytest.raises(aq.AqualogError, match="no --vehicle|vehicle"):
+    with pytest.raises(aq.AqualogError, match="no --vehicle"):
         aq.Campaign(LOG)
