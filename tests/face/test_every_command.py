@@ -225,7 +225,7 @@ def test_a_figure_that_needs_a_campaign_says_so(runs):
     with pytest.raises(aq.AqualogError, match="made from the runs of a campaign"):
         aq.thesis.figure("2.17")
     with pytest.raises(aq.AqualogError, match="is not made"):
-        aq.thesis.figure("2.16", runs)
+        aq.thesis.figure("2.20", runs)
 
 
 def test_cache(tmp_path, monkeypatch):

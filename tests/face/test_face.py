@@ -89,7 +89,7 @@ def test_records_read_themselves(tmp_path):
     assert aq.Vehicle.read(str(tmp_path / "car.toml")).mass == aq.Vehicle.read(tmp_path / "car.toml").mass == 1500.0
     (tmp_path / "model.toml").write_text(dump_model(aq.Model()))
     assert aq.Model.read(str(tmp_path / "model.toml")) == aq.Model()
-    with pytest.raises(aq.AqualogError, match=r"no .*file"):
+    with pytest.raises(aq.AqualogError, match="vehicle file not found"):
         aq.Vehicle.read(tmp_path / "none.toml")
 
 
