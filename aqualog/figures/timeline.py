@@ -29,7 +29,7 @@ __all__ = [
 ]  # fmt: skip
 
 COLOURS = (*WHEEL_COLOURS.values(), "#E69F00", "#56B4E9")
-"""Okabe and Ito's, in the order of the wheels' colours."""
+"""Okabe and Ito's [okabe2008], in the order of the wheels' colours."""
 
 TIME = Axis("t", "s")
 SLOPE = Axis("slip slope", "-", limits=(0.0, 36.0))

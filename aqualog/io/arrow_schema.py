@@ -3,7 +3,7 @@
 Writers such as pyarrow and pandas keep the schema as a FlatBuffers message under the key `ARROW:schema`; polars reads
 the columns by it but does not show the metadata of a field. Only what is needed is decoded here.
 
-Format: https://github.com/apache/arrow/blob/main/format/Schema.fbs
+Format: https://github.com/apache/arrow/blob/main/format/Schema.fbs [parquet2013]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The records of a ROS 1 bag; behind a damaged one the next chunk is sought.
 
-Format: http://wiki.ros.org/Bags/Format/2.0
+Format: http://wiki.ros.org/Bags/Format/2.0 [rosbag2010]
 """
 
 from __future__ import annotations

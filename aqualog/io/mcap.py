@@ -4,7 +4,7 @@ The reader walks the data section record by record. It unpacks every chunk withi
 against its checksum. A file that was cut off, or that has lost its index, therefore gives all messages before the cut.
 A damaged chunk or a wrong length costs that chunk only. An intact summary at the end saves a pass over the file.
 
-Format: https://mcap.dev/spec
+Format: https://mcap.dev/spec [mcap2022]
 """
 
 from __future__ import annotations

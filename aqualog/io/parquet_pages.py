@@ -6,7 +6,7 @@ They must follow each other through the whole of a column's place and hold its n
 the footer, unpack to no more than their values need, and fit their checksum where present. Only headers are held, and
 one page at a time where there are checksums.
 
-Format: https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift
+Format: https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift [parquet2013]
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A ROS 2 directory is read from its files; `metadata.yaml` only names and orders 
 split, is still read. Messages are decoded with the definitions in the recording, or with those of its ROS release
 where an old recording holds none.
 
-Formats: http://wiki.ros.org/Bags/Format/2.0, https://github.com/ros2/rosbag2
+Formats: http://wiki.ros.org/Bags/Format/2.0, https://github.com/ros2/rosbag2 [rosbag2010]
 """
 
 from __future__ import annotations

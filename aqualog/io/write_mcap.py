@@ -83,6 +83,7 @@ def _register(writer: Writer, topic: McapTopic) -> int:
     properties: dict[str, Any] = {}
     for field, (unit, meaning, _) in topic.columns.items():
         properties[field] = {"type": "number", "unit": unit, "description": f"{meaning} [{unit}]" if unit else meaning}
+    # [json_schema_2020]
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "type": "object", "properties": properties}
     name = topic.name.strip("/").replace("/", ".") or "signals"
     schema_id = writer.register_schema(name=name, encoding="jsonschema", data=json.dumps(schema).encode())

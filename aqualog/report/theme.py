@@ -9,8 +9,8 @@ __all__ = [
     "detector_colour", "in_light", "wheel_colour",
 ]  # fmt: skip
 
-# Okabe and Ito's palette: distinguishable with any common colour blindness, on white and on dark ground, and in grey
-# print.
+# Okabe and Ito's palette [okabe2008]: distinguishable with any common colour blindness, on white and on dark ground,
+# and in grey print.
 WHEEL_COLOURS = {"fl": "#0072B2", "fr": "#D55E00", "rl": "#009E73", "rr": "#CC79A7"}
 _DETECTOR_COLOURS = {"resistance": "#E69F00", "tie_rod": "#7F6BB3", "slip_slope_drop": "#8C6D31"}
 

@@ -17,7 +17,7 @@ _RESAMPLES, _SEED = 2000, 20240301
 def bootstrap(
     values: Sequence[float] | FloatArray, statistic: Callable[[FloatArray], float] | None = None
 ) -> tuple[float, float]:
-    """95 % percentile interval of a statistic over runs (default: the mean), by resampling the runs.
+    """95 % percentile interval of a statistic over runs (default: the mean), by resampling the runs [efron1979].
 
     Parameters
     ----------
