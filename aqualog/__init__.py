@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
     from aqualog.face import thesis
+    from aqualog.face.align import Alignment, align
     from aqualog.face.cache import cache
     from aqualog.face.calibrate import Calibration, calibrate
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
     from aqualog.face.detect import Detection, detect
+    from aqualog.face.diagnose import Diagnosis, diagnose
     from aqualog.face.doctor import doctor
     from aqualog.face.drive import Drive, read
     from aqualog.face.evaluate import evaluate
@@ -43,16 +45,20 @@ _FACE = {
     "slip_slope": "aqualog.face.slip_slope",
     "convert": "aqualog.face.convert",
     "Campaign": "aqualog.face.campaign",
+    "align": "aqualog.face.align",
     "calibrate": "aqualog.face.calibrate",
     "doctor": "aqualog.face.doctor",
     "evaluate": "aqualog.face.evaluate",
     "inspect": "aqualog.face.inspect",
+    "diagnose": "aqualog.face.diagnose",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
     "Model": "aqualog.model.term",
     "Detection": "aqualog.face.detect",
+    "Alignment": "aqualog.face.align",
     "Calibration": "aqualog.face.calibrate",
+    "Diagnosis": "aqualog.face.diagnose",
     "SlipSlope": "aqualog.face.slip_slope",
     "cache": "aqualog.face.cache",
     "physics": "aqualog.physics",
@@ -63,20 +69,24 @@ _FACE = {
 _MODULES = ("physics", "thesis")
 
 __all__ = [
+    "Alignment",
     "AqualogError",
     "Calibration",
     "Campaign",
     "Detection",
+    "Diagnosis",
     "Drive",
     "Model",
     "Signals",
     "SlipSlope",
     "Vehicle",
     "__version__",
+    "align",
     "cache",
     "calibrate",
     "convert",
     "detect",
+    "diagnose",
     "doctor",
     "evaluate",
     "inspect",

@@ -100,7 +100,7 @@ def _calibrate(
     progress: str,
 ) -> int:
     from aqualog.cli.console import told_if_interrupted
-    from aqualog.cli.setup import prepare
+    from aqualog.cli.setup import prepare, result_file
     from aqualog.errors import ConfigError, ExitCode
     from aqualog.face.calibrate import calibrate
     from aqualog.face.drives import NothingUsableError, grouped
@@ -108,7 +108,8 @@ def _calibrate(
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: which axle is driven, radii, axle distances")
     fixed = _fixed(fix)
-    targets = [_target(name, option) for name, option in ((out_name, "-o"), (page_name, "--page")) if name is not None]
+    out, page = result_file(out_name, "-o"), result_file(page_name, "--page")
+    targets = [p for p in (out, page) if p is not None]
     setup = prepare(
         logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
         progress=progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
@@ -118,10 +119,10 @@ def _calibrate(
             result = calibrate(grouped(logs, setup.drive), setup.vehicle, fix=fixed, progress=hear)
     except NothingUsableError:  # each reason was reported
         return int(ExitCode.NOTHING_USABLE)
-    if out_name is not None:
-        result.write_vehicle(out_name, force=True)
-    if page_name is not None:
-        result.write_page(page_name, force=True)
+    if out is not None:
+        result.write_vehicle(out, force=True)
+    if page is not None:
+        result.write_page(page, force=True)
     setup.console.data(result, as_json=as_json)
     for text in result.notes:
         setup.console.note(text)
@@ -147,11 +148,3 @@ def _fixed(texts: list[str]) -> dict[str, float]:
         fixed[name.strip()] = number
     check_fixed(fixed)
     return fixed
-
-
-def _target(name: str, option: str) -> Path:
-    from aqualog.errors import ConfigError
-
-    if not name.strip():
-        raise ConfigError(f"{option} is empty", expected="a file to write")
-    return Path(name)

@@ -56,7 +56,7 @@ COMMANDS = {
         "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined."
     ),
     "diagnose": Command(
-        "Say what the simulation gets wrong on measured drives: the cause, its size, how sure, and what it gains."
+        "Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain."
     ),
     "evaluate": Command(
         "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."

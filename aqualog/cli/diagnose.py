@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,15 +21,8 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from aqualog.cli.console import Console, Steps
-    from aqualog.cli.diagnose_drives import Drives
-    from aqualog.cli.diagnose_results import Targets
-    from aqualog.diagnose.records import Diagnosis
-    from aqualog.diagnose.run import Options
-    from aqualog.model.term import Model
-    from aqualog.vehicle import Vehicle as VehicleRecord
+    from aqualog.cli.console import Console
+    from aqualog.face.diagnose import Diagnosis
 
 __all__ = ["diagnose"]
 
@@ -96,7 +86,7 @@ def diagnose(
     progress: Progress = "auto",
     debug: Debug = False,
 ) -> None:
-    """Say what the simulation gets wrong on measured drives: the cause, its size, how sure, and what it gains.
+    """Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.
 
     The vehicle file is what the simulation believes. The verdict is one of: no_effect, named, compound, cannot_tell
     (the log does not separate the causes; a drive that would is named), unexplained, not_testable. The extended model
@@ -113,15 +103,14 @@ def diagnose(
     from aqualog.cli.console import Console, guarded
 
     with guarded(debug=debug):
-        from aqualog.cli.diagnose_results import Targets, target
+        from aqualog.cli.setup import result_file
         from aqualog.errors import ConfigError
         from aqualog.face.campaign import is_campaign
 
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
         if surrogates is not None and not bootstrap:
             raise ConfigError("--surrogates beside --no-bootstrap", expected="one of them")
-        number = surrogates if bootstrap else 0
-        targets = Targets(target(out, "-o"), target(page, "--page"), as_json, force)
+        targets = (result_file(out, "-o"), result_file(page, "--page"))
         if is_campaign(logs):
             strange = {
                 "--holdout": bool(holdout),
@@ -132,15 +121,18 @@ def diagnose(
             given = [option for option, is_given in strange.items() if is_given]
             code = _campaign(
                 logs, vehicle, model, signals, dbc or [], targets, given, seed=seed, level=level, surrogates=surrogates,
-                console=console,
+                console=console, as_json=as_json, force=force,
             )  # fmt: skip
         else:
             code = _diagnose(
                 logs, holdout or [], vehicle, model, signals, dbc or [], targets, rate, seed=seed, level=level,
-                surrogates=number, console=console, cached=cache,
+                surrogates=surrogates if bootstrap else 0, console=console, cached=cache, as_json=as_json, force=force,
             )  # fmt: skip
     if code:
         raise typer.Exit(code)
+
+
+Targets = tuple[Path | None, Path | None]  # model file, page
 
 
 def _diagnose(
@@ -158,19 +150,22 @@ def _diagnose(
     surrogates: int | None,
     console: Console,
     cached: bool | None,
+    as_json: bool,
+    force: bool,
 ) -> int:
-    from aqualog.cli.console import clean_line, told_if_interrupted
-    from aqualog.cli.diagnose_drives import check_apart, check_once, find_drives, load_drives
-    from aqualog.cli.diagnose_results import tell
+    from aqualog.cli.console import told_if_interrupted
     from aqualog.cli.setup import prepare
     from aqualog.errors import ConfigError, ExitCode
+    from aqualog.face.diagnose import diagnose
+    from aqualog.face.drives import NothingUsableError, grouped
     from aqualog.face.paths import expand, list_files, refuse_existing
 
     if vehicle_file is None:
         raise ConfigError("no --vehicle", expected="a vehicle file: it is what the simulation believes")
+    written = [p for p in targets if p is not None]
     setup = prepare(
-        logs, map_file=map_file, dbc=dbc, targets=targets.paths, force=targets.force, quiet=console.quiet,
-        verbose=console.verbose, progress=console.progress, vehicle_file=vehicle_file, cached=cached,
+        logs, map_file=map_file, dbc=dbc, targets=written, force=force, quiet=console.quiet, verbose=console.verbose,
+        progress=console.progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
     )  # fmt: skip
     missing = next((p for p in expand(holdout) if not p.exists()), None)
     if missing is not None:
@@ -178,71 +173,17 @@ def _diagnose(
             "no such file or folder", where=f"--holdout {missing}", expected="a drive to measure the gain on"
         )
     others = [*expand(holdout), *list_files(holdout), *([model_file] if model_file is not None else [])]
-    refuse_existing(targets.paths, force=True, sources=others)
-    known = _model(model_file)
-    drives, unseen = find_drives(logs, holdout)
-    check_apart(drives, unseen)
-    repeated = check_once(logs, drives)
-    with console.steps() as steps, told_if_interrupted("nothing was written"):
-        given = load_drives([*drives, *unseen], setup, dbc, rate, steps)
-        from aqualog.diagnose.run import Options
-
-        options = Options(seed=seed, level=level, views=targets.page is not None)
-        if surrogates is not None:
-            options = replace(options, surrogates=surrogates)
-        result = _result(given, [n for n, _ in unseen], setup.vehicle, known, options, steps)
-    for line in given.failed:
-        sys.stderr.write(f"error: {clean_line(line)}\n")
-    if result is None:
+    refuse_existing(written, force=True, sources=others)
+    try:
+        with console.hearing() as hear, told_if_interrupted("nothing was written"):
+            result = diagnose(
+                grouped(logs, setup.drive), setup.vehicle, holdout=grouped(holdout, setup.drive), model=model_file,
+                seed=seed, level=level, surrogates=surrogates, views=targets[1] is not None, progress=hear,
+            )  # fmt: skip
+    except NothingUsableError:  # each reason was reported
         return int(ExitCode.NOTHING_USABLE)
-    paths = [str(p) for n, files in drives if n in given.loaded for p in files]
-    changes = setup.changes()
-    tell(result, targets, paths, [*repeated, *given.notes, *changes], setup.vehicle.name, console)
-    asked = [n for n, _ in drives if n in given.loaded]
-    is_partial = given.failed or given.is_lossy or changes or len(result.drives) < len(asked)
-    return int(ExitCode.PARTIAL) if is_partial else int(ExitCode.DONE)
-
-
-def _model(path: Path | None) -> Model:
-    from aqualog.model.term import Model
-
-    if path is None:
-        return Model()
-    from aqualog.config.model import load_model
-
-    return load_model(path)
-
-
-def _result(
-    given: Drives, unseen: list[str], vehicle: VehicleRecord, known: Model, options: Options, steps: Steps
-) -> Diagnosis | None:
-    """The diagnosis; a drive that lacks a signal leaves `given` for a line in `failed`; None if all do."""
-    from aqualog.diagnose.run import diagnose as run
-    from aqualog.errors import SignalError
-
-    while drives := [(n, s) for n, s in given.loaded.items() if n not in unseen]:
-        held = [(n, s) for n, s in given.loaded.items() if n in unseen]
-        try:
-            return run(drives, vehicle, model=known, holdout=held, options=options, progress=_progress(steps))
-        except SignalError as error:
-            if error.where not in given.loaded:  # it is about all of them
-                given.failed.append(error.line())
-                break
-            given.drop(error.where, error.line())
-    return None
-
-
-def _progress(steps: Steps) -> Callable[[str, float], None]:
-    """A line for each step of work, with how far it is: renewed on a terminal, at most every tenth as lines."""
-    last: list[object] = []
-
-    def told(what: str, share: float) -> None:
-        now = [what, round(10.0 * share) if steps.mode == "plain" else round(100.0 * share)]
-        if now != last:
-            last[:] = now
-            steps(f"{what}, {100.0 * min(max(share, 0.0), 1.0):.0f} %")
-
-    return told
+    _finish(result, targets, console, as_json=as_json)
+    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
 
 
 def _campaign(
@@ -258,27 +199,42 @@ def _campaign(
     level: float,
     surrogates: int | None,
     console: Console,
+    as_json: bool,
+    force: bool,
 ) -> int:
-    """The same of a campaign's runs together, which carry what no single drive shows."""
-    from aqualog.cli.campaign_results import check_targets, exit_code, opened, results
-    from aqualog.cli.diagnose_results import tell
+    """Diagnose a campaign's runs together, which show what no single drive does."""
+    from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
     from aqualog.errors import ConfigError
+    from aqualog.face.detect import model_of
+    from aqualog.face.diagnose import diagnose
     from aqualog.face.paths import refuse_existing
 
     if strange:
-        raise ConfigError(f"{strange[0]} says nothing to a campaign", expected="what a campaign takes: --help")
-    configured = opened(inputs, vehicle=vehicle_file, map_file=map_file, dbc=dbc)
-    check_targets(configured, targets.paths, force=targets.force)
-    refuse_existing(targets.paths, force=True, sources=[model_file] if model_file is not None else [])
-    known = _model(model_file)
-    data, outcome = results(configured, None, console=console)
-    if not outcome.done:
-        return exit_code(outcome, data)
-    with console.steps() as steps:
-        from aqualog.diagnose.level import diagnose_campaign
+        raise ConfigError(f"{strange[0]} does not apply to a campaign", expected="what a campaign takes: --help")
+    campaign = open_campaign(inputs, vehicle=vehicle_file, signals=map_file, dbc=dbc)
+    written = [p for p in targets if p is not None]
+    campaign.check_targets(written, force=force)
+    refuse_existing(written, force=True, sources=[model_file] if model_file is not None else [])
+    known = model_of(model_file)
+    runs = run_campaign(campaign, console)
+    if runs.outcome.done:
+        with console.hearing() as hear:
+            result = diagnose(runs, model=known, seed=seed, level=level, surrogates=surrogates, progress=hear)
+        _finish(result, targets, console, as_json=as_json)
+    return exit_code(runs)
 
-        work = diagnose_campaign if surrogates is None else partial(diagnose_campaign, surrogates=surrogates)
-        result = work(configured.campaign, data, seed=seed, level=level, model=known, progress=steps)
-    names = dict.fromkeys(car.name for car in configured.vehicles.values())
-    tell(result, targets, inputs, [], ", ".join(names), console)
-    return exit_code(outcome, data)
+
+def _finish(result: Diagnosis, targets: Targets, console: Console, *, as_json: bool) -> None:
+    """Write the files, then stdout, then the notes."""
+    model, page = targets
+    if model is not None:
+        result = result.naming(model)
+        result.write_model(model, force=True)
+    if page is not None:
+        result.write_page(page, force=True)
+    console.data(result, as_json=as_json)
+    for text in result.notes:
+        console.note(text)
+    for path in targets:
+        if path is not None:
+            console.note(f"written: {path}")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from aqualog.align.mapping import SignalMap
 from aqualog.cli.console import Console
 from aqualog.config.signal_map import load_signal_map
+from aqualog.errors import ConfigError
 from aqualog.face.drive import Drive
 from aqualog.face.paths import expand, list_files, refuse_existing
 from aqualog.io.content import state_of
@@ -20,7 +21,7 @@ from aqualog.vehicle import Vehicle
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
 
-__all__ = ["Setup", "prepare"]
+__all__ = ["Setup", "prepare", "result_file"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +113,19 @@ def prepare(
         tuple(paths), signal_map, tuple(dbc), rate_hz, vehicle, _cache(cached, console), tuple(own), before
     )  # fmt: skip
     return Setup(console, drive, vehicle)
+
+
+def result_file(name: str | None, option: str) -> Path | None:
+    """Return the file that an option names; None without the option.
+
+    Raises
+    ------
+    ConfigError
+        If the name is empty.
+    """
+    if name is not None and not name.strip():
+        raise ConfigError(f"{option} is empty", expected="a file to write")
+    return None if name is None else Path(name)
 
 
 def _cache(cached: bool | None, console: Console) -> SignalCache | None:

@@ -12,6 +12,7 @@ from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.tables import flat
 from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -66,9 +67,8 @@ class Calibration(Result):
         """
         import polars as pl
 
-        pairs = {"ci95": ("low", "high")}
-        parameters = [_flat(p, pairs) for p in self.document["parameters"]]
-        drives = [_flat({k: v for k, v in d.items() if k != "left_out_s"}, pairs) for d in self.document["drives"]]
+        parameters = [flat(p) for p in self.document["parameters"]]
+        drives = [flat({k: v for k, v in d.items() if k != "left_out_s"}) for d in self.document["drives"]]
         residuals = [
             pl.DataFrame({n: getattr(d, n) for n in ("v", "force", "before", "after")}).select(
                 pl.lit(d.name).alias("drive"), pl.all()
@@ -145,19 +145,6 @@ class Calibration(Result):
             If the file exists and `force` is not given, or it is a source of this result.
         """
         return self._write_as("calibration.html", path, force=force)
-
-
-def _flat(entry: Mapping[str, Any], pairs: Mapping[str, tuple[str, str]], stem: str = "") -> dict[str, Any]:
-    """Return a row of a table: intervals become two columns, an inner mapping columns with its name before theirs."""
-    row: dict[str, Any] = {}
-    for name, value in entry.items():
-        if isinstance(value, Mapping):
-            row |= _flat(value, pairs, f"{name}_")
-        elif name in pairs:
-            row |= {f"{stem}{end}": x for end, x in zip(pairs[name], value, strict=True)}
-        else:
-            row[stem + name] = value
-    return row
 
 
 def calibrate(

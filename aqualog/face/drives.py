@@ -17,7 +17,16 @@ from aqualog.io.content import state_of
 from aqualog.types import Signals
 from aqualog.vehicle import Vehicle
 
-__all__ = ["DrivesLike", "Loaded", "NothingUsableError", "drives_of", "grouped", "load_drives", "with_own_names"]
+__all__ = [
+    "DrivesLike",
+    "Grouped",
+    "Loaded",
+    "NothingUsableError",
+    "drives_of",
+    "grouped",
+    "load_drives",
+    "with_own_names",
+]
 
 DrivesLike = DriveLike | Sequence[DriveLike]
 _Found = TypeVar("_Found")
@@ -29,6 +38,17 @@ class NothingUsableError(SignalError):
     def __init__(self, reasons: Sequence[str]) -> None:
         self.reasons = tuple(reasons)
         super().__init__(f"no drive can be used: {'; '.join(reasons)}")
+
+
+class Grouped(list[Drive]):
+    """Drives of files that were named; `repeated` of the `named` files are there more than once and count once."""
+
+    named = 0
+
+    @property
+    def repeated(self) -> int:
+        """Files that were named more than once."""
+        return self.named - len({p.resolve() for d in self for p in d.paths})
 
 
 class Loaded:
@@ -101,7 +121,7 @@ class Loaded:
         return text if (is_file and name in text) or text.startswith(f"{name}: ") or not paths else f"{name}: {text}"
 
 
-def grouped(names: Iterable[PathLike], like: Drive | None = None) -> list[Drive]:
+def grouped(names: Iterable[PathLike], like: Drive | None = None) -> Grouped:
     """Group files by drive: those of a folder belong together, those of a glob or a list are a drive each.
 
     Parameters
@@ -117,10 +137,12 @@ def grouped(names: Iterable[PathLike], like: Drive | None = None) -> list[Drive]
         If a glob or folder matches nothing.
     """
     base = like or Drive(())
-    drives: list[Drive] = []
+    drives = Grouped()
     seen: set[Path] = set()
     for name in map(str, names):
-        paths = [p for p in expand([name]) if p.resolve() not in seen]
+        found = expand([name])
+        drives.named += len(found)
+        paths = [p for p in found if p.resolve() not in seen]
         seen |= {p.resolve() for p in paths}
         own = list_files([name])
         if Path(name).is_dir():
@@ -144,6 +166,8 @@ def drives_of(drives: DrivesLike) -> list[Drive]:
     ------
     ConfigError, LogError
     """
+    if isinstance(drives, Grouped):
+        return drives
     many = [drives] if isinstance(drives, Drive | Signals | str | Path) else list(drives)
     if all(isinstance(d, str | Path) for d in many):
         return grouped([d for d in many if isinstance(d, str | Path)])

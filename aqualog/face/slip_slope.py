@@ -13,6 +13,7 @@ from aqualog.errors import ConfigError
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.tables import table
 from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -76,10 +77,10 @@ class SlipSlope(Result):
             for p in self.slopes.places
         ]
         return {
-            "slopes": _table(whole, _ROW),
-            "segments": _table(parts, _ROW),
-            "recursive": _table(recursive, _RECURSIVE),
-            "samples": pl.concat(samples) if samples else _table([], ("place", "t", "mu", "slip")),
+            "slopes": table(whole, _ROW, text=("place", "reason"), whole=("samples",)),
+            "segments": table(parts, _ROW, text=("place", "reason"), whole=("samples",)),
+            "recursive": table(recursive, "place slope slope_sd learnt_s changes", text=("place",), whole=("changes",)),
+            "samples": pl.concat(samples) if samples else table([], "place t mu slip", text=("place",)),
         }
 
     @property
@@ -126,24 +127,13 @@ class SlipSlope(Result):
         }
 
 
-_ROW = (
-    "place", "start_s", "end_s", "used_s", "samples", "slope", "slope_low", "slope_high", "offset", "offset_low",
-    "offset_high", "reason",
-)  # fmt: skip
-_RECURSIVE = ("place", "slope", "slope_sd", "learnt_s", "changes")
+_ROW = "place start_s end_s used_s samples slope slope_low slope_high offset offset_low offset_high reason"
 
 
 def _row(place: str, span: tuple[float, float], seconds: float, line: Line) -> dict[str, Any]:
     offset = (line.offset, *line.offset_ci) if line.told else (math.nan,) * 3
     values = (place, *span, seconds, line.samples, line.slope, *line.slope_ci, *offset, line.reason)
-    return dict(zip(_ROW, values, strict=True))
-
-
-def _table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> pl.DataFrame:
-    import polars as pl
-
-    kinds = {"place": pl.String, "reason": pl.String, "samples": pl.Int64, "changes": pl.Int64}
-    return pl.DataFrame(rows, schema={c: kinds.get(c, pl.Float64) for c in columns}).fill_nan(None)
+    return dict(zip(_ROW.split(), values, strict=True))
 
 
 def slip_slope(

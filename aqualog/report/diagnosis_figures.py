@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from aqualog.report.diagnosis_numbers import measured, percent, unit_text
-from aqualog.report.diagnosis_views import coordinate_axis
+from aqualog.report.diagnosis_views import AFTER, BEFORE, coordinate_axis
 from aqualog.report.diagnosis_words import by_change, channel_title, effect_title
 from aqualog.report.figures.slope_axes import axis, layout, see_through
-from aqualog.report.theme import INK, MUTED, wheel_colour
+from aqualog.report.theme import INK, MUTED
 from aqualog.report.wording import plot_text
 
 __all__ = ["AFTER", "BEFORE", "gain_bars", "isolability", "plots", "remainder"]
 
-BEFORE, AFTER = "#D55E00", wheel_colour("fl")
 _APART = [[0.0, "#B2182B"], [0.5, "#F4D9A8"], [0.9, "#9CCBA9"], [1.0, "#2B7A4B"]]
 _MOST_EFFECTS, _MOST_WITH_TEXT = 36, 24
 

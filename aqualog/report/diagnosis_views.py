@@ -12,12 +12,14 @@ import numpy as np
 from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis_numbers import unit_text
 from aqualog.report.diagnosis_words import COORDINATES, channel_title
-from aqualog.report.figures.slope_axes import rounded
+from aqualog.report.figures.slope_axes import axis, layout, rounded
+from aqualog.report.theme import wheel_colour
 from aqualog.report.wording import plot_text
 from aqualog.types import BoolArray, FloatArray
 
-__all__ = ["binned", "coordinate_axis", "view_data"]
+__all__ = ["AFTER", "BEFORE", "binned", "coordinate_axis", "view_data", "view_figures"]
 
+BEFORE, AFTER = "#D55E00", wheel_colour("fl")
 MOST_POINTS = 1200  # of one channel of one drive
 MOST_PLOTTED = 60_000  # of all channels and drives together
 _ALONG = ("t", "position")  # coordinates that a drive passes through in order
@@ -70,6 +72,42 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
         "tables": tables,
         "views": shown,
     }
+
+
+def view_figures(
+    views: Sequence[ResidualView], explained: Sequence[str] = (), *, most: int = 4
+) -> list[dict[str, Any]]:
+    """Return the first channels over the coordinate that the page opens with: points before, medians before and after.
+
+    Arguments as `view_data`; `most` is the number of figures.
+    """
+    data = view_data(views, explained)
+    start = data["start"]
+    if start is None:
+        return []
+    figures = []
+    for v in data["views"][:most]:
+        x, bins = data["tables"][v["coordinates"]].get(start), v["bins"].get(start)
+        if x is None:
+            continue
+        lines = [] if bins is None else [
+            _medians(bins[0], part[0], name, colour)
+            for part, name, colour in zip(bins[1:], ("before", "after"), (BEFORE, AFTER), strict=False)
+        ]  # fmt: skip
+        dots = {
+            "type": "scatter", "mode": "markers", "name": "samples before", "x": x, "y": v["before"],
+            "marker": {"color": BEFORE, "size": 3, "opacity": 0.25}, "hoverinfo": "skip",
+        }  # fmt: skip
+        drive = f", {data['drives'][v['drive']]}" if len(data["drives"]) > 1 else ""
+        y = axis("", v["limits"])
+        figures.append(
+            {"data": [dots, *lines], "layout": layout(v["title"] + drive, axis(coordinate_axis(start)[0]), y)}
+        )
+    return figures
+
+
+def _medians(x: list[Any], y: list[Any], name: str, colour: str) -> dict[str, Any]:
+    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "line": {"color": colour, "width": 2}}
 
 
 def _view(v: ResidualView, drive: int, coordinates: int, step: int) -> dict[str, Any]:

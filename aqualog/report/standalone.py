@@ -41,15 +41,20 @@ def side_by_side(found: Sequence[Mapping[str, Any]], *, columns: int = 2) -> go.
     columns = max(1, min(columns, len(figures)))
     rows = max(1, -(-len(figures) // columns))
     titles = [(f.layout.title.text or "") for f in figures]
+    named: set[str] = set()
     made = make_subplots(rows=rows, cols=columns, subplot_titles=titles)
     for i, one in enumerate(figures):
         row, column = i // columns + 1, i % columns + 1
         for trace in one.data:
+            if trace.type in ("scatter", "bar"):  # one entry in the legend for all panels
+                trace.update(showlegend=bool(trace.name) and trace.name not in named, legendgroup=trace.name)
+                named.add(trace.name)
             made.add_trace(trace, row=row, col=column)
         made.update_xaxes(one.layout.xaxis, row=row, col=column)
         made.update_yaxes(one.layout.yaxis, row=row, col=column)
     made.update_layout(
-        paper_bgcolor=LIGHT["@paper"], plot_bgcolor=LIGHT["@paper"], height=380 * rows, showlegend=False
+        paper_bgcolor=LIGHT["@paper"], plot_bgcolor=LIGHT["@paper"], height=380 * rows, showlegend=True,
+        legend={"orientation": "h", "y": -0.2 / rows, "yanchor": "top"},
     )  # fmt: skip
     return made
 

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 import aqualog
 from aqualog.align import cache as module
+from aqualog.align import load
 from aqualog.align.cache import SignalCache
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap, SourceClock
@@ -29,7 +30,7 @@ SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
 MAPS = {".csv": SAMPLES / "map_csv.toml", ".mcap": SAMPLES / "map_mcap.toml"}
 LOGS = [SAMPLES / f"lane_drive{s}" for s in (".mf4", ".csv", ".mcap")]
-READ = "aqualog.align.load.read_signals"
+READ = (load, "read_signals")
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def place(tmp_path):
 @pytest.fixture
 def not_read(monkeypatch):
     """After it is called, whoever reads a log fails."""
-    return lambda: monkeypatch.setattr(READ, lambda *_, **__: pytest.fail("read again"))
+    return lambda: monkeypatch.setattr(*READ, lambda *_, **__: pytest.fail("read again"))
 
 
 def run(*arguments, **environment):
@@ -168,7 +169,7 @@ def test_hashes_of_settled_logs_are_kept_and_those_of_young_ones_not(log, place)
 
 def test_what_changes_while_it_is_read_is_not_kept(log, place, monkeypatch):
     real = load_signals([log], vehicle=CAR)
-    monkeypatch.setattr(READ, lambda *_, **__: (log.write_bytes(b"x"), real)[1])
+    monkeypatch.setattr(*READ, lambda *_, **__: (log.write_bytes(b"x"), real)[1])
     load_signals([log], vehicle=CAR, cache=place)
     assert place.kept() == []
 
@@ -182,7 +183,7 @@ def test_some_signals_only_are_not_kept(log, place):
 def test_a_note_that_names_a_folder_is_not_kept(log, place, monkeypatch):
     real = load_signals([log], vehicle=CAR)
     noted = replace(real, quality=replace(real.quality, notes=(f"a split is left out: {log}: is cut",)))
-    monkeypatch.setattr(READ, lambda *_, **__: noted)
+    monkeypatch.setattr(*READ, lambda *_, **__: noted)
     load_signals([log], vehicle=CAR, cache=place)
     assert place.kept() == []
 
@@ -255,7 +256,7 @@ def test_least_used_goes_first_and_the_limit_holds(log, place, monkeypatch):
     real = load_signals([log], vehicle=CAR)
     size = to_parquet(real).getbuffer().nbytes
     small = SignalCache(place.folder.parent, limit=int(2.5 * size))
-    monkeypatch.setattr(READ, lambda *_, **__: real)
+    monkeypatch.setattr(*READ, lambda *_, **__: real)
     for age, rate in enumerate((10.0, 20.0)):
         load_signals([log], vehicle=CAR, rate_hz=rate, cache=small)
         for entry in small.kept():

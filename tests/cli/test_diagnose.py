@@ -272,7 +272,7 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
     assert (folder / "p.html").exists()
     code, _, err = run(folder / "campaign.toml", "--no-bootstrap", vehicle=False)
     assert code == 2
-    assert "--no-bootstrap says nothing to a campaign" in err
+    assert "--no-bootstrap does not apply to a campaign" in err
     run(folder / "campaign.toml", "--surrogates", 200, vehicle=False)
     assert asked[1][-1] == {"surrogates": 200}
     code, _, err = run(folder / "campaign.toml")

@@ -1,0 +1,395 @@
+"""`aq.diagnose`: what the simulation gets wrong on measured drives, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.errors import ConfigError
+from aqualog.face.campaign import Campaign, CampaignRuns, is_campaign
+from aqualog.face.detect import model_of
+from aqualog.face.drive import Drive, vehicle_needed
+from aqualog.face.drives import DrivesLike, Grouped, Loaded, drives_of, load_drives, with_own_names
+from aqualog.face.listener import Listener, Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.tables import flat, table
+from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.diagnose.records import Diagnosis as Found
+    from aqualog.model.term import Model
+    from aqualog.types import Signals
+
+__all__ = ["Diagnosis", "check_apart", "diagnose"]
+
+_MOST_DRIVES = 20  # named in the model file
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Result):
+    """Verdict, causes with size and interval, and what the extended model predicts better.
+
+    `found` holds the records, `logs` the files as they were named, `vehicle_name` the cars, `model_file` the file of
+    the extended model that document and page name.
+    """
+
+    found: Found
+    logs: tuple[str, ...]
+    vehicle_name: str
+    file_notes: tuple[str, ...] = ()
+    has_loss: bool = False
+    sources: tuple[Path, ...] = ()
+    model_file: str | None = None
+
+    @property
+    def verdict(self) -> str:
+        """`no_effect`, `named`, `compound`, `cannot_tell`, `unexplained` or `not_testable`."""
+        return self.found.verdict
+
+    @property
+    def model(self) -> Model:
+        """The extended model, for the argument `model` of `detect`, `simulate` and `diagnose`."""
+        return self.found.model
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Sentences on the logs and on the diagnosis."""
+        return (*self.file_notes, *self.found.notes)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog diagnose`."""
+        from aqualog import __version__
+        from aqualog.report.diagnosis_document import diagnosis_document
+
+        return diagnosis_document(
+            self.found, logs=self.logs, tool_version=__version__, notes=self.file_notes, vehicle=self.vehicle_name,
+            extended_model=self.model_file,
+        )  # fmt: skip
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`causes`, `gain` by channel, `limits` of detection, `unexplained` and `alternatives`.
+
+        A row of `causes` is a parameter: effect, where, parameter, value, low and high (95 %), unit.
+        """
+        d = self.document
+        causes = [
+            {"effect": c["effect"], "where": c["where"], "parameter": name, **flat(p)}
+            for c in d["causes"]
+            for name, p in (c["parameters"] or {"": {}}).items()
+        ]
+        channels = (d["gain"] or {"channel": {}})["channel"]
+        others = [
+            {"effects": " + ".join(c["key"] for c in a["causes"]), "evidence_ratio": a["evidence_ratio"]}
+            for a in d["alternative_sets"]
+        ]
+        unexplained = [{**r, "depends_on": ", ".join(r["depends_on"])} for r in d["unexplained"]]
+        return {
+            "causes": table(
+                causes, "effect where parameter value low high unit", text=("effect", "where", "parameter", "unit")
+            ),
+            "gain": table(
+                [{"channel": name, **c} for name, c in channels.items()],
+                "channel unit rmse_before rmse_after rmse_change free_before free_after free_change",
+                text=("channel", "unit"),
+            ),
+            "limits": table(
+                d["limits"], "effect where size unit smallest_worth_naming ratio", text=("effect", "where", "unit")
+            ),
+            "unexplained": table(
+                unexplained, "channel depends_on share p_value nearest cosine sentence",
+                text=("channel", "depends_on", "nearest", "sentence"),
+            ),
+            "alternatives": table(others, "effects evidence_ratio", text=("effects",)),
+        }  # fmt: skip
+
+    def text(self) -> str:
+        """Return the verdict and its basis."""
+        from aqualog.report.diagnosis_document import diagnosis_text
+
+        return diagnosis_text(self.document)
+
+    def headline(self) -> str:
+        """Return the verdict, the causes with their intervals, and the next drive if one is proposed."""
+        from aqualog.report.diagnosis_numbers import interval_text, ordinary, unit_text
+        from aqualog.report.diagnosis_words import effect_title, sentences
+
+        d = self.document
+        said = sentences(d)
+        used = f"{len(d['drives'])} drives" if len(d["drives"]) > 1 else ", ".join(d["drives"]) or "no drive"
+        lines = [f"{self.vehicle_name}, {used}: {self.verdict}", *said["headline"]]
+        for c in d["causes"][:3]:
+            for name, p in c["parameters"].items():
+                value, interval = interval_text(p)
+                lines.append(f"  {effect_title(c['key'])}, {name.replace('_', ' ')}: {value} ({interval}) "
+                             f"{unit_text(p['unit'])}")  # fmt: skip
+        return ordinary("\n".join([*lines[:6], *said["manoeuvre"][:1]]))
+
+    def plot(self) -> go.Figure:
+        """Return residuals before and after, errors of each channel, and what is not explained."""
+        from aqualog.report.diagnosis_figures import plots
+        from aqualog.report.diagnosis_views import view_figures
+        from aqualog.report.standalone import side_by_side
+
+        explained = [x for c in self.found.causes for x in c.explains]
+        found = plots(self.document)
+        separation = found.pop("isolability", None)
+        figures = [*view_figures(self.found.views, explained), *found.values()]
+        sentence = {"text": self.found.sentence, "showarrow": False}
+        return side_by_side(figures or [separation or {"data": [], "layout": {"annotations": [sentence]}}])
+
+    def files(self) -> Writers:
+        """Return `diagnosis.json`, `model.toml` and `diagnosis.html`."""
+        from aqualog.report.diagnosis_page import write_diagnosis_page
+
+        drives = self.found.drives
+        title = ", ".join([self.vehicle_name, *drives[:3]]) + (" …" if len(drives) > 3 else "")
+        return {
+            "diagnosis.json": text_file(lambda: self.to_json() + "\n"),
+            "model.toml": text_file(lambda: _model_text(self.found, self.vehicle_name)),
+            "diagnosis.html": lambda path: write_diagnosis_page(self.document, self.found.views, path, title),
+        }
+
+    def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+        """Write document, model and page into a folder; document and page name the model file there.
+
+        Raises
+        ------
+        ConfigError
+            If a file exists already, or is a source of this result.
+        """
+        return super(Diagnosis, self.naming(Path(folder) / "model.toml")).save(folder, force=force)
+
+    def naming(self, path: PathLike) -> Diagnosis:
+        """Return the same with `path` as the model file that document and page name."""
+        return replace(self, model_file=str(path))
+
+    def write_model(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the extended model, a file that `detect`, `simulate` and `diagnose` take.
+
+        Raises
+        ------
+        ConfigError
+            If the file exists and `force` is not given, or it is a source of this result.
+        """
+        return self._write_as("model.toml", path, force=force)
+
+    def write_page(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page with the pictures before and after (HTML).
+
+        Raises
+        ------
+        ConfigError
+            If the file exists and `force` is not given, or it is a source of this result.
+        """
+        return self._write_as("diagnosis.html", path, force=force)
+
+
+def _model_text(found: Found, vehicle: str) -> str:
+    """Return the model file: its origin as comments, then its terms; the same for the same result."""
+    from aqualog.config.model import dump_model
+
+    head = [
+        f"What the simulation of {vehicle} lacks, by aqualog diagnose.",
+        f"Verdict {found.verdict}: {found.sentence}",
+        *(f"Drive: {name}" for name in found.drives[:_MOST_DRIVES]),
+    ]
+    if len(found.drives) > _MOST_DRIVES:
+        head.append(f"and {len(found.drives) - _MOST_DRIVES} drives more.")
+    if not found.model.terms:
+        head.append("No term: this is the base model.")
+    # a name may hold anything, a comment ends with its line
+    lines = ["# " + "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split())) for text in head]
+    return "\n".join(lines) + "\n\n" + dump_model(found.model)
+
+
+def diagnose(
+    drives: DrivesLike | Campaign | CampaignRuns,
+    vehicle: PathLike | Vehicle | None = None,
+    *,
+    holdout: DrivesLike = (),
+    model: PathLike | Model | None = None,
+    seed: int = 1,
+    level: float = 0.01,
+    surrogates: int | None = None,
+    views: bool = True,
+    progress: Progress = None,
+) -> Diagnosis:
+    """Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.
+
+    Parameters
+    ----------
+    drives : Drive, Signals, str, Path or several; or a campaign
+        Each `Drive` and each file is a drive; the files of a folder are one drive. A drive that cannot be read is left
+        out, and `progress` hears why. A campaign is its file (TOML), a `Campaign`, or its runs.
+    vehicle : Vehicle, str or Path
+        What the simulation believes. Without it that of the first drive; a campaign names its own.
+    holdout : Drive, Signals, str, Path or several
+        Drives on which the gain is measured and nothing is fitted.
+    model : Model, str or Path, optional
+        Effects that are known already, on top of the base simulation.
+    seed : int
+        Of all that is drawn at random.
+    level : float
+        Share of drives without effect that may be given one, 0.0001 to 0.5.
+    surrogates : int, optional
+        Drives without effect that calibrate the test; 0: the test by its formula alone. Default 49, of a campaign 299.
+    views : bool
+        Keep the residuals before and after for page and figure.
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    LogError, SignalError, ConfigError
+        SignalError if no drive can be used.
+
+    Examples
+    --------
+    >>> r = aq.diagnose(["monday.mf4", "tuesday.mf4"], "car.toml", holdout="friday.mf4")
+    >>> r.verdict, r.tables["causes"]
+    >>> aq.detect("wet.mf4", "car.toml", model=r.model)
+    """
+    hear = listener(progress)
+    if not 1e-4 <= level <= 0.5:
+        raise ConfigError(f"level = {level:g}", expected="0.0001 to 0.5")
+    campaign = _campaign_of(drives, vehicle)
+    if campaign is not None:
+        if not (isinstance(holdout, Sequence) and not holdout):
+            raise ConfigError("holdout beside a campaign", expected="drives, or a campaign alone")
+        return _of_campaign(campaign, model_of(model), model, seed, level, surrogates, hear)
+    assert not isinstance(drives, Campaign | CampaignRuns)
+    known = model_of(model)
+    named, held = drives_of(drives), drives_of(holdout)
+    check_apart(named, held)
+    repeated = _repeated(named)
+    own, unseen = with_own_names(named, held)
+    car = vehicle_needed(vehicle, own[0] if own else None)
+    loaded = load_drives([*own, *unseen], car, hear)
+    names = [d.label for d in unseen]
+    options = {"seed": seed, "level": level, "views": views}
+    if surrogates is not None:
+        options["surrogates"] = surrogates
+    found = _found(loaded, names, car, known, options, hear)
+    changes = loaded.changes
+    used = [d for d in loaded.used if d.label not in names]
+    has_loss = loaded.has_loss or bool(changes) or len(found.drives) < len(used)
+    files = dict.fromkeys(p for d in (*own, *unseen) for p in d.sources)
+    others = (Path(x) for x in (vehicle, model) if isinstance(x, str | Path))
+    return Diagnosis(
+        found, tuple(str(p) for d in used for p in d.paths), car.name, (*repeated, *loaded.notes, *changes), has_loss,
+        (*files, *others),
+    )  # fmt: skip
+
+
+def _found(
+    loaded: Loaded, unseen: Sequence[str], car: Vehicle, known: Model | None, options: dict[str, Any], hear: Listener
+) -> Found:
+    """Return the diagnosis of the drives that can be used."""
+
+    def work(signals: dict[str, Signals]) -> Found:
+        from aqualog.diagnose.run import Options
+        from aqualog.diagnose.run import diagnose as run
+        from aqualog.model.term import Model
+
+        return run(
+            [(n, s) for n, s in signals.items() if n not in unseen], car, model=known or Model(),
+            holdout=[(n, s) for n, s in signals.items() if n in unseen], options=Options(**options),
+            progress=_shares(hear),
+        )  # fmt: skip
+
+    return loaded.tried(work, hear, unseen)
+
+
+def check_apart(drives: Sequence[Drive], unseen: Sequence[Drive]) -> None:
+    """Refuse a file that is diagnosed and held out: a gain on what was fitted means nothing.
+
+    Raises
+    ------
+    ConfigError
+    """
+    own = {p.resolve() for d in drives for p in d.paths}
+    twice = next((p for d in unseen for p in d.paths if p.resolve() in own), None)
+    if twice is not None:
+        raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives after --holdout")
+
+
+def _repeated(drives: Sequence[Drive]) -> list[str]:
+    """Return a note on files that are named more than once, of which each counts once."""
+    if not isinstance(drives, Grouped) or not drives.repeated:
+        return []
+    return [f"{drives.repeated} of {drives.named} logs given more than once: each counts once"]
+
+
+def _shares(hear: Listener) -> Callable[[str, float], None]:
+    """Report each step of work with its share: renewed on a terminal, at most every tenth as lines."""
+    last: list[object] = []
+
+    def report(what: str, share: float) -> None:
+        now = [what, round(10.0 * share) if hear.mode == "plain" else round(100.0 * share)]
+        if now != last:
+            last[:] = now
+            hear(f"{what}, {100.0 * min(max(share, 0.0), 1.0):.0f} %")
+
+    return report
+
+
+# --- campaigns -------------------------------------------------------------------------------------------------------
+
+
+def _campaign_of(drives: object, vehicle: PathLike | Vehicle | None) -> Campaign | CampaignRuns | None:
+    """Return the campaign behind an argument; None for drives."""
+    if isinstance(drives, Campaign | CampaignRuns):
+        if vehicle is not None:
+            raise ConfigError("vehicle beside a campaign", expected="it in the campaign's runs")
+        return drives
+    names = [drives] if isinstance(drives, str | Path) else drives
+    if not (isinstance(names, list | tuple) and all(isinstance(n, str | Path) for n in names)):
+        return None
+    texts = [str(n) for n in names]
+    if not is_campaign(texts):
+        return None
+    if isinstance(vehicle, Vehicle):
+        raise ConfigError("vehicle beside a campaign", where=texts[0], expected="it in the campaign's runs")
+    return Campaign(texts, vehicle=vehicle)
+
+
+def _of_campaign(
+    campaign: Campaign | CampaignRuns,
+    known: Model | None,
+    model: PathLike | Model | None,
+    seed: int,
+    level: float,
+    surrogates: int | None,
+    hear: Listener,
+) -> Diagnosis:
+    """Diagnose the runs of a campaign together: they show what no single drive does."""
+    from aqualog.face.drives import NothingUsableError
+    from aqualog.model.term import Model
+
+    runs = campaign.run(progress=hear) if isinstance(campaign, Campaign) else campaign
+    if not runs.outcome.done:
+        raise NothingUsableError([f"{name}: {reason}" for name, reason in runs.outcome.failed.items()])
+    from aqualog.diagnose.level import diagnose_campaign
+
+    configured = runs.campaign.configured
+    drawn: Any = {} if surrogates is None else {"surrogates": surrogates}
+    found = diagnose_campaign(
+        configured.campaign, runs.data, seed=seed, level=level, model=known or Model(), progress=hear, **drawn
+    )
+    names = dict.fromkeys(car.name for car in configured.vehicles.values())
+    others = (Path(x) for x in (model,) if isinstance(x, str | Path))
+    return Diagnosis(
+        found, runs.campaign.inputs, ", ".join(names), (), runs.has_loss, (*runs.campaign.sources, *others)
+    )
