@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from aqualog import physics
     from aqualog.errors import AqualogError
     from aqualog.face import thesis
-    from aqualog.face.align import Alignment, align
+    from aqualog.face.align import align
     from aqualog.face.cache import cache
-    from aqualog.face.calibrate import Calibration, calibrate
+    from aqualog.face.calibrate import calibrate
     from aqualog.face.campaign import Campaign
     from aqualog.face.convert import convert
-    from aqualog.face.detect import Detection, detect
-    from aqualog.face.diagnose import Diagnosis, diagnose
+    from aqualog.face.detect import detect
+    from aqualog.face.diagnose import diagnose
     from aqualog.face.doctor import doctor
     from aqualog.face.drive import Drive, read
     from aqualog.face.evaluate import evaluate
     from aqualog.face.inspect import inspect
-    from aqualog.face.slip_slope import SlipSlope, slip_slope
+    from aqualog.face.slip_slope import slip_slope
     from aqualog.model.term import Model
     from aqualog.types import Signals
     from aqualog.vehicle import Vehicle
@@ -55,11 +55,6 @@ _FACE = {
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
     "Model": "aqualog.model.term",
-    "Detection": "aqualog.face.detect",
-    "Alignment": "aqualog.face.align",
-    "Calibration": "aqualog.face.calibrate",
-    "Diagnosis": "aqualog.face.diagnose",
-    "SlipSlope": "aqualog.face.slip_slope",
     "cache": "aqualog.face.cache",
     "physics": "aqualog.physics",
     "thesis": "aqualog.face.thesis",
@@ -69,16 +64,11 @@ _FACE = {
 _MODULES = ("physics", "thesis")
 
 __all__ = [
-    "Alignment",
     "AqualogError",
-    "Calibration",
     "Campaign",
-    "Detection",
-    "Diagnosis",
     "Drive",
     "Model",
     "Signals",
-    "SlipSlope",
     "Vehicle",
     "__version__",
     "align",

@@ -1,5 +1,6 @@
 """The package's names: what they are, that they are there, and that they cost nothing until they are used."""
 
+import inspect
 import subprocess
 import sys
 import typing
@@ -37,9 +38,7 @@ def test_each_name_is_there_and_says_what_it_is(name):
 def test_functions_are_typed_and_have_an_example(name):
     function = getattr(aq, name)
     hints = function.__annotations__
-    code = function.__code__
-    arguments = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-    assert set(arguments) | {"return"} == set(hints)
+    assert set(inspect.signature(function).parameters) | {"return"} == set(hints)
     assert name == "cache" or ">>> " in function.__doc__
     assert f"aq.{name}" in function.__doc__ or name in ("cache", "read")
 
