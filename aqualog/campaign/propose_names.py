@@ -216,7 +216,7 @@ def _apply_rules(text: str, rules: dict[str, list[str]], notes: list[str]) -> tu
 
 
 def _apply_words(words: list[str], found: dict[str, str], rules: dict[str, list[str]]) -> list[str]:
-    """Words that a list knows into `found`; the others are given back."""
+    """Words that a list knows into `found`; the others are returned."""
     tyre: list[str] = []
     left: list[str] = []
     is_named = False

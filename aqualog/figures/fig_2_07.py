@@ -64,9 +64,8 @@ def make(evidence: Evidence) -> Figure:
         NUMBER,
         "traction coefficient of driven wheels in spin-ups over speed",
         f"{selected.fixed}. Mean while the rim is faster than the car by 5 % on the water, bins of 10 km/h; bars: 95 % "
-        "intervals with the run as the unit, missing with fewer than three runs. The wheel's own acceleration is "
-        "taken off "
-        f"its torque.",
+        "intervals with the run as the unit, missing with fewer than three runs. The torque is "
+        "corrected for the wheel's own acceleration.",
         (
             Panel("Traction coefficient in spin-ups, from the torque", V_KMH, _MU, tuple(lines)),
             *([Panel("Less the water's share of the torque (lower bound)", V_KMH, _MU, low)] if low else []),

@@ -72,7 +72,8 @@ def isolability(document: Mapping[str, Any]) -> dict[str, Any] | None:
         "xgap": 1, "ygap": 1, "hoverongaps": False, "text": [[percent(v) if v is not None else "" for v in row]
                                                             for row in values],
         "hovertemplate": "%{y} from %{x}: the right name in %{text}<extra></extra>",
-        "colorbar": {"title": {"text": "P(right name)", "side": "right"}, "thickness": 12, "tickformat": ".0%",
+        "colorbar": {"title": {"text": "probability of the right name", "side": "right"}, "thickness": 12,
+                     "tickformat": ".0%",
                      "outlinewidth": 0, "tickcolor": MUTED},
     }  # fmt: skip
     if len(keys) <= _MOST_WITH_TEXT:

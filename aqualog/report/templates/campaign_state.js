@@ -1,4 +1,4 @@
-// What is filtered. Everything else on the page follows from `chosen` and draws itself anew in `update`.
+// What is filtered. Everything else on the page follows from `chosen`, and `update` draws it again.
 const D = JSON.parse(document.getElementById("campaign-data").textContent);
 const facets = D.facets, runs = D.runs, count = runs.name.length;
 const SIDES = { left: ["fl", "rl"], right: ["fr", "rr"] };
