@@ -96,7 +96,7 @@ def test_wheels_and_pooled_groups_are_told(page):
     assert page.execute_script("return document.getElementById('pooled').hidden")
     pick(page, "n0")  # an own column, by which nothing is split
     assert not page.execute_script("return document.getElementById('pooled').hidden")
-    assert "rest on runs that the filters leave out" in texts(page, "#pooled")[0]
+    assert "also use runs that the filters leave out" in texts(page, "#pooled")[0]
 
 
 def test_matrix_cell_filters_and_lets_go(page):
