@@ -248,7 +248,7 @@ def _worse(document: Mapping[str, Any]) -> list[str]:
 
 def _channel(name: str, c: Mapping[str, Any]) -> list[str]:
     parts = []
-    for kind, words in (("rmse", "next sample"), ("free", "free simulation")):
+    for kind, words in (("rmse", "error one sample ahead"), ("free", "error in free simulation")):
         before, after, change = c[f"{kind}_before"], c[f"{kind}_after"], c[f"{kind}_change"]
         if before is None or after is None:
             continue
