@@ -77,7 +77,7 @@ _ALL = [
 
 POLYNOMIALS = {
     "tie_rod": "tie-rod force [N] over a front wheel's lateral (outward) and longitudinal force",
-    "steering_torque": "steering torque [N m] over the front axle's lateral force and the difference of its drive",
+    "steering_torque": "steering torque [N·m] over the front axle's lateral force and the difference of its drive",
 }
 """Sections of polynomials: c0, and c_y, c_x with powers from the first on; `sigma` is what they leave on dry road."""
 
@@ -151,7 +151,7 @@ class Vehicle:
         return self.r_l_f if wheel[0] == "f" else self.r_l_r
 
     def inertia(self, wheel: str) -> float:
-        """Inertia of a wheel about its axis. [kg m^2]"""
+        """Inertia of a wheel about its axis. [kg·m²]"""
         return self.inertia_f if wheel[0] == "f" else self.inertia_r
 
     @property

@@ -142,7 +142,7 @@ def _worker(limits: ReadLimits, *, debug: bool) -> Board:
 
 
 def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str], aside: Aside | None) -> None:
-    """Set the worker up; without `aside` all that libraries say is told as it comes."""
+    """Set the worker up; without `aside` everything that libraries write passes at once."""
     import resource
 
     from aqualog.io.in_hand import bound_memory, watched_by

@@ -1,4 +1,4 @@
-"""What libraries write to stderr by themselves: passed on, but for panics, of which the command tells in a line."""
+"""What libraries write to stderr by themselves: passed on, except panics, which the command reports in one line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Aside:
     """A pipe in place of a worker's stderr, for all that is not written by Python there.
 
     A panic of a compiled library prints lines of its own in whatever thread it happens, and then arrives as an error
-    of the log, which is told.
+    of the log, which is reported.
     """
 
     def __init__(self) -> None:
@@ -77,7 +77,7 @@ class Lines:
         self._empty = 0
 
     def kept(self, lines: Iterable[bytes]) -> Iterator[bytes]:
-        """Lines to be told; empty ones wait for the line after them."""
+        """Return lines to pass on; empty ones wait for the line after them."""
         for line in lines:
             if _PANIC.match(line):
                 self._is_next = self._is_in = True

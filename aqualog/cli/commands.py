@@ -131,7 +131,7 @@ def _refuse_empty(command: Any, args: list[str]) -> None:
 
 @contextmanager
 def _told_if_interrupted() -> Iterator[None]:
-    """Of a command at work it is told there (`console.guarded`); typer would leave without a word."""
+    """Report an interrupt; typer would leave without a message. `console.guarded` reports one of a command at work."""
     try:
         yield
     except KeyboardInterrupt:

@@ -70,7 +70,7 @@ def _sweep(base: Path) -> None:
 
 
 def _locked(folder: Path, *, exclusive: bool) -> int:
-    """A handle that holds a lock on the folder, -1 where there is none to be had."""
+    """A handle that holds a lock on the folder, -1 where no lock is available."""
     import fcntl
 
     try:
