@@ -1,4 +1,4 @@
-"""`python -m aqualog.book` writes the generated pages and schemas."""
+"""`python -m aqualog.book` writes the generated pages and schemas; with `site DIR` it builds the site."""
 
 from __future__ import annotations
 
@@ -33,12 +33,30 @@ def generated() -> dict[Path, str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Write what has changed, and say which files that are."""
+    """Write what has changed and say which files that are; with `site DIR` build the site."""
+    if arguments[:1] == ["site"] and len(arguments) == 2:
+        return _site(Path(arguments[1]))
+    if arguments:
+        sys.stderr.write("usage: python -m aqualog.book [site DIR]\n")
+        return 2
     for path, text in generated().items():
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
             sys.stdout.write(f"{path.relative_to(DOCS)}\n")
+    return 0
+
+
+def _site(folder: Path) -> int:
+    from aqualog.book.site import build
+    from aqualog.errors import AqualogError
+
+    try:
+        build(folder)
+    except AqualogError as error:
+        sys.stderr.write(f"error: {error.what}\n")
+        return int(error.exit_code)
+    sys.stdout.write(f"{folder / 'index.html'}\n")
     return 0
 
 

@@ -21,6 +21,7 @@ SECTIONS = {
 }
 """Folders of pages and their names, in the order in which a name that stands in two of them is looked for."""
 
+_PAGE = re.compile(r"\]\(([^)#\s]+\.md)")
 _INLINE = (
     (re.compile(r"!\[([^\]]*)\]\([^)]*\)"), r"\1"),
     (re.compile(r"\[([^\]]*)\]\([^)]*\)"), r"\1"),
@@ -45,14 +46,24 @@ class Topic:
         """`reference/campaign`, which names one page only."""
         return f"{self.section}/{self.name}" if self.section else self.name
 
+    @property
+    def file(self) -> str:
+        """The page's path in the book: `reference/campaign.md`."""
+        return f"{self.address}.md"
+
     def text(self) -> str:
         """The page's Markdown."""
         return self.path.read_text(encoding="utf-8")
 
 
 def topics(root: Path = DOCS) -> list[Topic]:
-    """All pages, by section and name."""
-    return [t for section in SECTIONS for t in _in_section(root, section)]
+    """All pages by section, in the order in which the first page names them; the others behind, by name."""
+    index = root / "index.md"
+    named = _PAGE.findall(index.read_text(encoding="utf-8")) if index.is_file() else []
+    place = {path: i for i, path in reversed(list(enumerate(named)))}
+    found = [t for section in SECTIONS for t in _in_section(root, section)]
+    sections = list(SECTIONS)
+    return sorted(found, key=lambda t: (sections.index(t.section), t.name != "index", place.get(t.file, len(named))))
 
 
 def find(name: str, pages: list[Topic]) -> Topic | None:

@@ -46,7 +46,7 @@ def test_no_schema_is_left_over():
 
 @pytest.mark.parametrize("document", DOCUMENTS.values(), ids=lambda d: d.name)
 def test_every_field_is_explained_in_the_reference(document):
-    entry = PAGE.split(f"\n## `{document.source}`\n")[1].split("\n## ")[0]
+    entry = PAGE.split(f"\n## `{document.heading}`\n")[1].split("\n## ")[0]
     for path, field in paths(document.fields):
         assert field.meaning, path
         assert f"{field.name}` |" in entry, path

@@ -60,6 +60,11 @@ class Document:
     fields: tuple[Field, ...]
     files: tuple[str, ...] = ()
 
+    @property
+    def heading(self) -> str:
+        """The source without the option, which all of them have."""
+        return self.source.removesuffix(" --json")
+
 
 def number(name: str, unit: str, meaning: str, *, null: bool = False) -> Field:
     """A number; integers are numbers too."""

@@ -8,7 +8,7 @@ __all__ = ["HISTORY", "MANIFEST"]
 
 MANIFEST = Document(
     "manifest",
-    "manifest.json of a store",
+    "manifest.json",
     "The state of every run of a campaign in its store.",
     (
         *HEAD,
@@ -29,7 +29,7 @@ MANIFEST = Document(
 
 HISTORY = Document(
     "history",
-    "history file of --history",
+    "history file",
     "Dry slip slopes of a car from earlier drives.",
     (
         HEAD[0],

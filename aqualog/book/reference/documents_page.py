@@ -31,7 +31,7 @@ Tables are Parquet files, which polars, pandas and DuckDB open as they are, or C
 
 def text() -> str:
     """The page."""
-    listed = [(f"[`{d.source}`](#{_anchor(d.source)})", d.summary) for d in DOCUMENTS.values()]
+    listed = [(f"[`{d.heading}`](#{_anchor(d.heading)})", d.summary) for d in DOCUMENTS.values()]
     listed += [(f"[`{t.name}`](#{_anchor(t.name)})", t.summary) for t in TABLES]
     return page(
         "Documents and tables",
@@ -53,7 +53,7 @@ def _anchor(heading: str) -> str:
 def _document(document: Document) -> list[str]:
     files = f" Also in {', '.join(map(code, document.files))}." if document.files else ""
     return [
-        f"## `{document.source}`",
+        f"## `{document.heading}`",
         f"{document.summary}{files} Schema: `schemas/{document.name}.schema.json`.",
         table(("field", "type", "unit", "meaning"), _rows(document)),
     ]
