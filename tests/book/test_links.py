@@ -101,7 +101,8 @@ def test_search_finds_a_page_that_is_opened_as_a_file(site, browser):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import WebDriverWait
 
-    browser.get((site / "guide" / "campaign.html").as_uri() + "?q=aquaplaning")
+    browser.get((site / "guide" / "campaign.html").as_uri())
+    browser.find_element(By.NAME, "query").send_keys("aquaplaning")
     results = WebDriverWait(browser, 20).until(lambda b: b.find_elements(By.CSS_SELECTOR, ".md-search-result__link"))
     assert any("aquaplaning" in r.get_attribute("href") for r in results)
 

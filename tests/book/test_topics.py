@@ -79,3 +79,13 @@ def test_every_page_has_a_title_and_a_summary(page):
 def test_every_page_is_in_a_section():
     assert {p.path for p in topics()} == set(DOCS.rglob("*.md"))
     assert set(SECTIONS) >= {p.section for p in topics()}
+
+
+def test_every_command_and_detector_has_a_page():
+    from aqualog.cli.commands import COMMANDS
+    from aqualog.detect.needs import DETECTORS
+
+    pages = topics()
+    assert [d for d in DETECTORS if find(f"method/{d}", pages) is None] == []
+    guide = "\n".join(p.text() for p in pages if p.section == "guide")
+    assert [c for c in COMMANDS if f"aqualog {c}" not in guide and c != "help"] == []
