@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from aqualog.report.figures.row import VEHICLE, Line, Row
 from aqualog.report.standalone import rows_figure
 from aqualog.report.theme import wheel_colour
 from aqualog.types import Signals
+from aqualog.units import displayed_unit
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -27,12 +29,17 @@ def signals_figure(signals: Signals, title: str) -> go.Figure:
         if np.isfinite(signals.array(name)).any():
             groups.setdefault((_stem(name), SYMBOLS[name].unit), []).append(name)
     rows = [
-        Row(stem, ", ".join(names), unit, lines=tuple(_line(signals, n, i) for i, n in enumerate(names)))
+        Row(stem, _caption(names), displayed_unit(unit), lines=tuple(_line(signals, n, i) for i, n in enumerate(names)))
         for (stem, unit), names in groups.items()
     ]
     made = rows_figure(rows, signals.frame.height, signals.dt)
     made.update_layout(meta={"title": title})
     return made
+
+
+def _caption(names: Sequence[str]) -> str:
+    """The meaning of a signal, or the names where several share the row."""
+    return SYMBOLS[names[0]].meaning if len(names) == 1 else ", ".join(names)
 
 
 def _stem(name: str) -> str:
