@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from aqualog.face.drive import Drive, read
     from aqualog.face.evaluate import evaluate
     from aqualog.face.inspect import inspect
+    from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
     from aqualog.model.term import Model
     from aqualog.types import Signals
@@ -51,6 +52,7 @@ _FACE = {
     "evaluate": "aqualog.face.evaluate",
     "inspect": "aqualog.face.inspect",
     "diagnose": "aqualog.face.diagnose",
+    "simulate": "aqualog.face.simulate",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.types",
     "Vehicle": "aqualog.vehicle",
@@ -82,6 +84,7 @@ __all__ = [
     "inspect",
     "physics",
     "read",
+    "simulate",
     "slip_slope",
     "thesis",
 ]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,9 +18,6 @@ from aqualog.cli.options import (
 
 if TYPE_CHECKING:
     from aqualog.cli.console import Console
-    from aqualog.model.scenario import Scenario
-    from aqualog.model.simulate import Simulation
-    from aqualog.model.term import Model
 
 __all__ = ["simulate"]
 
@@ -89,7 +83,7 @@ def simulate(
 def _campaign(
     names: list[str], out: Path, *, jobs: int | None, force: bool, console: Console, strange: dict[str, bool]
 ) -> int:
-    from aqualog.errors import ConfigError
+    from aqualog.errors import ConfigError, ExitCode
 
     if len(names) != 1:
         raise ConfigError(
@@ -99,10 +93,19 @@ def _campaign(
         )
     given = next((option for option, is_given in strange.items() if is_given), None)
     if given is not None:
-        raise ConfigError(f"{given} says nothing to a campaign", expected="-o, --jobs and --force")
-    from aqualog.cli.campaign_run import run_campaign
+        raise ConfigError(f"{given} does not apply to a campaign", expected="-o, --jobs and --force")
+    from aqualog.cli.console import told_if_interrupted
+    from aqualog.face.simulate import simulate_campaign
 
-    return run_campaign(names[0], out, jobs=jobs, force=force, console=console)
+    with console.hearing() as hear, told_if_interrupted(_INTERRUPTED):
+        result = simulate_campaign(names[0], out, jobs=jobs, force=force, progress=hear)
+    console.note(result.headline())
+    if not result.has_loss:
+        return int(ExitCode.DONE)
+    return int(ExitCode.PARTIAL if result.outcome.made or result.outcome.kept else ExitCode.FAILED)
+
+
+_INTERRUPTED = "the drives that are done stay, the same command goes on with the rest"
 
 
 def _drive(
@@ -118,91 +121,27 @@ def _drive(
 ) -> int:
     from aqualog.config.scenario import vehicle_of
     from aqualog.errors import ConfigError, ExitCode
-    from aqualog.face.paths import refuse_existing, write_whole
+    from aqualog.face.paths import refuse_existing
+    from aqualog.face.simulate import simulate
     from aqualog.io.write_log import check_suffix
 
-    suffix = check_suffix(out)
+    check_suffix(out)
     if len(names) > 1:
         raise ConfigError(f"{len(names)} scenarios", where=names[1], expected="one at a time")
     if jobs is not None:
-        raise ConfigError("--jobs says nothing to one drive", expected="aqualog simulate campaign NAME --jobs N")
+        raise ConfigError("--jobs does not apply to one drive", expected="aqualog simulate campaign NAME --jobs N")
     path = Path(names[0])
     refuse_existing([out], force=force, sources=[path, *vehicle_of(path), *([model_file] if model_file else [])])
-    with console.steps() as steps:
-        steps("reading")
-        scenario, model = _read(path, model_file, seed)
-        result, factor = _simulated(scenario, model, console, steps)
-        steps("writing")
-        from aqualog.model.log import write_simulation
-
-        comment = _comment(path, scenario, model_file)
-        write_whole(out, lambda p: write_simulation(p, result, suffix=suffix, comment=comment))
-    signals = [n for g in result.measured for n in g.columns]
+    with console.hearing() as hear:
+        result = simulate(path, model=model_file, seed=seed, progress=hear).naming(out)
+        hear("writing")
+        result.write(out, force=True)
     if as_json:
-        _print(out, scenario, signals, factor)
-    for lane in (n for n in scenario.lanes if not n.in_metres and n.start >= scenario.duration_s):
-        console.note(f"the lane from {lane.start:g} s begins after the drive, which ends at {scenario.duration_s:g} s")
-    for group in result.measured:
-        console.detail(f"  {group.name}: {group.t.size} samples")
+        console.data(result, as_json=True)
+    for text in result.notes:
+        console.note(text)
     console.note(
-        f"{len(signals)} signals of {scenario.duration_s:g} s (seed {scenario.seed}) are in {out}; "
-        f"simulated {factor:.3g} times as fast as driven"
+        f"{len(result.channels)} signals of {result.scenario.duration_s:g} s (seed {result.made.seed}) are in {out}; "
+        f"simulated {result.factor:.3g} times as fast as driven"
     )
     return int(ExitCode.DONE)
-
-
-def _read(path: Path, model_file: Path | None, seed: int | None) -> tuple[Scenario, Model]:
-    from dataclasses import replace
-
-    from aqualog.config.scenario import load_scenario
-    from aqualog.model.term import Model
-
-    scenario = load_scenario(path)
-    if seed is not None:
-        scenario = replace(scenario, seed=seed)
-    if model_file is None:
-        return scenario, Model()
-    from aqualog.config.model import load_model
-
-    return scenario, load_model(model_file)
-
-
-def _simulated(
-    scenario: Scenario, model: Model, console: Console, steps: Callable[[str], None]
-) -> tuple[Simulation, float]:
-    """The drive, and how many times faster than real it was, apart from the compiling that a first run needs."""
-    import time
-    from dataclasses import replace
-
-    steps("preparing")
-    with console.told_if_slow("the simulation"):
-        from aqualog.model.simulate import simulate as run
-
-        run(replace(scenario, duration_s=min(scenario.duration_s, 0.2)))
-    steps(f"simulating {scenario.duration_s:g} s")
-    start = time.perf_counter()
-    result = run(scenario, model)
-    return result, scenario.duration_s / max(time.perf_counter() - start, 1e-9)
-
-
-def _comment(path: Path, scenario: Scenario, model_file: Path | None) -> str:
-    from aqualog import __version__
-
-    model = f", model {model_file.stem}" if model_file else ""
-    return f"simulated by aqualog {__version__}: scenario {path.stem}{model}, seed {scenario.seed}"
-
-
-def _print(out: Path, scenario: Scenario, signals: list[str], factor: float) -> None:
-    from aqualog import __version__
-
-    document = {
-        "schema_version": 1,
-        "tool_version": __version__,
-        "log": str(out),
-        "duration_s": scenario.duration_s,
-        "sample_rate_hz": scenario.rate_hz,
-        "seed": scenario.seed,
-        "signals": signals,
-        "real_time_factor": float(f"{factor:.4g}"),
-    }
-    sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")

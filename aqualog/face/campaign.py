@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from aqualog.face.matrix import Matrix
     from aqualog.face.plan import BatchPlan
     from aqualog.face.propose import Proposal
+    from aqualog.face.simulate import SimulatedCampaign
     from aqualog.workers import Limits, WorkOn
 
 __all__ = ["Campaign", "CampaignRuns", "is_campaign", "names_of"]
@@ -146,6 +147,22 @@ class Campaign:
         from aqualog.face.propose import propose
 
         return propose(folder, out, vehicle=vehicle, dbc=dbc, force=force, progress=progress)
+
+    @staticmethod
+    def simulate(
+        programme: str, folder: PathLike, *, jobs: int | None = None, force: bool = False, progress: Progress = None
+    ) -> SimulatedCampaign:
+        """Simulate the drives of a programme, `thesis` or `situations`, into a folder.
+
+        See `aqualog.face.simulate.simulate_campaign`; the campaign is `.campaign` of what is returned.
+
+        Examples
+        --------
+        >>> aq.Campaign.simulate("thesis", "thesis", jobs=8).campaign.run()
+        """
+        from aqualog.face.simulate import simulate_campaign
+
+        return simulate_campaign(programme, folder, jobs=jobs, force=force, progress=progress)
 
     @property
     def name(self) -> str:

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
+from aqualog.align.mapping import SignalMap, resolve
 from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
+from aqualog.align.table import build_signals
 from aqualog.io.write_log import LogGroup, write_log
 from aqualog.model.sensors import Measured
 from aqualog.model.simulate import TRUTH_SYMBOLS, Simulation
 from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.types import FloatArray, TimeArray
+from aqualog.types import Channel, ChannelInfo, FloatArray, Signals, TimeArray
+from aqualog.vehicle import Vehicle
 
-__all__ = ["START_NS", "grid_of", "groups_of", "table_of", "write_simulation"]
+__all__ = ["START_NS", "grid_of", "groups_of", "signals_of", "table_of", "write_simulation"]
 
 START_NS = 1_748_000_000_000_000_000  # arbitrary: a drive must be the same whenever it is simulated
 _OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time stamps of its messages
@@ -23,6 +26,19 @@ def write_simulation(path: Path, simulation: Simulation, *, suffix: str, comment
     """Write a drive in the format of a suffix; the same drive gives the same bytes."""
     groups = groups_of(simulation) if suffix in _OWN_STAMPS else table_of(simulation)
     write_log(path, grid_of(simulation), groups, suffix=suffix, start_ns=START_NS, comment=comment, written_ns=START_NS)
+
+
+def signals_of(simulation: Simulation, vehicle: Vehicle, file: str) -> Signals:
+    """Return the signals that reading the drive's MDF log gives, without writing it; `file` is the log's name."""
+    channels = {}
+    for group in groups_of(simulation):
+        assert group.t_ns is not None
+        for name, (unit, _, x) in group.columns.items():
+            info = ChannelInfo(f"{group.name}.{name}", name, unit, x.size, file)
+            channels[info.path] = Channel(info, group.t_ns + START_NS, x, absolute=True)
+    found = resolve([c.info for c in channels.values()], SignalMap())
+    mapped = {symbol: (entry, channels[info.path]) for symbol, (entry, info) in found.items()}
+    return build_signals(mapped, signal_map=SignalMap(), vehicle=vehicle, file_faults=[], rate_hz=None)
 
 
 def groups_of(simulation: Simulation) -> list[LogGroup]:

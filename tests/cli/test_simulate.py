@@ -1,11 +1,11 @@
 """`aqualog simulate`: what is in the logs, and what is said when it cannot be done."""
 
 import json
+import os
 import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import asammdf
 import numpy as np
@@ -21,6 +21,8 @@ from aqualog.config.scenario import load_scenario
 from aqualog.errors import ConfigError
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
+from aqualog.model import campaign as programmes
+from aqualog.model.campaign import CampaignOutcome
 from aqualog.model.log import START_NS, _onto
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.simulate import simulate as simulated
@@ -330,14 +332,13 @@ def test_compiling_is_told_only_where_it_takes_long(monkeypatch, capsys):
 def campaign(monkeypatch):
     calls = []
 
-    def run_campaign(name, out_dir, *, jobs, force, console):
-        console.note("campaign runs")
-        calls.append((name, out_dir, jobs, force))
-        if name == "wrong":
+    def run(programme, folder, *, jobs, force, report):
+        calls.append((programme, folder, jobs, force))
+        if programme == "wrong":
             raise ConfigError("no such programme")
-        return 3 if name == "partly" else 0
+        return CampaignOutcome(3, 0, {"wet": "no car"} if programme == "partly" else {})
 
-    monkeypatch.setitem(sys.modules, "aqualog.cli.campaign_run", SimpleNamespace(run_campaign=run_campaign))
+    monkeypatch.setattr(programmes, "simulate_campaign", run)
     return calls
 
 
@@ -346,12 +347,15 @@ def test_campaign(campaign, tmp_path):
     args = ["simulate", "campaign", "thesis", "-o", str(tmp_path / "out")]
     result = runner.invoke(app, args)
     assert result.exit_code == 0
-    assert "campaign runs" in result.stderr
+    assert "3 drives simulated" in result.stderr
     assert runner.invoke(app, [*args, "-q"]).stderr == ""
     assert campaign.pop()
     assert runner.invoke(app, [*args, "--jobs", "2", "--force"]).exit_code == 0
-    assert campaign == [("thesis", Path(tmp_path / "out"), None, False), ("thesis", Path(tmp_path / "out"), 2, True)]
-    assert runner.invoke(app, [*args[:2], "partly", *args[3:]]).exit_code == 3
+    cores = os.cpu_count()
+    assert campaign == [("thesis", Path(tmp_path / "out"), cores, False), ("thesis", Path(tmp_path / "out"), 2, True)]
+    partly = runner.invoke(app, [*args[:2], "partly", *args[3:]])
+    assert partly.exit_code == 3
+    assert partly.stderr.startswith("error: wet: no car\n")
     assert runner.invoke(app, [*args[:2], "wrong", *args[3:]]).exit_code == 2
 
 

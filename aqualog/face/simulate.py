@@ -1,0 +1,351 @@
+"""`aq.simulate`: one drive of a scenario; and the drives of a whole programme."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.errors import ConfigError
+from aqualog.face.campaign import Campaign
+from aqualog.face.detect import model_of
+from aqualog.face.drive import Drive
+from aqualog.face.listener import Listener, Progress, listener
+from aqualog.face.paths import refuse_existing, write_whole
+from aqualog.face.progress import Progress as Counted
+from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+    import polars as pl
+
+    from aqualog.model.campaign import CampaignOutcome
+    from aqualog.model.scenario import Scenario
+    from aqualog.model.simulate import Simulation as Made
+    from aqualog.model.term import Model
+    from aqualog.types import Signals
+
+__all__ = ["SimulatedCampaign", "Simulation", "check_programme_folder", "simulate", "simulate_campaign"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Result):
+    """A simulated drive: what a car's sensors see, and the truth.
+
+    `made` holds the records, `factor` how many times faster than real it was simulated, `log` the file that the
+    document names, `comment` what a written log says of its origin.
+    """
+
+    made: Made
+    factor: float
+    name: str
+    comment: str
+    log: str
+    sources: tuple[Path, ...] = ()
+    has_loss: bool = False
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was driven and how it was measured, with the model's effects in it."""
+        return self.made.setup.scenario
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car of the scenario."""
+        return self.scenario.vehicle
+
+    @cached_property
+    def drive(self) -> Drive:
+        """The drive, which `detect` and the others take; its signals are those of the written log (.mf4)."""
+        from aqualog.model.log import signals_of
+
+        given = signals_of(self.made, self.vehicle, Path(self.log).name)
+        return Drive((), given=given, vehicle=self.vehicle, label=Path(self.log).name)
+
+    @property
+    def signals(self) -> Signals:
+        """The signals on one time base, SI, as they are read from the log."""
+        return self.drive.signals
+
+    @property
+    def truth(self) -> pl.DataFrame:
+        """What no sensor sees: `t` [s] and the columns `true_...`, at the rate of the scenario."""
+        import polars as pl
+
+        from aqualog.model.log import grid_of, table_of
+
+        groups = table_of(self.made)
+        columns = {n: x for g in groups for n, (_, _, x) in g.columns.items() if n.startswith("true_")}
+        return pl.DataFrame({"t": grid_of(self.made) * 1e-9, **columns}).fill_nan(None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Sentences on lanes that the drive does not reach."""
+        end = self.scenario.duration_s
+        return tuple(
+            f"the lane from {lane.start:g} s begins after the drive, which ends at {end:g} s"
+            for lane in self.scenario.lanes
+            if not lane.in_metres and lane.start >= end
+        )
+
+    @property
+    def channels(self) -> list[str]:
+        """Signals of the log, the truth among them."""
+        return [n for g in self.made.measured for n in g.columns]
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The JSON document of `aqualog simulate`."""
+        from aqualog import __version__
+
+        return {
+            "schema_version": 1,
+            "tool_version": __version__,
+            "log": self.log,
+            "duration_s": self.scenario.duration_s,
+            "sample_rate_hz": self.scenario.rate_hz,
+            "seed": self.made.seed,
+            "signals": self.channels,
+            "real_time_factor": float(f"{self.factor:.4g}"),
+        }
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`signals` and `truth`."""
+        return {"signals": self.signals.frame, "truth": self.truth}
+
+    def text(self) -> str:
+        """Return an empty text: the command prints no table."""
+        return ""
+
+    def headline(self) -> str:
+        """Return length, rate, seed, car and lanes."""
+        s = self.scenario
+        lanes = f"{len(s.lanes)} lane{'s' if len(s.lanes) != 1 else ''} with water or another surface"
+        return "\n".join(
+            [
+                f"{self.name}, {s.vehicle.name}: {s.duration_s:g} s at {s.rate_hz:g} Hz, seed {self.made.seed}",
+                f"  {len(self.channels)} signals, the truth among them; {lanes}",
+                *(f"  note: {n}" for n in self.notes),
+            ]
+        )
+
+    def plot(self) -> go.Figure:
+        """Return the signals over time, a row for each unit."""
+        return self.drive.plot()
+
+    def files(self) -> Writers:
+        """Return `simulation.json`, and the drive as an MDF log under the scenario's name."""
+        return {
+            f"{self.name}.mf4": lambda path: self._write(path, ".mf4"),
+            "simulation.json": text_file(lambda: self.to_json() + "\n"),
+        }
+
+    def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+        """Write log and document into a folder; the document names the log there.
+
+        Raises
+        ------
+        ConfigError
+            If a file exists already, or is a source of this result.
+        """
+        named = self.naming(Path(folder) / f"{self.name}.mf4")
+        return super(Simulation, named).save(folder, force=force)
+
+    def naming(self, path: PathLike) -> Simulation:
+        """Return the same with `path` as the log that the document names."""
+        return replace(self, log=str(path))
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the drive as a log: .mf4, .mcap, .csv or .parquet.
+
+        Raises
+        ------
+        ConfigError
+            If the suffix is not known, the file exists and `force` is not given, or it is a source.
+        """
+        from aqualog.io.write_log import check_suffix
+
+        target = Path(path)
+        suffix = check_suffix(target)
+        refuse_existing([target], force=force, sources=self.sources)
+        write_whole(target, lambda p: self._write(p, suffix))
+        return target
+
+    def _write(self, path: Path, suffix: str) -> None:
+        from aqualog.model.log import write_simulation
+
+        write_simulation(path, self.made, suffix=suffix, comment=self.comment)
+
+
+def simulate(
+    scenario: PathLike | Scenario,
+    *,
+    model: PathLike | Model | None = None,
+    seed: int | None = None,
+    progress: Progress = None,
+) -> Simulation:
+    """Simulate one drive.
+
+    The same scenario, model and seed give the same drive. A whole programme: `aq.Campaign.simulate`.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+        Scenario file (TOML), or its record.
+    model : Model, str or Path, optional
+        Effects on top of the base, as `aq.diagnose` finds them.
+    seed : int, optional
+        In place of the scenario's.
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    ConfigError
+        Also if scenario or model ask for what the car cannot do.
+
+    Examples
+    --------
+    >>> sim = aq.simulate("scenario.toml", seed=7)
+    >>> aq.detect(sim.drive, sim.vehicle).events
+    >>> sim.truth["true_contact_fl"], sim.write("drive.mf4")
+    """
+    hear = listener(progress)
+    hear("reading")
+    from aqualog.model.term import Model
+
+    sources: list[Path] = []
+    name = "simulated"
+    if isinstance(scenario, str | Path):
+        from aqualog.config.scenario import load_scenario, vehicle_of
+
+        path = Path(scenario)
+        sources += [path, *vehicle_of(path)]
+        scenario, name = load_scenario(path), path.stem
+    if seed is not None:
+        if not 0 <= seed < 2**63:
+            raise ConfigError(f"seed = {seed}", expected="0 or more, below 2^63")
+        scenario = replace(scenario, seed=seed)
+    known = model_of(model) or Model()
+    named = ""
+    if isinstance(model, str | Path):
+        sources.append(Path(model))
+        named = f", model {Path(model).stem}"
+    made, factor = _simulated(scenario, known, hear)
+    for group in made.measured:
+        hear.detail(f"  {group.name}: {group.t.size} samples")
+    from aqualog import __version__
+
+    comment = f"simulated by aqualog {__version__}: scenario {name}{named}, seed {scenario.seed}"
+    return Simulation(made, factor, name, comment, f"{name}.mf4", tuple(sources))
+
+
+def _simulated(scenario: Scenario, model: Model, hear: Listener) -> tuple[Made, float]:
+    """Return the drive, and how many times faster than real it was, without the compiling that a first run needs."""
+    hear("preparing")
+    with hear.slow("the simulation"):
+        from aqualog.model.simulate import simulate as run
+
+        run(replace(scenario, duration_s=min(scenario.duration_s, 0.2)))
+    hear(f"simulating {scenario.duration_s:g} s")
+    start = time.perf_counter()
+    made = run(scenario, model)
+    return made, scenario.duration_s / max(time.perf_counter() - start, 1e-9)
+
+
+# --- programmes ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SimulatedCampaign:
+    """A simulated campaign in a folder: `outcome` counts the drives made, kept and failed; `seconds` it took."""
+
+    folder: Path
+    outcome: CampaignOutcome
+    seconds: float
+
+    @property
+    def path(self) -> Path:
+        """The campaign file."""
+        return self.folder / "campaign.toml"
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign, to run."""
+        return Campaign(self.path)
+
+    @property
+    def has_loss(self) -> bool:
+        """Whether a drive failed."""
+        return bool(self.outcome.failed)
+
+    def headline(self) -> str:
+        """Return how many drives were simulated, and where the campaign is."""
+        o = self.outcome
+        kept = f", {o.kept} were there already" if o.kept else ""
+        failed = f", {len(o.failed)} failed" if o.failed else ""
+        return f"{o.made} drives simulated in {self.seconds:.0f} s{kept}{failed}; the campaign is {self.path}"
+
+    def __repr__(self) -> str:
+        return self.headline()
+
+
+def check_programme_folder(folder: PathLike) -> Path:
+    """Refuse the name of a log as the folder of a campaign.
+
+    Raises
+    ------
+    ConfigError
+    """
+    from aqualog.io.write_log import SUFFIXES
+
+    out = Path(folder)
+    if out.suffix.lower() in SUFFIXES:
+        raise ConfigError("is the name of a log", where=str(out), expected="a folder for the campaign")
+    return out
+
+
+def simulate_campaign(
+    programme: str, folder: PathLike, *, jobs: int | None = None, force: bool = False, progress: Progress = None
+) -> SimulatedCampaign:
+    """Simulate the drives of a programme into a folder, with vehicle files and a campaign file.
+
+    A folder in which the same programme was begun is completed. A drive that fails is left out, and `progress` hears
+    why.
+
+    Parameters
+    ----------
+    programme : str
+        `thesis` (the measuring campaign of the thesis) or `situations` (38 situations, most without water).
+    folder : str or Path
+        It is made if it does not exist.
+    jobs : int, optional
+        Drives at a time; default one per core.
+    force : bool
+        Simulate all drives again.
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such programme, or the folder holds something else.
+    """
+    from aqualog.model.campaign import simulate_campaign as run
+
+    hear, out = listener(progress), check_programme_folder(folder)
+    began = time.monotonic()
+    outcome = run(programme, out, jobs=jobs or os.cpu_count() or 1, force=force, report=Counted(hear, "drives"))
+    for name, reason in outcome.failed.items():
+        hear.failed(name, reason)
+    return SimulatedCampaign(out, outcome, time.monotonic() - began)
