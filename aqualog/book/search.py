@@ -10,7 +10,7 @@ from aqualog.book.topics import Topic, plain
 
 __all__ = ["Hit", "search"]
 
-_IN_TITLE, _IN_HEADING, _IN_SUMMARY = 40, 8, 10
+_IN_TITLE, _IN_HEADING, _IN_SUMMARY = 40, 12, 10
 _WHOLE = 3  # a word that stands alone counts more than a part of another
 _MOST_COUNTED = 10  # a long table of one word is no better page than an explanation
 
@@ -36,18 +36,20 @@ def _hit(words: list[str], page: Topic, most_lines: int) -> Hit | None:
     low = text.lower()
     if not words or not all(w in low for w in words):
         return None
-    lines = _lines(text)
-    scored = [(line, sum(_in(w, line) for w in words)) for line in lines]
-    body = sorted((s for _, s in scored), reverse=True)[:_MOST_COUNTED]
+    lines = list(dict.fromkeys(_lines(text)))
+    scored = [(line, sum(_in(w, line) for w in words)) for line, _ in lines]
+    body = sorted((s for (_, s), (_, is_code) in zip(scored, lines, strict=True) if not is_code), reverse=True)
     heads = [line for line in text.lower().splitlines() if line.startswith("#")]
-    score = sum(body)
+    score = sum(body[:_MOST_COUNTED])
     for word in words:
         score += _IN_TITLE * _in(word, f"{page.title} {page.name}")
         score += _IN_SUMMARY * _in(word, page.summary)
         score += _IN_HEADING * sum(_in(word, h) for h in heads)
-    shown = sorted((i for i, (_, s) in enumerate(scored) if s), key=lambda i: (-scored[i][1], i))
+    if page.section == "decisions":
+        score //= 2  # why something is so is asked for last
+    shown = sorted((i for i, (_, s) in enumerate(scored) if s), key=lambda i: (lines[i][1], -scored[i][1], i))
     count = len(shown)
-    return Hit(page, score, tuple(lines[i] for i in sorted(shown[:most_lines])), count)
+    return Hit(page, score, tuple(lines[i][0] for i in sorted(shown[:most_lines])), count)
 
 
 def _in(word: str, text: str) -> int:
@@ -57,14 +59,22 @@ def _in(word: str, text: str) -> int:
     return _WHOLE if re.search(rf"(?<![^\W_]){re.escape(word)}(?![^\W_])", low) else 1
 
 
-def _lines(text: str) -> list[str]:
-    """Paragraphs, list items, table rows and lines of code, each on one line."""
-    lines, paragraph, in_code = list[str](), list[str](), False
+def _lines(text: str) -> list[tuple[str, bool]]:
+    """Paragraphs, list items, table rows and lines of code, each on one line, and whether it is code.
+
+    A heading stands before its first paragraph.
+    """
+    lines, paragraph, in_code, heading = list[tuple[str, bool]](), list[str](), False, ""
 
     def end() -> None:
+        nonlocal heading
         if paragraph:
-            lines.append(plain(" ".join(paragraph)))
+            said = plain(" ".join(paragraph))
+            lines.append((f"{heading}: {said}" if heading else said, False))
             paragraph.clear()
+        elif heading:
+            lines.append((heading, False))
+        heading = ""
 
     for raw in text.splitlines():
         line = raw.strip()
@@ -72,16 +82,20 @@ def _lines(text: str) -> list[str]:
             in_code = not in_code
             end()
         elif in_code:
-            lines.append(line)
+            lines.append((line, True))
         elif not line or set(line) <= set("|-: "):
-            end()
+            if paragraph:
+                end()
         elif line.startswith("|"):
             end()
-            lines.append(plain("  ".join(c.strip() for c in line.strip("|").split("|"))))
-        elif line.startswith(("#", "- ", "* ", "> ")):
+            lines.append((plain("  ".join(c.strip() for c in line.strip("|").split("|"))), False))
+        elif line.startswith("#"):
             end()
-            paragraph.append(line.lstrip("#>-* "))
+            heading = plain(line.lstrip("# "))
+        elif line.startswith(("- ", "* ", "> ")):
+            end()
+            paragraph.append(line.lstrip(">-* "))
         else:
             paragraph.append(line)
     end()
-    return [line for line in lines if line]
+    return [(line, is_code) for line, is_code in lines if line]

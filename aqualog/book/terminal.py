@@ -83,7 +83,6 @@ class _Heading(Heading):
         if self.tag == "h1":
             text.stylize(Style(bold=True, underline=True))
         else:
-            yield Text()
             text.stylize(Style(bold=True))
         yield text
 
@@ -101,6 +100,7 @@ class _Table(TableElement):
                 made.show_edge = False
                 made.pad_edge = False
                 made.box = box.SIMPLE
+                made.show_header = any(str(c.header).strip() for c in made.columns)
                 made.expand = False
             yield made
 

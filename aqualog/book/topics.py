@@ -70,12 +70,13 @@ def find(name: str, pages: list[Topic]) -> Topic | None:
     """The page of that name, or None.
 
     `-`, `_` and a space are alike, as are capitals; a section may stand before the name. Of pages of one name the
-    first in the order of `SECTIONS` is meant, but a page at the top comes last.
+    first in the order of `SECTIONS` is meant, but a page at the top comes last. A page of decisions is found with its
+    section alone: its name is that of a package or a command.
     """
     wanted = _key(name)
     order = [s for s in SECTIONS if s] + [""]
     for page in sorted(pages, key=lambda p: order.index(p.section)):
-        names = [page.name, page.address]
+        names = [page.address] if page.section == "decisions" else [page.name, page.address]
         if page.name == "index":
             names = [page.section or "index", page.address]
         if wanted in map(_key, names):

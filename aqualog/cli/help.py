@@ -67,7 +67,7 @@ def _text(asked: list[str]) -> str:
         lines = [_bold(f"{len(hits)} page{'' if len(hits) == 1 else 's'} with “{name}”")]
         for hit in hits[:_MOST_PAGES]:
             lines += ["", f"{_bold(_called(hit.topic, pages))}  {hit.topic.title}"]
-            lines += [_cut(line) for line in hit.lines]
+            lines += [_cut(line, name.split()) for line in hit.lines]
             if hit.count > len(hit.lines):
                 lines.append(f"    ... {hit.count - len(hit.lines)} more")
         if len(hits) > _MOST_PAGES:
@@ -155,8 +155,12 @@ def _entry(text: str, asked: list[str]) -> str:
     return ""
 
 
-def _cut(line: str) -> str:
+def _cut(line: str, words: list[str]) -> str:
+    """A line as long as the terminal is wide, with one of the words in it."""
     most = max(50, _width()) - 5
+    at = max(line.lower().find(w.lower()) for w in words)
+    if at > most - 20:
+        line = f"…{line[at - most // 2 :]}"
     return f"    {line}" if len(line) <= most else f"    {line[: most - 1]}…"
 
 

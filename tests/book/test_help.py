@@ -38,6 +38,13 @@ def test_a_word_finds_pages():
     assert "environment" in result.stdout
 
 
+@pytest.mark.parametrize("name", ["detect", "plan", "campaign init", "aqualog slip-slope"])
+def test_a_command_is_shown_with_its_options(name):
+    result = ask(*name.split())
+    assert result.exit_code == 0
+    assert "--vehicle" in result.stdout or "aqualog slip-slope --help" in result.stdout
+
+
 def test_a_word_that_is_nowhere():
     result = ask("enviromment")
     assert result.exit_code == 2

@@ -49,6 +49,19 @@ def test_names(book, name, address):
     assert find(name, topics(book)).address == address
 
 
+def test_a_page_of_decisions_hides_no_command(book):
+    (book / "decisions" / "detect.md").write_text("# Decisions: detect\n\nWhy.\n")
+    assert find("detect", topics(book)) is None
+    assert find("decisions/detect", topics(book)).title == "Decisions: detect"
+
+
+def test_lines_of_code_stand_behind_what_explains_them(book):
+    (book / "guide" / "x.md").write_text(
+        "# X\n\nIt is.\n\n```console\n$ odd 1\n$ odd 2\n$ odd 3\n```\n\nAn odd word.\n"
+    )
+    assert search(["odd"], topics(book))[0].lines == ("$ odd 1", "$ odd 2", "An odd word.")
+
+
 def test_no_such_page(book):
     assert find("nothing", topics(book)) is None
     assert nearest("slipslope", [p.name for p in topics(book)]) == ["slip_slope"]
@@ -57,7 +70,7 @@ def test_no_such_page(book):
 def test_search_sets_the_page_of_that_title_first(book):
     hits = search(["slope"], topics(book))
     assert [h.topic.address for h in hits] == ["method/slip_slope", "guide/campaign", "reference/campaign"]
-    assert hits[1].lines == ("A slip slope.",)
+    assert hits[1].lines == ("Steps: A slip slope.",)
     assert hits[2].lines == ("slope_key  m",)
 
 
