@@ -6,7 +6,7 @@ What counts in a page, from top to bottom, in one folder that holds `sample_logs
   printed output ends with a line `...`, only the lines before it are compared; more output follows.
 - A fence ``python``: run in one session per page. A fence ``text`` right below it holds what it prints.
 - Comments directly above a fence: `<!-- not run -->` leaves it out, `<!-- needs: real_logs -->` leaves it out where the
-  measured drives are missing, `<!-- exit: 3 -->` is the code with which its last command ends,
+  measured drives are missing, `<!-- long -->` where nobody asks for what takes its time, `<!-- exit: 3 -->` is the code with which its last command ends,
   `<!-- file: map.toml -->` writes the fence's content to that file of the page's folder.
 
 Two outputs are the same if their words are and their numbers agree within 0.2 % or one unit of the last digit shown:
@@ -20,6 +20,7 @@ import argparse
 import json
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -33,7 +34,7 @@ DOCS = ROOT / "aqualog" / "docs"
 REAL_LOGS = ROOT.parent / "shared" / "real_logs"
 UNREAD = {"reference", "decisions"}  # generated, and history
 FENCE = re.compile(r"^(```+)(\w*)\s*$")
-COMMENT = re.compile(r"^<!--\s*(not run|[a-z]+:\s*.+?)\s*-->\s*$")
+COMMENT = re.compile(r"^<!--\s*(not run|long|[a-z]+:\s*.+?)\s*-->\s*$")
 NUMBER = re.compile(r"[-+−]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?%?")
 MORE = "..."
 
@@ -105,7 +106,7 @@ class Fault:
         return f"line {self.line}: {self.command}\n{self.why}"
 
 
-def check(page: Path, work: Path) -> tuple[str, list[Fault]]:
+def check(page: Path, work: Path, *, long: bool = False) -> tuple[str, list[Fault]]:
     """Run a page in the empty folder `work`: its text with the true output, and where it differed."""
     text = page.read_text(encoding="utf-8")
     lines = text.splitlines()
@@ -113,7 +114,11 @@ def check(page: Path, work: Path) -> tuple[str, list[Fault]]:
     faults: list[Fault] = []
     with Session(work) as session:
         for b in blocks(text):
-            if "not run" in b.marks or (b.marks.get("needs") == "real_logs" and not REAL_LOGS.is_dir()):
+            if (
+                "not run" in b.marks
+                or ("long" in b.marks and not long)
+                or (b.marks.get("needs") == "real_logs" and not REAL_LOGS.is_dir())
+            ):
                 continue
             if "file" in b.marks:
                 path = work / b.marks["file"]
@@ -322,16 +327,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     bad = 0
     for page in given.pages or pages():
+        before = _seconds()
         with tempfile.TemporaryDirectory() as folder:
-            text, faults = check(page.resolve(), Path(folder))
+            text, faults = check(page.resolve(), Path(folder), long=True)
         ends = [f for f in faults if f.why.startswith(("ended", "Trace", "Python"))]
         bad += len(faults if given.check else ends)
         for fault in faults if given.check else ends:
             print(f"{page}, {fault}\n")
-        if not given.check and text != page.read_text(encoding="utf-8"):
+        old = page.read_text(encoding="utf-8")
+        if not given.check and text != old:
             page.write_text(text, encoding="utf-8")
-            print(f"{page} rewritten")
+        print(
+            f"{_seconds() - before:5.1f} s  {page.name}{'' if text == old else ' differs' if given.check else ' rewritten'}",
+            flush=True,
+        )
     return 1 if bad else 0
+
+
+def _seconds() -> float:
+    """Processor time of all commands so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":

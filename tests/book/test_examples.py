@@ -11,6 +11,13 @@ def test_examples_are_true(page, tmp_path):
     assert not faults, "run `python -m tests.book.examples`\n" + "\n\n".join(map(str, faults))
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("page", [p for p in examples.pages() if any("long" in b.marks for b in examples.runnable(p))])
+def test_long_examples_are_true(page, tmp_path):
+    _, faults = examples.check(page, tmp_path, long=True)
+    assert not faults, "run `python -m tests.book.examples`\n" + "\n\n".join(map(str, faults))
+
+
 def written(tmp_path, text):
     page = tmp_path / "page.md"
     page.write_text(text, encoding="utf-8")
@@ -62,6 +69,11 @@ def test_python_that_fails_is_a_fault(tmp_path):
 
 def test_what_is_not_run_stays(tmp_path):
     page = "<!-- not run -->\n```console\n$ false\nwhat\n```\n\n<!-- not run -->\n```python\n1 / 0\n```\n"
+    assert written(tmp_path, page) == (page, [])
+
+
+def test_what_takes_its_time_is_left_out(tmp_path):
+    page = "<!-- long -->\n```console\n$ echo\nwhat\n```\n"
     assert written(tmp_path, page) == (page, [])
 
 
