@@ -225,3 +225,28 @@ def test_document_of_a_reproduction():
 def test_document_of_a_diagnosis(inputs, campaign):
     given = (MONDAY, *CAR, "--holdout", FRIDAY) if inputs == "drive" else (campaign / "campaign.toml",)
     assert complaints("diagnose", printed("diagnose", *given, "--json")) == []
+
+
+CONTRACT = {
+    "detect": "schema_version tool_version log duration_s sample_rate_hz signals.NAME.channel signals.NAME.unit "
+    "signals.NAME.rate_hz signals.NAME.missing_fraction events[].detector events[].wheel events[].side events[].start_s "
+    "events[].end_s events[].severity events[].peak events[].threshold events[].evidence.v_x events[].evidence.slip_min "
+    "unavailable[].detector unavailable[].missing quality.dropped_samples quality.time_jumps quality.truncated",
+    "bin_slipslope": "rows[].wheel rows[].v_low_kmh rows[].v_high_kmh rows[].runs rows[].samples rows[].slope "
+    "rows[].slope_ci95 rows[].intercept rows[].r2",
+    "bin_resistance": "rows[].v_low_kmh rows[].v_high_kmh rows[].runs rows[].samples rows[].delta_a_x rows[].delta_a_x_ci95",
+    "diagnose": "verdict causes[].effect causes[].where causes[].parameters.NAME.value causes[].parameters.NAME.ci95 "
+    "causes[].parameters.NAME.unit causes[].explains causes[].sentence alternatives unexplained[].channel "
+    "unexplained[].depends_on unexplained[].share gain.channel.NAME.rmse_before gain.channel.NAME.rmse_after "
+    "gain.heldout_log_score_gain gain.ci95 gain.heldout false_alarm_level detection_limits next_manoeuvre.name "
+    "next_manoeuvre.separates next_manoeuvre.sentence extended_model",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONTRACT)
+def test_fields_that_others_rely_on_are_always_there(name):
+    known = dict(paths(DOCUMENTS[name].fields))
+    for path in CONTRACT[name].split():
+        assert path in known, path
+        is_fixed = known[path].is_always or path.startswith(("events[].evidence.", "rows[].wheel", "signals.NAME."))
+        assert is_fixed, path
