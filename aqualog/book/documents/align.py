@@ -45,4 +45,5 @@ DOCUMENT = Document(
             text("file", "file"), text("channel", "channel, or how the quantity was made"), *_FIT,
         )),
     ),
+    files=("alignment.json",),
 )  # fmt: skip

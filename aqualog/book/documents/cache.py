@@ -25,4 +25,5 @@ DOCUMENT = Document(
         count("usable", "entries that this version can take"),
         count("removed", "entries that `--clean` removed"),
     ),
+    files=("cache.json",),
 )  # fmt: skip

@@ -75,4 +75,5 @@ DOCUMENT = Document(
         several("cannot_tell", "what these drives cannot determine, and what would"),
         several("notes", "sentences on the logs and on the estimates"),
     ),
+    files=("calibration.json",),
 )  # fmt: skip

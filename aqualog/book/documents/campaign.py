@@ -95,6 +95,7 @@ INSPECT = Document(
         )),
         several("notes", "sentences on the matrix"),
     ),
+    files=("matrix.json",),
 )  # fmt: skip
 
 BATCH = Document(
@@ -111,6 +112,7 @@ BATCH = Document(
         rows("failed", "logs that failed", (text("log", "log"), text("reason", "why"))),
         mapping("events", "events by detector, of all runs with results", _COUNT),
     ),
+    files=("campaign.json",),
 )
 
 _ESTIMATE = (
@@ -172,4 +174,5 @@ PLAN = Document(
             several("notes", "sentences on the estimate"),
         ),
     ),
+    files=("plan.json",),
 )  # fmt: skip

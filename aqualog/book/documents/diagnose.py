@@ -179,4 +179,5 @@ DOCUMENT = Document(
         )),
         several("notes", "sentences on the logs and on the diagnosis"),
     ),
+    files=("diagnosis.json",),
 )  # fmt: skip

@@ -50,4 +50,5 @@ DOCUMENT = Document(
             mapping("missing", "signals that a detector lacks", several("", "")),
         )),
     ),
+    files=("doctor.json",),
 )  # fmt: skip

@@ -124,4 +124,5 @@ DOCUMENT = Document(
         )),
         several("notes", "sentences on the evaluation"),
     ),
+    files=("evaluation.json",),
 )  # fmt: skip

@@ -53,4 +53,5 @@ DOCUMENT = Document(
         )),
         several("notes", "sentences on the files"),
     ),
+    files=("inspect.json",),
 )  # fmt: skip

@@ -85,7 +85,8 @@ SLIP_SLOPE = Document(
     (
         *_ABOUT,
         mapping("definitions", "what the names mean", text("", "")),
-        rows("rows", "slip slope by configuration, wheel and bin of speed", _SLOPE, keys=PLACE_KEYS),
+        rows("rows", "slip slope by configuration, wheel and bin of speed; `-o FILE` writes these rows as "
+             "a table, a pair `x_ci95` as `x_low` and `x_high`", _SLOPE, keys=PLACE_KEYS),
         rows("dry", "the same off the water", _SLOPE, keys=PLACE_KEYS),
         rows("delays", "by how much v_x is late, by car", (
             text("vehicle", "car"),
@@ -137,7 +138,7 @@ RESISTANCE = Document(
     (
         *_ABOUT,
         flag("less_own_dry_level", "whether each run's level before the lane was taken off (not with `--as-measured`)"),
-        rows("rows", "resistance by configuration and bin of speed", (
+        rows("rows", "resistance by configuration and bin of speed; `-o FILE` writes these rows as a table", (
             *_PLACE, *BIN,
             number("delta_a_x", "m/s^2", "mean resistance measure (2.9)", null=True), _ci("delta_a_x_ci95", "m/s^2"),
             number("scatter", "m/s^2", "scatter of the runs", null=True),

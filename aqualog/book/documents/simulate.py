@@ -19,4 +19,5 @@ DOCUMENT = Document(
         several("signals", "signals in the log, the truth among them"),
         number("real_time_factor", "-", "simulated time over computing time"),
     ),
+    files=("simulation.json",),
 )

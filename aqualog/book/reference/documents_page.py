@@ -16,7 +16,7 @@ _HOW = """
 `--json` prints one document on stdout. Numbers are SI unless the name says otherwise (`_kmh`, `_km`). A value that is
 not available is null; NaN and infinity never appear. `[]` marks a list, `NAME` a key that is data. A JSON Schema of
 each document lies in `aqualog/docs/schemas`; aqualog's own tests hold every document against it. New fields may be
-added without a new `schema_version`.
+added without a new `schema_version`. A document becomes a file by `-o`, or by `.save(DIR)` [from Python](python.md).
 
 Gains of a log score are in nats (natural logarithm of a likelihood ratio).
 
@@ -51,7 +51,7 @@ def _anchor(heading: str) -> str:
 
 
 def _document(document: Document) -> list[str]:
-    files = f" Also in {', '.join(map(code, document.files))}." if document.files else ""
+    files = f" As a file: {', '.join(map(code, document.files))}." if document.files else ""
     return [
         f"## `{document.heading}`",
         f"{document.summary}{files} Schema: `schemas/{document.name}.schema.json`.",
