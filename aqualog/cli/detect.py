@@ -158,7 +158,7 @@ def _detect(
     console = setup.console
     given = [p for p in (thresholds_file, model_file) if p is not None]
     if history_file is not None:
-        refuse_existing([history_file], force=True, sources=[*setup.sources, *targets, *given])
+        refuse_existing([history_file], force=True, sources=[*setup.drive.sources, *targets, *given])
     if given:
         refuse_existing(targets, force=force, sources=given)
     with console.hearing() as hear:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,42 +30,6 @@ class Setup:
     console: Console
     drive: Drive
     vehicle: Vehicle
-
-    @property
-    def paths(self) -> list[Path]:
-        """The logs."""
-        return list(self.drive.paths)
-
-    @property
-    def signal_map(self) -> SignalMap:
-        """Which channel is which signal."""
-        return self.drive.signal_map
-
-    @property
-    def sources(self) -> tuple[Path, ...]:
-        """All files that no result may overwrite."""
-        return self.drive.sources
-
-    @property
-    def cache(self) -> SignalCache | None:
-        """Where signals are kept; None if they are not."""
-        return self.drive.cache
-
-    def changes(self) -> tuple[str, ...]:
-        """Return a note for each log that has changed since the command began."""
-        return self.drive.changes()
-
-    @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Report an error within as a change of the log, if the log has changed.
-
-        Raises
-        ------
-        LogError
-            In place of an error of reading.
-        """
-        with self.drive.reading():
-            yield
 
 
 def prepare(

@@ -451,16 +451,13 @@ def reproduce(folder: PathLike, *, jobs: int | None = None, progress: Progress =
     AqualogError
         If a drive of the campaign cannot be simulated or measured.
     """
-    from aqualog.model.campaign import simulate_campaign
     from aqualog.reproduce.run import conclude, make_all
 
     hear, out, processes = listener(progress), Path(folder), jobs or os.cpu_count() or 1
     campaign = out / _CAMPAIGN
-    outcome = simulate_campaign("thesis", campaign, jobs=processes, force=False, report=Counted(hear, "drives"))
-    for run, reason in outcome.failed.items():
-        hear.failed(run, reason)
-    runs = Campaign(campaign / "campaign.toml").run(jobs=processes, progress=hear)
-    if outcome.failed or runs.outcome.failed:
+    simulated = Campaign.simulate("thesis", campaign, jobs=processes, progress=hear)
+    runs = simulated.campaign.run(jobs=processes, progress=hear)
+    if simulated.has_loss or runs.outcome.failed:
         raise AqualogError("the campaign is not whole", where=str(campaign), hint="the same command once more")
     made = make_all(runs.data, jobs=processes, report=Counted(hear, "figures and checks"))
     return Reproduction(conclude(made), made, _facts(len(runs.data.runs)), out)
