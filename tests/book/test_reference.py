@@ -67,6 +67,9 @@ def test_every_option_and_example_of_a_command(name, command):
         assert units(" ".join((param.help or "").split())).replace("|", "\\|") in flat
         if param.metavar:
             assert param.metavar.replace("|", "\\|") in entry
+        if param.param_type_name == "option" and not param.is_flag:
+            value = re.search(rf"`{max(param.opts, key=len)}`[^|]*\| ([^|]*)", entry)[1]
+            assert re.match(r"[A-Za-z]", value), param.name
     examples = re.findall(r"^ *(aqualog .+)$", (command.help or "").partition("Examples:")[2], re.M)
     assert all(e in entry for e in examples)
     assert examples or getattr(command, "commands", None)

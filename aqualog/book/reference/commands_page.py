@@ -87,7 +87,7 @@ def _option(param: Any) -> tuple[str, str, str, str]:
 
 
 def _value(param: Any) -> str:
-    kind = param.metavar or getattr(param.bare_type(), "__name__", "")
+    kind = param.metavar or str(param.bare_type())
     kind = {"float": "number", "int": "whole number", "str": "TEXT"}.get(kind, kind)
     low, high = param.min, param.max
     bounds = [f"{low:g} or more" if high is None else f"{low:g} ... {high:g}"] if low is not None else []
