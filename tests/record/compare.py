@@ -30,7 +30,7 @@ PROSE = {
     "question", "reason", "reasons", "rule", "sentence", "stderr", "stdout", "text", "thesis", "title", "what", "why",
     "words",
 }  # fmt: skip
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_NUMBER = re.compile(r"(?<![\w.^])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _WORDS = 4  # a text with as many is a sentence wherever it stands
 
 
