@@ -14,7 +14,7 @@ def results(real_logs):
 
 
 def test_acceleration_of_unseen_trips(results):
-    """Guards against change; the figures are in the README."""
+    """Guards against change; the figures are in the book (validation)."""
     for r in results:
         assert r.windows >= 10
         assert r.a_rms < 0.6 * r.a_spread

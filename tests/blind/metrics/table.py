@@ -70,7 +70,7 @@ def _median(x: object) -> float:
 
 
 def rivals_text(rows: Sequence[Row], own: str = "aqualog") -> tuple[str, list[Measure]]:
-    """The table for the README in markdown, and whether `own` is ahead of the best of the others on all three."""
+    """The table for the page of rivals in markdown, and whether `own` is ahead of the best of the others on all three."""
     found = rivals_measures(rows)
     lines = [
         "| method | finds something where nothing is (n) | right name first (n) | held-out gain, share of the oracle's, median |",
