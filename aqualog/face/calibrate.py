@@ -88,17 +88,20 @@ class Calibration(Result):
         return calibration_text(self.found)
 
     def headline(self) -> str:
-        """Return the estimated parameters, and the names of those that the drives do not determine."""
+        """Return the estimated parameters of the car, and the names of those that the drives do not determine."""
         from aqualog.report.calibration_document import parameter_cells
+        from aqualog.report.diagnosis_numbers import unit_text
 
         found = self.found
-        rows = [parameter_cells(p) for p in found.parameters if p.identified]
-        values = [f"{name} {value}{f' {unit}' if unit != '-' else ''} ({interval or 'given'})"
+        known = [p for p in found.parameters if p.identified]
+        # an offset of each drive follows: the tables have it
+        rows = [parameter_cells(p) for p in known if "[" not in p.name]
+        values = [f"{name} {value} {'' if unit == '-' else f'{unit_text(unit)} '}({interval or 'given'})"
                   for name, value, interval, unit, *_ in rows]  # fmt: skip
-        not_found = ", ".join(p.name for p in found.parameters if not p.identified)
+        not_found = ", ".join(p.name for p in found.parameters if not p.identified and "[" not in p.name)
         return "\n".join(
             [
-                f"{found.vehicle_name}: {len(rows)} of {len(found.parameters)} parameters estimated from "
+                f"{found.vehicle_name}: {len(known)} of {len(found.parameters)} parameters estimated from "
                 f"{len(found.drives)} drives; value (95 %)",
                 *("  " + "; ".join(values[i : i + 2]) for i in range(0, len(values), 2)),
                 *([f"  not determined: {not_found}"] if not_found else []),

@@ -55,6 +55,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], *, columns: int = 2) -> go.
     made.update_layout(
         paper_bgcolor=LIGHT["@paper"], plot_bgcolor=LIGHT["@paper"], height=380 * rows, showlegend=True,
         legend={"orientation": "h", "y": -0.2 / rows, "yanchor": "top"},
+        barmode=next((f.layout.barmode for f in figures if f.layout.barmode), None),
     )  # fmt: skip
     return made
 
