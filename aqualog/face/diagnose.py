@@ -242,7 +242,8 @@ def diagnose(
     surrogates : int, optional
         Drives without effect that calibrate the test; 0: the test by its formula alone. Default 49, of a campaign 299.
     views : bool
-        Keep the residuals before and after for page and figure.
+        Keep the residuals before and after for page and figure, as the command does with `--page`. The document then
+        has the units of all channels.
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
