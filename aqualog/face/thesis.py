@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from aqualog.figures.record import Figure, Finding
     from aqualog.reproduce.run import Conclusion, Made
 
-__all__ = ["FORMATS", "Figures", "Reproduction", "figure", "figures", "reproduce"]
+__all__ = ["FORMATS", "FUNCTIONS", "Figures", "Reproduction", "figure", "figures", "reproduce"]
 
 FORMATS = ("html", "csv", "png", "svg")
+FUNCTIONS = ("figure", "figures", "reproduce")
 
 _ALL_ON_ONE = "figures.html"
 _WHOLE = 10_000  # characters: no sentence of a finding is longer

@@ -5,11 +5,16 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Iterable
+from importlib import import_module
+from pkgutil import iter_modules
 from types import FunctionType, ModuleType
 from typing import Any
 
 import aqualog
+from aqualog import face
 from aqualog.book.markdown import code, fence, page, table
+from aqualog.face import thesis
+from aqualog.face.result import Result
 
 __all__ = ["text"]
 
@@ -24,6 +29,8 @@ list. Faults are exceptions, see [exit codes](exit_codes.md). A command reads lo
 from Python nothing is limited, and a log that crashes its reader ends your process.
 """
 _MOST = 90  # characters of a signature on one line
+_COMMON = frozenset(code(n) for n in ("has_loss", "notes", "sources", "document", "headline() -> str", "text() -> str"))
+"""Members that mean the same for every result."""
 _SECTION = re.compile(r"^(Parameters|Returns|Raises|Yields|Examples|Notes)\n-{3,}\n", re.M)
 _ITEM = re.compile(r"^(\S.*?)(?: : (.*))?$\n((?:^(?:    .*)?$\n?)*)", re.M)
 
@@ -34,6 +41,8 @@ def text() -> str:
     shown = [(n, getattr(aqualog, n)) for n in names]
     listed = [(code(f"aq.{n}"), _kind(x), _first(x)) for n, x in shown]
     parts = [p for name, x in shown for p in _entry(name, x)]
+    parts += [p for name in thesis.FUNCTIONS for p in _entry(f"thesis.{name}", getattr(thesis, name))]
+    parts += _results()
     return page("Python", _SUMMARY, _HOW, table(("name", "kind", "meaning"), listed) if listed else "", *parts)
 
 
@@ -59,6 +68,27 @@ def _entry(name: str, x: Any) -> list[str]:
         rows = list(_members(x))
         parts.append(table(("member", "meaning"), rows) if rows else "")
     return parts
+
+
+def _results() -> list[str]:
+    """What every result offers, and what each adds of its own."""
+    kinds = sorted(_classes(), key=lambda c: c.__name__)
+    common = dict(_members(Result))
+    parts = ["## Results", *_doc(inspect.getdoc(Result) or ""), table(("member", "meaning"), list(common.items()))]
+    for kind in kinds:
+        own = [(n, said) for n, said in _members(kind) if n not in _COMMON and common.get(n) != said]
+        parts += [f"### `{kind.__name__}`", *_doc(inspect.getdoc(kind) or "")]
+        parts.append(table(("member", "meaning"), own) if own else "")
+    return parts
+
+
+def _classes() -> Iterable[type[Result]]:
+    """The results of the face, by module."""
+    for module in iter_modules(face.__path__, f"{face.__name__}."):
+        for found in vars(import_module(module.name)).values():
+            is_result = inspect.isclass(found) and issubclass(found, Result) and found is not Result
+            if is_result and found.__module__ == module.name and not found.__name__.startswith("_"):
+                yield found
 
 
 def _doc(doc: str) -> list[str]:
