@@ -178,8 +178,8 @@ def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
     Returns
     -------
     bool array (n,)
-        Stretches of exactly zero, into which it falls faster than a car stops. If the value before was constant,
-        the sensor is held on a finer grid: the rate of its fall is unknown, and the zero is kept.
+        Stretches of exactly zero, into which it falls faster than a car stops. A zero is kept if the value
+        before it was a repeated one: a slow signal is held there on a finer grid, and the rate of its fall is unknown.
     """
     lost = np.zeros(v.size, dtype=np.bool_)
     if v.size < 2:

@@ -146,7 +146,7 @@ class JointCusumWatch:
 
 
 def _counts(track: Track, scene: Scene) -> BoolArray:
-    """Flag samples without a braking force on the statistic's wheel; a variance must exceed that of the other axle."""
+    """Flag samples without a braking force on the statistic's wheel; of a variance 0.7 must belong to one axle."""
     bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
     if track.detector == "minor_spin_down":
         with np.errstate(invalid="ignore"):

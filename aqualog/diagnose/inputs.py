@@ -104,8 +104,9 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
     """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`.
 
     Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an undriven
-    axle is torque like any other: 50 N·m now and then are 3 % of the torque in slow driving. On an axle with no other
-    torque, everything below that level is noise of unknown spectrum.
+    axle is torque like any other: 50 N·m now and then are 3 % of the torque in slow driving. Where an undriven
+    axle scatters by less than `NOT_TORQUE`, only events that stand out of its scatter are kept. The rest is noise of
+    unknown spectrum, and its mean replaces it.
     """
     out = np.empty_like(torque)
     driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2

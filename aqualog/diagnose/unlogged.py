@@ -46,7 +46,7 @@ def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
 def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N·m], >= 0
 
-    None where the car slows down faster than it rolls out: brakes are on all wheels, and one axle alone would lock at
+    Zero where the car slows down faster than it rolls out: brakes are on all wheels, and one axle alone would lock at
     that deceleration. At most for `A_MOST`.
     """
     inertia = np.gradient(smooth(v, dt, SPEED_S), dt)

@@ -57,9 +57,9 @@ def aligning_moment(
         Turning left positive: a force to the left behind the centre turns the wheel to the right. [N·m]
 
     The sticking bristles' forces grow linearly from the front edge b of the dry contact to where they begin to slide:
-    they act at two thirds of that stretch. The sliding ones follow the rest of the parabola. Limits: small slip on a
-    full contact gives -a/3 F_y; full sliding of a full contact 0; on a shortened one the remaining force acts further
-    back, -a (1 - 2 L / 3) F_y, until it vanishes with L.
+    they act at two thirds of that stretch. The sliding ones follow the rest of the parabola. Limits: small slip gives
+    -a (1 - 2 L / 3) F_y, which is -a/3 F_y on a full contact; full sliding gives -3 a (1 - L)^2 / (3 - 2 L) F_y, which
+    is 0 on a full contact. A shortened contact acts further back, until its force vanishes with L.
 
     Source: chapter 3 of Pacejka [pacejka2012] (K) for L = 1; derived for L < 1.
     """
@@ -118,7 +118,7 @@ def kingpin_moment(
     axis. The bearings do not pass it on: it slows the wheel down and comes back as longitudinal force. Small angles; no
     steer angle, no inertia of the wheel about the kingpin, no friction, no toe.
 
-    Thesis [fichtinger2024]: section 2.4 measures what comes of it (C61-C63); geometry D.
+    Thesis [fichtinger2024]: section 2.4 measures what comes of it (C61-C63); geometry K.
     """
     sine = np.sin(geometry.inclination)
     scrub = geometry.hub_offset - r_l * sine

@@ -145,7 +145,7 @@ def brush_forces(
 
     The stiffness-weighted slip sets how far the contact slides. Sticking bristles pull along it, sliding ones against
     the sliding velocity. Limits: s_y = 0 is `brush_force`; slopes C_x L^2 and C_y L^2 at 0;
-    |F| <= mu F_z L^2 (3 - 2 L),    full sliding along (s_x, s_y).
+    |F| <= mu F_z L^2 (3 - 2 L), full sliding along (s_x, s_y).
 
     Source: chapter 3 of Pacejka [pacejka2012] for L = 1; derived for L < 1.
     """

@@ -12,7 +12,8 @@ __all__ = ["LAG_MAX", "velocity_lag"]
 TAU = 0.3  # [s] both accelerations are smoothed alike
 TAU_SLOW = 5.0  # [s] grade and offset of the accelerometer change more slowly
 LAG_MAX = 0.5  # [s]
-# A receiver counts as in time until about this much has been seen: 5 s of accelerations that change by 0.1 m/s³
+# Integral of the squared jerk at which half of a lag is reported, less of it before: a receiver counts as in time at
+# first. 5 s of accelerations that change by 0.1 m/s³ have it
 KNOWN = 0.05  # [m^2/s^5]
 
 

@@ -69,6 +69,8 @@ def line(fig, row, x, y, name, colour, *, dash="solid", width=1.8, **kw):
 def level(fig, row, value, text, *, position="top right"):
     fig.add_hline(value, line={"color": THRESHOLD, "dash": "dash", "width": 1.4}, row=row, col=1, annotation_text=text,
                   annotation_position=position, annotation_font={"color": THRESHOLD, "size": 13})  # fmt: skip
+    if fig.layout[f"yaxis{row}" if row > 1 else "yaxis"].type == "log":
+        fig.layout.annotations[-1].y = np.log10(value)  # annotations count in decades there, lines do not
 
 
 def shade(fig, t, bits, *, rows=None, colour=EVENT_SHADE):
@@ -92,7 +94,7 @@ def track(result, detector, wheel=None):
 def spin_down():
     _, result, t = sample()
     f, found = result.features, track(result, "spin_down", "fr")
-    fig = panels(["speed [m/s]", "difference [m/s²]", "sum [m/s]"])
+    fig = panels(["speed [m/s]", "a_wΔ [m/s²]", "sum [m/s]"])
     line(fig, 1, t, f["v_w_fr"], "front right wheel", WHEEL_COLOURS["fr"])
     line(fig, 1, t, f["v_x_hat"], "car", INK, dash="dash")
     line(fig, 2, t, f["a_w_delta_fr"], "wheel less car", WHEEL_COLOURS["fr"], showlegend=False)
@@ -142,7 +144,7 @@ def slip_slope_drop():
         line(fig, 2, t, track(result, "slip_slope_drop", w).statistic, w, WHEEL_COLOURS[w], showlegend=False)
     level(fig, 2, found.threshold, "threshold 0.5")
     lane(fig)
-    shade(fig, t, found.active)
+    shade(fig, t, np.any([track(result, "slip_slope_drop", w).active for w in ("rl", "rr")], axis=0))
     fig.update_yaxes(range=(0, 37), row=1, col=1)
     return fig
 
@@ -261,7 +263,7 @@ def water_law():
         line(fig, 1, 1e3 * h, np.where(v < 100.0, v * KMH, np.nan), f"aqualog, {name}", colour, width=2.6)
     line(fig, 1, 1e3 * h, hydroplaning.gallaway_speed(h, 1.9e5, tread_depth=1.6e-3, texture_depth=0.78e-3) * KMH, "Gallaway, 1.6 mm", MUTED, dash="dash")  # fmt: skip
     thin = h < 2.4e-3
-    line(fig, 1, 1e3 * h[thin], hydroplaning.pavdrn_speed(h[thin]) * KMH, "PAVDRN", MUTED, dash="dot")
+    line(fig, 1, 1e3 * h[thin], hydroplaning.pavdrn_speed(h[thin]) * KMH, "PAVDRN, 1.65 bar", MUTED, dash="dot")
     line(fig, 1, 1e3 * h, hydroplaning.usf_speed(h, 1.9e5, 4000.0) * KMH, "USF", MUTED, dash="dashdot")
     line(
         fig,

@@ -50,11 +50,14 @@ class Tuning(NamedTuple):
 TUNING = Tuning()
 
 MEANINGS: dict[str, tuple[str, str]] = {
-    "r": ("s", "spectral density of the slip's noise: 5e-4 rms at 5 Hz on a measured road drive"),
+    "r": (
+        "s",
+        "spectral density of the slip's noise: 5e-4 rms at 5 Hz, correlated by 0.48 from sample to sample, on a road",
+    ),
     "q_k": ("1/s", "variance that 1/C gains per second"),
     "q_beta": ("1/s", "variance that the slope ratio of the axles gains per second"),
     "q_delta": ("1/s", "variance that the slip offset gains per second"),
-    "sd_k": ("-", "standard deviation of 1/C at the start, relative to a slope of 33"),
+    "sd_k": ("-", "standard deviation of 1/C at the start at a slope of 33, else in proportion to 1/C"),
     "sd_beta": ("-", "standard deviation of the slope ratio at the start"),
     "sd_delta": ("-", "standard deviation of the slip offset at the start"),
     "sd_k_reset": ("-", "standard deviation of 1/C after an alarm"),
