@@ -53,7 +53,10 @@ class Board:
         _, length = _HEAD.unpack(self._page[: _HEAD.size])
         if not _ENTRY.size < length <= _SIZE - _HEAD.size:
             return self._last
-        entry = self._page[_HEAD.size : _HEAD.size + length]
+        page = self._page[: _HEAD.size + length]
+        if page != self._page[: len(page)] or _HEAD.unpack_from(page)[1] != length or not page.endswith(b"\0"):
+            return self._last  # the process is writing just now
+        entry = page[_HEAD.size :]
         seconds, size, step = _ENTRY.unpack_from(entry)
         log, *temporary = (os.fsdecode(n) for n in entry[_ENTRY.size :].split(b"\0")[:-1])
         self._last = InHand(log, seconds, size, step, tuple(temporary))

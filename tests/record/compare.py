@@ -12,19 +12,7 @@ from pathlib import Path
 from typing import Any
 
 # not of the result: the version, and what a run takes
-LEFT_OUT = {
-    "tool_version",
-    "code",
-    "seconds",
-    "bytes",
-    "size",
-    "digest",
-    "key",
-    "usable",
-    "limit_bytes",
-    "last_used",
-    "folder",
-}
+LEFT_OUT = {"tool_version", "seconds", "bytes", "limit_bytes", "last_used", "folder", "real_time_factor"}
 PROSE = {
     "caption", "condition", "criterion", "detail", "found", "hint", "how", "label", "meaning", "message", "note", "notes",
     "question", "reason", "reasons", "rule", "sentence", "stderr", "stdout", "text", "thesis", "title", "what", "why",

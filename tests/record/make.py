@@ -22,7 +22,7 @@ from tests.record.values import masked, values_below
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 DRIVES = ROOT.parent / "shared" / "real_logs"
-_TOOK = re.compile(r"^(note: .*\bin |note: results are .*, )\d+ (s|min|h)\b", re.MULTILINE)
+_TOOK = re.compile(r"^(note: .*\bin |note: results are .*, |note: .* simulated )[\d.]+ (s|min|h|times)\b", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,9 +26,12 @@ def masked(text: str) -> str:
     return _KEY.sub("KEY", text)
 
 
+_STAMPS = {"contents.json"}  # places and times of change
+
+
 def values_below(folder: Path, keep: str) -> dict[str, Any]:
     """Name -> values of every file in a folder."""
-    files = sorted(p for p in folder.glob(keep) if p.is_file())
+    files = sorted(p for p in folder.glob(keep) if p.is_file() and p.name not in _STAMPS)
     logs = _logs_of_keys(folder)
     return {masked(_named(p.relative_to(folder).as_posix(), logs)): values_of(p) for p in files}
 
