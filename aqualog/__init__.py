@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from aqualog.types import Signals
     from aqualog.vehicle import Vehicle
 
-__version__ = "0.10.0"
+__version__ = "0.11.0"
 
 _FACE = {
     "read": "aqualog.face.drive",
