@@ -17,7 +17,7 @@ DETECTORS = (
 
 MIN_RATE_SPIN = 5.0  # [Hz] a full spin-down lasts half a second and more
 MIN_RATE_RESISTANCE = 2.0  # [Hz]
-MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 200 ms; slower wheel speeds show kerbs and noise only
+MIN_RATE_MINOR = 20.0  # [Hz] a minor spin-down lasts 50 to 300 ms; slower wheel speeds show kerbs and noise only
 
 
 def check_needs(
@@ -73,7 +73,7 @@ def check_needs(
 
 
 def _lone_wheel(have: set[str], omega: list[str]) -> list[str]:
-    """Return whether a wheel has no reference to compare with."""
+    """List the missing wheel speeds if the log has a single one and no reference to compare it with."""
     return omega if len(omega) == len(WHEELS) - 1 and "v_x" not in have else []
 
 
