@@ -44,6 +44,10 @@ class Change:
 def changes(old: Any, new: Any, place: str = "", *, is_prose: bool = False) -> Iterator[Change]:
     """All places where two documents differ; `is_prose` for what lies below a key of prose."""
     if isinstance(old, dict) and isinstance(new, dict):
+        old, new = dict(old), dict(new)
+        for was, now in _reworded_keys(old, new):
+            yield Change(f"{place}.(key)", was, now, is_wording=True)
+            old[now] = old.pop(was)
         for key in [*old, *(k for k in new if k not in old)]:
             if key in LEFT_OUT:
                 continue
@@ -64,6 +68,13 @@ def changes(old: Any, new: Any, place: str = "", *, is_prose: bool = False) -> I
 def case_changes(old: Path, new: Path) -> list[Change]:
     """Differences between two files of a record."""
     return list(changes(json.loads(old.read_text()), json.loads(new.read_text())))
+
+
+def _reworded_keys(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str]]:
+    """Keys that are sentences, by their order, where as many have gone as have come."""
+    gone = [k for k in old if k not in new and _is_sentence(k)]
+    come = [k for k in new if k not in old and _is_sentence(k)]
+    return list(zip(gone, come, strict=True)) if len(gone) == len(come) else []
 
 
 def _is_same(old: Any, new: Any) -> bool:

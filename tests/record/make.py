@@ -24,6 +24,8 @@ ROOT = HERE.parents[1]
 DRIVES = ROOT.parent / "shared" / "real_logs"
 _TOOK = re.compile(r"^(note: .*\bin |note: results are .*, |note: .* simulated )[\d.]+ (s|min|h|times)\b", re.MULTILINE)
 
+_ONCE = re.compile(r"^note: compiling .* once after an installation\n", re.MULTILINE)
+
 
 @dataclass(frozen=True, slots=True)
 class Tool:
@@ -73,7 +75,7 @@ def run(case: Case, work: Path, tool: Tool, drives: Path) -> dict[str, Any]:
     def plain(text: str) -> str:
         return masked(text.replace(f"{work}/", "").replace(f"{drives.resolve()}/", "real_logs/"))
 
-    printed, told = plain(done.stdout), _TOOK.sub(r"\1TIME", plain(done.stderr))
+    printed, told = plain(done.stdout), _ONCE.sub("", _TOOK.sub(r"\1TIME", plain(done.stderr)))
     kept = {"line": case.line, "exit": done.returncode, "stderr": told, "files": values_below(work / out, case.keep)}
     try:
         document = json.loads(printed)

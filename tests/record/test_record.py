@@ -24,6 +24,8 @@ from tests.record.values import masked, values_of
         ({"notes": [{"of": "a"}]}, {"notes": [{"of": "b"}]}, 0, 1),
         ({"notes": ["a"]}, {"notes": ["a", "b"]}, 1, 0),
         ({"x": "what is told of it"}, {"x": "what it reports"}, 0, 1),
+        ({"it is not told where": 3}, {"where it was is not known": 3}, 0, 1),
+        ({"it is not told where": 3}, {"where it was is not known": 4}, 1, 1),
         ({"tool_version": "0.10.0"}, {"tool_version": "0.11.0"}, 0, 0),
     ],
 )
