@@ -184,7 +184,7 @@ def cells(
         samples = data.samples(info)
         on_road = road_of(samples, road)
         if np.isnan(samples.on_water).all():
-            left_out["whether on or off the water is not known"] += int(samples.t.size)
+            left_out["on or off the water is not known"] += int(samples.t.size)
         reason = samples.array("reason").astype(np.int64)
         good = on_road & (reason == 0) if only_usable else on_road
         if only_usable:

@@ -24,7 +24,7 @@ _WAYS = {
     "minor_spin_down": "minor spin-downs",
     "spin_down": "full spin-downs",
 }
-_UNKNOWN = "whether on or off the water is not known"
+_UNKNOWN = "on or off the water is not known"
 
 
 def slope_text(

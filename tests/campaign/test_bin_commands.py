@@ -132,4 +132,4 @@ def test_water_that_nobody_tells_is_told(campaign, tmp_path):
     car = tmp_path / "car.toml"
     car.write_text(vehicle_toml(SEDAN))
     done = invoke("bin-resistance", *sorted(bare.iterdir()), "--vehicle", car, "--store", tmp_path / "s", "--jobs", 1)
-    assert "no samples: whether on or off the water is not known\ntry: water_depth_mm = 0" in done.stdout
+    assert "no samples: on or off the water is not known\ntry: water_depth_mm = 0" in done.stdout
