@@ -97,8 +97,28 @@ class _Package(ModuleType):
     """
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if not (isinstance(value, ModuleType) and name in _FACE and value.__name__ != _FACE[name]):
+        if isinstance(value, ModuleType) and name in _FACE and value.__name__ != _FACE[name]:
+            value.__class__ = _Folder
+            _share(name)
+        else:
             super().__setattr__(name, value)
+
+
+class _Folder(ModuleType):
+    """A folder beside a function of the same name, which has its modules too: `import aqualog.detect.stream as s`."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        super().__setattr__(name, value)
+        if isinstance(value, ModuleType):
+            _share(self.__name__.rpartition(".")[2])
+
+
+def _share(name: str) -> None:
+    """Give a function that is loaded the modules of the folder with its name, as far as they are loaded."""
+    folder, function = sys.modules.get(f"aqualog.{name}"), globals().get(name)
+    if folder is not None and function is not None:
+        own = {n: m for n, m in vars(folder).items() if getattr(m, "__name__", "") == f"aqualog.{name}.{n}"}
+        vars(function).update({n: m for n, m in own.items() if isinstance(m, ModuleType)})
 
 
 sys.modules[__name__].__class__ = _Package
@@ -111,6 +131,8 @@ def __getattr__(name: str) -> Any:
     module = import_module(_FACE[name])
     found = module if name in _MODULES else getattr(module, name)
     globals()[name] = found
+    if name not in _MODULES and _FACE[name].startswith("aqualog.face."):
+        _share(name)
     return found
 
 

@@ -65,7 +65,7 @@ class AqualogError(Exception):
 
     def line(self) -> str:
         """One line for the terminal."""
-        text = f"{self.where}: {self.what}" if self.where else self.what
+        text = f"{_short(self.where)}: {self.what}" if self.where else self.what
         if self.expected:
             text += f"; expected {self.expected}"
         if self.hint:

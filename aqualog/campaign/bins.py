@@ -102,9 +102,9 @@ def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0
         If no run has a key, or the road or width is not valid.
     """
     if road not in ROADS:
-        raise ConfigError(f'--road "{road}"', expected=" ".join(ROADS))
+        raise ConfigError(f'road "{road}"', expected=" ".join(ROADS))
     if not 1.0 <= width_kmh <= 100.0:
-        raise ConfigError(f"--bin-width {width_kmh:g}", expected="1 to 100 km/h")
+        raise ConfigError(f"bin width {width_kmh:g} km/h", expected="1 to 100 km/h")
     names = [n for n in by if n != SIDE]
     keys = group_keys(names, campaign.keys) if names else ()
     if not by:

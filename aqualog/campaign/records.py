@@ -79,5 +79,5 @@ def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
             wrong.append(f'"{name[:60]}"' + (f' (did you mean "{near[0]}"?)' if near and near[0] != name else ""))
         found += keys
     if wrong:
-        raise ConfigError(f"--by {', '.join(wrong)}: no run has this key", expected=", ".join(known) or "a campaign")
+        raise ConfigError(f"by {', '.join(wrong)}: no run has this key", expected=", ".join(known) or "a campaign")
     return tuple(dict.fromkeys(found))

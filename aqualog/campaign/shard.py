@@ -39,9 +39,7 @@ def shard_of(text: str) -> Shard:
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
     shard = Shard(int(match[1]), int(match[2])) if match else Shard(0, 0)
     if not 1 <= shard.index <= shard.count <= _MOST:
-        raise ConfigError(
-            f"--shard {text}", expected="I/N with I from 1 to N", hint="--shard 2/8 is the second of eight parts"
-        )
+        raise ConfigError(f"shard {text}", expected="I/N with I from 1 to N", hint="2/8 is the second of eight parts")
     return shard
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["help_pages"]
 
 _MOST_PAGES = 12
+_MOST_NAME = 80
 _NAME_WIDTH = 22
 
 
@@ -75,7 +76,8 @@ def _text(asked: list[str]) -> str:
         return "\n".join([*lines, "", "`aqualog help NAME` shows a page.", ""])
     near = nearest(name, [p.name for p in pages] + list(COMMANDS))
     hint = "aqualog help " + ", aqualog help ".join(near) if near else "aqualog help, which lists the topics"
-    raise ConfigError(f'no page is named "{name}", and no page holds this word', hint=hint)
+    shown = name if len(name) <= _MOST_NAME else f"{name[:_MOST_NAME]}…"
+    raise ConfigError(f'no page is named "{shown}", and no page holds this word', hint=hint)
 
 
 def _list(pages: list[Topic]) -> str:
@@ -185,5 +187,8 @@ def _show(text: str) -> None:
         return
     import pydoc
 
+    words = os.environ.get("PAGER", "").split()
+    if words and shutil.which(words[0]) is None:  # it would show nothing
+        del os.environ["PAGER"]
     os.environ.setdefault("LESS", "FRX")  # styles as they are, and the text stays on the screen
     pydoc.pager(text)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from aqualog.align.mapping import SignalMap
 from aqualog.errors import AqualogError, ConfigError
+from aqualog.face.arguments import names_of, number_of, text_of
 from aqualog.face.drive import Drive, read, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
@@ -178,8 +179,11 @@ def align(
     >>> drive = aq.read(["wheels.csv", "gps.csv"], map=r.map)
     """
     check_quantity(quantity)
-    if not 0.1 <= max_offset_s <= 3600.0:
-        raise ConfigError(f"max_offset_s = {max_offset_s:g}", expected="0.1 to 3600 s")
+    max_offset_s = number_of(max_offset_s, "max_offset_s", 0.1, 3600.0, "s")
+    if start_offset_s is not None:
+        start_offset_s = number_of(start_offset_s, "start_offset_s", -1e12, 1e12, "s")
+    if not isinstance(channels, Mapping | None):
+        raise TypeError(f"channels: expected a mapping of file to channel, not {type(channels).__name__}")
     hear = listener(progress)
     if isinstance(reference, Drive):
         if sources or map is not None or dbc != ():
@@ -188,8 +192,8 @@ def align(
             )
         drive = reference
     else:
-        first = [reference] if isinstance(reference, str | Path) else list(reference)
-        drive = read([*first, *sources], map, vehicle, dbc=dbc)
+        first = names_of(reference)
+        drive = read([*first, *names_of(sources)], map, vehicle, dbc=dbc)
     if len(drive.paths) < 2:
         raise ConfigError("align compares files", expected="a reference and at least one source")
     _check_channels(channels or {}, [p.name for p in drive.paths])
@@ -217,15 +221,15 @@ def check_quantity(quantity: str) -> None:
     """
     from aqualog.align.carrier import QUANTITIES
 
-    if quantity not in QUANTITIES:
-        raise ConfigError(f'--quantity "{quantity}"', expected=" or ".join(QUANTITIES))
+    if text_of(quantity, "quantity") not in QUANTITIES:
+        raise ConfigError(f'quantity "{quantity[:60]}"', expected=" or ".join(QUANTITIES))
 
 
 def _check_channels(channels: Mapping[str, str], files: Sequence[str]) -> None:
     for file, channel in channels.items():
         if file not in files or not channel:
             raise ConfigError(
-                f'--channel "{file}={channel}"', expected=f"FILE=CHANNEL with FILE one of {', '.join(files)}"
+                f'channel "{file}={channel}"', expected=f"FILE=CHANNEL with FILE one of {', '.join(files)}"
             )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError
+from aqualog.face.arguments import file_of
 from aqualog.face.listener import Listener
 from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.result import PathLike, Result, Writers, text_file
@@ -78,7 +79,7 @@ class _Binned(Result):
         ------
         ConfigError
         """
-        target = Path(path)
+        target = file_of(path, "path")
         check_table(target)
         refuse_existing([target], force=force, sources=self.sources)
         write_whole(target, partial(_write, self.document["rows"], target.suffix.lower()))

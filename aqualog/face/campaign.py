@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError
+from aqualog.face.arguments import file_of, names_of, number_of, text_of, whole_number
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import expand, list_files, refuse_existing
 from aqualog.face.progress import Progress as Counted
@@ -32,12 +33,7 @@ if TYPE_CHECKING:
     from aqualog.face.simulate import SimulatedCampaign
     from aqualog.workers import Limits, WorkOn
 
-__all__ = ["Campaign", "CampaignRuns", "is_campaign", "names_of"]
-
-
-def names_of(inputs: PathLike | Sequence[PathLike]) -> list[str]:
-    """Return inputs as they were named."""
-    return [str(inputs)] if isinstance(inputs, str | Path) else [str(p) for p in inputs]
+__all__ = ["Campaign", "CampaignRuns", "is_campaign"]
 
 
 def is_campaign(inputs: Sequence[str]) -> bool:
@@ -96,23 +92,25 @@ class Campaign:
         from aqualog.config.configured import configure, configure_logs
 
         names = names_of(inputs)
-        databases = [Path(p) for p in names_of(dbc)]
-        map_file = None if map is None else Path(map)
-        limits = None if thresholds is None else Path(thresholds)
+        if not names:
+            raise ConfigError("no log is named", expected="a campaign file, or at least one log")
+        databases = [file_of(p, "dbc") for p in names_of(dbc, "dbc")]
+        map_file = None if map is None else file_of(map, "map")
+        limits = None if thresholds is None else file_of(thresholds, "thresholds")
         if is_campaign(names):
             if vehicle is not None:
-                raise ConfigError("--vehicle beside a campaign", where=names[0], expected="it in the campaign's runs")
-            found = configure(Path(names[0]), map_file=map_file, dbc=databases, thresholds=limits)
+                raise ConfigError("vehicle beside a campaign", where=names[0], expected="it in the campaign's runs")
+            found = configure(file_of(names[0], "inputs"), map_file=map_file, dbc=databases, thresholds=limits)
         elif vehicle is None:
-            raise ConfigError("no --vehicle", expected="a vehicle file, or a campaign file that names one")
+            raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
         else:
             found = configure_logs(
-                expand(names), Path(vehicle), map_file=map_file, dbc=databases, thresholds=limits,
+                expand(names), file_of(vehicle, "vehicle"), map_file=map_file, dbc=databases, thresholds=limits,
                 lists=tuple(list_files(names)),
             )  # fmt: skip
         self.inputs = tuple(names)
         self.configured: Configured = found
-        self._store = None if store is None else str(store)
+        self._store = None if store is None else names_of(store, "store")[0]
 
     @staticmethod
     def propose(
@@ -189,7 +187,9 @@ class Campaign:
             return address_of(self._store)
         path = self.configured.campaign.path
         if path.suffix.lower() != ".toml":
-            raise ConfigError("logs without a campaign file have no place for results", expected="--store DIR")
+            raise ConfigError(
+                "logs without a campaign file have no place for results", expected="a folder or URL as store"
+            )
         return path.with_suffix(".store")
 
     @property
@@ -217,6 +217,7 @@ class Campaign:
         """
         from aqualog.campaign.bins import check_plan
 
+        bin_width = number_of(bin_width, "bin_width", 1.0, 100.0, "km/h")
         return check_plan(self.configured.campaign, split(by), width_kmh=bin_width, road=road)
 
     def check_targets(self, targets: Sequence[Path], *, force: bool) -> None:
@@ -257,7 +258,10 @@ class Campaign:
         """
         from aqualog.face.matrix import matrix
 
-        return matrix(self.configured.campaign.path)
+        path = self.configured.campaign.path
+        if path.suffix.lower() != ".toml":
+            raise ConfigError("logs without a campaign file have no test matrix", expected="a campaign file (TOML)")
+        return matrix(path)
 
     def plan(
         self,
@@ -327,11 +331,17 @@ class Campaign:
         from aqualog.workers import Limits
 
         began = time.monotonic()
+        if jobs is not None:
+            jobs = whole_number(jobs, "jobs", 1, 1024)
+        if limit_s is not None:
+            limit_s = number_of(limit_s, "limit_s", 1.0, 1e9, "s")
+        if limit_mb is not None:
+            limit_mb = whole_number(limit_mb, "limit_mb", 300, 10**9)
         if cluster is not None and jobs is not None:
-            raise ConfigError("--jobs beside --cluster", expected="as many as there are workers")
-        if cluster is not None and not cluster.strip():
-            raise ConfigError("--cluster is empty", expected="tcp://host:8786")
-        part = None if shard is None else shard_of(shard)
+            raise ConfigError("jobs beside cluster", expected="as many as there are workers")
+        if cluster is not None and not text_of(cluster, "cluster").strip():
+            raise ConfigError("cluster is empty", expected="tcp://host:8786")
+        part = None if shard is None else shard_of(text_of(shard, "shard"))
         configured = self.configured
         if part is not None:
             configured = replace(configured, campaign=part_of(configured.campaign, part))
@@ -370,7 +380,7 @@ class CampaignRuns(Result):
         notes = (f"results are in {self.data.store.name}, {self.seconds:.0f} s",)
         if self.shard is None:
             return notes
-        return (*notes, "the same command without --shard makes the tables, when all parts are done")
+        return (*notes, "the same without a shard makes the tables, when all parts are done")
 
     @property
     def sources(self) -> tuple[Path, ...]:  # type: ignore[override]
@@ -421,7 +431,7 @@ class CampaignRuns(Result):
         rows = [
             {"run": r.index, "name": r.name, **{k: e.get(k) for k in flat}} for r in self.data.done for e in r.events
         ]
-        return pl.DataFrame(rows, infer_schema_length=None)
+        return pl.DataFrame(rows, None if rows else ["run", "name", *flat], infer_schema_length=None)
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -550,7 +560,7 @@ class CampaignRuns(Result):
         from aqualog.report.campaign_findings import find
         from aqualog.report.campaign_folder import write_report
 
-        out, hear = Path(folder), listener(progress)
+        out, hear = file_of(folder, "folder"), listener(progress)
         self.campaign.check_report(out, force=force)
         chosen = self.campaign.check_bins(by, bin_width=bin_width)
         findings = find(self.data, chosen, robust=robust, report=hear)
@@ -566,7 +576,7 @@ def _detectors() -> Sequence[str]:
 
 def split(by: str | Sequence[str]) -> list[str]:
     """Return keys that stand in one text, with commas, or in several."""
-    names = by.split(",") if isinstance(by, str) else by
+    names = by.split(",") if isinstance(by, str) else names_of(by, "by")
     return [n.strip() for n in names if n.strip()]
 
 
@@ -586,7 +596,7 @@ def _results(
     from aqualog.workers import most_processes
 
     if jobs is not None and jobs > most_processes():
-        hear.note(f"--jobs {jobs}: {most_processes()} processes are the most on this machine")
+        hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")
     hear("looking at the logs")
     from aqualog.campaign.batch import run_batch
     from aqualog.campaign.samples import load_results

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from aqualog.errors import ConfigError
+from aqualog.face.arguments import file_of
 from aqualog.face.drive import DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
@@ -26,7 +27,7 @@ def check_target(path: Path, *, decimal_comma: bool) -> str:
 
     suffix = check_suffix(path)
     if decimal_comma and suffix != ".csv":
-        raise ConfigError(f"--decimal-comma does not apply to {suffix}", where=str(path), expected="a .csv")
+        raise ConfigError(f"decimal comma does not apply to {suffix}", where=str(path), expected="a .csv")
     return suffix
 
 
@@ -62,7 +63,7 @@ def convert(
     --------
     >>> aq.convert(aq.read("drive.mf4", map="map.toml"), "drive.parquet")
     """
-    target, hear, one = Path(path), listener(progress), drive_of(drive)
+    target, hear, one = file_of(path, "path"), listener(progress), drive_of(drive)
     suffix = check_target(target, decimal_comma=decimal_comma)
     refuse_existing([target], force=force, sources=one.sources)
     with one.reading():

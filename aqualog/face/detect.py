@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError, SignalError
+from aqualog.face.arguments import file_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
@@ -85,8 +86,24 @@ class Detection(Result):
         return self.drive_result.signals.frame
 
     @property
+    def has_samples(self) -> bool:
+        """Whether features and statistics of every sample were kept."""
+        rows, found = self.signals.height, self.drive_result
+        return found.features.height == (rows if found.features.width else 0) and all(
+            t.statistic.size == rows for t in found.tracks
+        )
+
+    def _check_samples(self) -> None:
+        if not self.has_samples:
+            raise ConfigError(
+                "features and statistics of the samples were not kept", where=self.drive.title,
+                expected="aq.detect(..., samples=True)",
+            )  # fmt: skip
+
+    @property
     def features(self) -> pl.DataFrame:
         """What the detectors looked at, with `t` [s]; see `DriveResult`."""
+        self._check_samples()
         return self.signals.select("t").hstack(self.drive_result.features)
 
     @property
@@ -96,6 +113,7 @@ class Detection(Result):
 
         from aqualog.report.document import track_name
 
+        self._check_samples()
         columns: dict[str, Any] = {"t": self.signals["t"]}
         for track in self.drive_result.tracks:
             columns[track_name(track)] = track.statistic
@@ -104,8 +122,9 @@ class Detection(Result):
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
-        """`events`, `signals`, `features` and `tracks`."""
-        return {"events": self.events, "signals": self.signals, "features": self.features, "tracks": self.tracks}
+        """`events`, `signals`, and where the samples were kept `features` and `tracks`."""
+        found = {"events": self.events, "signals": self.signals}
+        return {**found, "features": self.features, "tracks": self.tracks} if self.has_samples else found
 
     def text(self) -> str:
         """Return the table of events, and what could not be judged."""
@@ -133,11 +152,15 @@ class Detection(Result):
         from aqualog.report.page import drive_rows
         from aqualog.report.standalone import rows_figure
 
+        self._check_samples()
         signals = self.drive_result.signals
         return rows_figure(drive_rows(self.drive_result), signals.frame.height, signals.dt)
 
     def files(self) -> Writers:
-        """Return `events.json`, `signals.parquet` and `report.html`; the table only of a drive that was read whole."""
+        """Return `events.json`, `signals.parquet` and `report.html`.
+
+        The table only of a drive that was read whole; without samples only the events.
+        """
         from aqualog.report.page import write_page
 
         files = {
@@ -147,7 +170,7 @@ class Detection(Result):
         }
         if self.drive_result.signals.full is not None:
             del files["signals.parquet"]
-        return files
+        return files if self.has_samples else {"events.json": files["events.json"]}
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
@@ -159,9 +182,10 @@ class Detection(Result):
         """
         from aqualog.io.write_log import check_suffix
 
-        target = Path(path)
+        target = file_of(path, "path")
         suffix = check_suffix(target)
         refuse_existing([target], force=force, sources=self.sources)
+        self._check_samples()
         write_whole(target, lambda p: self._write(p, suffix))
         return target
 
@@ -190,7 +214,7 @@ class Detection(Result):
         memory = self.memory or Memory()
         key = self.drive_key or drive_key(self.drive_result.signals)
         name, slopes = memory.name(self.vehicle), self.drive_result.slopes
-        update_history(Path(history), lambda h: remembered(h, name, slopes, drive=key))
+        update_history(file_of(history, "history"), lambda h: remembered(h, name, slopes, drive=key))
 
 
 _EVENT_COLUMNS = (
@@ -281,7 +305,7 @@ def detect(
             grid = loaded.drive.grid
             check_something_to_do(loaded.drive.symbols, 1e9 / grid.dt_ns, loaded.drive.notes, car, one.name)
             hear.detail(f"{grid.rows} samples at {1e9 / grid.dt_ns:g} Hz, gone through in windows")
-            out = None if windows is None else Path(windows)
+            out = None if windows is None else file_of(windows, "windows")
             result = detect_in_windows(loaded, car, settings=settings, memory=memory, out=out, report=hear)
         changes = one.changes()
     result = replace(result, notes=(*notes, *result.notes, *changes))
@@ -325,11 +349,11 @@ def model_of(model: PathLike | Model | None) -> Model | None:
     ConfigError
         If the file is no model.
     """
-    if not isinstance(model, str | Path):
-        return model
+    if model is None:
+        return None
     from aqualog.model.term import Model
 
-    return Model.read(model)
+    return model if isinstance(model, Model) else Model.read(file_of(model, "model", "aq.Model"))
 
 
 def _memory(history: PathLike | None, configuration: str, reference: str) -> Memory:
@@ -338,13 +362,14 @@ def _memory(history: PathLike | None, configuration: str, reference: str) -> Mem
     from aqualog.detect.slip_slope.history import History, check_configuration
     from aqualog.detect.slip_slope.watch import Memory
 
-    if reference not in ("robust", "max"):
-        raise ConfigError(f"--reference {reference[:40]!r}", expected="robust or max")
-    check_configuration(configuration, where="--configuration")
+    if text_of(reference, "reference") not in ("robust", "max"):
+        raise ConfigError(f"reference {reference[:40]!r}", expected="robust or max")
+    check_configuration(text_of(configuration, "configuration"))
     known = History()
     if history is not None:
-        check_history_file(Path(history))
-        known = load_history(Path(history))
+        file = file_of(history, "history")
+        check_history_file(file)
+        known = load_history(file)
     return Memory(known, configuration.strip(), "max" if reference == "max" else "robust")
 
 
@@ -353,7 +378,7 @@ def _settings(thresholds: PathLike | None) -> Settings | None:
         return None
     from aqualog.config.settings import load_settings
 
-    return load_settings(Path(thresholds))
+    return load_settings(file_of(thresholds, "thresholds"))
 
 
 def check_something_to_do(

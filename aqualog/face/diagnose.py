@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError
+from aqualog.face.arguments import number_of, whole_number
 from aqualog.face.campaign import Campaign, CampaignRuns, is_campaign
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive, vehicle_needed
@@ -263,8 +264,10 @@ def diagnose(
     >>> aq.detect("wet.mf4", "car.toml", model=r.model)
     """
     hear = listener(progress)
-    if not 1e-4 <= level <= 0.5:
-        raise ConfigError(f"level = {level:g}", expected="0.0001 to 0.5")
+    level = number_of(level, "level", 1e-4, 0.5)
+    seed = whole_number(seed, "seed", 0, 2**63 - 1)
+    if surrogates is not None:
+        surrogates = whole_number(surrogates, "surrogates", 0, 100_000)
     campaign = _campaign_of(drives, vehicle)
     if campaign is not None:
         if not (isinstance(holdout, Sequence) and not holdout):
@@ -272,7 +275,7 @@ def diagnose(
         return _of_campaign(campaign, model_of(model), model, seed, level, surrogates, hear)
     assert not isinstance(drives, Campaign | CampaignRuns)
     known = model_of(model)
-    named, held = drives_of(drives), drives_of(holdout)
+    named, held = drives_of(drives), drives_of(holdout, is_needed=False)
     check_apart(named, held)
     repeated = _repeated(named)
     own, unseen = with_own_names(named, held)
@@ -323,7 +326,7 @@ def check_apart(drives: Sequence[Drive], unseen: Sequence[Drive]) -> None:
     own = {p.resolve() for d in drives for p in d.paths}
     twice = next((p for d in unseen for p in d.paths if p.resolve() in own), None)
     if twice is not None:
-        raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives after --holdout")
+        raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives as holdout")
 
 
 def _repeated(drives: Sequence[Drive]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,7 +55,14 @@ class Health(Result):
         """`findings` and `files`."""
         import polars as pl
 
-        return {n: pl.DataFrame(self.document[n], infer_schema_length=None) for n in ("findings", "files")}
+        from aqualog.doctor.records import FileState, Finding
+
+        records = {"findings": Finding, "files": FileState}
+        return {
+            n: pl.DataFrame(self.document[n], None if self.document[n] else [f.name for f in fields(kind)],
+                            infer_schema_length=None)
+            for n, kind in records.items()
+        }  # fmt: skip
 
     def text(self) -> str:
         """Return what the command prints."""

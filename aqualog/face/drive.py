@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from aqualog.align.mapping import SignalMap
 from aqualog.errors import AqualogError, ConfigError, LogError, SignalError
+from aqualog.face.arguments import file_of, names_of, number_of
 from aqualog.face.paths import expand, list_files
-from aqualog.face.result import PathLike
+from aqualog.face.result import PathLike, printable
 from aqualog.io.content import Seen, changed_files, state_of
 from aqualog.types import Signals
 from aqualog.vehicle import Vehicle
@@ -163,10 +164,18 @@ class Drive:
         return convert(self, path, decimal_comma=decimal_comma, force=force)
 
     def __repr__(self) -> str:
-        return "\n".join(_lines(self))
+        try:
+            lines = _lines(self)
+        except AqualogError as error:  # a repr shows what there is
+            lines = [f"{self.title}: cannot be read", f"  {error.line()}"]
+        return "\n".join(printable(line) for line in lines)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(repr(self))}</pre>{self.frame._repr_html_()}"
+        text = f"<pre>{escape(repr(self))}</pre>"
+        try:
+            return f"{text}{self.frame._repr_html_()}"
+        except AqualogError:
+            return text
 
 
 DriveLike = Drive | Signals | PathLike | Sequence[PathLike]
@@ -209,16 +218,16 @@ def read(
     >>> drive = aq.read("drive.mf4", map="map.toml", vehicle="car.toml")
     >>> drive.frame.select("t", "v_x")
     """
-    if rate_hz is not None and not 0.1 <= rate_hz <= 100_000.0:
-        raise ConfigError(f"rate_hz = {rate_hz:g}", expected="0.1 to 100000 Hz")
-    names = _names(logs)
+    if rate_hz is not None:
+        rate_hz = number_of(rate_hz, "rate_hz", 0.1, 100_000.0, "Hz")
+    names = names_of(logs)
     paths = tuple(expand(names))
     if not paths:
         raise ConfigError("no log is named", expected="at least one file of a drive")
     for path in paths:
         if not path.exists():
             raise LogError("no such file or folder", where=str(path), expected="a log")
-    databases = tuple(Path(n) for n in _names(dbc))
+    databases = tuple(file_of(n, "dbc") for n in names_of(dbc, "dbc"))
     own = [Path(x) for x in (map, vehicle) if isinstance(x, str | Path)]
     return Drive(
         paths,
@@ -245,7 +254,7 @@ def vehicle_of(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -
     """Return the vehicle behind an argument; without one that of the drive, else a default car."""
     if vehicle is None:
         return (drive.vehicle if drive is not None else None) or Vehicle()
-    return vehicle if isinstance(vehicle, Vehicle) else Vehicle.read(vehicle)
+    return vehicle if isinstance(vehicle, Vehicle) else Vehicle.read(file_of(vehicle, "vehicle", "aq.Vehicle"))
 
 
 def vehicle_needed(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -> Vehicle:
@@ -271,16 +280,12 @@ def with_vehicle(drive: Drive, vehicle: Vehicle) -> Drive:
     return replace(drive, vehicle=vehicle)
 
 
-def _names(logs: Logs) -> list[str]:
-    return [str(logs)] if isinstance(logs, str | Path) else [str(p) for p in logs]
-
-
 def _map_of(given: PathLike | SignalMap | None) -> SignalMap:
     if given is None or isinstance(given, SignalMap):
         return given or SignalMap()
     from aqualog.config.signal_map import load_signal_map
 
-    return load_signal_map(Path(given))
+    return load_signal_map(file_of(given, "map", "SignalMap"))
 
 
 def _cache() -> SignalCache:

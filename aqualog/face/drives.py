@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from aqualog.errors import AqualogError, ConfigError, SignalError
+from aqualog.face.arguments import names_of
 from aqualog.face.drive import Drive, DriveLike, drive_of
 from aqualog.face.listener import Listener
 from aqualog.face.paths import expand, list_files
@@ -159,8 +160,10 @@ def _like(base: Drive, paths: Sequence[Path], label: str, lists: Sequence[Path])
     )  # fmt: skip
 
 
-def drives_of(drives: DrivesLike) -> list[Drive]:
+def drives_of(drives: DrivesLike, *, is_needed: bool = True) -> list[Drive]:
     """Return the drives behind an argument: each `Drive`, table of signals or inner list is one, files see `grouped`.
+
+    Without `is_needed` there may be none.
 
     Raises
     ------
@@ -168,7 +171,11 @@ def drives_of(drives: DrivesLike) -> list[Drive]:
     """
     if isinstance(drives, Grouped):
         return drives
+    if isinstance(drives, bytes | Mapping) or not isinstance(drives, Drive | Signals | Path | Iterable):
+        names_of(drives, "drives")  # says what was expected
     many = [drives] if isinstance(drives, Drive | Signals | str | Path) else list(drives)
+    if not many and is_needed:
+        raise ConfigError("no drive is named", expected="at least one file or aq.Drive")
     if all(isinstance(d, str | Path) for d in many):
         return grouped([d for d in many if isinstance(d, str | Path)])
     found: list[Drive] = []

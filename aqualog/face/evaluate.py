@@ -8,7 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.face.campaign import Campaign, is_campaign, names_of, split
+from aqualog.face.arguments import file_of, names_of
+from aqualog.face.campaign import Campaign, is_campaign, split
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import refuse_existing, write_text, write_whole
 from aqualog.face.result import PathLike, Result, Writers, text_file
@@ -108,7 +109,7 @@ class Comparison(Result):
         ------
         ConfigError
         """
-        refuse_existing([Path(path)], force=force, sources=self.sources)
+        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
         write_whole(Path(path), self._page)
         return Path(path)
 
@@ -119,7 +120,7 @@ class Comparison(Result):
         ------
         ConfigError
         """
-        refuse_existing([Path(path)], force=force, sources=self.sources)
+        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
         write_text(Path(path), self._thresholds())
         return Path(path)
 
@@ -207,7 +208,7 @@ def evaluate(
     from aqualog.evaluate.run import evaluate as evaluate_drives
     from aqualog.evaluate.run import tune as tune_drives
 
-    start, of_rivals = load_thresholds(Path(thresholds)) if thresholds is not None else (DEFAULT, {})
+    start, of_rivals = load_thresholds(file_of(thresholds, "thresholds")) if thresholds is not None else (DEFAULT, {})
     sources = given.sources
     if thresholds is not None:
         joint = load_settings(Path(thresholds)).joint_cusum
@@ -236,8 +237,10 @@ def inputs_of(
     from aqualog.face.evaluate_inputs import campaign_inputs, log_inputs
 
     names = list(inputs.inputs) if isinstance(inputs, Campaign) else names_of(inputs)
-    car, map_file, truth = (None if p is None else Path(p) for p in (vehicle, map, labels))
-    databases = [Path(p) for p in names_of(dbc)]
+    car, map_file, truth = (
+        None if p is None else file_of(p, n) for n, p in (("vehicle", vehicle), ("map", map), ("labels", labels))
+    )
+    databases = [file_of(p, "dbc") for p in names_of(dbc, "dbc")]
     if is_campaign(names):
         return campaign_inputs(Path(names[0]), car, map_file, databases, truth)
     return log_inputs(names, car, map_file, databases, truth)

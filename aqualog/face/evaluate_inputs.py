@@ -42,7 +42,7 @@ def campaign_inputs(
     ConfigError
         Also for options that the campaign itself answers.
     """
-    for option, value in (("--vehicle", vehicle), ("--labels", labels)):
+    for option, value in (("vehicle", vehicle), ("labels", labels)):
         if value is not None:
             raise ConfigError(f"{option} beside a campaign", where=str(path), expected="it in the campaign's runs")
     campaign = load_campaign(path)
@@ -69,8 +69,10 @@ def log_inputs(
     ConfigError, LogError
     """
     if vehicle is None:
-        raise ConfigError("no --vehicle", expected="a vehicle file, or a campaign file that names one")
+        raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
     paths = expand(inputs)
+    if not paths:
+        raise ConfigError("no log is named", expected="a campaign file, or at least one log")
     car = load_vehicle(vehicle)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
     given = _labels(labels, paths)

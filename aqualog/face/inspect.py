@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ExitCode
+from aqualog.face.arguments import file_of
 from aqualog.face.drive import DriveLike, drive_of
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import refuse_existing, write_text
@@ -159,7 +160,7 @@ class Contents(Result):
         ConfigError
             If the file exists and `force` is not given.
         """
-        refuse_existing([Path(path)], force=force, sources=self.sources)
+        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
         write_text(Path(path), self._map_text())
         return Path(path)
 

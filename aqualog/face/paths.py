@@ -5,14 +5,16 @@ from __future__ import annotations
 import glob
 import os
 import stat
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from aqualog.errors import ConfigError, LogError
+from aqualog.errors import AqualogError, ConfigError, LogError
+from aqualog.face.arguments import check_name
+from aqualog.io import whole
 from aqualog.io.sniff import sniff
-from aqualog.io.whole import write_text, write_whole
 
-__all__ = ["expand", "list_files", "refuse_existing", "write_text", "write_whole"]
+__all__ = ["expand", "list_files", "refuse_existing", "write_text", "write_whole", "writing"]
 
 
 def expand(names: Iterable[str]) -> list[Path]:
@@ -44,6 +46,7 @@ def _one(name: str) -> list[Path]:
     if not name:  # it would be the folder in which the user happens to be
         raise ConfigError("a name is empty", expected="a log, folder or glob", hint="check the shell's variables")
     path = Path(name)
+    check_name(path)
     if path.is_dir():
         return _from_folder(path)
     if not path.exists() and glob.has_magic(name):
@@ -102,6 +105,9 @@ def _is_log(path: Path) -> bool:
     return True
 
 
+_FORCE = "--force (from Python force=True) to overwrite, or another name"
+
+
 def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = ()) -> None:
     """Stop before any work if a result would overwrite something; a source is not overwritten even by force.
 
@@ -115,6 +121,7 @@ def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Pat
     own = {os.path.realpath(f) for s in sources for f in (s, *(s.iterdir() if s.is_dir() else ()))}
     targets: set[str] = set()
     for path in paths:
+        check_name(path)
         real = os.path.realpath(path)
         if real in own:
             raise ConfigError("is a source of this very run", where=str(path), hint="another name for the result")
@@ -124,8 +131,50 @@ def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Pat
         if path.is_dir():
             raise ConfigError("is a folder", where=str(path), expected="a file to write")
         if os.path.lexists(path) and not force:  # also a link that leads nowhere
-            raise ConfigError("exists already", where=str(path), hint="--force to overwrite, or another name")
+            raise ConfigError(
+                "exists already", where=str(path), hint="--force (from Python force=True) to overwrite, or another name"
+            )
         _check_folder(path)
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Write a file whole or not at all, see `aqualog.io.whole.write_whole`.
+
+    Raises
+    ------
+    AqualogError
+        If it cannot be written.
+    """
+    with writing(path):
+        whole.write_whole(path, write)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all.
+
+    Raises
+    ------
+    AqualogError
+        If it cannot be written.
+    """
+    with writing(path):
+        whole.write_text(path, text)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Report that a result cannot be written.
+
+    Raises
+    ------
+    AqualogError
+        In place of an error of the system.
+    """
+    try:
+        yield
+    except OSError as error:
+        what = f"cannot be written ({error.strerror or error})"
+        raise AqualogError(what, where=str(path), hint="another place for the result") from error
 
 
 def _check_folder(path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError, FitError
+from aqualog.face.arguments import whole_number
 from aqualog.face.listener import Progress, listener
 from aqualog.face.progress import Progress as Counted
 from aqualog.face.progress import lasting
@@ -135,6 +136,8 @@ def plan(
     lead_s = (time.monotonic() - began) * lead_cpu_s / max(lead_cpu_s - began_cpu, 1e-3)
     work = work_of(campaign.configured, place)
     cores = os.cpu_count() or 1
+    if jobs is not None:
+        jobs = whole_number(jobs, "jobs", 1, 1024)
     processes = max(1, min(jobs or cores, most_processes(), len(work.new)))
     chosen = choose(work.new, sample or max(8, 2 * min(processes, cores)))
     if not chosen:
@@ -150,7 +153,7 @@ def plan(
     if len(failed) == len(trial.tried):
         raise FitError(
             f"none of {len(failed)} logs of the sample gives a result: {failed[0].reason}",
-            hint="`aqualog inspect CAMPAIGN`, or a larger --sample",
+            hint="`aqualog inspect CAMPAIGN`, or a larger sample",
         )
     found = foretell(work, trial, processes=processes, cores=cores, lead_s=lead_s, lead_cpu_s=lead_cpu_s)
     parts = shards_within(campaign.configured, work, found, seconds) if seconds is not None else None
@@ -160,7 +163,7 @@ def plan(
 def _seconds(text: str) -> float:
     match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|min|h|d)", text.strip())
     if match is None or float(match[1]) <= 0.0:
-        raise ConfigError(f"--within {text}", expected="a time: 90s, 30min, 8h or 2d")
+        raise ConfigError(f"within {text}", expected="a time: 90s, 30min, 8h or 2d")
     return float(match[1]) * _UNITS[match[2]]
 
 

@@ -118,11 +118,11 @@ def propose(
 ) -> Proposal:
     """Look at every log in a folder and below it, and propose a campaign file; see `Campaign.propose`."""
     from aqualog.config.vehicle import load_vehicle
-    from aqualog.face.campaign import names_of
+    from aqualog.face.arguments import file_of, names_of
 
-    hear, place, target = listener(progress), Path(folder), Path(out)
-    car = None if vehicle is None else Path(vehicle)
-    databases = tuple(Path(p) for p in names_of(dbc))
+    hear, place, target = listener(progress), file_of(folder, "folder"), file_of(out, "out")
+    car = None if vehicle is None else file_of(vehicle, "vehicle")
+    databases = tuple(file_of(p, "dbc") for p in names_of(dbc, "dbc"))
     if not place.is_dir():
         raise ConfigError("is no folder", where=str(place), expected="a folder with logs")
     if target.suffix.lower() != ".toml":

@@ -9,13 +9,14 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.face.paths import refuse_existing, write_whole
+from aqualog.face.arguments import file_of
+from aqualog.face.paths import refuse_existing, write_whole, writing
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-__all__ = ["PathLike", "Result", "Writers", "text_file"]
+__all__ = ["PathLike", "Result", "Writers", "printable", "text_file"]
 
 PathLike = str | Path
 Writers = Mapping[str, Callable[[Path], None]]
@@ -80,17 +81,20 @@ class Result(ABC):
         ------
         ConfigError
             If a file exists already, or is a source of this result.
+        AqualogError
+            If a file cannot be written.
         """
-        out, files = Path(folder), self.files()
+        out, files = file_of(folder, "folder"), self.files()
         refuse_existing([out / name for name in files], force=force, sources=self.sources)
-        out.mkdir(parents=True, exist_ok=True)
+        with writing(out):
+            out.mkdir(parents=True, exist_ok=True)
         for name, write in files.items():
             write_whole(out / name, write)
         return tuple(out / name for name in files)
 
     def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
         """Write the file that `save` calls `name` to a path of the user's choice."""
-        target = Path(path)
+        target = file_of(path, "path")
         refuse_existing([target], force=force, sources=self.sources)
         write_whole(target, self.files()[name])
         return target
@@ -98,7 +102,7 @@ class Result(ABC):
     def __repr__(self) -> str:
         lines = self.headline().rstrip("\n").split("\n")
         shown = lines[:_REPR_LINES] + (["..."] if len(lines) > _REPR_LINES else [])
-        return "\n".join(_printable(line) for line in shown)
+        return "\n".join(printable(line) for line in shown)
 
     def _repr_html_(self) -> str:
         table = next(iter(self.tables.values()), None)
@@ -115,6 +119,7 @@ def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
     return write
 
 
-def _printable(line: str) -> str:
+def printable(line: str) -> str:
+    """Return a line that fits and drives no terminal."""
     shown = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
     return shown if len(shown) <= _REPR_WIDTH else f"{shown[: _REPR_WIDTH - 1]}…"

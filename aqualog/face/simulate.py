@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import ConfigError
+from aqualog.face.arguments import file_of, whole_number
 from aqualog.face.campaign import Campaign
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive
@@ -171,7 +172,7 @@ class Simulation(Result):
         """
         from aqualog.io.write_log import check_suffix
 
-        target = Path(path)
+        target = file_of(path, "path")
         suffix = check_suffix(target)
         refuse_existing([target], force=force, sources=self.sources)
         write_whole(target, lambda p: self._write(p, suffix))
@@ -226,16 +227,16 @@ def simulate(
 
     sources: list[Path] = []
     name = "simulated"
-    if isinstance(scenario, str | Path):
+    from aqualog.model.scenario import Scenario
+
+    if not isinstance(scenario, Scenario):
         from aqualog.config.scenario import load_scenario, vehicle_of
 
-        path = Path(scenario)
+        path = file_of(scenario, "scenario", "a Scenario")
         sources += [path, *vehicle_of(path)]
         scenario, name = load_scenario(path), path.stem
     if seed is not None:
-        if not 0 <= seed < 2**63:
-            raise ConfigError(f"seed = {seed}", expected="0 or more, below 2^63")
-        scenario = replace(scenario, seed=seed)
+        scenario = replace(scenario, seed=whole_number(seed, "seed", 0, 2**63 - 1))
     known = model_of(model) or Model()
     named = ""
     if isinstance(model, str | Path):
@@ -309,7 +310,7 @@ def check_programme_folder(folder: PathLike) -> Path:
     """
     from aqualog.io.write_log import SUFFIXES
 
-    out = Path(folder)
+    out = file_of(folder, "folder")
     if out.suffix.lower() in SUFFIXES:
         raise ConfigError("is the name of a log", where=str(out), expected="a folder for the campaign")
     return out
@@ -345,6 +346,8 @@ def simulate_campaign(
 
     hear, out = listener(progress), check_programme_folder(folder)
     began = time.monotonic()
+    if jobs is not None:
+        jobs = whole_number(jobs, "jobs", 1, 1024)
     outcome = run(programme, out, jobs=jobs or os.cpu_count() or 1, force=force, report=Counted(hear, "drives"))
     for name, reason in outcome.failed.items():
         hear.failed(name, reason)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.errors import AqualogError, ConfigError
+from aqualog.face.arguments import file_of
 from aqualog.face.campaign import Campaign, CampaignRuns
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
@@ -144,7 +145,7 @@ class Figures(Result):
         AqualogError
             For pictures without the extra `images`, or without Chromium.
         """
-        out = Path(folder)
+        out = file_of(folder, "folder")
         with _pictures(self.formats) as pictures:
             drawn = [p for f in self.made for p in _drawn(f, out, self.formats, pictures, force=force)]
         return (*super().save(folder, force=force), *drawn)
@@ -245,7 +246,7 @@ def check_formats(formats: Sequence[str]) -> tuple[str, ...]:
     asked = [f.strip().lower() for f in formats if f.strip()]
     if not asked or set(asked) - set(FORMATS):
         raise ConfigError(
-            f'--format "{",".join(formats)[:60]}"', expected=f"one or more of {','.join(FORMATS)}, with commas"
+            f'format "{",".join(formats)[:60]}"', expected=f"one or more of {','.join(FORMATS)}, with commas"
         )
     return tuple(f for f in FORMATS if f in asked)
 
@@ -454,7 +455,7 @@ def reproduce(folder: PathLike, *, jobs: int | None = None, progress: Progress =
     """
     from aqualog.reproduce.run import conclude, make_all
 
-    hear, out, processes = listener(progress), Path(folder), jobs or os.cpu_count() or 1
+    hear, out, processes = listener(progress), file_of(folder, "folder"), jobs or os.cpu_count() or 1
     campaign = out / _CAMPAIGN
     simulated = Campaign.simulate("thesis", campaign, jobs=processes, progress=hear)
     runs = simulated.campaign.run(jobs=processes, progress=hear)

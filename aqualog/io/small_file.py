@@ -33,6 +33,10 @@ def read_small(path: Path, *, what: str, expected: str, largest: int) -> bytes:
         if path.is_file() and path.stat().st_size > largest:
             raise ConfigError(f"{what} is larger than {largest // 2**20} MiB", where=str(path), expected=expected)
         return path.read_bytes()
+    except ValueError as error:  # a NUL character
+        raise ConfigError(
+            f"{what} not found: no file has the name {str(path)[:60]!r}", hint="check the path"
+        ) from error
     except FileNotFoundError as error:
         raise ConfigError(f"{what} not found", where=str(path), hint="check the path") from error
     except IsADirectoryError as error:

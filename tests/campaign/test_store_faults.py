@@ -461,7 +461,7 @@ def test_no_result_goes_into_a_store(own):
 
 def test_processes_are_not_without_end(own):
     result = run("batch", own / "campaign.toml", "--jobs", "1000")
-    assert f"--jobs 1000: {most_processes()} processes are the most" in result.stderr
+    assert f"jobs 1000: {most_processes()} processes are the most" in result.stderr
 
 
 def test_lists_of_thousands_of_levels_are_no_json(own):

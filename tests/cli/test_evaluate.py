@@ -157,7 +157,7 @@ def test_logs_without_water_share_an_empty_labels_file(folder):
 @pytest.mark.parametrize(
     ("args", "code", "text"),
     [
-        (("dry.csv",), 2, "--vehicle"),
+        (("dry.csv",), 2, "no vehicle"),
         (("campaign.toml", "dry.csv"), 2, "stands among other inputs"),
         (("campaign.toml", "--vehicle", "rwd.toml"), 2, "beside a campaign"),
         (("campaign.toml", "--by", "tire"), 2, 'did you mean "tyre"'),

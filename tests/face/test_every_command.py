@@ -262,5 +262,5 @@ def test_errors_say_what_to_give(tmp_path):
         aq.read(tmp_path / "none.mf4")
     with pytest.raises(aq.AqualogError, match=r"0\.1 to 100000"):
         aq.read(LOG, rate_hz=0.0)
-    with pytest.raises(aq.AqualogError, match="no --vehicle"):
+    with pytest.raises(aq.AqualogError, match="no vehicle"):
         aq.Campaign(LOG)
