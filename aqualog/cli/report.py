@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -52,6 +53,7 @@ def report(
     from aqualog.cli.console import Console, guarded
     from aqualog.errors import ConfigError
 
+    began = time.monotonic()
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
         if not campaign.lower().endswith(".toml"):
@@ -66,7 +68,8 @@ def report(
         runs = run_campaign(opened, console, jobs=jobs)
         with console.hearing() as hear:
             page = runs.report(folder, by=by, bin_width=width, robust=robust, force=True, progress=hear)
-        console.note(f"{page}: pages of {len(runs.data.runs)} runs")
+        files = sum(p.is_file() for p in page.parent.rglob("*"))
+        console.note(f"{page}: {files} files, {time.monotonic() - began:.0f} s")
         code = exit_code(runs)
     if code:
         raise typer.Exit(code)
