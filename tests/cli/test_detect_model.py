@@ -54,7 +54,7 @@ def test_what_the_detectors_do_not_use_is_told(tmp_path):
     (tmp_path / "model.toml").write_text('[[term]]\neffect = "tone_ring"\namplitude = 0.004\n')
     result = run("detect", MF4, "--vehicle", CAR, "--model", tmp_path / "model.toml", "-o", tmp_path / "out")
     assert result.returncode == 0, result.stderr
-    assert "tone_ring: no detector takes that as known" in result.stderr
+    assert "tone_ring: no detector uses this quantity" in result.stderr
     document = json.loads((tmp_path / "out" / "events.json").read_text())
     assert any("tone_ring" in n for n in document["quality"]["notes"])
     assert document["model"][0]["effect"] == "tone_ring"

@@ -206,11 +206,11 @@ def test_payload_moves_the_centre_of_mass(base):
 @pytest.mark.parametrize(
     ("m", "told"),
     [
-        (model("road_grade", grade=0.03), "road_grade: no detector takes that as known"),
-        (model("water_drag", gain=1.5), "water_drag: no detector takes that as known"),
-        (model("uneven_water", depth_gain=0.5), "uneven_water at left: no detector takes that as known"),
-        (model("tone_ring", amplitude=0.01), "tone_ring: no detector takes that as known"),
-        (model("relaxation_length", length=0.3), "relaxation_length: no detector takes that as known"),
+        (model("road_grade", grade=0.03), "road_grade: no detector uses this quantity"),
+        (model("water_drag", gain=1.5), "water_drag: no detector uses this quantity"),
+        (model("uneven_water", depth_gain=0.5), "uneven_water at left: no detector uses this quantity"),
+        (model("tone_ring", amplitude=0.01), "tone_ring: no detector uses this quantity"),
+        (model("relaxation_length", length=0.3), "relaxation_length: no detector uses this quantity"),
         (model("signal_delay", "steer_angle", delay=0.1), "signal_delay at steer_angle: the log has no steer_angle"),
         (model("pressure_loss", "fl", radius=0.01, slope=0.1), "pressure_loss at fl: used without leak_slope"),
     ],
