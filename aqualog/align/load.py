@@ -169,5 +169,5 @@ def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) 
         + (f" ({notes[0]})" if notes else "")
         + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",
         where=", ".join(p.name for p in paths),
-        hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+        hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
     )

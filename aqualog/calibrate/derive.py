@@ -39,10 +39,10 @@ def check_fixed(fixed: Mapping[str, float]) -> None:
     """
     for name, value in fixed.items():
         if name not in FIXABLE:
-            raise ConfigError(f'--fix "{name}" is not known', expected=", ".join(FIXABLE))
+            raise ConfigError(f'fix "{name}" is not known', expected=", ".join(FIXABLE))
         low, high = FIXABLE[name]
         if not low <= value <= high:
-            raise ConfigError(f"--fix {name}={value:g}", expected=f"a value between {low:g} and {high:g}")
+            raise ConfigError(f"fix {name}={value:g}", expected=f"a value between {low:g} and {high:g}")
 
 
 def derived(balance: Balance, fixed: Mapping[str, float]) -> dict[str, float]:

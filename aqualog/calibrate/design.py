@@ -120,7 +120,7 @@ def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
         raise SignalError(
             f"cannot calibrate without {', '.join(missing)}", where=name,
             expected="accelerometer, torques of the driven wheels, and velocity or wheel speeds",
-            hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+            hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
         )  # fmt: skip
 
 

@@ -371,6 +371,8 @@ def _fault(error: BaseException, logs: Sequence[Path]) -> Fault:
     while behind is not None:
         if isinstance(behind, OSError | MemoryError):
             return Fault(_told(error, logs))
+        if isinstance(behind, KeyboardInterrupt):  # compiled code turns it into an error of its own
+            raise KeyboardInterrupt from error
         behind = behind.__cause__ or behind.__context__
     return Fault(_told(error, logs), is_proven=isinstance(error, LogError | SignalError | ConfigError | FitError))
 

@@ -94,7 +94,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     if not channels:
         raise SignalError(
             "nothing to compare", where=name, expected="accelerometer or wheel speeds, and a velocity",
-            hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+            hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
         )  # fmt: skip
     vehicle = _as_known(vehicle, signals)
     columns = {s: signals.array(s) for s in present}

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
@@ -192,7 +193,9 @@ def calibrate(
     from aqualog.calibrate.derive import check_fixed
 
     hear = listener(progress)
-    fixed = dict(fix or {})
+    if not isinstance(fix, Mapping | None):
+        raise TypeError(f"fix: expected a mapping of name to value, not {type(fix).__name__}")
+    fixed = {text_of(n, "fix"): number_of(v, f"fix {n}", -1e9, 1e9) for n, v in (fix or {}).items()}
     check_fixed(fixed)
     (all_drives,) = with_own_names(drives_of(drives))
     car = vehicle_needed(vehicle, all_drives[0] if all_drives else None)

@@ -401,7 +401,7 @@ def check_something_to_do(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=name,
         expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
-        hint="`aqualog inspect LOG --write-map map.toml`, then --signals map.toml",
+        hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
     )
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
@@ -185,10 +185,10 @@ def slip_slope(
     hear = listener(progress)
     one = drive_of(drive)
     car = vehicle_needed(vehicle, one)
-    if not 0.02 <= mu_max <= 1.0:
-        raise ConfigError(f"mu_max = {mu_max:g}", expected="0.02 to 1")
-    if delay is not None and not -1.0 <= delay <= 1.0:
-        raise ConfigError(f"delay = {delay:g}", expected="-1 to 1 s")
+    mu_max = number_of(mu_max, "mu_max", 0.02, 1.0)
+    if delay is not None:
+        delay = number_of(delay, "delay", -1.0, 1.0, "s")
+    method, traction = text_of(method, "method"), text_of(traction, "traction")
     with one.reading():
         from aqualog.detect.slip_slope.direct import slip_slopes
 

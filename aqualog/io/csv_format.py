@@ -63,4 +63,4 @@ def format_of(formats: Mapping[str, CsvFormat], file: str) -> CsvFormat:
 def csv_hint(*keys: str) -> str:
     """How to say it."""
     examples = {"separator": 'separator = ";"', "decimal": 'decimal = ","', "encoding": 'encoding = "cp1252"'}
-    return f"say it in a map (--signals): [csv] {' '.join(examples[k] for k in keys)}"
+    return f"say it in a signal map: [csv] {' '.join(examples[k] for k in keys)}"

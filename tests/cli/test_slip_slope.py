@@ -120,7 +120,7 @@ def test_all_wheel_drive_without_velocity(folder):
     [
         ("even.csv", (), 4, "cannot estimate the slip slope"),
         ("no_torque.csv", ("--traction", "torque"), 4, "missing torque_rl"),
-        ("drive.csv", ("--method", "best"), 2, "--method"),
+        ("drive.csv", ("--method", "best"), 2, "method"),
         ("missing.csv", (), 1, "missing.csv"),
     ],
 )

@@ -94,6 +94,10 @@ def test_a_file_of_the_readers_that_cannot_be_named():
         (lambda: aq.diagnose(LOG, CAR, level="a"), "level: expected a number"),
         (lambda: aq.diagnose(LOG, CAR, seed=1.5), "seed: expected a whole number, not float"),
         (lambda: aq.diagnose(LOG, CAR, surrogates="9"), "surrogates: expected a whole number, not str"),
+        (lambda: aq.calibrate(LOG, CAR, fix="mass=3"), "fix: expected a mapping"),
+        (lambda: aq.calibrate(LOG, CAR, fix={"mass": "3"}), "fix mass: expected a number, not str"),
+        (lambda: aq.slip_slope(LOG, CAR, mu_max="a"), "mu_max: expected a number"),
+        (lambda: aq.slip_slope(LOG, CAR, method=None), "method: expected a text"),
         (lambda: aq.simulate(SAMPLES / "scenario.toml", seed="a"), "seed: expected a whole number"),
     ],
 )
@@ -116,6 +120,8 @@ def test_messages_name_arguments_and_no_options():
         lambda: aq.Campaign(LOG),
         lambda: aq.evaluate(LOG),
         lambda: aq.convert(LOG, "x.mf4", decimal_comma=True),
+        lambda: aq.slip_slope(LOG, CAR, method="x"),
+        lambda: aq.calibrate(LOG, CAR, fix={"x": 1.0}),
     ):
         with pytest.raises(aq.AqualogError) as caught:
             call()
@@ -254,3 +260,12 @@ def test_a_long_topic_and_a_pager_that_does_not_exist(monkeypatch):
     monkeypatch.setenv("PAGER", "/no/such/pager -x")
     pages._show("a\n" * 1000)
     assert shown == [("a\n" * 1000, None)]
+
+
+def test_an_interrupt_within_compiled_code_is_no_fault_of_a_log():
+    from aqualog.campaign.batch import _fault
+
+    error = SystemError("returned a result with an exception set")
+    error.__cause__ = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt):
+        _fault(error, [LOG])

@@ -16,7 +16,7 @@ TractionSource = Literal["torque", "accelerometer"]
 METHODS = ("auto", "axle", "velocity", "differential")
 TRACTIONS = ("auto", "torque", "accelerometer")
 
-_MAP_HINT = "`aqualog inspect LOG --write-map map.toml`, then --signals map.toml"
+_MAP_HINT = "`aqualog inspect LOG --write-map map.toml`, then the log with this signal map"
 
 
 class Way(NamedTuple):
@@ -54,9 +54,9 @@ def choose_way(
     """
     have = set(available)
     if method not in METHODS:
-        raise ConfigError(f'--method "{method}"', expected=", ".join(METHODS))
+        raise ConfigError(f'method "{method}"', expected=", ".join(METHODS))
     if traction not in TRACTIONS:
-        raise ConfigError(f'--traction "{traction}"', expected=", ".join(TRACTIONS))
+        raise ConfigError(f'traction "{traction}"', expected=", ".join(TRACTIONS))
     chosen = _method(vehicle, have, method, where)
     source, notes = _traction(vehicle, have, traction, where)
     return Way(chosen, source, notes)
