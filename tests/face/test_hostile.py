@@ -41,7 +41,9 @@ ON_FILES = {
 }
 
 
-@pytest.mark.parametrize("wrong", [5, 1.5, True, b"drive.mf4", {"a": 1}, object(), [3], [None]], ids=repr)
+@pytest.mark.parametrize(
+    "wrong", [5, 1.5, True, b"drive.mf4", {"a": 1}, object(), [3], [None]], ids=lambda x: type(x).__name__
+)
 @pytest.mark.parametrize("name", ON_LOGS)
 def test_logs_of_a_wrong_type(name, wrong):
     with pytest.raises(TypeError, match=r"(logs|drives): expected str or Path, one or several"):
@@ -63,7 +65,7 @@ def test_no_logs(name):
         ON_LOGS[name]([])
 
 
-@pytest.mark.parametrize("wrong", [5, b"x.toml", {"mass": 1.0}, ["x.toml"], object()], ids=repr)
+@pytest.mark.parametrize("wrong", [5, b"x.toml", {"mass": 1.0}, ["x.toml"], object()], ids=lambda x: type(x).__name__)
 @pytest.mark.parametrize("name", ON_FILES)
 def test_files_of_a_wrong_type(name, wrong):
     with pytest.raises(TypeError, match=f"^{name}: expected str or Path"):
