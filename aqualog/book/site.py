@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -10,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from aqualog.book.sources import linked
 from aqualog.book.topics import DOCS, SECTIONS, Topic, topics
 from aqualog.errors import AqualogError, ConfigError
 
@@ -19,6 +21,7 @@ _TOP = ("glossary", "sources")
 """Pages at the top that stand in the navigation by themselves; the others are together, the changelog last."""
 
 _SHIM = "https://unpkg.com/iframe-worker/shim"
+_SOURCES = Path("sources.md")
 _WORKER = Path(__file__).parent / "worker.js"
 
 
@@ -96,8 +99,8 @@ def build(out: Path, *, docs: Path = DOCS) -> None:
         raise ConfigError("is a folder with other files", where=str(out), expected="an empty folder, or a site")
     with tempfile.TemporaryDirectory() as folder:
         # JSON is YAML, too
-        settings = Path(folder) / "mkdocs.yml"
-        settings.write_text(json.dumps(configuration(topics(docs), docs=docs, out=out.absolute())), encoding="utf-8")
+        settings, pages = Path(folder) / "mkdocs.yml", _cited(docs, Path(folder) / "docs")
+        settings.write_text(json.dumps(configuration(topics(docs), docs=pages, out=out.absolute())), encoding="utf-8")
         command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(settings)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -106,6 +109,17 @@ def build(out: Path, *, docs: Path = DOCS) -> None:
             "\n".join(["the site cannot be built", *(warnings or [done.stderr[-2000:]])]), where=str(docs)
         )
     _make_local(out)
+
+
+def _cited(docs: Path, folder: Path) -> Path:
+    """Copy the pages; each citation becomes a link to its entry among the sources."""
+    shutil.copytree(docs, folder)
+    for path in folder.rglob("*.md"):
+        page = path.relative_to(folder)
+        if page != _SOURCES:
+            to = "../" * len(page.parent.parts) + str(_SOURCES)
+            path.write_text(linked(path.read_text(encoding="utf-8"), to), encoding="utf-8")
+    return folder
 
 
 def _make_local(out: Path) -> None:

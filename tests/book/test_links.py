@@ -81,6 +81,14 @@ def test_the_site_builds_without_a_warning_and_has_every_page(site):
     assert all((site / p.file).with_suffix(".html").is_file() for p in topics())
 
 
+def test_citations_lead_to_their_sources(site):
+    page = (site / "method" / "minor_spin_down.html").read_text(encoding="utf-8")
+    sources = (site / "sources.html").read_text(encoding="utf-8")
+    cited = set(re.findall(r'href="../sources.html#([^"]+)"', page))
+    assert {"e4", "c32", "fichtinger2024", "35"} <= cited
+    assert all(f'id="{key}"' in sources for key in cited)
+
+
 def test_pages_of_the_site_load_nothing_from_elsewhere(site):
     loaded = r"<(?:script|img|iframe|source)[^>]+src=[\"']?([^\"'\s>]+)|<link[^>]+href=[\"']?([^\"'\s>]+)"
     for path in site.rglob("*.html"):
