@@ -108,7 +108,7 @@ def test_resistance_as_the_contract_says(campaign, tmp_path):
     ("args", "said"),
     [
         (["--by", "tire"], "no run has this key"),
-        (["--road", "damp"], "--road"),
+        (["--road", "damp"], 'road "damp"'),
         (["-o", "x.xlsx"], "no format of a table"),
     ],
 )

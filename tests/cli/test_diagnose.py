@@ -277,7 +277,7 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
     assert asked[1][-1] == {"surrogates": 200}
     code, _, err = run(folder / "campaign.toml")
     assert code == 2
-    assert "--vehicle beside a campaign" in err
+    assert "vehicle beside a campaign" in err
 
 
 def test_help_of_the_whole_command():
