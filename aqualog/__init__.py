@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from aqualog import physics
-    from aqualog.errors import AqualogError
+    from aqualog.core.errors import AqualogError
+    from aqualog.core.records import Signals
+    from aqualog.core.vehicle import Vehicle
     from aqualog.face import thesis
     from aqualog.face.align import align
     from aqualog.face.cache import cache
@@ -35,8 +37,6 @@ if TYPE_CHECKING:
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
     from aqualog.model.term import Model
-    from aqualog.types import Signals
-    from aqualog.vehicle import Vehicle
 
 __version__ = "0.11.0"
 
@@ -54,13 +54,13 @@ _FACE = {
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
     "Drive": "aqualog.face.drive",
-    "Signals": "aqualog.types",
-    "Vehicle": "aqualog.vehicle",
+    "Signals": "aqualog.core.records",
+    "Vehicle": "aqualog.core.vehicle",
     "Model": "aqualog.model.term",
     "cache": "aqualog.face.cache",
     "physics": "aqualog.physics",
     "thesis": "aqualog.face.thesis",
-    "AqualogError": "aqualog.errors",
+    "AqualogError": "aqualog.core.errors",
 }
 
 _MODULES = ("physics", "thesis")

@@ -12,13 +12,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.notation import SYMBOLS, WHEELS
 from aqualog.io.write_table import TableColumn, write_csv, write_parquet
 from aqualog.model.effects import EFFECTS
 from aqualog.model.log import START_NS, table_of, write_simulation
 from aqualog.model.sensors import Channel
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from aqualog.notation import SYMBOLS, WHEELS
 
 HERE = Path(__file__).resolve().parent
 ROS_TYPES = {

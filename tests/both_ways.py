@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 
 def command(*args, code=0):

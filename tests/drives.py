@@ -3,8 +3,8 @@
 import polars as pl
 from small_model import Drive, Lane, simulate
 
-from aqualog.types import Quality, Signals
-from aqualog.vehicle import Vehicle
+from aqualog.core.records import Quality, Signals
+from aqualog.core.vehicle import Vehicle
 
 CAR = Vehicle(name="test car", given=frozenset({"mass"}))
 FWD = Vehicle(name="fwd car", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))

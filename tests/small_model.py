@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.compiled import compiled
-from aqualog.notation import WHEELS
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
-from aqualog.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

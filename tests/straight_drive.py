@@ -3,8 +3,8 @@
 import numpy as np
 import polars as pl
 
-from aqualog.types import Quality, Signals
-from aqualog.vehicle import Vehicle
+from aqualog.core.records import Quality, Signals
+from aqualog.core.vehicle import Vehicle
 
 G = 9.80665
 GIVEN = frozenset({"mass", "l_f", "l_r"})

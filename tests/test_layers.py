@@ -12,7 +12,7 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "errors", "places", "compiled", "notation", "units", "types", "intervals", "vehicle", "physics", "io", "workers", "align", "features", "calibrate",
+    "core", "physics", "io", "workers", "align", "features", "calibrate",
     "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "figures", "reproduce", "config", "face", "book", "cli",
 )  # fmt: skip
 # align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
@@ -23,7 +23,7 @@ def layer(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-READERS = {"vehicle.py": "config", "model/term.py": "config"}  # a record's `read` goes to its reader
+READERS = {"core/vehicle.py": "config", "model/term.py": "config"}  # a record's `read` goes to its reader
 
 
 def imports(path: Path):

@@ -23,19 +23,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aqualog.align.mapping import SignalMap, map_text
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Signals
+from aqualog.core.user_folders import user_cache
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.content import Contents, Seen, change_since, hash_of, sources_stamp
 from aqualog.io.whole import write_text, write_whole
-from aqualog.notation import WHEELS
-from aqualog.places import user_cache
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Kept", "Key", "SignalCache", "cache_folder", "cache_limit"]
 
-_BEHIND = (
-    "io", "align", "errors.py", "notation.py", "types.py", "units.py", "vehicle.py",
-)  # fmt: skip
+_BEHIND = ("core", "io", "align")
 _LIBRARIES = ("asammdf", "cantools", "mcap", "mcap-protobuf-support", "rosbags", "numpy", "polars")
 _ENTRY = re.compile(r"[0-9a-f]{8}-[0-9a-f]{32}-[0-9a-f]{8}\.parquet")
 _ORPHAN = re.compile(r"\.[0-9a-z-]{1,40}-\w{8}\.(parquet|json)\.tmp")  # as `write_whole` names them

@@ -11,11 +11,11 @@ from aqualog.align.mapping import Entry, SignalMap, matching
 from aqualog.align.propose import propose_map, words_of
 from aqualog.align.resample import linear
 from aqualog.align.timebase import ClockRepair
-from aqualog.errors import SignalError
-from aqualog.notation import WHEELS
-from aqualog.types import Channel, FloatArray, TimeArray
-from aqualog.units import convert, is_unit, parse_unit
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Channel, FloatArray, TimeArray
+from aqualog.core.units import convert, is_unit, parse_unit
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["QUANTITIES", "Carrier", "find_carrier"]
 

@@ -15,11 +15,11 @@ from aqualog.align.resample import median_period_ns
 from aqualog.align.shared import OfLast
 from aqualog.align.standing import StandWatch, Stretch
 from aqualog.align.timebase import ClockRepair
-from aqualog.errors import ConfigError, SignalError
-from aqualog.notation import ACCEPTED, SYMBOLS, Symbol
-from aqualog.types import BoolArray, Channel, FloatArray, Origin, TimeArray
-from aqualog.units import convert, parse_unit
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.notation import ACCEPTED, SYMBOLS, Symbol
+from aqualog.core.records import BoolArray, Channel, FloatArray, Origin, TimeArray
+from aqualog.core.units import convert, parse_unit
+from aqualog.core.vehicle import Vehicle
 
 __all__ = [
     "Clean", "Judged", "Span", "Stamps", "clean_channel", "corrected", "glitch_note", "judged", "mean_of_steps",

@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.errors import FitError
-from aqualog.intervals import student_quantile
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.core.errors import FitError
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = ["ClockFit", "estimate_clock"]
 

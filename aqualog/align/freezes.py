@@ -17,7 +17,7 @@ import numpy as np
 
 from aqualog.align.glitches import is_leap
 from aqualog.align.standing import Stretch, is_standing, standing_ns
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
     "Freeze", "FreezeWatch", "Stop", "freeze_note", "in_freezes", "longest_stop", "watch_of", "while_moving",

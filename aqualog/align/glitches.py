@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
     "KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "Leap", "glitches_of", "is_leap", "lost_speed", "sensor_glitches",

@@ -11,10 +11,10 @@ import polars as pl
 from aqualog.align.clean import Clean, Span
 from aqualog.align.mapping import SignalMap
 from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear, placed
-from aqualog.errors import ConfigError, SignalError
-from aqualog.notation import WHEELS, Symbol
-from aqualog.types import BoolArray, Channel, FloatArray, TimeArray
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.notation import WHEELS, Symbol
+from aqualog.core.records import BoolArray, Channel, FloatArray, TimeArray
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["Grid", "columns_of", "common_clock", "frame_of", "grid_of", "missing_samples", "onto_grid"]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from aqualog.align.mapping import Entry, SignalMap, resolve
 from aqualog.align.table import build_signals
-from aqualog.errors import SignalError
+from aqualog.core.errors import SignalError
+from aqualog.core.records import ChannelInfo, FileFaults, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.types import ChannelInfo, FileFaults, Signals
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache

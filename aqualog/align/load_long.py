@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from aqualog.align.load import find_channels, idle_files, kept, read_options, read_signals
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
+from aqualog.core.records import ChannelInfo, FileFaults, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.base import Part, ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.types import ChannelInfo, FileFaults, Signals
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache

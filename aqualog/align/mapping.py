@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
-from aqualog.errors import SignalError
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.records import ChannelInfo
 from aqualog.io.csv_format import CsvFormat
-from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.types import ChannelInfo
 
 __all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve"]
 

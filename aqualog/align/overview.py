@@ -9,8 +9,8 @@ import numpy as np
 
 from aqualog.align.resample import median_period_ns
 from aqualog.align.timebase import ClockRepair
-from aqualog.types import Channel, FloatArray, TimeFaults
-from aqualog.units import is_unit, parse_unit
+from aqualog.core.records import Channel, FloatArray, TimeFaults
+from aqualog.core.units import is_unit, parse_unit
 
 __all__ = ["ChannelOverview", "find_mounting", "overview", "rotated_channels"]
 

@@ -16,9 +16,9 @@ from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.standing import stand_watch_of
 from aqualog.align.timebase import DAY_NS
-from aqualog.errors import ConfigError, SignalError
-from aqualog.types import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.records import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["NotInPiecesError", "PieceCleaner"]
 

@@ -17,9 +17,9 @@ import numpy as np
 from aqualog.align.mapping import Entry, channel_id
 from aqualog.align.resample import linear
 from aqualog.align.timebase import ClockRepair
-from aqualog.notation import ACCEPTED, SYMBOLS, WHEELS
-from aqualog.types import Channel, FloatArray, TimeArray
-from aqualog.units import is_unit, parse_unit
+from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
+from aqualog.core.records import Channel, FloatArray, TimeArray
+from aqualog.core.units import is_unit, parse_unit
 
 __all__ = ["Proposal", "propose_map", "words_of"]
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from aqualog.align.clean import Clean
 from aqualog.align.resample import gap_limit_ns
-from aqualog.notation import SYMBOLS
-from aqualog.types import FileFaults, Origin, Quality, TimeFaults
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import FileFaults, Origin, Quality, TimeFaults
 
 __all__ = ["missing_notes", "quality_of"]
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = ["MEDIAN_OF", "Placed", "bin_mean", "gap_limit_ns", "hold", "linear", "median_period_ns", "placed"]
 

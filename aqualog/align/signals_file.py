@@ -10,7 +10,7 @@ from typing import Any
 
 import polars as pl
 
-from aqualog.types import Origin, Quality, Signals, TimeFaults
+from aqualog.core.records import Origin, Quality, Signals, TimeFaults
 
 __all__ = ["files_of", "from_parquet", "to_parquet"]
 

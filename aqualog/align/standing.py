@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = ["SPEEDS", "StandWatch", "Stretch", "is_standing", "stand_watch_of", "standing_by", "standing_ns"]
 

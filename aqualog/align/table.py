@@ -15,10 +15,10 @@ from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.resample import placed
 from aqualog.align.shared import OfLast
 from aqualog.align.standing import SPEEDS, StandWatch, Stretch, stand_watch_of, standing_by
-from aqualog.errors import SignalError
-from aqualog.notation import SYMBOLS
-from aqualog.types import Channel, FileFaults, Origin, Signals
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import Channel, FileFaults, Origin, Signals
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["build_signals"]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from aqualog.align.resample import MEDIAN_OF
 from aqualog.align.shared import OfLast
-from aqualog.types import BoolArray, TimeArray, TimeFaults
+from aqualog.core.records import BoolArray, TimeArray, TimeFaults
 
 __all__ = ["DAY_NS", "ClockRepair"]
 

@@ -21,11 +21,11 @@ from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.pieces import NotInPiecesError, PieceCleaner
 from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.standing import SPEEDS, standing_by
-from aqualog.errors import SignalError
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import Channel, ChannelInfo, FileFaults, FloatArray, Origin, Signals, TimeArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.base import Part
-from aqualog.notation import SYMBOLS
-from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, Origin, Signals, TimeArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["LongDrive", "NotInPiecesError", "Parts", "long_drive"]
 

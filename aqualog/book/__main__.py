@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
 
 def _site(folder: Path) -> int:
     from aqualog.book.site import build
-    from aqualog.errors import AqualogError
+    from aqualog.core.errors import AqualogError
 
     try:
         build(folder)

@@ -13,7 +13,7 @@ from typing import Any
 
 from aqualog.book.sources import linked
 from aqualog.book.topics import DOCS, SECTIONS, Topic, topics
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 
 __all__ = ["build", "configuration", "navigation"]
 

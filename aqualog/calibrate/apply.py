@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from aqualog.calibrate.records import Parameter, TieRodFit
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["calibrated", "told"]
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from aqualog.calibrate.design import Windows
 from aqualog.calibrate.offset import Offset
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
+from aqualog.core.records import FloatArray
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
 
 __all__ = ["Balance", "Sample", "fit_balance", "residual"]
 

@@ -9,8 +9,8 @@ from aqualog.calibrate import words
 from aqualog.calibrate.balance import Balance, Sample, fit_balance
 from aqualog.calibrate.records import Parameter
 from aqualog.calibrate.spread import Spread, half_width
-from aqualog.errors import ConfigError
-from aqualog.vehicle import KEYS, Vehicle
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = ["FIXABLE", "GAIN_SD", "balance_parameters", "check_fixed", "derived", "estimates"]
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.calibrate.lag import earlier, lag_between
-from aqualog.errors import SignalError
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.features.stream import INPUTS, FeatureStream
-from aqualog.notation import WHEELS
 from aqualog.physics.resistance import air_drag
-from aqualog.types import BoolArray, FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["BESIDE_S", "BRAKE_PRESSURE", "REASONS", "WINDOW_S", "Drive", "Windows", "prepare", "widened"]
 

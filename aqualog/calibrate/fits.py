@@ -12,10 +12,10 @@ from aqualog.calibrate.compare import mass_difference
 from aqualog.calibrate.design import Drive
 from aqualog.calibrate.records import DriveFit
 from aqualog.calibrate.spread import jackknife_of
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["drive_fits"]
 

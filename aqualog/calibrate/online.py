@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.features.smoothing import gain
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["OnlineParams", "OnlineState", "initial_state", "scan"]
 

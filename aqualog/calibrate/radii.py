@@ -13,10 +13,10 @@ from aqualog.calibrate.design import WINDOW_S, Drive
 from aqualog.calibrate.lag import earlier, lag_between
 from aqualog.calibrate.records import Parameter
 from aqualog.calibrate.spread import BLOCKS_MIN, DRIVES_MIN, Spread, combined, half_width, jackknife, stratified
-from aqualog.notation import AXLES, WHEELS
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Radii", "fit_radii", "radii_of_blocks", "radii_spread", "radius_parameters"]
 

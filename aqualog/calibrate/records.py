@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["Calibration", "DriveFit", "Parameter", "TieRodFit"]
 

@@ -17,10 +17,10 @@ from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
 from aqualog.calibrate.spread import one_more, spread_of
 from aqualog.calibrate.tie_rod import transfers
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import SPREAD, Vehicle
 from aqualog.physics.load import G
-from aqualog.types import Signals
-from aqualog.vehicle import SPREAD, Vehicle
 
 __all__ = ["calibrate"]
 

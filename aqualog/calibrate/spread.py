@@ -10,9 +10,9 @@ import numpy as np
 
 from aqualog.calibrate.balance import Sample
 from aqualog.calibrate.design import Windows
-from aqualog.errors import FitError
-from aqualog.intervals import student_quantile
-from aqualog.types import FloatArray
+from aqualog.core.errors import FitError
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import FloatArray
 
 __all__ = [
     "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "combined", "half_width", "jackknife", "jackknife_of",

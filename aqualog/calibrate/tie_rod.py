@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from aqualog.calibrate.design import BESIDE_S, BRAKE_PRESSURE, Drive, widened
 from aqualog.calibrate.records import TieRodFit
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
+from aqualog.core.intervals import student_quantile
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.features.stream import INPUTS, FeatureStream
-from aqualog.intervals import student_quantile
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["fit_tie_rod", "transfers"]
 

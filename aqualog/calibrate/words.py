@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.calibrate.balance import Sample
 from aqualog.calibrate.offset import CLIMB_SD
 from aqualog.calibrate.records import DriveFit, Parameter
-from aqualog.vehicle import Key
+from aqualog.core.vehicle import Key
 
 __all__ = [
     "GAIN_UNKNOWN", "NO_SLOPE", "RADIUS_SHORT", "cannot_tell", "left_out", "notes", "outside", "radius_unknown",

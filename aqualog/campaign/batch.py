@@ -20,12 +20,12 @@ from aqualog.campaign.place import Address
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.store import Store
 from aqualog.campaign.tables import write_tables
+from aqualog.core.errors import AqualogError, ConfigError, FitError, LogError, SignalError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
-from aqualog.errors import AqualogError, ConfigError, FitError, LogError, SignalError
 from aqualog.evaluate.labels import Label
 from aqualog.io.limits import VARIABLES, limits_from, size_of
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn, work_on
 
 __all__ = [

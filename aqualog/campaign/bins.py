@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from aqualog.campaign.measure import REASONS
 from aqualog.campaign.records import Campaign, Run, group_keys
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
-from aqualog.errors import ConfigError
-from aqualog.notation import SIDES, WHEELS
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import SIDES, WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
     "DEFAULT_KEYS", "DEPTH_KEYS", "KMH", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells", "check_plan",

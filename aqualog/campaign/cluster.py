@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.io.limits import limits_from
 from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn
 

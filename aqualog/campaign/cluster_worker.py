@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from aqualog import __version__
 from aqualog.campaign.key import code_stamp
 from aqualog.campaign.place import is_url, place_of
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.io.whole import write_text
 
 __all__ = ["Asked", "Stamp", "asked_of", "own_stamp", "unlike"]

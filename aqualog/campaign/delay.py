@@ -10,8 +10,8 @@ import numpy as np
 from aqualog.campaign.bins import pooled, road_of
 from aqualog.campaign.regress import NOWHERE, Design, Interval, estimate
 from aqualog.campaign.samples import CampaignData, RunInfo
-from aqualog.notation import WHEELS
-from aqualog.types import FloatArray
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 
 __all__ = ["Delay", "delays", "source_of"]
 

@@ -11,17 +11,17 @@ import numpy as np
 
 from aqualog.campaign.loaded import loads_of
 from aqualog.campaign.samples import RunInfo
+from aqualog.core.notation import SIDES, WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, P_NOMINAL
 from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
-from aqualog.notation import SIDES, WHEELS
 from aqualog.physics.contact import contact_share, slip_stiffness_ratio
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.rolling import load_factor, pressure_factor
 from aqualog.physics.tyre_brush import brush_parts
 from aqualog.physics.water import residual_film
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "LINEAR",

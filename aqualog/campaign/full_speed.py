@@ -13,8 +13,8 @@ from aqualog.campaign.regress import NOWHERE, Interval
 from aqualog.campaign.samples import CampaignData
 from aqualog.campaign.slip_slope import SLOPE_MAX, SlopeRow, SlopeTable, contact
 from aqualog.campaign.spin_downs import Pass, passes
-from aqualog.intervals import student_quantile
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
 

@@ -6,17 +6,23 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap, map_text
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
 from aqualog.io.content import Contents, Seen, change_since, hash_of, sources_stamp
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Contents", "Seen", "change_since", "code_stamp", "result_key"]
 
 _BEHIND = (
-    "physics", "io", "align", "features", "calibrate", "detect", "campaign/measure.py",
-    "campaign/thin.py", "compiled.py", "errors.py",
-    "intervals.py", "notation.py", "places.py", "types.py", "units.py", "vehicle.py",
-)  # fmt: skip
+    "core",
+    "physics",
+    "io",
+    "align",
+    "features",
+    "calibrate",
+    "detect",
+    "campaign/measure.py",
+    "campaign/thin.py",
+)
 
 
 def result_key(

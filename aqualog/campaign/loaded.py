@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from aqualog.campaign.records import Run
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import centre_shift
-from aqualog.vehicle import Vehicle
 
 __all__ = ["loaded", "loads_of"]
 

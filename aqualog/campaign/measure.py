@@ -13,11 +13,11 @@ import polars as pl
 from aqualog import __version__
 from aqualog.align.windows import LongDrive
 from aqualog.campaign.thin import STEP_S, Thinning
+from aqualog.core.records import DriveResult, Event, FileFaults, FloatArray, Signals, Track
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.long import ROWS, detect_long, present_in
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.stream import Settings, detect_drive
-from aqualog.types import DriveResult, Event, FileFaults, FloatArray, Signals, Track
-from aqualog.vehicle import Vehicle
 
 __all__ = ["REASONS", "STEP_S", "Measurement", "measure", "measure_long"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aqualog.campaign.batch import name_of
 from aqualog.campaign.records import Campaign
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["Measured", "lane_faults", "measured_runs"]
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.compiled import compiled
-from aqualog.types import FloatArray
+from aqualog.core.compiled import compiled
+from aqualog.core.records import FloatArray
 
 __all__ = [
     "APART", "Design", "Moments", "Working", "about_own_mean", "huber_weights", "moments_of", "run_starts",

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["Address", "Place", "address_of", "is_of_process", "is_orphan", "is_url", "place_of", "temporary_name"]
 

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from aqualog.campaign.place import is_orphan
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.io.whole import only_here, write_whole
 
 __all__ = ["Folder"]

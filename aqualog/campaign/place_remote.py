@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aqualog.campaign.place import is_orphan, temporary_name
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 
 __all__ = ["Remote"]
 

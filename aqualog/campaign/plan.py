@@ -14,11 +14,11 @@ from aqualog.campaign.batch import Configured, Job, compared, plan_jobs
 from aqualog.campaign.shard import number_of
 from aqualog.campaign.store import Store
 from aqualog.campaign.trial import Trial, Tried
-from aqualog.errors import LogError
-from aqualog.intervals import student_quantile
+from aqualog.core.errors import LogError
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import FloatArray
 from aqualog.io.content import Remembered
 from aqualog.io.sniff import sniff
-from aqualog.types import FloatArray
 
 __all__ = ["Estimate", "Plan", "Work", "Worker", "choose", "foretell", "makespan", "shards_within", "work_of"]
 

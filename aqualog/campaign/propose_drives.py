@@ -15,11 +15,11 @@ from pathlib import Path
 
 from aqualog.campaign.records import GROUP_NAMES
 from aqualog.campaign.store import MARK
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
+from aqualog.core.records import ChannelInfo
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import open_log
 from aqualog.io.sniff import sniff
-from aqualog.types import ChannelInfo
 
 __all__ = ["Drive", "Found", "LogFile", "drive_name", "group_drives", "is_run_table", "kinds_of", "scan", "tokens"]
 

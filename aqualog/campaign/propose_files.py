@@ -11,7 +11,7 @@ from pathlib import Path
 
 from aqualog.campaign.propose_drives import Drive, tokens
 from aqualog.campaign.propose_names import NameTable
-from aqualog.vehicle import KEYS, POLYNOMIALS
+from aqualog.core.vehicle import KEYS, POLYNOMIALS
 
 __all__ = ["NEEDED", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "unmapped_text", "vehicle_text"]
 

@@ -15,12 +15,12 @@ from aqualog.align.mapping import Entry, SignalMap, matching
 from aqualog.align.overview import overview, rotated_channels
 from aqualog.align.propose import Proposal, propose_map, words_of
 from aqualog.campaign.propose_drives import Drive, LogFile
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Channel
+from aqualog.core.units import is_unit
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.notation import WHEELS
-from aqualog.types import Channel
-from aqualog.units import is_unit
 
 __all__ = ["MapProposal", "measures_wheels", "propose_signals"]
 

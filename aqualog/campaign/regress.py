@@ -19,8 +19,8 @@ from aqualog.campaign.moments import (
     run_starts,
     working_model,
 )
-from aqualog.intervals import student_quantile
-from aqualog.types import FloatArray
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import FloatArray
 
 __all__ = ["ATTENUATION_MAX", "NOWHERE", "Design", "Estimate", "Interval", "RunParts", "estimate"]
 

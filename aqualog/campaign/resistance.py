@@ -13,7 +13,7 @@ from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, cells
 from aqualog.campaign.regress import NOWHERE, Design, Interval, estimate
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import LIMITS, Limits, too_few_runs
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["MeanRow", "ResistanceTable", "dry_level", "mean_of_cell", "resistances"]
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.io.small_file import read_small
 
 __all__ = ["RunTable", "as_point", "decimal_sign", "read_table"]

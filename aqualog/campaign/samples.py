@@ -14,9 +14,9 @@ from aqualog.campaign.batch import Configured, Job, name_of, plan_jobs
 from aqualog.campaign.key import Contents
 from aqualog.campaign.records import Run
 from aqualog.campaign.store import Store
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import AQUAPLANING, Label, Span
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["SETTLING_S", "CampaignData", "RunInfo", "RunSamples", "load_results"]
 

@@ -14,8 +14,8 @@ from aqualog.campaign.delay import Delay, Source, delays, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
 from aqualog.campaign.regress import ATTENUATION_MAX, NOWHERE, Design, Estimate, Interval, estimate
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
-from aqualog.notation import SIDES
-from aqualog.types import FloatArray
+from aqualog.core.notation import SIDES
+from aqualog.core.records import FloatArray
 
 __all__ = ["LIMITS", "Limits", "SlopeRow", "SlopeTable", "contact", "fit_slope", "slip_slopes", "too_few_runs"]
 

@@ -8,10 +8,10 @@ from aqualog.campaign.bins import Picked, Plan, cells, driven_of
 from aqualog.campaign.resistance import MeanRow, mean_of_cell
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import Limits
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray
 from aqualog.physics.load import wheel_loads
 from aqualog.physics.traction import residual_traction
-from aqualog.types import BoolArray
 
 __all__ = ["SPINNING", "events_of", "is_spinning", "spin_ups"]
 

@@ -24,8 +24,8 @@ import polars as pl
 
 from aqualog.campaign.measure import Measurement
 from aqualog.campaign.place import Address, Place, is_orphan, place_of
-from aqualog.errors import AqualogError, ConfigError, LogError
-from aqualog.notation import WHEELS
+from aqualog.core.errors import AqualogError, ConfigError, LogError
+from aqualog.core.notation import WHEELS
 
 __all__ = ["MARK", "Store"]
 

@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Track
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.negative_force import HOLD
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.direct import SMOOTHING
@@ -19,11 +22,8 @@ from aqualog.detect.slip_slope.direct_inputs import (
     smoothed,
     torque_traction,
 )
-from aqualog.notation import WHEELS
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.slip import wheel_slip
-from aqualog.types import BoolArray, FloatArray, Track
-from aqualog.vehicle import Vehicle
 
 __all__ = ["STEP_S", "Thinning"]
 

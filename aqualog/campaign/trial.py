@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from aqualog.campaign.batch import CRASHED, Configured, Fault, Job, measure_one, run_batch
 from aqualog.campaign.store import Store
-from aqualog.compiled import kept_code
+from aqualog.core.compiled import kept_code
 from aqualog.workers import Crashed, work_on
 
 __all__ = ["Trial", "Tried", "peak_memory", "tried"]

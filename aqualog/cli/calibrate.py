@@ -101,7 +101,7 @@ def _calibrate(
 ) -> int:
     from aqualog.cli.console import told_if_interrupted
     from aqualog.cli.setup import prepare, result_file
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.calibrate import calibrate
     from aqualog.face.drives import NothingUsableError, grouped
 
@@ -134,7 +134,7 @@ def _calibrate(
 def _fixed(texts: list[str]) -> dict[str, float]:
     """Return `mass=1400` as a mapping; the estimator checks names and bounds."""
     from aqualog.calibrate.derive import check_fixed
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
 
     fixed: dict[str, float] = {}
     for text in texts:

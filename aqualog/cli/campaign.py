@@ -53,7 +53,7 @@ def init(
       aqualog campaign init can_logs --dbc car.dbc
     """
     from aqualog.cli.console import Console, guarded
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.propose import propose
 
     with guarded(debug=debug):

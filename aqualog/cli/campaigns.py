@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from aqualog.cli.apart import is_command
 from aqualog.cli.console import Console, told_if_interrupted
-from aqualog.errors import ConfigError, ExitCode
+from aqualog.core.errors import ConfigError, ExitCode
 
 if TYPE_CHECKING:
     from aqualog.face.campaign import Campaign, CampaignRuns

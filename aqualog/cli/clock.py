@@ -83,7 +83,7 @@ def _align(
     progress: str,
 ) -> int:
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.align import align, check_quantity
 
     check_quantity(quantity)

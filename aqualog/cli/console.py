@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 import typer
 
 from aqualog.cli.apart import apart
-from aqualog.errors import AqualogError, ConfigError, ExitCode
+from aqualog.core.errors import AqualogError, ConfigError, ExitCode
 from aqualog.face.listener import Listener
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from aqualog.cli.options import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from aqualog.types import Signals as SignalTable
-    from aqualog.vehicle import Vehicle as VehicleRecord
+    from aqualog.core.records import Signals as SignalTable
+    from aqualog.core.vehicle import Vehicle as VehicleRecord
 
 __all__ = ["convert"]
 
@@ -81,7 +81,7 @@ def _convert(
     progress: str,
 ) -> int:
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.convert import check_target, convert
 
     check_target(out, decimal_comma=decimal_comma)
@@ -104,7 +104,7 @@ def _convert(
 
 def _of_default_car(signals: SignalTable, vehicle: VehicleRecord) -> list[str]:
     """Return a note where no car is named: its radii are in the numbers that are written, and stand nowhere else."""
-    from aqualog.units import parse_unit
+    from aqualog.core.units import parse_unit
 
     is_speed = [
         parse_unit(o.unit, where=o.file).dimension == "speed"

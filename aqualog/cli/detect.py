@@ -140,7 +140,7 @@ def _detect(
     progress: str,
 ) -> int:
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.detect import DETECT_FILES, detect
     from aqualog.face.paths import refuse_existing
     from aqualog.io.write_log import check_suffix

@@ -104,7 +104,7 @@ def diagnose(
 
     with guarded(debug=debug):
         from aqualog.cli.setup import result_file
-        from aqualog.errors import ConfigError
+        from aqualog.core.errors import ConfigError
         from aqualog.face.campaign import is_campaign
 
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
@@ -155,7 +155,7 @@ def _diagnose(
 ) -> int:
     from aqualog.cli.console import told_if_interrupted
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.diagnose import diagnose
     from aqualog.face.drives import NothingUsableError, grouped
     from aqualog.face.paths import expand, list_files, refuse_existing
@@ -204,7 +204,7 @@ def _campaign(
 ) -> int:
     """Diagnose a campaign's runs together, which show what no single drive does."""
     from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
     from aqualog.face.detect import model_of
     from aqualog.face.diagnose import diagnose
     from aqualog.face.paths import refuse_existing

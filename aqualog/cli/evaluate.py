@@ -76,7 +76,7 @@ def evaluate(
       aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
     """
     from aqualog.cli.console import Console, clean, guarded, told_if_interrupted
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.evaluate.judge import ODD_LABELS
     from aqualog.face.evaluate import evaluate, inputs_of
     from aqualog.face.paths import refuse_existing

@@ -62,7 +62,7 @@ def figures(
     """  # fmt: skip
     from aqualog.cli.campaigns import INTERRUPTED, exit_code, open_campaign
     from aqualog.cli.console import Console, clean, guarded, told_if_interrupted
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.thesis import check_formats, figures
 
     with guarded(debug=debug):

@@ -54,7 +54,7 @@ def _text(asked: list[str]) -> str:
     from aqualog.book.search import search
     from aqualog.book.topics import find, nearest, topics
     from aqualog.cli.commands import COMMANDS
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
 
     pages = topics()
     if not asked:

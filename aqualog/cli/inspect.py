@@ -71,7 +71,7 @@ def inspect(
 
 def _campaign(names: list[str], *, has_log_options: bool, as_json: bool) -> int:
     from aqualog.cli.inspect_campaign import inspect_campaign
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
 
     if len(names) > 1:
         raise ConfigError("a campaign file beside other inputs", where=", ".join(names)[:200], expected="it alone")

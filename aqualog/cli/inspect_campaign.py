@@ -14,7 +14,7 @@ def inspect_campaign(path: Path, *, as_json: bool) -> int:
 
     A missing log counts as an input that failed; without any log nothing is usable.
     """
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.matrix import matrix
 
     found = matrix(path)

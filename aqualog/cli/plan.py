@@ -62,7 +62,7 @@ def plan(
     """  # fmt: skip
     from aqualog.cli.campaigns import open_campaign
     from aqualog.cli.console import Console, guarded
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
 
     with guarded(debug=debug):
         console = Console.make(quiet=quiet, verbose=verbose, progress=progress)

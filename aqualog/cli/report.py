@@ -51,7 +51,7 @@ def report(
     """
     from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
     from aqualog.cli.console import Console, guarded
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
 
     began = time.monotonic()
     with guarded(debug=debug):

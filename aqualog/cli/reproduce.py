@@ -39,7 +39,7 @@ def reproduce(
       aqualog reproduce -o reproduction --jobs 8 --progress plain --json
     """  # fmt: skip
     from aqualog.cli.console import Console, clean, guarded, told_if_interrupted
-    from aqualog.errors import ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.thesis import check_reproduction, reproduce
 
     with guarded(debug=debug):

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from aqualog.align.mapping import SignalMap
 from aqualog.cli.console import Console
 from aqualog.config.signal_map import load_signal_map
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.drive import Drive
 from aqualog.face.paths import expand, list_files, refuse_existing
 from aqualog.io.content import state_of
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache

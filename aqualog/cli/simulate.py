@@ -83,7 +83,7 @@ def simulate(
 def _campaign(
     names: list[str], out: Path, *, jobs: int | None, force: bool, console: Console, strange: dict[str, bool]
 ) -> int:
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
 
     if len(names) != 1:
         raise ConfigError(
@@ -120,7 +120,7 @@ def _drive(
     console: Console,
 ) -> int:
     from aqualog.config.scenario import vehicle_of
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.paths import refuse_existing
     from aqualog.face.simulate import simulate
     from aqualog.io.write_log import check_suffix

@@ -112,7 +112,7 @@ def _slip_slope(
     progress: str,
 ) -> int:
     from aqualog.cli.setup import prepare
-    from aqualog.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.slip_slope import SLIP_SLOPE_FILES, slip_slope
 
     if vehicle_file is None:
@@ -140,7 +140,7 @@ def _slip_slope(
 
 def _folder(name: str) -> Path:
     """Return the folder for results. It need not exist, but a file must not be in its way."""
-    from aqualog.errors import ConfigError
+    from aqualog.core.errors import ConfigError
 
     expected = "a folder for the results"
     if not name.strip():

@@ -24,7 +24,7 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.table_faults import LineFaults
 from aqualog.config.toml_file import TableFaults, load_toml
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError, LogError
+from aqualog.core.errors import ConfigError, LogError
 
 __all__ = ["CAMPAIGN_KEYS", "RUN_KEYS", "CampaignFile", "RunKey", "load_campaign", "read_campaign"]
 

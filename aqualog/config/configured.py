@@ -14,8 +14,8 @@ from aqualog.config.labels import load_labels
 from aqualog.config.settings import load_settings
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.errors import ConfigError
 from aqualog.detect.stream import Settings
-from aqualog.errors import ConfigError
 
 __all__ = ["configure", "configure_logs", "files_of"]
 

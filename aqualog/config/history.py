@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from aqualog.config.toml_file import DEEPEST
+from aqualog.core.errors import ConfigError
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
-from aqualog.errors import ConfigError
 from aqualog.io.whole import write_text
 
 __all__ = ["check_history_file", "load_history", "save_history", "update_history"]

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from aqualog.config.file_key import FileKey
 from aqualog.config.table_faults import LineFaults
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.evaluate.labels import Label, joined
 from aqualog.io.small_file import read_small
-from aqualog.notation import WHEELS
 
 __all__ = ["LABEL_KEYS", "load_labels"]
 

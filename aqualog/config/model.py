@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import TableFaults, is_number, load_toml
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.term import Effect, Knots, Model, Term

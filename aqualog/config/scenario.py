@@ -11,13 +11,13 @@ from typing import Any
 
 from aqualog.config.toml_file import TableFaults, is_number, is_real, load_toml
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.faults import FAULT_KINDS, SensorFault
 from aqualog.model.scenario import Excitation, Kick, Lane, Profile, Scenario, Steering
 from aqualog.model.sensors import SENSORS, Sensors
 from aqualog.model.surface import SURFACES
 from aqualog.model.tyre import TYRE_KEYS, TYRES, Tyre
-from aqualog.vehicle import Vehicle
 
 __all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "ScenarioKey", "load_scenario", "vehicle_of"]
 

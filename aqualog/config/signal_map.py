@@ -10,9 +10,9 @@ from typing import Any
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.config.file_key import FileKey
 from aqualog.config.toml_file import Faults, is_number, load_toml
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.csv_format import CsvFormat, format_fault
-from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.units import is_unit, parse_unit
 
 __all__ = ["MAP_KEYS", "load_signal_map", "map_text"]
 

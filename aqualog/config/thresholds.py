@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import TableFaults, load_toml
+from aqualog.core.errors import ConfigError
 from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS, Thresholds
-from aqualog.errors import ConfigError
 
 __all__ = ["load_thresholds", "thresholds_text"]
 

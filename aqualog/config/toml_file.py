@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.io.small_file import read_small
 
 __all__ = ["DEEPEST", "Faults", "TableFaults", "is_number", "is_real", "line_of", "load_toml"]

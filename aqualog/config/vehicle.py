@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import TableFaults, is_real, load_toml
-from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle
+from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle
 
 __all__ = ["load_vehicle"]
 
@@ -21,7 +21,7 @@ _SPLIT = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
 def load_vehicle(path: Path) -> Vehicle:
     """Read and check a vehicle file.
 
-    A key that is left out takes its default (see `aqualog.vehicle.KEYS`); unknown keys are errors.
+    A key that is left out takes its default (see `aqualog.core.vehicle.KEYS`); unknown keys are errors.
 
     Raises
     ------

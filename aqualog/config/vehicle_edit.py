@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aqualog.calibrate.apply import calibrated, told
 from aqualog.calibrate.records import Calibration, Parameter
-from aqualog.vehicle import KEYS, POLYNOMIALS, Vehicle, spread_lines
+from aqualog.core.vehicle import KEYS, POLYNOMIALS, Vehicle, spread_lines
 
 __all__ = ["calibrated_toml"]
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["CusumParams", "CusumState", "initial_state", "scan", "step"]
 

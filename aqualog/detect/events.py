@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.types import BoolArray, Event, FloatArray, Track
+from aqualog.core.records import BoolArray, Event, FloatArray, Track
 
 __all__ = ["EventBook", "EventBuilder", "Evidence", "as_they_are"]
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import FloatArray
 from aqualog.features.smoothing import gain
-from aqualog.types import FloatArray
 
 __all__ = ["EwvarParams", "EwvarState", "from_seconds", "initial_state", "scan", "step"]
 

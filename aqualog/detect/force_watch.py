@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from aqualog.calibrate import online
+from aqualog.core.notation import side_of
+from aqualog.core.records import BoolArray, Event, FloatArray, Track
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, joint, resistance, tie_rod
 from aqualog.detect.events import EventBook
 from aqualog.detect.negative_force import hold_on
 from aqualog.detect.scene import Scene
 from aqualog.detect.thresholds import Thresholds
-from aqualog.notation import side_of
-from aqualog.types import BoolArray, Event, FloatArray, Track
-from aqualog.vehicle import Vehicle
 
 __all__ = ["ResistanceWatch", "TieRodWatch"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.wheel_watch import MU_FULL, SLIP_FULL
 from aqualog.physics.slip import slip_of_wheel_speed
-from aqualog.types import BoolArray, FloatArray, Track
 
 __all__ = ["CRITERIA", "GATED", "GATE_HOLD", "HOLD", "SLOPE", "Criteria", "criteria"]
 

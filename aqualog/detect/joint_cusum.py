@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray, Track
+from aqualog.core.records import BoolArray, FloatArray, Track
 
 __all__ = ["TERMS", "JointCusumParams", "terms"]
 

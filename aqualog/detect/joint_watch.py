@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, Event, FloatArray, Track
 from aqualog.detect import cusum, joint, joint_cusum, other_surface
 from aqualog.detect.events import EventBook
 from aqualog.detect.joint_cusum import JointCusumParams
 from aqualog.detect.negative_force import began_free, hold_on
 from aqualog.detect.scene import Scene, traction
-from aqualog.notation import WHEELS
-from aqualog.types import BoolArray, Event, FloatArray, Track
 
 __all__ = ["JointCriteriaWatch", "JointCusumWatch", "SlopeJudge"]
 

@@ -9,14 +9,14 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.windows import LongDrive
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import DriveResult, Event, FileFaults, FloatArray, Signals, Track
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.picture import Picture
 from aqualog.detect.plausibility import Plausibility
 from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import DriveStream, Settings, in_order
-from aqualog.notation import SYMBOLS
-from aqualog.types import DriveResult, Event, FileFaults, FloatArray, Signals, Track
-from aqualog.vehicle import Vehicle
 
 __all__ = ["ROWS", "detect_long", "present_in"]
 

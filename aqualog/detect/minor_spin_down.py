@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["MinorParams", "MinorState", "initial_state", "scan"]
 

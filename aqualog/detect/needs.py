@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from aqualog.notation import AXLES, SIDES, WHEELS
-from aqualog.types import Unavailable
-from aqualog.vehicle import Vehicle
+from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.records import Unavailable
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["DETECTORS", "MIN_RATE_MINOR", "check_needs"]
 

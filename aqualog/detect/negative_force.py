@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.compiled import compiled
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "began_free", "hold_on", "is_braking"]
 

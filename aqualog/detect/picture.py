@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["Picture"]
 

@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from aqualog.notation import AXLES, WHEELS
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["Plausibility"]
 

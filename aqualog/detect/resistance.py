@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure", "usable_for_offset"]
 

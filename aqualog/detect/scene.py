@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.negative_force import HOLD, hold_on, is_braking
 from aqualog.features.stream import Features
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["BrakeWatch", "Scene", "any_wheel", "traction"]
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["SpinParams", "SpinState", "initial_state", "scan"]
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.records import DriveResult, Event, FloatArray, Signals, Track, Unavailable
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.events import EventBook
 from aqualog.detect.force_watch import ResistanceWatch, TieRodWatch
 from aqualog.detect.joint_cusum import JointCusumParams
@@ -21,8 +23,6 @@ from aqualog.detect.slip_slope.watch import Memory, SlipSlopeWatch, pairs
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.detect.wheel_watch import MinorWatch, SpinWatch
 from aqualog.features.stream import Features, FeatureStream
-from aqualog.types import DriveResult, Event, FloatArray, Signals, Track, Unavailable
-from aqualog.vehicle import Vehicle
 
 __all__ = ["DriveStream", "Piece", "Settings", "detect_drive", "in_order"]
 

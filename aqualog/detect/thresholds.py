@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["DEFAULT", "MEANINGS", "UNITS", "Thresholds"]
 

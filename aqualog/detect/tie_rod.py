@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["SIGMA", "params", "scaled_residual"]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.notation import SIDES, WHEELS, side_of
+from aqualog.core.records import BoolArray, Event, FloatArray, Track
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import minor_spin_down, spin
 from aqualog.detect.events import EventBook
 from aqualog.detect.scene import Scene, traction
-from aqualog.notation import SIDES, WHEELS, side_of
 from aqualog.physics.slip import slip_of_wheel_speed
-from aqualog.types import BoolArray, Event, FloatArray, Track
-from aqualog.vehicle import Vehicle
 
 __all__ = ["MU_FULL", "SLIP_FULL", "MinorWatch", "SpinWatch"]
 

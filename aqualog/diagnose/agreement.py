@@ -11,6 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.intervals import chi2_log_p
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
 from aqualog.diagnose.outcome import Z
@@ -19,9 +21,7 @@ from aqualog.diagnose.refit import KNOWN, Refit, metric, whitened_residual
 from aqualog.diagnose.search import Candidate
 from aqualog.diagnose.subsets import PRIOR_WIDTH
 from aqualog.diagnose.words import cause_sentence
-from aqualog.intervals import chi2_log_p
 from aqualog.model.effects import EFFECTS
-from aqualog.types import FloatArray
 
 __all__ = ["agreements", "widened"]
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "BLOCK_S",

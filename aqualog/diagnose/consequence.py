@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import DriveResult, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.diagnose.records import Consequence
@@ -21,8 +23,6 @@ from aqualog.model.situations import SITUATIONS
 from aqualog.model.sketch import KMH, Sketch, full_speed
 from aqualog.model.term import Model
 from aqualog.model.tyre import TYRES
-from aqualog.types import DriveResult, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["DETECTORS", "DRY", "PASSES", "consequences", "consequences_on_logs"]
 

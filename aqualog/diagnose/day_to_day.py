@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.physics.load import G
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Kind", "as_value", "day_to_day", "kind_of"]
 

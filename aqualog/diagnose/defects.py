@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.drive import Drive
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Defect", "accelerometer_defect"]
 

@@ -8,6 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.units import is_unit, parse_unit
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import block_means, block_step, channels_of
 from aqualog.diagnose.floating import floating
 from aqualog.diagnose.inputs import SPEED_S, quiet_speed, quiet_torque, smooth
@@ -22,15 +27,10 @@ from aqualog.diagnose.unlogged import (
     road_wheel_angle,
     roll_out,
 )
-from aqualog.errors import SignalError
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
-from aqualog.notation import AXLES, WHEELS
-from aqualog.types import BoolArray, FloatArray, Signals
-from aqualog.units import is_unit, parse_unit
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Drive", "led_by", "prepare"]
 

@@ -8,18 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import FloatArray, Signals
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.model.plant import Plant, build_plant
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import ESC, Channel, Sensors
 from aqualog.model.term import Model, Setup, Term
 from aqualog.model.tyre import TYRES
-from aqualog.notation import AXLES, WHEELS
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag, cornering_drag
 from aqualog.physics.rolling import effective_radius, warm_up_factor
-from aqualog.types import FloatArray, Signals
-from aqualog.vehicle import KEYS, Vehicle
 
 __all__ = ["Extended", "extended_inputs"]
 

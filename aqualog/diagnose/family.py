@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench, gram_of, noises_after, tolerant
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.hypotheses import THREADS
 from aqualog.diagnose.noise import Noise, surrogate, white_noise
 from aqualog.diagnose.subsets import fit_set, gains_on_top
-from aqualog.types import FloatArray
 
 __all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
 

@@ -11,13 +11,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import centre_line_speeds
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import Course, follow
 from aqualog.model.term import Model, Term
-from aqualog.notation import WHEELS
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["floating"]
 

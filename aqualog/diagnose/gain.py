@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.errors import FitError
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.records import ChannelGain, Consequence, Gain
-from aqualog.errors import FitError
-from aqualog.intervals import student_quantile
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
     "BLOCK_S", "DRIVES_AS_UNITS", "HeldOut", "LogScoreGain", "block_scores", "channel_gain", "corridor_share", "gain",

@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.term import Knots, Model, Term
 from aqualog.physics.load import G
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Profile", "find_profile", "with_profile"]
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.gain import HeldOut, block_scores, gain
@@ -15,7 +16,6 @@ from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
 from aqualog.diagnose.records import Consequence, Gain
 from aqualog.model.follow import follow
 from aqualog.model.term import Model
-from aqualog.types import FloatArray
 
 __all__ = ["measured_gain"]
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.tolerances import STAND_IN, TOLERANCES, WATER_TOLERANCES
-from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.term import Effect, Model, Parameter, Term
-from aqualog.notation import AXLES, WHEELS
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "value_in", "with_values"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["SPEED_S", "quiet", "quiet_speed", "quiet_torque", "smooth"]
 

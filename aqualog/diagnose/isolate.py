@@ -9,11 +9,11 @@ from statistics import NormalDist
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
 from aqualog.diagnose.words import listed, name_of, quantity
-from aqualog.types import FloatArray
 
 __all__ = ["confusions", "limits", "reference_sizes", "separation"]
 

@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.isolate import p_correct
@@ -24,7 +25,6 @@ from aqualog.diagnose.search import CREDIBLE, Candidate
 from aqualog.diagnose.trial import Case, of_check, of_log, of_run
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Model
-from aqualog.types import FloatArray
 
 __all__ = ["next_manoeuvre", "resolving"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
     "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "spectra", "surrogate", "white_noise", "whitened",

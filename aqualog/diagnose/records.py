@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aqualog.core.records import FloatArray
 from aqualog.model.term import Model
-from aqualog.types import FloatArray
 
 __all__ = [
     "AGREES", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence", "Diagnosis",

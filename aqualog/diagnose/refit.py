@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
 from aqualog.diagnose.subsets import PRIOR_WIDTH, SetFit
-from aqualog.errors import ConfigError
 from aqualog.model.term import Model
-from aqualog.types import FloatArray
 
 __all__ = ["KNOWN", "Metric", "Refit", "metric", "refit", "whitened_residual"]
 

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.errors import SignalError
+from aqualog.core.records import FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
 from aqualog.diagnose.bench import Bench, Stack, without_deviations
@@ -27,10 +30,7 @@ from aqualog.diagnose.support import supported
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_term import as_term
 from aqualog.diagnose.words import verdict_sentence
-from aqualog.errors import SignalError
 from aqualog.model.term import Model
-from aqualog.types import FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Options", "diagnose"]
 

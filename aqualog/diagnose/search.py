@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.notation import AXLES
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench, make_bench, noises_after
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive, led_by
@@ -20,8 +22,6 @@ from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, whitened
 from aqualog.diagnose.relations import imitations
 from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set
 from aqualog.model.term import Model
-from aqualog.notation import AXLES
-from aqualog.types import FloatArray
 
 __all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
 

@@ -8,9 +8,9 @@ from itertools import combinations
 
 import numpy as np
 
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
-from aqualog.notation import AXLES, WHEELS
-from aqualog.types import FloatArray
 
 __all__ = ["PRIOR_WIDTH", "SetFit", "best_sets", "compatible", "fit_set", "gains_on_top"]
 

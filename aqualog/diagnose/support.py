@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import BoolArray
 from aqualog.diagnose.bench import Bench, gram_of, tolerant
 from aqualog.diagnose.channels import block_step, contrasts
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import gains_on_top
-from aqualog.types import BoolArray
 
 __all__ = ["supported"]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray, Signals
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive, prepare
@@ -19,7 +20,6 @@ from aqualog.diagnose.search import Candidate
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model
-from aqualog.types import FloatArray, Signals
 
 __all__ = ["Case", "of_check", "of_log", "of_run"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["PAIRS", "Basis", "bases"]
 

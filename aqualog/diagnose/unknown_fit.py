@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["Parts", "energies", "parts_of", "roughness", "simultaneous", "weights"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["Candidate", "Choice", "blocks_of_rows", "choose"]
 

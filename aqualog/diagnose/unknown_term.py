@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.records import Remainder
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.term import Term
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
 
 __all__ = ["as_term"]
 

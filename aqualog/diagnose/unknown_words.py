@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.unknown_proxy import Choice
-from aqualog.types import FloatArray
 
 __all__ = ["describe"]
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.inputs import SPEED_S, smooth
 from aqualog.model.plant import understeer_gradient
 from aqualog.model.tyre import Tyre
-from aqualog.notation import WHEELS
 from aqualog.physics.kinematics import kinematic_steer_angle
 from aqualog.physics.load import G
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "A_MOST",

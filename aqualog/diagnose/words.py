@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from string import Formatter
 
+from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import Cause, Estimate
-from aqualog.units import displayed_unit
 
 __all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "verdict_sentence"]
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from aqualog.align.freezes import longest_stop
 from aqualog.align.overview import ChannelOverview
 from aqualog.align.standing import Stretch
+from aqualog.core.records import Channel, TimeFaults
 from aqualog.doctor.records import Finding, Level
-from aqualog.types import Channel, TimeFaults
 
 __all__ = ["channel_findings"]
 

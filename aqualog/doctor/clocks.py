@@ -9,10 +9,10 @@ from aqualog.align.carrier import Carrier, find_carrier
 from aqualog.align.clean import corrected
 from aqualog.align.clock import estimate_clock
 from aqualog.align.mapping import SignalMap
+from aqualog.core.errors import FitError, SignalError
+from aqualog.core.records import Channel
+from aqualog.core.vehicle import Vehicle
 from aqualog.doctor.records import Finding
-from aqualog.errors import FitError, SignalError
-from aqualog.types import Channel
-from aqualog.vehicle import Vehicle
 
 __all__ = ["clock_findings", "on_clock", "speed_of"]
 

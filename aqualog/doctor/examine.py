@@ -11,18 +11,18 @@ from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
 from aqualog.align.standing import StandWatch, Stretch
+from aqualog.core.errors import AqualogError
+from aqualog.core.records import FileFaults
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
 from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
 from aqualog.doctor.records import Examination, FileState, Finding
-from aqualog.errors import AqualogError
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.content import changed_files, state_of
 from aqualog.io.open_log import open_log
 from aqualog.io.sound import read_sound
-from aqualog.types import FileFaults
-from aqualog.vehicle import Vehicle
 
 __all__ = ["examine"]
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.joint_cusum import JointCusumParams
-from aqualog.errors import SignalError
 from aqualog.evaluate.labels import Label, Labels, Span, after, until
 from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
-from aqualog.notation import WHEELS
-from aqualog.types import FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Drive", "LogSource", "MadeSource", "Source", "labels_in"]
 

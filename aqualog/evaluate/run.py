@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.detect.needs import DETECTORS
 from aqualog.detect.thresholds import DEFAULT, Thresholds
-from aqualog.errors import AqualogError, ConfigError
 from aqualog.evaluate.drives import Drive, Source
 from aqualog.evaluate.judge import judge
 from aqualog.evaluate.records import RunRecord

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.evaluate.labels import AQUAPLANING, Label, Labels, Span, joined
-from aqualog.notation import WHEELS
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["CONTACT_FULL", "CONTACT_PARTIAL", "TRUTH_STEMS", "spans_of", "truth_labels"]
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.align.mapping import SignalMap
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import names_of, number_of, text_of
 from aqualog.face.drive import Drive, read, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
 from aqualog.face.tables import flat
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

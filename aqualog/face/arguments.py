@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 
 __all__ = ["check_name", "file_of", "names_of", "number_of", "text_of", "whole_number"]
 

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of
 from aqualog.face.listener import Listener
 from aqualog.face.paths import refuse_existing, write_whole

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.face.result import Result, Writers, text_file
 
 if TYPE_CHECKING:

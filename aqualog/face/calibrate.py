@@ -8,20 +8,20 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
 from aqualog.face.tables import flat
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
     from aqualog.calibrate.records import Calibration as Found
-    from aqualog.types import Signals
+    from aqualog.core.records import Signals
 
 __all__ = ["Calibration", "calibrate"]
 

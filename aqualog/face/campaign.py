@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of, names_of, number_of, text_of, whole_number
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import expand, list_files, refuse_existing
@@ -592,7 +592,7 @@ def _results(
     limits: Limits,
 ) -> tuple[CampaignData, BatchOutcome]:
     """Bring the store up to date and load it; with `shard` the campaign is that shard's already."""
-    from aqualog.places import has_kept_code
+    from aqualog.core.user_folders import has_kept_code
     from aqualog.workers import most_processes
 
     if jobs is not None and jobs > most_processes():

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of
 from aqualog.face.drive import DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.result import PathLike
-from aqualog.vehicle import Vehicle
 
 __all__ = ["check_target", "convert"]
 

@@ -9,14 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError, SignalError
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.records import DriveResult, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.result import PathLike, Result, Writers, text_file
-from aqualog.types import DriveResult, Signals
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from aqualog.align.load_long import LoadedLong
+from aqualog.core.records import DriveResult
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.long import detect_long
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import Settings
 from aqualog.face.paths import write_whole
 from aqualog.io.in_hand import unfinished
-from aqualog.types import DriveResult
-from aqualog.vehicle import Vehicle
 
 __all__ = ["detect_in_windows"]
 

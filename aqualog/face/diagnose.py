@@ -8,7 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, whole_number
 from aqualog.face.campaign import Campaign, CampaignRuns, is_campaign
 from aqualog.face.detect import model_of
@@ -17,15 +18,14 @@ from aqualog.face.drives import DrivesLike, Grouped, Loaded, drives_of, load_dri
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
 from aqualog.face.tables import flat, table
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.core.records import Signals
     from aqualog.diagnose.records import Diagnosis as Found
     from aqualog.model.term import Model
-    from aqualog.types import Signals
 
 __all__ = ["Diagnosis", "check_apart", "diagnose"]
 

@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ExitCode
+from aqualog.core.errors import ExitCode
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.drive import DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.align.mapping import SignalMap
-from aqualog.errors import AqualogError, ConfigError, LogError, SignalError
+from aqualog.core.errors import AqualogError, ConfigError, LogError, SignalError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, names_of, number_of
 from aqualog.face.paths import expand, list_files
 from aqualog.face.result import PathLike, printable
 from aqualog.io.content import Seen, changed_files, state_of
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

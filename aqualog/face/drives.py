@@ -8,15 +8,15 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from aqualog.errors import AqualogError, ConfigError, SignalError
+from aqualog.core.errors import AqualogError, ConfigError, SignalError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import names_of
 from aqualog.face.drive import Drive, DriveLike, drive_of
 from aqualog.face.listener import Listener
 from aqualog.face.paths import expand, list_files
 from aqualog.face.result import PathLike
 from aqualog.io.content import state_of
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "DrivesLike",

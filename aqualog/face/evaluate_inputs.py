@@ -13,11 +13,11 @@ from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.drives import LogSource
 from aqualog.evaluate.labels import Label
 from aqualog.face.paths import expand, list_files
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Inputs", "campaign_inputs", "log_inputs"]
 

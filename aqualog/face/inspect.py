@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ExitCode
+from aqualog.core.errors import ExitCode
 from aqualog.face.arguments import file_of
 from aqualog.face.drive import DriveLike, drive_of
 from aqualog.face.listener import Progress, listener

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aqualog.errors import AqualogError, ConfigError, LogError
+from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.face.arguments import check_name
 from aqualog.io import whole
 from aqualog.io.sniff import sniff

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError, FitError
+from aqualog.core.errors import ConfigError, FitError
 from aqualog.face.arguments import whole_number
 from aqualog.face.listener import Progress, listener
 from aqualog.face.progress import Progress as Counted

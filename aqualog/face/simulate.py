@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, whole_number
 from aqualog.face.campaign import Campaign
 from aqualog.face.detect import model_of
@@ -19,17 +20,16 @@ from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.progress import Progress as Counted
 from aqualog.face.result import PathLike, Result, Writers, text_file
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.core.records import Signals
     from aqualog.model.campaign import CampaignOutcome
     from aqualog.model.scenario import Scenario
     from aqualog.model.simulate import Simulation as Made
     from aqualog.model.term import Model
-    from aqualog.types import Signals
 
 __all__ = ["SimulatedCampaign", "Simulation", "check_programme_folder", "simulate", "simulate_campaign"]
 

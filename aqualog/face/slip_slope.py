@@ -9,12 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, text_file
 from aqualog.face.tables import table
-from aqualog.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

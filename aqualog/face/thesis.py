@@ -11,7 +11,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.face.arguments import file_of
 from aqualog.face.campaign import Campaign, CampaignRuns
 from aqualog.face.listener import Listener, Progress, listener

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from aqualog.compiled import compiled
-from aqualog.types import FloatArray
+from aqualog.core.compiled import compiled
+from aqualog.core.records import FloatArray
 
 __all__ = ["UNSET", "derivative", "fading_lowpass", "gain", "lowpass"]
 

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.physics.lateral import front_axle_lateral_force, outward, split_by_load, yaw_inertia
 from aqualog.physics.steering import tie_rod_force
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["FRONT", "STEERING_INPUTS", "SteeringModel"]
 

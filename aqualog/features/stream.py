@@ -10,16 +10,16 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.features.smoothing import UNSET, derivative, fading_lowpass, lowpass
 from aqualog.features.steering_model import STEERING_INPUTS, SteeringModel
 from aqualog.features.velocity import initial_state, observe, params_from_seconds
-from aqualog.notation import WHEELS
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 from aqualog.physics.load import wheel_loads
 from aqualog.physics.resistance import nominal_acceleration
 from aqualog.physics.traction import residual_traction, traction_coefficient
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["INPUTS", "FeatureStream", "Features"]
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import FloatArray
 from aqualog.features.smoothing import gain
-from aqualog.types import FloatArray
 
 __all__ = ["VelocityParams", "VelocityState", "initial_state", "observe", "params_from_seconds"]
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from aqualog.campaign.slip_slope import SlopeRow
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import FloatArray
 from aqualog.figures.evidence import KMH
 from aqualog.figures.measures import TEN, Effect
-from aqualog.intervals import student_quantile
-from aqualog.types import FloatArray
 
 __all__ = ["fall", "line_of_logs", "ratio", "uneven", "usable"]
 

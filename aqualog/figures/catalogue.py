@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures.record import Figure, stem_of
 
 if TYPE_CHECKING:

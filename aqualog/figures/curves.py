@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.physics import tyre_brush
 from aqualog.physics.differential import differential_slip, differential_traction, speed_ratio
-from aqualog.types import FloatArray
 
 __all__ = ["LOAD_FRONT", "LOAD_REAR", "Road", "Split", "slip_of_traction", "split", "surface", "tangent", "traction"]
 

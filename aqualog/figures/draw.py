@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
+from aqualog.core.units import displayed_text
 from aqualog.figures.record import Axis, Line, Note, Panel, Sheet
 from aqualog.report.theme import GRID, INK, MUTED
 from aqualog.report.wording import plot_text
-from aqualog.types import FloatArray
-from aqualog.units import displayed_text
 
 __all__ = ["PLOT_PX", "panel_figure", "rounded"]
 

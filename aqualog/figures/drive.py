@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.types import BoolArray, DriveResult, FloatArray
+from aqualog.core.records import BoolArray, DriveResult, FloatArray
 
 __all__ = ["DriveRun"]
 

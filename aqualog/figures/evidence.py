@@ -10,10 +10,10 @@ import numpy as np
 
 from aqualog.align.load import load_signals
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray
 from aqualog.detect.stream import detect_drive
 from aqualog.figures.drive import DriveRun
-from aqualog.notation import WHEELS
-from aqualog.types import BoolArray
 
 __all__ = ["CONSTANT", "KMH", "LEAST_SAMPLES", "Evidence", "Facts", "free_wheels"]
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from aqualog import __version__
+from aqualog.core.records import FloatArray
 from aqualog.figures.draw import rounded
 from aqualog.figures.record import Figure, Line, Panel
-from aqualog.types import FloatArray
 
 __all__ = ["document", "figure_csv"]
 

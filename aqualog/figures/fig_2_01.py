@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.evidence import KMH
 from aqualog.figures.levels import PALETTE
 from aqualog.figures.record import Axis, Figure, Finding, Line, Note, Panel, judged
@@ -11,7 +12,6 @@ from aqualog.figures.wedge import DEPTH, LOAD, TYRE, full_speed, half_length, sh
 from aqualog.model.plant import P_ANCHOR
 from aqualog.physics.contact import friction_ratio, load_shift
 from aqualog.report.theme import INK, MUTED, WATER
-from aqualog.types import FloatArray
 
 __all__ = ["make"]
 

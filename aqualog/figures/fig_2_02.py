@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.bin_lines import fall
 from aqualog.figures.evidence import KMH, Evidence
 from aqualog.figures.levels import PALETTE, V_KMH
@@ -18,7 +19,6 @@ from aqualog.figures.wedge import DEPTH, LOAD, full_speed, half_length, share
 from aqualog.model.programme import PRESSURES
 from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
 from aqualog.report.theme import wheel_colour
-from aqualog.types import FloatArray
 
 __all__ = ["make"]
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.detect.minor_spin_down import MinorParams
 from aqualog.figures.drive import DriveRun
 from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged, seconds
@@ -28,7 +29,6 @@ from aqualog.model.scenario import Lane
 from aqualog.model.surface import SURFACES
 from aqualog.model.thesis_scenes import scene
 from aqualog.report.theme import MUTED, THRESHOLD, wheel_colour
-from aqualog.types import FloatArray
 
 __all__ = ["make", "panels"]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.record import Figure, Finding, Table, judged
 from aqualog.figures.scene_panels import speed_panel, tie_rod_panels
 from aqualog.figures.scene_study import (
@@ -26,7 +27,6 @@ from aqualog.figures.scene_study import (
 )
 from aqualog.model.sketch import KMH
 from aqualog.model.thesis_scenes import scene
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["make"]
 

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.thresholds import DEFAULT
 from aqualog.figures.drive import DriveRun
 from aqualog.figures.record import Axis, Figure, Finding, Panel, Table, judged, seconds
 from aqualog.figures.scene_panels import bit_panel, feature_lines, panel, speed_panel
 from aqualog.figures.scene_study import MANY, SOME, SceneRun, in_runs, runs, spread, stretches
 from aqualog.report.theme import INK, MUTED, THRESHOLD, WHEEL_COLOURS
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["make", "panels"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.detect.slip_slope.estimator import initial_state, scan
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table, judged
@@ -11,7 +12,6 @@ from aqualog.figures.study import HIGH_SLOPE, LOW_SLOPE, RATE_HZ, SUV, Case, dri
 from aqualog.figures.timeline import COLOURS, TIME
 from aqualog.physics.differential import differential_traction
 from aqualog.report.theme import THRESHOLD
-from aqualog.types import FloatArray
 
 __all__ = ["make", "sums"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.curves import LOAD_REAR, Split, split
 from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table, judged, seconds
 from aqualog.figures.solid import DIFFERENCE, DRY, FRONT_SLIP, TRACTION, forces, initial_slope, sheet, split_lines
 from aqualog.figures.study import Case, drive, estimate, false_alarms, first_alarm, slope_at
 from aqualog.figures.timeline import COLOURS
 from aqualog.report.theme import INK, THRESHOLD
-from aqualog.types import FloatArray
 
 __all__ = ["blind_split", "make", "slip_per_force"]
 

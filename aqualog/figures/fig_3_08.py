@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table, judged
 from aqualog.figures.solid import TRACTION
 from aqualog.figures.study import GATE_OFF, Case, drive, inputs
 from aqualog.figures.timeline import COLOURS
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["extreme_share", "make"]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
 from aqualog.figures.draw import panel_figure
 from aqualog.figures.record import Figure
 from aqualog.report.theme import LIGHT, in_light

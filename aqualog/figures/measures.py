@@ -12,8 +12,8 @@ from aqualog.campaign.bins import Pool, pooled
 from aqualog.campaign.regress import Design, estimate
 from aqualog.campaign.resistance import dry_level
 from aqualog.campaign.samples import RunInfo, RunSamples
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.evidence import KMH, Evidence
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
     "LEAST_RUNS", "TEN", "Effect", "Means", "additive", "bin_means", "common", "difference", "lines_through", "pool_of",

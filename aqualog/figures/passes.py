@@ -10,9 +10,9 @@ from aqualog.campaign.bins import Pool
 from aqualog.campaign.full_speed import fit_half
 from aqualog.campaign.samples import RunInfo
 from aqualog.campaign.spin_downs import Pass, passes
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.evidence import Evidence
 from aqualog.figures.measures import LEAST_RUNS, Effect, lines_through
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["begins", "full_speed", "half_speeds", "has_full", "has_minor", "over_passes", "passes_of"]
 

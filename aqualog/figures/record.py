@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = [
     "BORNE_OUT", "IN_PART", "NOT_BORNE_OUT", "Axis", "Figure", "Finding", "Line", "Note", "Panel", "RunsUsed", "Sheet",

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from aqualog.campaign.samples import RunInfo
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.figures.drive import DriveRun
 from aqualog.figures.evidence import KMH, Evidence
 from aqualog.figures.record import Axis, Line, Panel
 from aqualog.figures.scene_panels import WHEEL_WORDS
-from aqualog.notation import WHEELS
 from aqualog.report.theme import INK, WATER, wheel_colour
-from aqualog.types import FloatArray
 
 __all__ = ["ENTRY_S", "aligned", "speed_panels", "spread_over", "water_of"]
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.drive import DriveRun
 from aqualog.figures.record import Axis, Line, Panel
-from aqualog.notation import WHEELS
 from aqualog.report.theme import INK, MUTED, WATER, wheel_colour
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
     "SPEED", "TIME", "WHEEL_WORDS", "bit_panel", "feature_lines", "panel", "speed_panel", "tie_rod_panels", "water",

@@ -11,18 +11,18 @@ import numpy as np
 from aqualog.calibrate.apply import calibrated
 from aqualog.calibrate.design import prepare
 from aqualog.calibrate.tie_rod import transfers
+from aqualog.core.errors import FitError
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope.history import History, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
-from aqualog.errors import FitError
 from aqualog.figures.drive import DriveRun
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.sketch import KMH, slalom_angle
 from aqualog.model.thesis_scenes import scene
-from aqualog.types import BoolArray, FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "DRY_SEED", "MANY", "SEEDS", "SOME", "Known", "SceneRun", "in_runs", "known", "residual", "run", "run_of", "runs",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from aqualog.campaign.samples import RunInfo
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
 from aqualog.figures.record import RunsUsed
 
 __all__ = [

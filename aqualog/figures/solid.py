@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.curves import Road, split, surface
 from aqualog.figures.record import Axis, Line, Sheet
 from aqualog.figures.study import HIGH_MU, HIGH_SLOPE, LOW_MU, LOW_SLOPE
 from aqualog.figures.timeline import COLOURS
-from aqualog.types import FloatArray
 
 __all__ = ["DIFFERENCE", "DRY", "FRONT_SLIP", "SNOW", "TRACTION", "forces", "initial_slope", "sheet", "split_lines"]
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from aqualog.campaign.spin_downs import Pass
+from aqualog.core.records import FloatArray
 from aqualog.evaluate.intervals import wilson
 from aqualog.figures.evidence import KMH, Evidence
 from aqualog.figures.measures import TEN
@@ -15,7 +16,6 @@ from aqualog.figures.passes import begins, full_speed, half_speeds, has_full, ha
 from aqualog.figures.record import Finding, judged
 from aqualog.figures.scene_panels import WHEEL_WORDS
 from aqualog.figures.selection import label, value_of
-from aqualog.types import FloatArray
 
 __all__ = ["at_89", "at_118", "before_full", "exponential", "new_tread", "rising_number"]
 

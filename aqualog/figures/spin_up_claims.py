@@ -9,13 +9,13 @@ import numpy as np
 from aqualog.campaign.bins import Pool
 from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.campaign.spin_ups import is_spinning
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.figures.evidence import KMH, Evidence
 from aqualog.figures.measures import TEN, Effect, difference, pool_of, trend
 from aqualog.figures.passes import full_speed, over_passes, passes_of
 from aqualog.figures.record import Finding, judged
 from aqualog.figures.selection import FAMILIES, NotInCampaign, Selected, Wish, choose, value_of
 from aqualog.figures.tyres import WORN
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
     "WISH",

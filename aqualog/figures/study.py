@@ -7,12 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.slip_slope.estimator import Estimate, initial_state, scan
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation
 from aqualog.physics.differential import differential_slip, speed_ratio
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = [
     "GATE_OFF", "HIGH_MU", "HIGH_SLOPE", "LOW_MU", "LOW_SLOPE", "RATE_HZ", "SUV", "Case", "Drive", "adaption_time",

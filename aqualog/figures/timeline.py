@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.record import Axis, Line, seconds
 from aqualog.figures.study import (
     HIGH_SLOPE,
@@ -20,7 +21,6 @@ from aqualog.figures.study import (
     slope_at,
 )
 from aqualog.report.theme import INK, MUTED, WHEEL_COLOURS
-from aqualog.types import FloatArray
 
 __all__ = [
     "COLOURS", "SLOPE", "TIME", "detection_time", "estimate_lines", "false_alarms_of",

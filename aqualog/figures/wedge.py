@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH
 from aqualog.model.tyre import TYRES
 from aqualog.physics.contact import contact_half_length, contact_share
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
-from aqualog.types import FloatArray
 
 __all__ = ["DEPTH", "LOAD", "TYRE", "full_speed", "half_length", "share"]
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.bag_records import (
     BAG,
     CHUNK,

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
+from aqualog.core.records import Channel, ChannelInfo, Drift, FileFaults
 from aqualog.io.csv_format import CsvFormat
-from aqualog.types import Channel, ChannelInfo, Drift, FileFaults
 
 __all__ = ["FaultLog", "Part", "ReadOptions", "Reader", "part_of"]
 

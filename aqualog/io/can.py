@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.errors import LogError
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.errors import LogError
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["BitField", "Dbc", "decode_signal", "is_decodable", "load_dbc", "pgn", "selected"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import BoolArray, Drift, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, Drift, FloatArray, TimeArray
 
 __all__ = ["DriftWatch", "drift_note"]
 

@@ -12,7 +12,8 @@ from typing import Self
 import numpy as np
 import polars as pl
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import BoolArray, Channel, ChannelInfo, FileFaults, FloatArray
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import STYLES, numbers, plain
@@ -32,7 +33,6 @@ from aqualog.io.table_time import (
     no_unit_note,
 )  # fmt: skip
 from aqualog.io.text_file import TextFile, open_text
-from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, FloatArray
 
 __all__ = ["CsvReader"]
 

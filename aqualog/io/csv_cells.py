@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["STYLES", "Numbers", "Style", "is_bad", "is_clock", "is_date", "is_number", "is_stamp", "numbers", "plain"]
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import Literal
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.units import is_unit
 from aqualog.io.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
 from aqualog.io.csv_format import CsvFormat, csv_hint
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.text_file import TextFile
-from aqualog.units import is_unit
 
 __all__ = ["Column", "ColumnKind", "Layout", "find_layout", "is_comment", "split_line"]
 

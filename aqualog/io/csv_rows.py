@@ -9,10 +9,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import BoolArray
 from aqualog.io.csv_dialect import Layout, is_comment, split_line
 from aqualog.io.text_file import TextFile
-from aqualog.types import BoolArray
 
 __all__ = ["RowFaults", "Rows", "behind", "bodies", "find_rows", "rows_of"]
 

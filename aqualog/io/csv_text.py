@@ -10,11 +10,11 @@ import codecs
 from dataclasses import dataclass
 from pathlib import Path
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.units import is_unit
 from aqualog.io.csv_format import csv_hint
 from aqualog.io.table_names import split_unit
 from aqualog.io.text_file import check_lines
-from aqualog.units import is_unit
 
 __all__ = ["LogText", "read_text"]
 

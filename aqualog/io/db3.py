@@ -16,7 +16,7 @@ from typing import Any
 import zstandard
 from rosbags.typesys import Stores
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.batches import Batch, Message, batched
 from aqualog.io.messages import SAMPLES, Stream, UndecodableError, codec_for, make_stream
 from aqualog.io.unpack import Allowance, DamagedError, unpack

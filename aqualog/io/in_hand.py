@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from aqualog.errors import AqualogError, LogError
+from aqualog.core.errors import AqualogError, LogError
 from aqualog.io.limits import VARIABLES, ReadLimits, size_of
 
 __all__ = ["InHand", "bound_memory", "bounded", "memory_bound", "reading", "unfinished", "watched_by"]

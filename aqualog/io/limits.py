@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["LEAST_MB", "VARIABLES", "ReadLimits", "limits_from", "machine_memory", "size_of"]
 

@@ -24,7 +24,7 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import Schema as SchemaRecord
 from mcap.summary import Summary
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
 from aqualog.io.batches import Batch, Message, batched, damage_notes, gap_note
 from aqualog.io.mcap_records import HEAD, MAGIC, Records

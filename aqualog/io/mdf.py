@@ -26,7 +26,8 @@ import numpy as np
 from asammdf.blocks.utils import extract_xml_comment
 from numpy.typing import NDArray
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, pgn, selected
 from aqualog.io.mdf3_survey import survey3
@@ -38,7 +39,6 @@ from aqualog.io.mdf_salvage import damaged_blocks
 from aqualog.io.mdf_survey import Survey, mapped
 from aqualog.io.memory import bytes_text, free_memory
 from aqualog.io.patched_file import PatchedFile
-from aqualog.types import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
 
 __all__ = ["MdfReader"]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.mdf_survey import BlockError, Survey, Walk
 from aqualog.io.memory import bytes_text
 

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.types import BoolArray
+from aqualog.core.records import BoolArray
 
 try:
     from deflate import zlib_decompress as _libdeflate  # asammdf brings it along where it can

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.errors import LogError
-from aqualog.types import FloatArray
+from aqualog.core.errors import LogError
+from aqualog.core.records import FloatArray
 
 __all__ = ["Formula", "formula_text", "is_text_only", "physical", "refusal"]
 

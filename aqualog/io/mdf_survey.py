@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 
 __all__ = ["BlockError", "Survey", "Walk", "mapped"]
 

@@ -29,13 +29,13 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel, ChannelInfo, Drift, FileFaults, FloatArray, TimeArray
 from aqualog.io.base import FaultLog, Part, part_of
 from aqualog.io.batches import Batch, rows_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.fixed_layout import Layout, ros_layout
 from aqualog.io.ros_types import MAX_TEXT, RefusedError, checked
-from aqualog.types import Channel, ChannelInfo, Drift, FileFaults, FloatArray, TimeArray
 
 __all__ = [
     "SAMPLES", "Codec", "Leaf", "MessageReader", "Source", "Stream", "UndecodableError", "codec_for",

@@ -8,13 +8,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, cast
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel, ChannelInfo, FileFaults
 from aqualog.io.base import Part, Reader, ReadOptions, part_of
 from aqualog.io.csv_format import format_of
 from aqualog.io.in_hand import reading
 from aqualog.io.sniff import sniff
 from aqualog.io.sound import read_sound
-from aqualog.types import Channel, ChannelInfo, FileFaults
 
 __all__ = ["DriveLog", "open_log"]
 

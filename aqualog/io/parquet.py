@@ -13,7 +13,8 @@ from typing import Any, Self
 import numpy as np
 import polars as pl
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
@@ -32,7 +33,6 @@ from aqualog.io.table_time import (
     no_unit_note,
 )
 from aqualog.io.write_table import METADATA_KEY
-from aqualog.types import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
 
 __all__ = ["ParquetReader"]
 

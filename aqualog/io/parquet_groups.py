@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.base import FaultLog
 from aqualog.io.parquet_pages import Group, Index, is_of, page_fault, read_index
 from aqualog.io.thrift import MalformedError

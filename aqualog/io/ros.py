@@ -18,7 +18,7 @@ from typing import BinaryIO
 import zstandard
 from rosbags.typesys import Stores
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.bag import BagSource
 from aqualog.io.bag_records import MAGIC as BAG_MAGIC
 from aqualog.io.base import FaultLog, ReadOptions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["read_small"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.csv_format import csv_hint
 
 __all__ = ["sniff"]

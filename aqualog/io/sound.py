@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel, ChannelInfo
 from aqualog.io.base import Reader
-from aqualog.types import Channel, ChannelInfo
 
 __all__ = ["read_sound"]
 

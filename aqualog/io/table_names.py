@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from aqualog.units import is_unit
+from aqualog.core.units import is_unit
 
 __all__ = ["split_unit", "unique_names"]
 

@@ -11,10 +11,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from aqualog.errors import ConfigError, LogError
+from aqualog.core.errors import ConfigError, LogError
+from aqualog.core.records import BoolArray, TimeArray
+from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.base import ReadOptions
-from aqualog.types import BoolArray, TimeArray
-from aqualog.units import is_unit, parse_unit
 
 __all__ = [
     "Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "judged_unit", "no_unit_note",

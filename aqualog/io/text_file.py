@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 
 __all__ = ["LARGE", "LONGEST_LINE", "TextFile", "check_lines", "open_text"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from aqualog.errors import ConfigError
-from aqualog.types import FloatArray, TimeArray
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray, TimeArray
 
 __all__ = ["LogGroup", "check_suffix", "write_log"]
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from aqualog.errors import LogError
-from aqualog.types import FloatArray, TimeArray
+from aqualog.core.errors import LogError
+from aqualog.core.records import FloatArray, TimeArray
 
 __all__ = ["McapTopic", "write_mcap"]
 

@@ -16,9 +16,9 @@ import numpy as np
 from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray, TimeArray
 from aqualog.io.can import load_dbc
-from aqualog.types import FloatArray, TimeArray
 
 __all__ = ["CanFrames", "CanMessage", "MdfGroup", "write_can_mf4", "write_frames_mf4", "write_mf4"]
 

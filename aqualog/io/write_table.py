@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import FloatArray
 from aqualog.io.table_names import split_unit
-from aqualog.types import FloatArray
 
 __all__ = ["METADATA_KEY", "TableColumn", "join_parquet", "write_csv", "write_parquet"]
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.model.plant import Plant, with_mass_at
 from aqualog.model.sensors import Channel
 from aqualog.model.term import Effect, Parameter, Setup
-from aqualog.notation import AXLES, SIDES, WHEELS
-from aqualog.types import FloatArray
 
 __all__ = ["EFFECTS", "wheels_at"]
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from aqualog.errors import ConfigError
-from aqualog.types import FloatArray
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray
 
 __all__ = [
     "AMPLITUDE_KINDS",

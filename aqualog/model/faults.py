@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["FAULT_KINDS", "FaultKind", "SensorFault", "with_faults"]
 

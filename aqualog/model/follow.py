@@ -8,7 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel
 from aqualog.model.plant import Plant, build_plant
 from aqualog.model.road import build_road
@@ -17,10 +20,7 @@ from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
 from aqualog.model.start import resistance_at, rolling_state
 from aqualog.model.term import Model, Setup
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["FOLLOW_RATE", "Course", "follow", "led_truth", "setup_along", "shown"]
 

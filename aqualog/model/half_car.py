@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled, inlined
-from aqualog.errors import ConfigError
+from aqualog.core.compiled import compiled, inlined
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray
 from aqualog.model.excitation import axle_forces, excitation_amplitude, waveform
 from aqualog.model.scenario import Excitation
 from aqualog.physics import load, resistance, slip, tyre_brush
-from aqualog.types import FloatArray
 
 __all__ = ["HalfCar", "HalfCarResult", "HalfCarRun", "SurfaceChange", "simulate_half_car"]
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined
+from aqualog.core.records import FloatArray
 from aqualog.model import excitation
 from aqualog.model.antilock import antilock
 from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, Plant, flat
@@ -48,7 +49,6 @@ from aqualog.physics import (
     water,
 )
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
 
 __all__ = ["COLUMNS", "N_STATES", "Controls", "integrate", "run"]
 

@@ -9,12 +9,12 @@ import numpy as np
 from aqualog.align.mapping import SignalMap, resolve
 from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.table import build_signals
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.records import Channel, ChannelInfo, FloatArray, Signals, TimeArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.write_log import LogGroup, write_log
 from aqualog.model.sensors import Measured
 from aqualog.model.simulate import TRUTH_SYMBOLS, Simulation
-from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.types import Channel, ChannelInfo, FloatArray, Signals, TimeArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["START_NS", "grid_of", "groups_of", "signals_of", "table_of", "write_simulation"]
 

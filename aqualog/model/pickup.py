@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["OMEGA_MIN", "edge_times", "reported_speed", "ring_angles", "rolled_angle"]
 

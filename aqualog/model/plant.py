@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.tyre import P_REFERENCE, Tyre
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G, centre_shift
 from aqualog.physics.rolling import pressure_factor
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "understeer_gradient", "with_mass_at"]
 

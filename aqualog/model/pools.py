@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.tyre import TYRES, Tyre
-from aqualog.vehicle import Vehicle
 
 __all__ = ["SCORING_POOL", "TUNING_POOL", "Pool"]
 

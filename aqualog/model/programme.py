@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Lane, Scenario, Steering
 from aqualog.model.situations import SITUATIONS, TUNING_POOL, Drawn, draw
 from aqualog.model.sketch import slalom_angle
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
-from aqualog.vehicle import Vehicle
 
 __all__ = ["PROGRAMMES", "Run", "situations", "thesis"]
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
 from aqualog.model.road import DRY
 from aqualog.model.start import resistance_at, rolling_state
-from aqualog.types import FloatArray
 
 __all__ = ["Replay", "replay"]
 

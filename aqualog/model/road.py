@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import FloatArray
 from aqualog.model.scenario import Kick, Lane, Scenario
 from aqualog.model.surface import Surface
-from aqualog.types import FloatArray
 
 __all__ = ["DRY", "Road", "build_road"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.sensors import ESC, Sensors
 from aqualog.model.surface import SURFACES, Surface
 from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Excitation", "Kick", "Lane", "Scenario", "Steering", "Waveform"]
 

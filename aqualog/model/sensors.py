@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import SYMBOLS, WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.model.faults import SensorFault, with_faults
 from aqualog.model.pickup import edge_times, reported_speed, ring_angles, rolled_angle
-from aqualog.notation import SYMBOLS, WHEELS
-from aqualog.types import FloatArray
 
 __all__ = ["ESC", "IDEAL", "SENSORS", "Channel", "Group", "Measured", "Sensors", "Truth", "measure"]
 

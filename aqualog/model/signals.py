@@ -6,11 +6,11 @@ import polars as pl
 
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.table import build_signals
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.records import Channel, ChannelInfo, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.log import START_NS, grid_of, table_of
 from aqualog.model.simulate import Simulation
-from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.types import Channel, ChannelInfo, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["as_signals"]
 

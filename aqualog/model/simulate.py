@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.model import kernel
 from aqualog.model.excitation import waveform
 from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, Plant, build_plant, with_mass_at
@@ -15,12 +17,10 @@ from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
 from aqualog.model.start import resistance_at, rolling_state
 from aqualog.model.term import Model, Setup
-from aqualog.notation import WHEELS
 from aqualog.physics.contact import contact_half_length
 from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.physics.steering import STEERING, kingpin_moment, steering_torque, tie_rod_force
-from aqualog.types import FloatArray
 
 __all__ = [
     "STEP_S",

@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.model import situations_dry, situations_faults, situations_water
 from aqualog.model.plant import build_plant
 from aqualog.model.pools import SCORING_POOL, TUNING_POOL, Pool
 from aqualog.model.scenario import Scenario
 from aqualog.model.sketch import Drawn, Sketch, Taken
-from aqualog.vehicle import KEYS, Vehicle
 
 __all__ = ["SCORING_POOL", "SITUATIONS", "TUNING_POOL", "Drawn", "Pool", "Situation", "believed_vehicle", "draw"]
 

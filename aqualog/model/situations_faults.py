@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from aqualog.core.notation import WHEELS
 from aqualog.model.faults import SensorFault
 from aqualog.model.scenario import Kick
 from aqualog.model.sensors import ESC
 from aqualog.model.sketch import KMH, Sketch, Taken, terms
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
 
 __all__ = ["MAKERS"]
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.effects import EFFECTS
 from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, understeer_gradient
 from aqualog.model.pools import Pool
@@ -17,7 +18,6 @@ from aqualog.model.term import Model, Term
 from aqualog.model.tyre import Tyre
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G
-from aqualog.vehicle import Vehicle
 
 __all__ = ["KMH", "Drawn", "Sketch", "Taken", "full_speed", "lagging_torque", "slalom_angle", "terms"]
 

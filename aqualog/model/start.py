@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag
 from aqualog.physics.rolling import effective_radius
-from aqualog.types import FloatArray
 
 __all__ = ["resistance_at", "rolling_state"]
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.plant import Plant
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import Sensors

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.programme import LEFT_SHARE, SEDAN, SUV, SUV_REAR
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.sketch import KMH, slalom_angle
 from aqualog.model.tyre import TYRES
-from aqualog.vehicle import Vehicle
 
 __all__ = ["SCENES", "scene"]
 

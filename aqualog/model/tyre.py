@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aqualog.vehicle import Key
+from aqualog.core.vehicle import Key
 
 __all__ = ["P_REFERENCE", "TYRES", "TYRE_KEYS", "Tyre"]
 

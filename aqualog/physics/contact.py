@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = [
     "contact_half_length",

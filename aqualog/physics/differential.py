@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.physics.slip import V_MIN
-from aqualog.types import FloatArray
 
 __all__ = [
     "beta_of_ratio",

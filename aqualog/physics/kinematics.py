@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["centre_line_speed", "kinematic_steer_angle", "wheel_velocity"]
 

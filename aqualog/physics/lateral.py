@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["front_axle_lateral_force", "outward", "split_by_load", "yaw_inertia"]
 

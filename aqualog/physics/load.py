@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["G", "centre_shift", "loads_of_wheels", "wheel_loads"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
 
 __all__ = ["air_drag", "cornering_drag", "grade_force", "nominal_acceleration", "rolling_resistance_force"]
 

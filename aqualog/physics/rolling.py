@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["effective_radius", "load_factor", "mf61_rolling_resistance", "pressure_factor", "warm_up_factor"]
 

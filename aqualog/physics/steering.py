@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.physics.tyre_brush import brush_parts, sliding_edge
-from aqualog.types import FloatArray
 
 __all__ = ["STEERING", "SteeringGeometry", "aligning_moment", "kingpin_moment", "steering_torque", "tie_rod_force"]
 

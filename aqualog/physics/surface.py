@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["series_slope"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.physics.resistance import air_drag, rolling_resistance_force
-from aqualog.types import FloatArray
 
 __all__ = ["DELTA_A_WATER", "residual_traction", "traction_coefficient", "traction_of_one_axle"]
 

@@ -10,7 +10,7 @@ from typing import Any
 from aqualog import __version__
 from aqualog.align.carrier import QUANTITIES, Carrier
 from aqualog.align.clock import ClockFit
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
 
 __all__ = ["alignment_document", "alignment_text"]
 

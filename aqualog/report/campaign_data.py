@@ -9,8 +9,8 @@ from typing import Any
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import campaign_matrix
 from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.core.notation import WHEELS
 from aqualog.detect.needs import DETECTORS
-from aqualog.notation import WHEELS
 from aqualog.report.campaign_answers import RESISTANCE_LEVEL, Answer
 from aqualog.report.campaign_findings import Curve, Findings
 from aqualog.report.campaign_labels import group_text, key_title, value_text

@@ -13,7 +13,7 @@ from aqualog.campaign.regress import Interval
 from aqualog.campaign.resistance import MeanRow, ResistanceTable
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable
 from aqualog.campaign.spin_downs import SpinDownRow
-from aqualog.notation import SIDES
+from aqualog.core.notation import SIDES
 
 __all__ = ["SCHEMA_VERSION", "flat_rows", "resistance_document", "slope_document"]
 

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from aqualog.campaign.samples import CampaignData
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.io.whole import write_text
 from aqualog.report.campaign_csv import tables_of
 from aqualog.report.campaign_findings import Findings

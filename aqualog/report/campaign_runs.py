@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aqualog.campaign.samples import RunInfo, RunSamples
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 
 __all__ = ["BEHIND_S", "EventCount", "RunFacts", "facts_of"]
 

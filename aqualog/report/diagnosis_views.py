@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis_numbers import unit_text
 from aqualog.report.diagnosis_words import COORDINATES, channel_title
 from aqualog.report.figures.slope_axes import axis, layout, rounded
 from aqualog.report.theme import wheel_colour
 from aqualog.report.wording import plot_text
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["AFTER", "BEFORE", "binned", "coordinate_axis", "view_data", "view_figures"]
 

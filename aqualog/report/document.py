@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from aqualog import __version__
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import DriveResult, Event, Signals, SlopeSummary, Track, Unavailable
 from aqualog.io.write_log import LogGroup
-from aqualog.notation import SYMBOLS
-from aqualog.types import DriveResult, Event, Signals, SlopeSummary, Track, Unavailable
 
 __all__ = ["SCHEMA_VERSION", "document", "result_groups", "signal_groups", "track_name"]
 

@@ -11,8 +11,8 @@ from aqualog.campaign.matrix import FEW, TOO_FEW, Configuration, Matrix
 from aqualog.campaign.measured import Measured
 from aqualog.campaign.propose_files import NEEDED
 from aqualog.campaign.records import Campaign
+from aqualog.core.vehicle import Vehicle
 from aqualog.report.text import table
-from aqualog.vehicle import Vehicle
 
 __all__ = ["matrix_document", "matrix_text"]
 

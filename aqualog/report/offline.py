@@ -14,8 +14,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from aqualog.core.units import displayed_text
 from aqualog.report.wording import readable
-from aqualog.units import displayed_text
 
 __all__ = [
     "PLOTLY_HERE", "TEMPLATES", "content_policy", "environment", "json_island", "plotly_js", "with_plotly",

@@ -8,6 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from aqualog import __version__
+from aqualog.core.records import DriveResult
 from aqualog.report import tables
 from aqualog.report.event_columns import event_columns
 from aqualog.report.figures.accelerations import accelerations
@@ -25,7 +26,6 @@ from aqualog.report.offline import PLOTLY_HERE, TEMPLATES, content_policy, envir
 from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.verdict import by_importance, verdict
-from aqualog.types import DriveResult
 
 __all__ = ["drive_rows", "render_page", "write_page"]
 

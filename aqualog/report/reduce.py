@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.types import BoolArray, Event, FloatArray
+from aqualog.core.records import BoolArray, Event, FloatArray
 
 __all__ = ["ALL_SAMPLES", "POINTS", "Plan", "Spans", "make_plan", "merge_spans", "reduce_indices", "spans_of"]
 

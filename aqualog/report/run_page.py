@@ -13,8 +13,9 @@ from markupsafe import Markup
 
 from aqualog import __version__
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.detect.needs import DETECTORS
-from aqualog.notation import WHEELS
 from aqualog.report.campaign_labels import key_title, value_text
 from aqualog.report.campaign_page import script_of
 from aqualog.report.campaign_runs import RunFacts
@@ -22,7 +23,6 @@ from aqualog.report.names import cut
 from aqualog.report.offline import TEMPLATES, content_policy, environment, json_island
 from aqualog.report.theme import WHEEL_COLOURS, detector_colour
 from aqualog.report.wording import detector_name, evidence_parts, number, place
-from aqualog.types import FloatArray
 
 __all__ = ["command_of", "render_run_page"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from aqualog.notation import SYMBOLS
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import DriveResult, Event, Origin, SlopeSummary, TimeFaults
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.wording import detector_name, evidence_parts, number, place, pretty_unit, speed_kmh
-from aqualog.types import DriveResult, Event, Origin, SlopeSummary, TimeFaults
 
 __all__ = [
     "Cell", "detector_rows", "event_rows", "fault_columns", "fault_rows", "head_facts", "problems", "signal_rows",

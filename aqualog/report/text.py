@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from aqualog.core.records import DriveResult, Event, SlopeSummary
 from aqualog.report.names import cut
-from aqualog.types import DriveResult, Event, SlopeSummary
 
 __all__ = ["CELL", "NOTE", "event_table", "lacking", "table"]
 

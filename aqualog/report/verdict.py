@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aqualog.core.records import DriveResult, Event
 from aqualog.report.wording import detector_name, number, place, speed_kmh
-from aqualog.types import DriveResult, Event
 
 __all__ = ["Verdict", "by_importance", "verdict"]
 

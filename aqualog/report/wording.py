@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from aqualog.types import Event
-from aqualog.units import displayed_unit
+from aqualog.core.records import Event
+from aqualog.core.units import displayed_unit
 
 __all__ = [
     "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "readable",

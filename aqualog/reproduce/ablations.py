@@ -7,15 +7,15 @@ from functools import lru_cache
 
 import numpy as np
 
+from aqualog.core.notation import SIDES, WHEELS
+from aqualog.core.records import BoolArray, DriveResult, FloatArray
 from aqualog.detect import minor_spin_down
 from aqualog.detect.joint import CRITERIA, GATED
 from aqualog.detect.negative_force import hold_on
 from aqualog.detect.scene import BrakeWatch
 from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
 from aqualog.detect.wheel_watch import A_Y_MINOR
-from aqualog.notation import SIDES, WHEELS
 from aqualog.reproduce.drawn import Taken, detected, taken
-from aqualog.types import BoolArray, DriveResult, FloatArray
 
 __all__ = ["bits_of", "variants"]
 

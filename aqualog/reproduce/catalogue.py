@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 
 __all__ = ["COUNT", "KINDS", "Claim", "claims", "number_of", "read"]
 

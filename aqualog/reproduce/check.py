@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures.record import Finding
 from aqualog.reproduce.verdict import REPRODUCED, Verdict, of_figure
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, DriveResult, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings, detect_drive
-from aqualog.errors import SignalError
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.intervals import poisson, wilson
 from aqualog.evaluate.labels import Labels, Span, joined, without
@@ -17,11 +20,8 @@ from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, SITUATIONS, draw
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
 from aqualog.reproduce.check import Plan
 from aqualog.reproduce.tables import spread_over
-from aqualog.types import BoolArray, DriveResult, FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["NUISANCE", "WATER", "Score", "Taken", "detected", "drives", "made", "score", "taken", "threshold_for"]
 

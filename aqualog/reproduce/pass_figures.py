@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.evaluate.truth import CONTACT_PARTIAL, PARTIAL_S, spans_of
 from aqualog.model.scenario import Scenario
-from aqualog.notation import WHEELS
 from aqualog.reproduce.passes import (
     DIP,
     ENTRY,
@@ -25,7 +26,6 @@ from aqualog.reproduce.passes import (
     slope_of,
     wheel_dip,
 )
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["SLOPE_EDGES", "SPIN_EDGES", "PassFigures", "figures_of"]
 

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.model.programme import LEFT_SHARE, SEDAN
 from aqualog.model.scenario import Lane, Profile, Scenario
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth
 from aqualog.model.tyre import TYRES
-from aqualog.notation import WHEELS
 from aqualog.physics.load import wheel_loads
 from aqualog.physics.resistance import nominal_acceleration
 from aqualog.physics.slip import wheel_slip
 from aqualog.physics.traction import traction_coefficient
-from aqualog.types import FloatArray
 
 __all__ = [
     "DIP", "DURATION", "ENTRY", "EXIT", "HIGH", "KMH", "LOW", "MEDIUM", "SPIN_UP", "STOP", "Pass", "drive_pass",

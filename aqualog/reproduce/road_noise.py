@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.tuning import Params, Tuning
 from aqualog.figures.study import HIGH_SLOPE
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["DT", "ROAD_NOISE", "noise", "run"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from aqualog.campaign.samples import CampaignData
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.figures import catalogue as figure_catalogue
 from aqualog.figures.evidence import Evidence
 from aqualog.figures.record import Figure

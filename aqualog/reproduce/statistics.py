@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.evaluate.intervals import wilson
-from aqualog.types import FloatArray
 
 __all__ = ["bootstrap", "percent", "ratio_of_counts", "share"]
 

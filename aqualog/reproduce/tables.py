@@ -10,11 +10,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.reproduce.check import Checks, Maker, Plan
 from aqualog.reproduce.pass_figures import PassFigures, figures_of
 from aqualog.reproduce.passes import Pass
-from aqualog.types import BoolArray, FloatArray
 from aqualog.workers import Crashed, work_on
 
 __all__ = [

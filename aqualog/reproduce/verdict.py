@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures.record import BORNE_OUT, IN_PART, NOT_BORNE_OUT
 from aqualog.figures.record import Verdict as FigureVerdict
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from aqualog.compiled import compiled
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["alarm_bits"]
 

@@ -14,8 +14,10 @@ from difflib import get_close_matches
 
 import numpy as np
 
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import Event, Signals, Track, Unavailable
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.events import EventBuilder, Evidence
-from aqualog.errors import ConfigError
 from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.rivals import (
     front_rear_pattern,
@@ -29,8 +31,6 @@ from aqualog.rivals import (
 )
 from aqualog.rivals.inputs import present_symbols, rival_inputs
 from aqualog.rivals.records import Rival, RivalInputs, RivalResult, always_partial
-from aqualog.types import Event, Signals, Track, Unavailable
-from aqualog.vehicle import Vehicle
 
 __all__ = ["RIVALS", "Rival", "RivalInputs", "RivalResult", "run_rivals"]
 

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import SIDES
+from aqualog.core.records import FloatArray, Track
 from aqualog.features.smoothing import fading_lowpass, gain
-from aqualog.notation import SIDES
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import FloatArray, Track
 
 __all__ = ["THRESHOLD", "at_the_rear", "dips", "run"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.negative_force import HOLD, hold_on, is_braking
 from aqualog.features.stream import INPUTS, Features, FeatureStream
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import BoolArray, FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["present_symbols", "rival_inputs"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.features.smoothing import UNSET, derivative, lowpass
-from aqualog.types import FloatArray
 
 __all__ = ["LAG_MAX", "velocity_lag"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from aqualog.notation import WHEELS
-from aqualog.vehicle import Vehicle
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 
 __all__ = [
     "MIN_RATE", "MIN_RATE_OSCILLATION", "MIN_RATE_PATTERN", "all_wheels", "balance", "fast_wheels", "pattern_wheels",

@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from aqualog.core.records import BoolArray, Event, FloatArray, Track, Unavailable
+from aqualog.core.vehicle import Vehicle
 from aqualog.features.stream import Features
-from aqualog.types import BoolArray, Event, FloatArray, Track, Unavailable
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Needs", "Rival", "RivalInputs", "RivalResult", "Severity", "always_partial"]
 

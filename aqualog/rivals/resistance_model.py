@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Track
 from aqualog.features.smoothing import UNSET, fading_lowpass, lowpass
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import Track
 
 __all__ = ["THRESHOLD", "run"]
 

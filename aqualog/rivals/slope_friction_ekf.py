@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined
+from aqualog.core.notation import side_of
+from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.features.smoothing import gain
-from aqualog.notation import side_of
 from aqualog.physics.tyre_brush import brush_force, brush_slope
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
 from aqualog.rivals.slope_inputs import driven_wheels, reference_slope
 from aqualog.rivals.slope_rls import PATIENCE
-from aqualog.types import BoolArray, FloatArray, Track
 
 __all__ = ["MU_FULL", "THRESHOLD", "CurveParams", "run", "scan", "severity"]
 

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.negative_force import hold_on
 from aqualog.detect.slip_slope.activation import ACTIVE, JUMPING, LIMITS, SPINNING, inactive_reason
 from aqualog.detect.slip_slope.watch import AFTER_JUMP, TAU_SMOOTH
 from aqualog.features.smoothing import UNSET, derivative, lowpass
-from aqualog.notation import WHEELS
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.load import G
 from aqualog.rivals.late_velocity import velocity_lag
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["Driven", "driven_wheels", "loss_of_slope", "reference_slope"]
 

@@ -7,18 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import side_of
+from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.detect.slip_slope import ekf
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
-from aqualog.notation import side_of
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
 from aqualog.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
 from aqualog.rivals.slope_rls import PATIENCE, SLIP_LINE
-from aqualog.types import BoolArray, FloatArray, Track
 
 __all__ = ["THRESHOLD", "KalmanParams", "run", "scan"]
 

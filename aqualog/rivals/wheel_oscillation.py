@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS, side_of
+from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.features.smoothing import gain
-from aqualog.notation import WHEELS, side_of
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import BoolArray, FloatArray, Track
 
 __all__ = ["THRESHOLD", "BandParams", "level_change", "run"]
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS, side_of
+from aqualog.core.records import FloatArray, Track
 from aqualog.detect.wheel_watch import SLIP_FULL
 from aqualog.features.smoothing import UNSET, derivative
 from aqualog.features.stream import TAU_WHEEL
-from aqualog.notation import WHEELS, side_of
 from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.rivals.alarm import alarm_bits
 from aqualog.rivals.records import RivalInputs
-from aqualog.types import FloatArray, Track
 
 __all__ = ["THRESHOLD", "critical_share", "run", "severity"]
 

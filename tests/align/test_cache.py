@@ -24,7 +24,7 @@ from aqualog.align.signals_file import from_parquet, to_parquet
 from aqualog.cli.main import app
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
-from aqualog.types import Origin, Quality, Signals, TimeFaults
+from aqualog.core.records import Origin, Quality, Signals, TimeFaults
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")
@@ -130,7 +130,7 @@ def test_key_holds_all_that_signals_depend_on(log, place, monkeypatch):
 def test_every_source_behind_signals_is_in_the_key():
     code = (
         "import sys; from pathlib import Path; from aqualog.align.load import load_signals\n"
-        "from aqualog.vehicle import Vehicle\n"
+        "from aqualog.core.vehicle import Vehicle\n"
         f"load_signals([Path({str(LOGS[0])!r})], vehicle=Vehicle())\n"
         "print(*(m for m in sys.modules if m.startswith('aqualog')))"
     )
@@ -282,7 +282,7 @@ def test_what_is_larger_than_the_limit_is_not_kept(log, tmp_path):
 def test_many_processes_at_once(log, tmp_path):
     code = (
         "import sys; from pathlib import Path; from aqualog.align.cache import SignalCache\n"
-        "from aqualog.align.load import load_signals; from aqualog.vehicle import Vehicle\n"
+        "from aqualog.align.load import load_signals; from aqualog.core.vehicle import Vehicle\n"
         f"for _ in range(20):\n"
         f"    c = SignalCache(Path({str(tmp_path / 'cache')!r}), limit=300_000)\n"  # room for one of two: they fight
         f"    s = load_signals([Path({str(log)!r})], vehicle=Vehicle(), rate_hz=float(sys.argv[1]), cache=c)\n"

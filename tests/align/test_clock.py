@@ -12,8 +12,8 @@ import polars as pl
 import pytest
 
 from aqualog.align.clock import estimate_clock
-from aqualog.errors import FitError
-from aqualog.intervals import student_quantile
+from aqualog.core.errors import FitError
+from aqualog.core.intervals import student_quantile
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real_logs"
 real = [

@@ -5,7 +5,7 @@ import pytest
 
 from aqualog.align.load import idle_files, load_signals
 from aqualog.align.mapping import SignalMap
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 
 def table(path, *names):

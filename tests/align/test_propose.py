@@ -3,7 +3,7 @@
 import numpy as np
 
 from aqualog.align.propose import propose_map, words_of
-from aqualog.types import Channel, ChannelInfo
+from aqualog.core.records import Channel, ChannelInfo
 
 
 def channel(path, unit, file="a.mf4"):

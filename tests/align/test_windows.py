@@ -9,10 +9,10 @@ import pytest
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.table import build_signals
 from aqualog.align.windows import NotInPiecesError, long_drive
-from aqualog.errors import ConfigError, SignalError
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.records import Channel, ChannelInfo
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.base import part_of
-from aqualog.types import Channel, ChannelInfo
-from aqualog.vehicle import Vehicle
 
 CAR = Vehicle()
 S = 1_000_000_000

@@ -47,9 +47,9 @@ def _filter(scale: Scale) -> list[Row]:
 
 
 def _simulator(scale: Scale) -> list[Row]:
+    from aqualog.core.vehicle import Vehicle
     from aqualog.model.scenario import Scenario
     from aqualog.model.simulate import STEP_S, simulate
-    from aqualog.vehicle import Vehicle
 
     seconds = scale.simulated_s
     scenario = Scenario(Vehicle(name="sedan"), duration_s=seconds, rate_hz=100.0)

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 from aqualog.detect.slip_slope import ekf, estimator
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aqualog.types import FloatArray
+from aqualog.core.records import FloatArray
 from tests.bench.child import ROOT
 
 __all__ = ["CAR", "SIGNALS", "drive", "many_logs", "one_log"]
@@ -45,8 +45,8 @@ def drive(seconds: float, seed: int = 1) -> Mapping[str, FloatArray]:
 
 def one_log(path: Path, seconds: float) -> Path:
     """A log of that length, transposed and deflated as aqualog writes MF4."""
+    from aqualog.core.notation import SYMBOLS
     from aqualog.io.write_log import LogGroup, write_log
-    from aqualog.notation import SYMBOLS
 
     n = round(seconds * RATE)
     columns = drive(min(seconds, PERIOD_S))
@@ -61,7 +61,7 @@ def _in_pieces(path: Path, columns: Mapping[str, FloatArray], n: int) -> Path:
     """The same with asammdf, which can take a file up piece by piece; `write_log` holds it as a whole."""
     import asammdf
 
-    from aqualog.notation import SYMBOLS
+    from aqualog.core.notation import SYMBOLS
 
     period = next(iter(columns.values())).size
     piece = period * max(1, round(PIECE_H * 3600.0 * RATE / period))
@@ -94,8 +94,8 @@ def many_logs(folder: Path, count: int, seconds: float) -> Path:
 
 
 def _short(path: Path, seconds: float, seed: int) -> Path:
+    from aqualog.core.notation import SYMBOLS
     from aqualog.io.write_log import LogGroup, write_log
-    from aqualog.notation import SYMBOLS
 
     columns = drive(seconds, seed)
     group = LogGroup("drive", {k: (SYMBOLS[k].unit, SYMBOLS[k].meaning, x) for k, x in columns.items()})

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import polars as pl
 
-from aqualog.types import DriveResult, Event, Quality, Signals
+from aqualog.core.records import DriveResult, Event, Quality, Signals
 from tests.bench.compare import Row
 from tests.bench.logs import RATE
 from tests.bench.scale import Scale

@@ -35,8 +35,8 @@ def pieces_of(hours: float, piece_h: float) -> list[tuple[int, int, int]]:
 
 def write_piece(path: Path, begin: int, end: int) -> Path:
     """Rows begin to end of what `one_log` writes, as a file of its own."""
+    from aqualog.core.notation import SYMBOLS
     from aqualog.io.write_log import LogGroup, write_log
-    from aqualog.notation import SYMBOLS
 
     found = drive(PERIOD_S)
     rows = np.arange(begin, end) % next(iter(found.values())).size

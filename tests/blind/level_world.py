@@ -17,7 +17,7 @@ from aqualog.campaign.batch import Configured
 from aqualog.campaign.loaded import loaded
 from aqualog.campaign.records import Campaign, Run
 from aqualog.campaign.samples import CampaignData, RunInfo
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 CAR = Vehicle(name="blind rwd", mass=1610.0, l_f=1.35, l_r=1.45, h_cg=0.53, rolling_resistance=0.0102)
 CAR_AWD = Vehicle(

@@ -12,10 +12,10 @@ import numpy as np
 import polars as pl
 from blind.world.noise import coloured
 
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["CAR", "EFFECTS", "drive"]
 

@@ -97,10 +97,10 @@ def test_sources_named_in_documents_carry_a_key(path):
 
 
 def test_tables_of_keys_name_their_sources_by_key():
+    from aqualog.core.vehicle import KEYS
     from aqualog.model.effects import EFFECTS
     from aqualog.model.surface import SURFACES
     from aqualog.model.tyre import TYRE_KEYS
-    from aqualog.vehicle import KEYS
 
     tables = (KEYS, TYRE_KEYS, EFFECTS, SURFACES)
     rows = [row for table in tables for row in (table.values() if isinstance(table, dict) else table)]

@@ -10,7 +10,7 @@ from conftest import ROOT
 
 from aqualog.book.site import build, configuration, navigation
 from aqualog.book.topics import DOCS, topics
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md"]
 

@@ -21,17 +21,17 @@ from aqualog.config.settings import JOINT_KEYS, load_settings
 from aqualog.config.signal_map import MAP_KEYS, load_signal_map
 from aqualog.config.thresholds import load_thresholds
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.errors import ExitCode
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.units import spellings
+from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD
 from aqualog.detect.needs import DETECTORS
 from aqualog.detect.slip_slope.tuning import MEANINGS, TUNING
-from aqualog.errors import ExitCode
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.tyre import TYRE_KEYS, TYRES
-from aqualog.notation import ACCEPTED, SYMBOLS
 from aqualog.rivals.catalogue import RIVALS
-from aqualog.units import spellings
-from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD
 
 PACKAGE = Path(aqualog.__file__).parent
 FILES = generated()

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import ESC
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import Vehicle
 
 WIND_SD = 3.0  # [m/s]
 GRADE_SD = 0.02  # [rad]

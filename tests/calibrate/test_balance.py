@@ -9,9 +9,9 @@ from aqualog.calibrate.derive import balance_parameters, derived, estimates
 from aqualog.calibrate.design import Windows
 from aqualog.calibrate.offset import ALTITUDE_SD, Offset
 from aqualog.calibrate.spread import WIND_SD, jackknife_of, spread_of
-from aqualog.errors import ConfigError, FitError
+from aqualog.core.errors import ConfigError, FitError
+from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
-from aqualog.vehicle import Vehicle
 
 MASS, AREA, R_W, RHO = 1500.0, 0.7, 0.011, 1.204
 WAY = 10_000.0

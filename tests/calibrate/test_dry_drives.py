@@ -14,10 +14,10 @@ from aqualog.calibrate.offset import energy_offset
 from aqualog.calibrate.run import calibrate
 from aqualog.config.vehicle import load_vehicle
 from aqualog.config.vehicle_edit import calibrated_toml
-from aqualog.errors import FitError, SignalError
+from aqualog.core.errors import FitError, SignalError
+from aqualog.core.records import Quality, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.sensors import ESC, IDEAL
-from aqualog.types import Quality, Signals
-from aqualog.vehicle import Vehicle
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth
 from aqualog.physics.lateral import front_axle_lateral_force, outward, split_by_load, yaw_inertia
-from aqualog.vehicle import Vehicle
 
 CAR = Vehicle(name="car", mass=1700.0, l_f=1.3, l_r=1.5)
 

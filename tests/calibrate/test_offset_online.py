@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from aqualog.calibrate import online
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, resistance
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import Vehicle
 
 DT = 0.01
 P = online.OnlineParams.make(DT)

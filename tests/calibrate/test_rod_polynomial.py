@@ -5,12 +5,12 @@ import pytest
 
 from aqualog.calibrate.design import prepare
 from aqualog.calibrate.tie_rod import fit_tie_rod, transfers
-from aqualog.errors import FitError
+from aqualog.core.errors import FitError
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.physics.steering import tie_rod_force
-from aqualog.vehicle import Vehicle
 
 DT = 0.01
 TRUE = {"c0": (40.0,), "c_y": (-0.31, 8e-6), "c_x": (0.07,)}

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.tyre import TYRES
-from aqualog.vehicle import vehicle_toml
 
 
 def pass_of(kmh, seed, *, depth=1.3e-3, duration=4.0, tyre="worn_summer", lane=(1.2, 3.2)):

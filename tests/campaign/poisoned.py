@@ -29,10 +29,10 @@ from campaign.dask_here import cluster
 from campaign.made import pass_of
 from campaign.poison import HOOKED, HOSTILE_NAMES, hooked, real_poison
 
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import vehicle_toml
 
 SUFFIXES = (".mf4", ".parquet", ".csv", ".mcap")
 HEAD = ("log", "tyre", "water_depth_mm", "pressure_front_bar", "pressure_rear_bar", "lane_start_s", "lane_end_s")

@@ -24,7 +24,7 @@ from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
-from aqualog.errors import ConfigError, LogError
+from aqualog.core.errors import ConfigError, LogError
 from aqualog.model.programme import SEDAN
 from aqualog.workers import Crashed, work_on
 

@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 
 from aqualog.cli.bin_resistance import bin_resistance
 from aqualog.cli.bin_slipslope import bin_slipslope
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import vehicle_toml
 
 app = typer.Typer()
 app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)

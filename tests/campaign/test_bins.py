@@ -18,9 +18,9 @@ from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.campaign.slip_slope import Limits, slip_slopes
 from aqualog.campaign.spin_downs import minor_spin_downs
 from aqualog.campaign.spin_ups import spin_ups
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.model.programme import SEDAN, SUV
-from aqualog.notation import WHEELS
 from aqualog.physics.tyre_brush import brush_force
 
 DRY_SLOPE, V_FULL, EXPONENT = 28.0, 120.0 * KMH, 4.0

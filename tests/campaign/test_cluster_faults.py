@@ -27,7 +27,7 @@ from aqualog.campaign.cluster import on_cluster
 from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.cli.main import app
-from aqualog.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.io.limits import ReadLimits
 from aqualog.workers import NO_LIMITS, Crashed, Limits
 
@@ -265,7 +265,7 @@ def test_a_scheduler_that_is_lost_half_way(tmp_path):
 @pytest.mark.long
 def test_workers_with_another_aqualog(campaign, tmp_path):
     shutil.copytree(Path(aqualog.__file__).parent, tmp_path / "other" / "aqualog")
-    with (tmp_path / "other" / "aqualog" / "units.py").open("a") as source:
+    with (tmp_path / "other" / "aqualog" / "core" / "units.py").open("a") as source:
         source.write("# another\n")
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "other")}
     with cluster(tmp_path, workers=1, env=env, cwd=tmp_path) as (address, _):

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from aqualog.campaign.shard import Shard, part_of, shard_of
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.workers import Crashed, Limits, work_on
 
 

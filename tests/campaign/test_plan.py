@@ -21,10 +21,10 @@ from aqualog.campaign.shard import Shard, part_of
 from aqualog.campaign.store import Store
 from aqualog.campaign.trial import Trial, Tried, tried
 from aqualog.cli.main import app
-from aqualog.compiled import kept_code
 from aqualog.config.configured import configure
+from aqualog.core.compiled import kept_code
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.content import Contents
-from aqualog.vehicle import Vehicle
 
 
 @pytest.fixture(scope="module")

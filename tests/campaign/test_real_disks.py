@@ -13,7 +13,7 @@ from aqualog.campaign import batch
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
 
 
 def mounts(*arguments):

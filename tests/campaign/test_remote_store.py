@@ -28,7 +28,7 @@ from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store
 from aqualog.cli import apart
 from aqualog.cli.main import app
-from aqualog.errors import ConfigError, LogError
+from aqualog.core.errors import ConfigError, LogError
 
 
 class Other(LocalFileSystem):

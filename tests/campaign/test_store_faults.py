@@ -22,7 +22,7 @@ from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import MARK, Store
 from aqualog.cli.main import app
 from aqualog.config.configured import configure, configure_logs
-from aqualog.errors import AqualogError, LogError
+from aqualog.core.errors import AqualogError, LogError
 from aqualog.workers import most_processes
 
 
@@ -155,7 +155,7 @@ def test_what_the_content_proves_is_not_tried_again(bare, monkeypatch):
 def test_every_source_behind_a_result_is_in_its_key(made):
     log = made / "logs" / "v100_0.parquet"
     code = (
-        "import sys; from pathlib import Path; from aqualog.vehicle import Vehicle\n"
+        "import sys; from pathlib import Path; from aqualog.core.vehicle import Vehicle\n"
         "from aqualog.align.load import load_signals; from aqualog.campaign.measure import measure\n"
         f"measure(load_signals([Path({str(log)!r})], vehicle=Vehicle()), Vehicle())\n"
         "print(*(m for m in sys.modules if m.startswith('aqualog')))"

@@ -13,11 +13,11 @@ from aqualog.campaign.batch import run_batch
 from aqualog.campaign.measure import measure, measure_long
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
+from aqualog.core.notation import WHEELS
 from aqualog.detect.slip_slope.direct_inputs import smoothed
 from aqualog.detect.stream import detect_drive
 from aqualog.io.write_table import TableColumn, write_parquet
 from aqualog.model.programme import SEDAN
-from aqualog.notation import WHEELS
 
 
 def drive(path, *, without=(), dt=0.01, seconds=40.0):

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from campaign.made import pass_of
 
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import vehicle_toml
 
 SUFFIXES = (".mf4", ".parquet", ".csv", ".mcap")
 BROKEN = (100, 201, 302, 403, 504)  # of the logs: cut in half, empty, no table, cut in its head, zeros

@@ -13,7 +13,7 @@ import pytest
 
 from aqualog.cli.aside import Lines
 from aqualog.cli.board import Board
-from aqualog.errors import AqualogError, ConfigError, LogError
+from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.io import in_hand
 from aqualog.io.in_hand import InHand, reading, unfinished, watched_by
 from aqualog.io.limits import ReadLimits, _group_limits, limits_from, machine_memory
@@ -75,7 +75,7 @@ import json
 from typing import Annotated
 import typer
 from aqualog.cli import main
-from aqualog.errors import AqualogError
+from aqualog.core.errors import AqualogError
 from aqualog.io.open_log import open_log
 
 app = typer.Typer()

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from aqualog.cli.calibrate import calibrate
 from aqualog.config.vehicle import load_vehicle
-from aqualog.vehicle import vehicle_toml
+from aqualog.core.vehicle import vehicle_toml
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(calibrate)

@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 from aqualog.cli.diagnose import diagnose
 from aqualog.cli.main import app as whole
 from aqualog.config.model import load_model
+from aqualog.core.errors import SignalError
+from aqualog.core.vehicle import Vehicle, vehicle_toml
 from aqualog.diagnose import run as engine
-from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
-from aqualog.vehicle import Vehicle, vehicle_toml
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(diagnose)

@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 from aqualog.cli.console import Console
 from aqualog.cli.main import app
 from aqualog.config.scenario import load_scenario
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import SYMBOLS
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
 from aqualog.model import campaign as programmes
@@ -26,7 +27,6 @@ from aqualog.model.campaign import CampaignOutcome
 from aqualog.model.log import START_NS, _onto
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.simulate import simulate as simulated
-from aqualog.notation import SYMBOLS
 
 CAR = ROOT / "sample_logs" / "vehicle.toml"
 FORMATS = ("mf4", "mcap", "csv", "parquet")

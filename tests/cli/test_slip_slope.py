@@ -10,7 +10,7 @@ import sys
 import pytest
 from straight_drive import AWD, RWD, C, drive
 
-from aqualog.vehicle import vehicle_toml
+from aqualog.core.vehicle import vehicle_toml
 
 
 def run(*args):

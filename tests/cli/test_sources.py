@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.face import paths as files
 from aqualog.face.paths import expand, refuse_existing
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import FileFaults
+from aqualog.core.records import FileFaults
 from tests.damaged.damage import Damage
 
 # Formats whose samples stand behind no checksum: that one of them is another number cannot be seen.
@@ -86,7 +86,7 @@ def samples_of(path: Path) -> tuple[Samples, FileFaults]:
 def look(path: Path) -> Seen:
     """Run `detect` on a log and read it; what is expected of a damaged log comes back, anything else is raised."""
     from aqualog.cli.main import app
-    from aqualog.errors import AqualogError
+    from aqualog.core.errors import AqualogError
 
     code, out, words = 0, io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(words):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from aqualog.notation import SYMBOLS
+from aqualog.core.notation import SYMBOLS
 from tests.mdf_by_hand import Blocks
 
 T = np.arange(400) * 0.01  # [s]

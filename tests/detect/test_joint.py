@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Track
 from aqualog.detect import joint, joint_cusum, other_surface
 from aqualog.detect.events import EventBook
 from aqualog.detect.joint_cusum import TERMS, JointCusumParams
 from aqualog.detect.joint_watch import JointCriteriaWatch, JointCusumWatch
 from aqualog.detect.scene import Scene
-from aqualog.notation import WHEELS
-from aqualog.types import Track
 
 DT = 0.01
 N = 200

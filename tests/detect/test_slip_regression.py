@@ -10,12 +10,12 @@ import polars as pl
 import pytest
 from straight_drive import AWD, FWD, RWD, C, drive
 
+from aqualog.core.errors import ConfigError, FitError, SignalError
 from aqualog.detect.slip_slope import stability as stab
 from aqualog.detect.slip_slope.direct import slip_slopes
 from aqualog.detect.slip_slope.direct_inputs import LEFT_OUT
 from aqualog.detect.slip_slope.regression import fit_line, fit_trend, lag_of_slip, noise_of_traction
 from aqualog.detect.slip_slope.stability import block_labels, judge_stability, make_segments, percent
-from aqualog.errors import ConfigError, FitError, SignalError
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
 

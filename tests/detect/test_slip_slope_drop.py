@@ -13,19 +13,19 @@ import pytest
 from aqualog.align.load import load_signals
 from aqualog.config.history import load_history, save_history
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import SlopeSummary
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import drop
 from aqualog.detect.slip_slope.history import History, Period, reference, remembered
 from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory, pairs
 from aqualog.detect.stream import DriveStream, detect_drive
-from aqualog.errors import ConfigError
 from aqualog.model.scenario import Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.surface import SURFACES
 from aqualog.report.figures.slip_slope import slip_slope
 from aqualog.report.text import event_table
-from aqualog.types import SlopeSummary
-from aqualog.vehicle import Vehicle
 
 DT = 0.01
 RWD = Vehicle(name="rwd", given=frozenset({"mass", "tyre.slip_slope_r"}))

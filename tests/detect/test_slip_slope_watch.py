@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import SlopeSummary
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.detect.slip_slope.watch import TAU_SMOOTH, SlipSlopeWatch, pairs
 from aqualog.features.smoothing import UNSET, lowpass
-from aqualog.notation import WHEELS
-from aqualog.types import SlopeSummary
-from aqualog.vehicle import Vehicle
 
 DT = 0.01
 N = 6000

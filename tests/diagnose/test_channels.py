@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from test_drive import CAR, plain, signals, term
 
+from aqualog.core.notation import WHEELS
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step, channel_values, channels_of, contrasts
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import residual
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 
 ALL = frozenset(

@@ -2,13 +2,13 @@
 
 import pytest
 
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.consequence import DETECTORS, PASSES, consequences, consequences_on_logs
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Scenario
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from aqualog.vehicle import KEYS, Vehicle
 
 CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset(KEYS))
 SPEED = ((0.0, 8.0), (8.0, 8.0), (16.0, 32.0), (24.0, 32.0), (34.0, 12.0), (36.0, 12.0), (43.0, 32.0), (48.0, 32.0))

@@ -7,10 +7,12 @@ import numpy as np
 import polars as pl
 import pytest
 
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import CHANNELS, block_means
 from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import residual
-from aqualog.errors import SignalError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Scenario
@@ -18,8 +20,6 @@ from aqualog.model.sensors import IDEAL, Channel
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from aqualog.notation import WHEELS
-from aqualog.vehicle import Vehicle
 
 CAR = Vehicle(name="test car", given=frozenset({"mass"}))
 # no braking: the car of the log rolls out

@@ -6,9 +6,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
-from aqualog.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.scenario import Scenario, Steering
@@ -16,8 +18,6 @@ from aqualog.model.sensors import ESC, IDEAL, Sensors
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from aqualog.notation import WHEELS
-from aqualog.vehicle import KEYS, Vehicle
 
 CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset(KEYS))
 SPEED = ((0.0, 18.0), (5.0, 18.0), (12.0, 34.0), (20.0, 34.0), (28.0, 20.0), (35.0, 20.0))

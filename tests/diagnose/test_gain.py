@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from aqualog.core.errors import FitError
 from aqualog.diagnose.gain import (
     BLOCK_S,
     HeldOut,
@@ -15,7 +16,6 @@ from aqualog.diagnose.gain import (
     log_score_gain,
     oracle_share,
 )
-from aqualog.errors import FitError
 
 RNG = np.random.default_rng(11)
 UNITS = {"force_balance": "m/s^2", "kinematic": "m/s^2"}

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from test_drive import CAR, NOISY, changed, plain, signals, term
 
+from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import setup_along
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
 
 
 def one(name, where=None, **fixed):

@@ -10,12 +10,12 @@ from blind.level_world import CAR, Hidden, campaign_of, world
 from aqualog.campaign.loaded import loaded
 from aqualog.campaign.measure import measure
 from aqualog.campaign.records import Run
+from aqualog.core.intervals import chi2_log_p
 from aqualog.diagnose.level import diagnose_campaign
 from aqualog.diagnose.level.expect import Driven, respond
 from aqualog.diagnose.level.noise import design_of, fit
 from aqualog.diagnose.level.observe import passes_of
 from aqualog.diagnose.level.passes import expected_values
-from aqualog.intervals import chi2_log_p
 from aqualog.model.effects import EFFECTS
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import next_manoeuvre as module
 from aqualog.diagnose.bench import gram_of, noises_after, tolerant
 from aqualog.diagnose.channels import contrasts
@@ -23,8 +25,6 @@ from aqualog.model.sensors import Channel
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 # radii that a file does not give are hardly known, and then no run tells them from the velocity's scale
 CAR = Vehicle(name="test car", given=frozenset({"mass", "wheels.r_e_f", "wheels.r_e_r"}))

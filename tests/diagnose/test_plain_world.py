@@ -5,8 +5,8 @@ from blind import plain
 
 from aqualog.align.load import load_signals
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.diagnose.run import Options, diagnose
-from aqualog.vehicle import vehicle_toml
 
 OPTIONS = Options(surrogates=9, views=False, consequences=False)
 

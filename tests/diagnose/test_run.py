@@ -7,11 +7,11 @@ import polars as pl
 import pytest
 from test_drive import CAR, NOISY, changed, plain, signals, term
 
+from aqualog.core.errors import SignalError
 from aqualog.diagnose import run
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
-from aqualog.errors import SignalError
 from aqualog.model.term import Model
 
 FEW = ("payload_mass", "accelerometer_bias@a_x", "tyre_radius@fl", "signal_delay@v_x", "road_grade", "head_wind")

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.bench import gram_of, make_bench, tolerant, without_deviations
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import PRIOR_WIDTH, best_sets, compatible, fit_set, gains_on_top
 from aqualog.model.effects import EFFECTS
-from aqualog.vehicle import Vehicle
 
 CHANNELS = ("axle_slip", "lateral")
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_basis import bases
@@ -15,7 +16,6 @@ from aqualog.diagnose.unknown_words import describe
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
-from aqualog.vehicle import Vehicle
 
 DT, SECONDS = 0.1, 240.0
 CHANNELS = ("force_balance", "kinematic", "slip_fl")

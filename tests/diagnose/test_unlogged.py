@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from test_drive import CAR, changed, plain, signals
 
+from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.unlogged import brakes_unlogged, needed_torque, roll_out
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Steering
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
 
 TORQUES = [f"torque_{w}" for w in WHEELS]
 DT = 0.01

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
+from aqualog.core.vehicle import Vehicle, vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.tyre import TYRES
-from aqualog.vehicle import Vehicle, vehicle_toml
 
 GIVEN = frozenset({"name", "drivetrain", "mass", "tyre.slip_slope_f", "tyre.slip_slope_r"})
 RWD = Vehicle(name="rwd", given=GIVEN)

@@ -25,8 +25,8 @@ import numpy as np
 from evaluate.rods import with_tie_rods
 
 import aqualog
-from aqualog.errors import AqualogError
-from aqualog.notation import WHEELS
+from aqualog.core.errors import AqualogError
+from aqualog.core.notation import WHEELS
 
 SOURCES = ("physics", "features", "calibrate", "detect", "rivals", "model", "evaluate")
 

@@ -7,7 +7,7 @@ import pytest
 from aqualog.campaign.records import group_keys
 from aqualog.config.campaign import load_campaign, read_campaign
 from aqualog.config.labels import load_labels
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.evaluate.labels import Label
 
 

@@ -7,8 +7,8 @@ import pytest
 from evaluate.made import FWD, RWD, scenario
 
 from aqualog.config.thresholds import load_thresholds, thresholds_text
+from aqualog.core.errors import ConfigError, LogError
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.errors import ConfigError, LogError
 from aqualog.evaluate import judge as judge_module
 from aqualog.evaluate import run
 from aqualog.evaluate.compare import better_rivals, coverage, situation_scores

@@ -7,7 +7,7 @@ from both_ways import check_result, command
 from calibrate.dry_drives import believed, campaign
 
 import aqualog as aq
-from aqualog.vehicle import vehicle_toml
+from aqualog.core.vehicle import vehicle_toml
 
 FILES = ("calibration.json", "calibrated.toml", "calibration.html")
 

@@ -9,9 +9,9 @@ from both_ways import check_shown, command
 from report.diagnosis_case import cases, views_of
 
 import aqualog as aq
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.diagnose import level
 from aqualog.diagnose import run as engine
-from aqualog.vehicle import vehicle_toml
 
 FILES = ("diagnosis.json", "model.toml", "diagnosis.html")
 

@@ -81,7 +81,7 @@ def test_an_unknown_name_is_an_attribute_error():
 
 def test_records_read_themselves(tmp_path):
     from aqualog.config.model import dump_model
-    from aqualog.vehicle import vehicle_toml
+    from aqualog.core.vehicle import vehicle_toml
 
     car = aq.Vehicle(name="a car", mass=1500.0)
     (tmp_path / "car.toml").write_text(vehicle_toml(car))

@@ -6,7 +6,7 @@ from both_ways import check_result, check_shown, command
 from straight_drive import AWD, RWD, C, drive
 
 import aqualog as aq
-from aqualog.vehicle import vehicle_toml
+from aqualog.core.vehicle import vehicle_toml
 
 FILES = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
 

@@ -14,7 +14,7 @@ from small_campaign import evidence, folder, made_of_campaign
 
 from aqualog.campaign.slip_slope import SlopeRow
 from aqualog.campaign.spin_downs import Pass
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures import bin_lines, catalogue, fig_2_11, fig_2_24, measures, spin_down_claims, tread_claims
 from aqualog.figures.draw import panel_figure
 from aqualog.figures.export import document, figure_csv
@@ -370,7 +370,7 @@ def test_pictures(tmp_path, monkeypatch):
 
 
 def test_pictures_without_a_browser_say_what_is_needed(monkeypatch):
-    from aqualog.errors import AqualogError
+    from aqualog.core.errors import AqualogError
     from aqualog.figures import image
 
     pytest.importorskip("kaleido")

@@ -9,9 +9,9 @@ import pytest
 from made import all_made, finding, made
 
 import aqualog.figures
+from aqualog.core.errors import ConfigError
 from aqualog.detect.slip_slope.estimator import initial_state, scan
 from aqualog.detect.slip_slope.tuning import TUNING, Params
-from aqualog.errors import ConfigError
 from aqualog.figures import (
     catalogue,
     curves,

@@ -9,11 +9,11 @@ from unittest import mock
 
 import numpy as np
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel, FileFaults
 from aqualog.io import batches, csv_rows, mdf, mdf_blocks, messages, parquet, text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import open_log
-from aqualog.types import Channel, FileFaults
 
 T0_NS = 1_700_000_000 * 10**9
 LONGEST_LINE = 2000

@@ -13,9 +13,9 @@ import numpy as np
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
-from aqualog.errors import AqualogError, ConfigError
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import AqualogError, ConfigError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["LOG", "check_error", "check_finite", "drive", "folder_with", "loaded"]
 

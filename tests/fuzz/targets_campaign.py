@@ -8,7 +8,7 @@ from aqualog.campaign.logs import log_states, missing_lines
 from aqualog.campaign.matrix import campaign_matrix
 from aqualog.config.campaign import read_campaign
 from aqualog.config.configured import configure, files_of
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from tests.fuzz.registry import Target, target
 from tests.fuzz.settings_files import LOG, check_error, check_finite, folder_with, loaded
 

@@ -14,13 +14,13 @@ from aqualog.config.settings import joint_text, load_settings
 from aqualog.config.signal_map import load_signal_map, map_text
 from aqualog.config.thresholds import load_thresholds, thresholds_text
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.errors import AqualogError
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import KEYS, Vehicle, vehicle_toml
 from aqualog.detect.slip_slope.history import History, Period, history_to_json, reference
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.errors import AqualogError
 from aqualog.rivals.catalogue import RIVALS
-from aqualog.types import Signals
-from aqualog.vehicle import KEYS, Vehicle, vehicle_toml
 from tests.fuzz.registry import Target, target
 from tests.fuzz.settings_files import LOG, NAMES, check_error, check_finite, drive, folder_with, loaded
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aqualog.config.model import dump_model, load_model
 from aqualog.config.scenario import load_scenario
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model

@@ -9,8 +9,8 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from aqualog.errors import ConfigError, LogError
-from aqualog.types import FileFaults
+from aqualog.core.errors import ConfigError, LogError
+from aqualog.core.records import FileFaults
 from tests.fuzz import __main__ as command
 from tests.fuzz import readers, settings_files, targets_campaign, targets_config, targets_simulation, turn, watch
 from tests.fuzz.corpus import Case, case_of, cases

@@ -10,7 +10,7 @@ import cantools.database
 import numpy as np
 import pytest
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io.can import decode_signal, load_dbc, pgn
 
 REAL = Path(__file__).parents[2].parent / "shared" / "real_logs"

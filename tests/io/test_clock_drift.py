@@ -9,12 +9,12 @@ from mcap.writer import Writer
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
+from aqualog.core.vehicle import Vehicle
 from aqualog.doctor.examine import examine
 from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import DriftWatch
 from aqualog.io.open_log import open_log
-from aqualog.vehicle import Vehicle
 
 S = 1_000_000_000
 T0 = 1_750_000_000 * S

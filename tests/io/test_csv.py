@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from aqualog.align.mapping import SignalMap, resolve
-from aqualog.errors import ConfigError, LogError, SignalError
+from aqualog.core.errors import ConfigError, LogError, SignalError
 from aqualog.io import text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.csv import CsvReader

@@ -22,15 +22,15 @@ from rosbags.typesys import Stores, get_typestore
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.errors import LogError, SignalError
+from aqualog.core.errors import LogError, SignalError
+from aqualog.core.records import Channel
+from aqualog.core.vehicle import Vehicle
 from aqualog.io import mcap_records
 from aqualog.io.base import ReadOptions
 from aqualog.io.mcap import McapReader, McapSource
 from aqualog.io.mcap_scan import scanned
 from aqualog.io.unpack import FREE, Allowance, DamagedError
 from aqualog.io.write_mcap import McapTopic, write_mcap
-from aqualog.types import Channel
-from aqualog.vehicle import Vehicle
 
 LONGEST = 1 << 24
 T0 = 1_700_000_000 * 10**9

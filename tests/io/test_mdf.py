@@ -18,13 +18,13 @@ from asammdf.blocks.conversion_utils import from_dict
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
-from aqualog.errors import ConfigError, LogError, SignalError
+from aqualog.core.errors import ConfigError, LogError, SignalError
+from aqualog.core.records import Channel, FileFaults
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import MdfReader, _variable
 from aqualog.io.mdf_conversion import Formula
 from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
-from aqualog.types import Channel, FileFaults
-from aqualog.vehicle import Vehicle
 
 REAL = Path(__file__).parents[2].parent / "shared" / "real_logs"
 START = 1_700_000_000_123_456_789

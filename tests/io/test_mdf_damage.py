@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import aqualog.io.mdf as reader
 from aqualog.cli.main import app
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io import mdf4_survey, mdf_blocks, mdf_harness
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import MdfReader

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io import parquet
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import ReadOptions

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.io import parquet
 from aqualog.io.base import ReadOptions
 from aqualog.io.parquet import ParquetReader

@@ -16,11 +16,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
+from aqualog.core.records import Channel
 from aqualog.io.bag_records import CHUNK, INDEX, BagRecords, kind_of
 from aqualog.io.base import ReadOptions
 from aqualog.io.ros import RosReader
-from aqualog.types import Channel
 
 T0 = 1_700_000_000 * 10**9
 STEP = 10**7

@@ -2,7 +2,7 @@
 
 import pytest
 
-from aqualog.errors import LogError
+from aqualog.core.errors import LogError
 from aqualog.face.paths import expand
 from aqualog.io.sniff import sniff
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle, vehicle_toml
 from aqualog.io.open_log import open_log
 from aqualog.model import campaign
 from aqualog.model.campaign import simulate_campaign
 from aqualog.model.programme import APPROACH_S, PROGRAMMES, RUN_OUT_S, thesis
-from aqualog.vehicle import Vehicle, vehicle_toml
 
 CONTRACT = {
     "log", "tyre", "tread_depth_mm", "wear", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",

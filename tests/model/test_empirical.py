@@ -7,7 +7,7 @@ import pytest
 from thesis.passes import SEDAN
 
 from aqualog.config.model import dump_model, load_model
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.scenario import Lane, Scenario

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from aqualog.compiled import inlined
-from aqualog.errors import ConfigError
+from aqualog.core.compiled import inlined
+from aqualog.core.errors import ConfigError
 from aqualog.model.excitation import (
     AMPLITUDE_KINDS,
     WAVEFORMS,

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
@@ -15,8 +17,6 @@ from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, simulate
 from aqualog.model.start import rolling_state
 from aqualog.model.term import Model, Term
-from aqualog.notation import WHEELS
-from aqualog.vehicle import Vehicle
 
 CAR = Vehicle(name="test car")
 SPEED = ((0.0, 18.0), (5.0, 18.0), (15.0, 26.0), (25.0, 26.0), (45.0, 20.0), (60.0, 28.0))

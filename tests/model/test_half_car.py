@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation
 from aqualog.physics.tyre_brush import brush_force

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from thesis.passes import SEDAN
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.model.plant import build_plant
 from aqualog.model.replay import replay
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth
 from aqualog.model.tyre import TYRES
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 
 PLANT = build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"])

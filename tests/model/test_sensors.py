@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aqualog.core.notation import SYMBOLS, WHEELS
 from aqualog.model.pickup import reported_speed
 from aqualog.model.sensors import ESC, IDEAL, SENSORS, Channel, Group, Sensors, Truth, measure
-from aqualog.notation import SYMBOLS, WHEELS
 
 DT = 1e-3
 R_E = 0.317

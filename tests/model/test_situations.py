@@ -7,7 +7,9 @@ import polars as pl
 import pytest
 from thesis.passes import SEDAN
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import KEYS
 from aqualog.model.effects import EFFECTS
 from aqualog.model.faults import SensorFault
 from aqualog.model.programme import situations
@@ -18,9 +20,7 @@ from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, SITUATIONS, TUNING_POOL, draw
 from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
-from aqualog.vehicle import KEYS
 
 SLOW = 25.0  # [m/s]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.simulate import simulate
 from aqualog.model.thesis_scenes import SCENES, scene
 from aqualog.physics.steering import STEERING

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from thesis.passes import SEDAN, resistance, slip_and_traction
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Excitation, Lane, Scenario, Steering
@@ -16,10 +18,8 @@ from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
 from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
-from aqualog.notation import WHEELS
 from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G, wheel_loads
-from aqualog.vehicle import Vehicle
 
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
 AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"mass"}))

@@ -15,8 +15,8 @@ import pytest
 from aqualog.align.load import load_signals
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
+from aqualog.core.notation import WHEELS
 from aqualog.detect.stream import detect_drive
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G
 
 HERE = Path(__file__).parent

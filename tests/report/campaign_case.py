@@ -9,10 +9,10 @@ from aqualog.campaign.batch import run_batch
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
+from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
-from aqualog.vehicle import vehicle_toml
 
 SCRIPT = "</script><script>alert(1)</script>"
 IMAGE = '"><img src=x onerror=alert(2)>'

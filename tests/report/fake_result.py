@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 
-from aqualog.notation import WHEELS, side_of
-from aqualog.types import DriveResult, Event, Origin, Quality, Signals, TimeFaults, Track, Unavailable
+from aqualog.core.notation import WHEELS, side_of
+from aqualog.core.records import DriveResult, Event, Origin, Quality, Signals, TimeFaults, Track, Unavailable
 
 HOSTILE = ("</script><script>alert(1)</script>", "<img src=x onerror=alert(1)>", "[bold]")
 SPIKE = 0.371  # [m/s] an outlier of one sample

@@ -13,6 +13,7 @@ from aqualog.campaign.bins import plan
 from aqualog.campaign.samples import CampaignData, load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
+from aqualog.core.records import Unavailable
 from aqualog.detect.slip_slope.direct import DirectResult
 from aqualog.detect.thresholds import DEFAULT
 from aqualog.evaluate.match import Cell
@@ -34,7 +35,6 @@ from aqualog.reproduce.check import Check
 from aqualog.reproduce.page import render_reproduction
 from aqualog.reproduce.run import Made, conclude
 from aqualog.reproduce.verdict import VERDICTS
-from aqualog.types import Unavailable
 
 NAMES = {
     "script": "</script><script>alert(1)</script>",

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from aqualog.campaign.bins import plan
 from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.cli.main import app
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.report.campaign_answers import answers_of
 from aqualog.report.campaign_crossing import crossing
 from aqualog.report.campaign_findings import Curve, Point, find

@@ -15,10 +15,10 @@ import polars as pl
 import pytest
 
 import aqualog.report
+from aqualog.core.records import Quality, Unavailable
 from aqualog.report.page import FIRST_EVENTS, MOST_ROWS, render_page, write_page
 from aqualog.report.reduce import POINTS
 from aqualog.report.tables import event_rows
-from aqualog.types import Quality, Unavailable
 
 TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
 

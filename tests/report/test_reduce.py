@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aqualog.core.records import Event
 from aqualog.report.reduce import (
     ALL_SAMPLES,
     DETAIL_SAMPLES,
@@ -15,7 +16,6 @@ from aqualog.report.reduce import (
     reduce_indices,
     spans_of,
 )
-from aqualog.types import Event
 
 N = 360_000
 

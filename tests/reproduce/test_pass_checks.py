@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.evaluate.intervals import wilson
 from aqualog.figures import scene_study
 from aqualog.reproduce import tables

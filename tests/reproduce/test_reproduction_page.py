@@ -10,7 +10,7 @@ from headless import severe, wait_for
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures.record import BORNE_OUT, NOT_BORNE_OUT, Axis, Figure, Finding, Line, Panel
 from aqualog.reproduce.catalogue import claims
 from aqualog.reproduce.check import Check

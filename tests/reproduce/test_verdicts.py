@@ -6,7 +6,7 @@ from importlib.resources import files
 
 import pytest
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.figures.record import BORNE_OUT, IN_PART, NOT_BORNE_OUT, Finding
 from aqualog.reproduce.catalogue import claims, number_of, read
 from aqualog.reproduce.check import Check, Plan, from_finding

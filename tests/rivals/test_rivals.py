@@ -9,8 +9,8 @@ from drives import AWD, CAR, FWD, drive, lane
 from straight_drive import RWD
 from straight_drive import drive as straight
 
-from aqualog.errors import ConfigError
-from aqualog.notation import WHEELS
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.rivals.catalogue import RIVALS, run_rivals
 
 KNOWN = frozenset({"mass", "l_f", "l_r", "tyre.slip_slope_f", "tyre.slip_slope_r"})

@@ -14,11 +14,11 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import DriveStream
 from aqualog.model.scenario import Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.surface import SURFACES
-from aqualog.vehicle import Vehicle
 
 __all__ = ["CAR", "SPLITS", "Outcome", "drive", "outcome", "study"]
 

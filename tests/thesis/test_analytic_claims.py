@@ -6,18 +6,18 @@ Each compares the package's function with numbers or with an integration of its 
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import ewvar, minor_spin_down, spin
 from aqualog.features.stream import FeatureStream
 from aqualog.model.excitation import axle_forces, f_step, waveform
 from aqualog.model.half_car import HalfCar, HalfCarRun, simulate_half_car
 from aqualog.model.scenario import Excitation
-from aqualog.notation import WHEELS
 from aqualog.physics.contact import friction_ratio, remaining_share, slip_stiffness_ratio
 from aqualog.physics.resistance import nominal_acceleration
 from aqualog.physics.slip import wheel_slip
 from aqualog.physics.surface import series_slope
 from aqualog.physics.tyre_brush import brush_force, brush_stiffness
-from aqualog.vehicle import Vehicle
 
 DT = 0.01
 L_OF_C8 = np.array([0.9, 0.8, np.sqrt(0.5), 0.6, 0.5])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-import aqualog.compiled as compilation
+import aqualog.core.compiled as compilation
 from aqualog.align.load import load_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.slip_slope import drop, history
@@ -20,7 +20,7 @@ from aqualog.features import smoothing, velocity
 LOADED = """
 import sys
 import numpy as np
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 from aqualog.features.smoothing import _lowpass
 y, last = _lowpass(0.1, 0.0, np.arange(4.0))
 assert sum(_lowpass.stats.cache_hits.values()) == 1
@@ -59,7 +59,7 @@ def test_kept_code_is_loaded_without_what_compiles():
 
 
 CALLER = """
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 from made_here.two import called
 from made_here.two.called import LIMIT, step
 
@@ -84,7 +84,7 @@ def alone(x):
     return x
 """
 CALLED = """
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 
 LIMIT = 1.0
 

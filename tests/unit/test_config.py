@@ -7,9 +7,9 @@ from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.align.mapping import map_text as map_key
 from aqualog.config.signal_map import load_signal_map, map_text
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import KEYS, vehicle_toml
 from aqualog.io.csv_format import CsvFormat, format_of
-from aqualog.vehicle import KEYS, vehicle_toml
 
 CONTRACT = """
 name = "sedan RWD"

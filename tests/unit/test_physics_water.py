@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
-from aqualog.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined
 from aqualog.physics import (
     contact,
     hydroplaning,

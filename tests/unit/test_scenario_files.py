@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from aqualog.config.model import dump_model, load_model
 from aqualog.config.scenario import SAMPLE_RATES_HZ, SCENARIO_KEYS, load_scenario
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.faults import SensorFault
 from aqualog.model.scenario import Kick, Lane, Scenario

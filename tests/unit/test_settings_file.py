@@ -3,8 +3,8 @@
 import pytest
 
 from aqualog.config.settings import joint_text, load_settings
+from aqualog.core.errors import ConfigError
 from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS, Thresholds
-from aqualog.errors import ConfigError
 
 TEXT = """[thresholds]
 resistance = 0.3

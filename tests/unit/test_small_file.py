@@ -8,7 +8,7 @@ import pytest
 from aqualog.campaign.run_table import read_table
 from aqualog.config.labels import load_labels
 from aqualog.config.vehicle import load_vehicle
-from aqualog.errors import ConfigError, LogError
+from aqualog.core.errors import ConfigError, LogError
 from aqualog.io.can import load_dbc
 from aqualog.io.small_file import read_small
 

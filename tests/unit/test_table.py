@@ -3,9 +3,9 @@ import pytest
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock, resolve
 from aqualog.align.table import build_signals
-from aqualog.errors import ConfigError, SignalError
-from aqualog.types import Channel, ChannelInfo, FileFaults
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.records import Channel, ChannelInfo, FileFaults
+from aqualog.core.vehicle import Vehicle
 
 CAR = Vehicle(r_e_f=0.3, r_e_r=0.32, steering_ratio=16.0)
 MS = 1_000_000

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from aqualog.align.timebase import ClockRepair
-from aqualog.types import TimeFaults
+from aqualog.core.records import TimeFaults
 
 MS = 1_000_000
 S = 1_000_000_000

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from aqualog.errors import SignalError
-from aqualog.notation import ACCEPTED, SYMBOLS
-from aqualog.units import convert, is_unit, parse_unit
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.units import convert, is_unit, parse_unit
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from aqualog.book.documents.fields import (
     text,
 )
 from aqualog.book.documents.shared import BIN, PLACE_KEYS
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
 
 __all__ = ["RESISTANCE", "SLIP_SLOPE"]
 

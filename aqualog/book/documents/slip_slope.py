@@ -16,7 +16,7 @@ from aqualog.book.documents.fields import (
     several,
     text,
 )
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
 
 __all__ = ["DOCUMENT"]
 

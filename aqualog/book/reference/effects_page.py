@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from aqualog.book.markdown import code, fence, page, table
+from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.term import Effect
-from aqualog.notation import AXLES, SIDES, WHEELS
 
 __all__ = ["EXAMPLE", "text"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aqualog.book.markdown import code, page, table
-from aqualog.errors import AqualogError, ConfigError, ExitCode, FitError, LogError, SignalError
+from aqualog.core.errors import AqualogError, ConfigError, ExitCode, FitError, LogError, SignalError
 
 __all__ = ["MEANINGS", "text"]
 
@@ -36,6 +36,7 @@ def text() -> str:
         _HOW,
         table(("code", "meaning", "when"), rows),
         "## Errors in Python",
-        f"From Python the same faults are exceptions. All derive from `{AqualogError.__name__}` in `aqualog.errors`.",
+        "From Python the same faults are exceptions. "
+        f"All derive from `{AqualogError.__name__}` in `{AqualogError.__module__}`.",
         table(("exception", "exit code", "meaning"), errors),
     )

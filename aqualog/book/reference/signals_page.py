@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 
 from aqualog.book.markdown import code, number, page, table
+from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS, Symbol
+from aqualog.core.units import spellings
 from aqualog.model.simulate import TRUTH_SYMBOLS
-from aqualog.notation import ACCEPTED, SYMBOLS, WHEELS, Symbol
-from aqualog.units import spellings
 
 __all__ = ["text"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from aqualog.book.markdown import code, fence, number, page, table
-from aqualog.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, vehicle_toml
+from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, vehicle_toml
 
 __all__ = ["example", "text"]
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["LIMITS", "REASONS", "Limits", "inactive_reason"]
 

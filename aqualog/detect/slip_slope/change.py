@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 
 __all__ = ["cusum_input"]
 

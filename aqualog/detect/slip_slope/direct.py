@@ -10,6 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.errors import ConfigError, FitError, SignalError
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.direct_inputs import (
     BESIDE,
@@ -37,11 +41,7 @@ from aqualog.detect.slip_slope.stability import block_labels, judge_stability, m
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
 from aqualog.detect.slip_slope.ways import Method, choose_way
-from aqualog.errors import ConfigError, FitError, SignalError
 from aqualog.features.stream import FeatureStream
-from aqualog.notation import AXLES, WHEELS
-from aqualog.types import BoolArray, FloatArray, Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["MU_MAX", "slip_slopes"]
 

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
 from aqualog.detect.negative_force import hold_on, is_braking
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.activation import Limits
-from aqualog.notation import AXLES, WHEELS
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.slip import V_MIN, wheel_slip
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "BESIDE",

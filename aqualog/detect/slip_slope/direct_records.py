@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from aqualog.core.records import FloatArray
 from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.stability import Segment, Stability
 from aqualog.detect.slip_slope.ways import Method, TractionSource
-from aqualog.types import FloatArray
 
 __all__ = ["DirectResult", "PlaceSlope", "Recursion"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from aqualog.core.errors import FitError
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope.direct_records import PlaceSlope, Recursion
 from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.ways import Way
-from aqualog.errors import FitError
-from aqualog.vehicle import Vehicle
 
 __all__ = ["DELAY_NOTED", "LAG_NOTED", "OFFSET_NOTED", "SHARED_NOTED", "notes_on", "refuse"]
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.slip_slope.history import KEPT_PERIODS, Period, Rule
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["DropParams", "DropState", "completed", "initial_state", "scan"]
 

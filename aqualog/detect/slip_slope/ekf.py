@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aqualog.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined
 from aqualog.physics import differential
 
 __all__ = ["Belief", "predict", "update"]

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import ekf, observability
 from aqualog.detect.slip_slope.change import cusum_input
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.observability import Window
 from aqualog.detect.slip_slope.tuning import Params, Tuning
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["STATUS", "Estimate", "State", "initial_state", "scan"]
 

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from aqualog.errors import ConfigError
-from aqualog.types import Signals, SlopeSummary
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import Signals, SlopeSummary
 
 __all__ = [
     "History", "Period", "Rule", "check_configuration", "drive_key", "history_from_json", "history_to_json",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 
 __all__ = ["EMPTY", "Window", "aged", "sd_beta", "sd_slope", "step"]
 

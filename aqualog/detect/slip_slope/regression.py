@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.intervals import student_quantile
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["Interval", "Late", "Line", "Trend", "fit_line", "fit_trend", "lag_of_slip", "noise_of_traction"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aqualog.types import SlopeSummary
+from aqualog.core.records import SlopeSummary
 
 __all__ = ["remarks"]
 

@@ -8,6 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from aqualog.core.notation import AXLES, SIDES
+from aqualog.core.records import BoolArray, FloatArray, SlopeSummary
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import ewvar
 from aqualog.detect.negative_force import hold_on
 from aqualog.detect.slip_slope import activation, drop, estimator
@@ -16,10 +19,7 @@ from aqualog.detect.slip_slope.history import History, Rule
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
 from aqualog.detect.thresholds import DEFAULT
 from aqualog.features.smoothing import UNSET, derivative, lowpass
-from aqualog.notation import AXLES, SIDES
 from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
-from aqualog.types import BoolArray, FloatArray, SlopeSummary
-from aqualog.vehicle import Vehicle
 
 __all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Literal, NamedTuple
 
-from aqualog.errors import ConfigError, SignalError
-from aqualog.notation import WHEELS
-from aqualog.vehicle import Vehicle
+from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["METHODS", "TRACTIONS", "Method", "TractionSource", "Way", "choose_way"]
 

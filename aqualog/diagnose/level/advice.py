@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.expect import Driven, Response, respond
 from aqualog.diagnose.level.noise import Fit
 from aqualog.diagnose.level.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
@@ -16,10 +18,8 @@ from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
 from aqualog.model.tyre import TYRES
-from aqualog.notation import WHEELS
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag
-from aqualog.types import FloatArray
 
 __all__ = ["advice"]
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.passes import Passes, expected_values
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Effect, Model, Parameter, Term
-from aqualog.types import FloatArray
 
 __all__ = ["Hypothesis", "Library", "hypotheses", "library", "model_with", "untested"]
 

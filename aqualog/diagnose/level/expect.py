@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined
+from aqualog.core.records import FloatArray
 from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, flat
 from aqualog.model.term import Setup
 from aqualog.physics import contact, hydroplaning, load, rolling, water
 from aqualog.physics.contact import friction_ratio
 from aqualog.physics.tyre_brush import brush_parts
-from aqualog.types import FloatArray
 
 __all__ = ["NODES", "S_MAX", "Driven", "Response", "respond"]
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.noise import Fit, inverse_of, prior_of
 from aqualog.diagnose.level.passes import RESISTANCE, Passes
 from aqualog.diagnose.level.refit import Refit
 from aqualog.diagnose.records import ChannelGain, Gain
-from aqualog.types import FloatArray
 
 __all__ = ["gain"]
 

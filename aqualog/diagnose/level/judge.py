@@ -9,10 +9,10 @@ from statistics import NormalDist
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.catalogue import Library
 from aqualog.diagnose.level.refit import conditioned
 from aqualog.diagnose.records import Confusion, Limit
-from aqualog.types import FloatArray
 
 __all__ = ["confusions", "limits"]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.types import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["NU", "Design", "Fit", "Scatter", "design_of", "fit", "inverse_of", "prior_of", "weighted"]
 

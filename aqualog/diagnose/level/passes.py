@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.campaign.samples import RunInfo
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.level.expect import Driven, respond
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
-from aqualog.notation import WHEELS
-from aqualog.types import BoolArray, FloatArray
 
 __all__ = ["RESISTANCE", "Passes", "Told", "channels_of", "doubted", "expected_values", "question_of", "steady"]
 

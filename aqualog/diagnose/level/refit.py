@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.intervals import student_quantile
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.catalogue import Hypothesis, model_with
 from aqualog.diagnose.level.noise import inverse_of, prior_of
 from aqualog.diagnose.level.passes import Passes, expected_values
-from aqualog.intervals import student_quantile
 from aqualog.model.term import Model, Parameter
-from aqualog.types import FloatArray
 
 __all__ = ["Refit", "conditioned", "intervals", "refit", "weighed"]
 

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.intervals import chi2_log_p
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.anything import Anything, anything
 from aqualog.diagnose.level.catalogue import Library
 from aqualog.diagnose.level.noise import Fit
 from aqualog.diagnose.level.passes import RESISTANCE, Passes
 from aqualog.diagnose.level.refit import conditioned
 from aqualog.diagnose.records import Remainder
-from aqualog.intervals import chi2_log_p
-from aqualog.types import FloatArray
 
 __all__ = ["remainders"]
 

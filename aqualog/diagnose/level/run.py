@@ -9,6 +9,8 @@ import numpy as np
 
 from aqualog.campaign.records import Campaign
 from aqualog.campaign.samples import CampaignData
+from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.level.advice import advice
 from aqualog.diagnose.level.anything import Anything, anything, whole_fit
 from aqualog.diagnose.level.catalogue import Library, hypotheses, library, untested
@@ -24,8 +26,6 @@ from aqualog.diagnose.level.views import views
 from aqualog.diagnose.level.words import cause_sentence, verdict_sentence
 from aqualog.diagnose.records import Alternative, Cause, Diagnosis, Estimate, Remainder, Significance, Verdict
 from aqualog.model.term import Model
-from aqualog.types import FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["diagnose_campaign"]
 

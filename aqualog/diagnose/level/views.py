@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.level.passes import RESISTANCE, Passes
 from aqualog.diagnose.records import ResidualView
-from aqualog.types import FloatArray
 
 __all__ = ["views"]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from aqualog.core.records import DriveResult
 from aqualog.report.figures.row import Row, wheel_lines
-from aqualog.types import DriveResult
 
 __all__ = ["accelerations"]
 

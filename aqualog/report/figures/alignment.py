@@ -9,11 +9,11 @@ import numpy as np
 
 from aqualog.align.carrier import QUANTITIES, Carrier
 from aqualog.align.clock import ClockFit
+from aqualog.core.records import FloatArray, TimeArray
 from aqualog.report.figures.slope_axes import axis, layout, rounded
 from aqualog.report.reduce import ALL_SAMPLES, reduce_indices
 from aqualog.report.theme import INK, WHEEL_COLOURS
 from aqualog.report.wording import plot_text
-from aqualog.types import FloatArray, TimeArray
 
 __all__ = ["alignment_figures"]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from aqualog.calibrate.records import Calibration
+from aqualog.core.records import FloatArray
 from aqualog.report.figures.slope_axes import axis, layout, rounded
 from aqualog.report.theme import MUTED, wheel_colour
-from aqualog.types import FloatArray
 
 __all__ = ["balance_residuals"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import DriveResult, Track
 from aqualog.report.figures.row import VEHICLE, Lane, Row
 from aqualog.report.figures.water import watered
 from aqualog.report.reduce import spans_of
 from aqualog.report.theme import WATER, detector_colour
 from aqualog.report.wording import detector_name, place
-from aqualog.types import DriveResult, Track
 
 __all__ = ["lanes"]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from aqualog.core.records import DriveResult
 from aqualog.report.figures.row import VEHICLE, Line, Row, feature
 from aqualog.report.theme import MUTED, detector_colour
-from aqualog.types import DriveResult
 
 __all__ = ["resistance"]
 

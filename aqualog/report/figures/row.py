@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import DriveResult, FloatArray
 from aqualog.report.reduce import Spans
 from aqualog.report.theme import wheel_colour
-from aqualog.types import DriveResult, FloatArray
 
 if TYPE_CHECKING:
     import polars as pl

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aqualog.notation import SYMBOLS, WHEELS
+from aqualog.core.notation import SYMBOLS, WHEELS
+from aqualog.core.records import Signals
+from aqualog.core.units import displayed_unit
 from aqualog.report.figures.row import VEHICLE, Line, Row
 from aqualog.report.standalone import rows_figure
 from aqualog.report.theme import wheel_colour
-from aqualog.types import Signals
-from aqualog.units import displayed_unit
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

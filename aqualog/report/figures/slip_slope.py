@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from aqualog.notation import SIDES
+from aqualog.core.notation import SIDES
+from aqualog.core.records import DriveResult
 from aqualog.report.figures.row import VEHICLE, Line, Row, feature
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.report.wording import place
-from aqualog.types import DriveResult
 
 __all__ = ["slip_slope"]
 

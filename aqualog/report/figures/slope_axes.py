@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.report.theme import GRID, INK, MUTED
-from aqualog.types import FloatArray
 
 __all__ = ["axis", "layout", "rounded", "see_through"]
 

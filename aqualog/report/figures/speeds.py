@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from aqualog.core.records import DriveResult
 from aqualog.report.figures.row import VEHICLE, Line, Row, feature, wheel_lines
 from aqualog.report.figures.water import watered
 from aqualog.report.theme import INK, MUTED
-from aqualog.types import DriveResult
 
 __all__ = ["speeds"]
 

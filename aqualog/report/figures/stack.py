@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.units import convert
 from aqualog.report.figures.row import VEHICLE, Lane, Line, Row
 from aqualog.report.reduce import Plan, Spans, reduce_indices
 from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, GRID, INK, MUTED, THRESHOLD, WATER_SHADE
 from aqualog.report.wording import plot_text
-from aqualog.units import convert
 
 __all__ = ["groups", "stack"]
 

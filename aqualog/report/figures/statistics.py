@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import DriveResult, Track
 from aqualog.report.figures.row import VEHICLE, Line, Row
 from aqualog.report.theme import detector_colour
 from aqualog.report.wording import caption, detector_name, place, pretty_unit
-from aqualog.types import DriveResult, Track
 
 __all__ = ["statistics"]
 

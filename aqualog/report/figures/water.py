@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import DriveResult
 from aqualog.report.figures.row import VEHICLE, Line, Row, feature
 from aqualog.report.reduce import Spans, spans_of
 from aqualog.report.theme import MUTED, WATER, WHEEL_COLOURS
-from aqualog.types import DriveResult
 
 __all__ = ["water", "watered"]
 

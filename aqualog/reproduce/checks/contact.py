@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
 from aqualog.model.tyre import TYRES
 from aqualog.physics.contact import contact_share, friction_ratio, remaining_share, slip_stiffness_ratio
@@ -11,7 +12,6 @@ from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.tyre_brush import brush_force, brush_stiffness
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

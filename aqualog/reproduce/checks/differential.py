@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.figures.study import SUV
 from aqualog.model.half_car import HalfCarRun, simulate_half_car
@@ -15,7 +16,6 @@ from aqualog.physics.tyre_brush import brush_stiffness
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.road_noise import DT, run
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

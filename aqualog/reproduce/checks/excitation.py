@@ -8,12 +8,12 @@ from typing import get_args
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.figures.study import Case, drive, estimate, first_alarm, is_used
 from aqualog.model.excitation import WAVEFORMS, axle_forces, f_step, waveform
 from aqualog.model.scenario import Waveform
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.verdict import NEEDS_DATA, judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.statistics import bootstrap, percent
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

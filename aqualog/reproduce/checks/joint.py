@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.compare import Coverage, coverage, situation_scores
 from aqualog.evaluate.drives import Drive, labels_in
 from aqualog.evaluate.judge import judge
@@ -18,11 +20,9 @@ from aqualog.model.pools import SCORING_POOL, Pool
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, draw
-from aqualog.notation import WHEELS
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.tables import SEEDS, estimate, spread_over
 from aqualog.reproduce.verdict import judged
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "CHECKS", "MEASURED", "SEEDS", "SINGLE", "VARIANTS", "Row", "c70", "c78", "compared", "drives",

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from aqualog.core.records import Track
 from aqualog.detect import joint_cusum
 from aqualog.detect.joint_cusum import JointCusumParams
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.verdict import DIFFERENCE, judged
-from aqualog.types import Track
 
 __all__ = ["CHECKS", "SEEDS"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from aqualog.core.records import BoolArray
 from aqualog.evaluate.match import LIMITS_S, hits
 from aqualog.evaluate.truth import spans_of
 from aqualog.reproduce.ablations import bits_of, variants
@@ -11,7 +12,6 @@ from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.drawn import WATER, Taken, drives, score
 from aqualog.reproduce.statistics import share
 from aqualog.reproduce.verdict import judged
-from aqualog.types import BoolArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import BoolArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Scenario
@@ -16,8 +18,6 @@ from aqualog.physics.resistance import nominal_acceleration
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.drawn import Taken, detected, made, score
 from aqualog.reproduce.verdict import judged
-from aqualog.types import BoolArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["CHECKS", "SEEDS"]
 

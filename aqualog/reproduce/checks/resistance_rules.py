@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, resistance
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.model.effects import EFFECTS
@@ -21,8 +23,6 @@ from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.drawn import WATER, Score, Taken, detected, drives, score, threshold_for
 from aqualog.reproduce.statistics import bootstrap, ratio_of_counts
 from aqualog.reproduce.verdict import judged
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["CHECKS", "SEEDS"]
 

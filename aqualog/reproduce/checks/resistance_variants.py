@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.reproduce.check import Check, Checks, Maker
 from aqualog.reproduce.checks.resistance import (
     CONFIGURATIONS,
@@ -40,7 +41,6 @@ from aqualog.reproduce.tables import (
     told,
 )
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "LOADED", "SEEDS", "UNLOADED"]
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.reproduce.check import Check, Checks, Maker
 from aqualog.reproduce.checks.resistance import CONFIGURATIONS, SLOW, at_speeds
 from aqualog.reproduce.checks.slope_detection import detected
@@ -27,7 +28,6 @@ from aqualog.reproduce.tables import (
     told,
 )
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS", "SOURCE", "WORN", "regressed", "slopes_of"]
 

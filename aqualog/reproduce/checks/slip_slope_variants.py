@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.reproduce.check import Check, Checks, Maker
 from aqualog.reproduce.checks.resistance import at_speeds
 from aqualog.reproduce.checks.resistance_variants import LOADED, UNLOADED
@@ -24,7 +25,6 @@ from aqualog.reproduce.tables import (
     told,
 )
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

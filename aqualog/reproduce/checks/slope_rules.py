@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import DriveResult
+from aqualog.core.vehicle import KEYS
 from aqualog.detect.slip_slope.history import History, Rule, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
@@ -24,8 +26,6 @@ from aqualog.reproduce.pass_figures import figures_of
 from aqualog.reproduce.passes import HIGH, LOW, Pass
 from aqualog.reproduce.statistics import bootstrap, share
 from aqualog.reproduce.verdict import NEEDS_DATA, judged
-from aqualog.types import DriveResult
-from aqualog.vehicle import KEYS
 
 __all__ = ["CHECKS", "SEEDS"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.reproduce.check import Check, Checks, Maker
 from aqualog.reproduce.pass_figures import SPIN_EDGES
 from aqualog.reproduce.passes import HIGH, Pass
@@ -21,7 +22,6 @@ from aqualog.reproduce.tables import (
     told,
 )
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS", "rank_correlation"]
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.evaluate.intervals import wilson
 from aqualog.reproduce.check import Check, Checks, Maker
 from aqualog.reproduce.checks.contact_loss import GRID, SOON, SOURCE
@@ -25,7 +26,6 @@ from aqualog.reproduce.tables import (
     told,
 )
 from aqualog.reproduce.verdict import judged
-from aqualog.types import FloatArray
 
 __all__ = ["CHECKS", "SEEDS", "aic_gain"]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.records import BoolArray
 from aqualog.detect import spin
 from aqualog.evaluate.intervals import wilson
 from aqualog.model.situations import SCORING_POOL, draw
@@ -13,7 +14,6 @@ from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.drawn import WATER, Taken, detected, drives, made
 from aqualog.reproduce.tables import spread_over
 from aqualog.reproduce.verdict import judged
-from aqualog.types import BoolArray
 
 __all__ = ["CHECKS", "SEEDS"]
 

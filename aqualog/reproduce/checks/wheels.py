@@ -6,16 +6,16 @@ from functools import partial
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, ewvar, minor_spin_down, spin
 from aqualog.evaluate.intervals import wilson
 from aqualog.features.stream import FeatureStream
-from aqualog.notation import WHEELS
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.drawn import WATER, Score, Taken, detected, drives, score, threshold_for
 from aqualog.reproduce.statistics import bootstrap, ratio_of_counts, share
 from aqualog.reproduce.verdict import judged
-from aqualog.types import BoolArray, FloatArray
-from aqualog.vehicle import Vehicle
 
 __all__ = ["CHECKS", "SEEDS"]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.consequence import DETECTORS
 from aqualog.diagnose.extended import extended_inputs
@@ -11,8 +13,6 @@ from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.labels import joined, without
 from aqualog.evaluate.match import beginning_in
 from aqualog.model.term import Model
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = ["consequence"]
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from blind.metrics.engine import Drive, Noise, noise_of, prepare, residual, shapes, unit_innovations
 
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.records import Diagnosis
 from aqualog.model.term import Model
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle
 
 __all__ = [
     "Log",

@@ -10,7 +10,7 @@ from blind.metrics.engine import residual
 from blind.metrics.forecast import Log, white
 from blind.metrics.rows import Fact
 
-from aqualog.errors import ConfigError
+from aqualog.core.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 

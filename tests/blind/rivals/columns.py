@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["TWINS", "Residuals", "named_columns", "stacked"]
 

@@ -9,7 +9,7 @@ from blind.rivals.columns import TWINS, Residuals, named_columns, scales, stacke
 from blind.rivals.select import SELECTORS, Finding
 from blind.rivals.sindy import MEANINGS, THRESHOLDS, ensemble, polynomials, single
 
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["METHODS", "heldout_share", "measured"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from blind.rivals.columns import Residuals
 from blind.rivals.select import Finding
 
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 __all__ = ["MEANINGS", "THRESHOLDS", "ensemble", "polynomials", "single"]
 

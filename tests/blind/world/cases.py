@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from aqualog.types import Signals
-from aqualog.vehicle import Vehicle, vehicle_toml
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle, vehicle_toml
 
 from .effects import PLACE_FIXED, UNKNOWN, Hidden, apply, scaled
 from .kernel import drive_car

@@ -10,7 +10,7 @@ from math import ceil, cos, exp, pi, sin, tanh
 
 import numpy as np
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 
 from .tyre import combined, load_law, lost_contact, saddle, water_force
 from .world import CAR, TYRE, G

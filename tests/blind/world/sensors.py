@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from aqualog.types import Origin, Quality, Signals
+from aqualog.core.records import Origin, Quality, Signals
 
 from .kernel import OUT
 from .noise import gaps, levels, of_level, outliers, quantised

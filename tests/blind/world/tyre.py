@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import atan, exp, sin, sqrt, tanh
 
-from aqualog.compiled import compiled
+from aqualog.core.compiled import compiled
 
 __all__ = ["KINDS", "SECANT", "C", "E", "combined", "load_law", "lost_contact", "saddle", "water_force"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.vehicle import KEYS, Vehicle
+from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = ["CARS"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from aqualog.vehicle import Vehicle
+from aqualog.core.vehicle import Vehicle
 
 from .tyre import KINDS, SECANT
 

@@ -15,7 +15,7 @@ from typing import Any
 from numba import config, njit
 from numba.core.runtime import rtsys
 
-from aqualog.places import code_folder
+from aqualog.core.user_folders import code_folder
 
 __all__ = ["compiled", "inlined", "kept_code"]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from aqualog.notation import WHEELS
+from aqualog.core.notation import WHEELS
 
 __all__ = [
     "COEFFICIENTS",

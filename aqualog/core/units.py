@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.errors import SignalError
+from aqualog.core.errors import SignalError
 
 __all__ = ["Unit", "convert", "displayed_text", "displayed_unit", "is_unit", "parse_unit", "spellings"]
 

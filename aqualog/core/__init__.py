@@ -1,0 +1,1 @@
+"""What every room stands on: errors, records, symbols, units, the vehicle, compiled code."""
