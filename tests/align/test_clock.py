@@ -282,7 +282,7 @@ def test_quantiles_of_student():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), pytest.param(150.0, 0.3, 5.0, marks=pytest.mark.long)]
+    ("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), pytest.param(150.0, 0.3, 5.0, marks=pytest.mark.nightly)]
 )
 def test_intervals_cover_the_truth(seconds, sd, memory_s):
     cases, refusals, hits = 220, 0, np.zeros(5)

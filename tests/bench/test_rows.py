@@ -1,4 +1,4 @@
-"""Every benchmark, tiny: both sides run and agree. What starts processes is tried once, and at length by `-m long`."""
+"""Every benchmark, tiny: both sides run and agree. What starts processes is tried once, and at length by `-m nightly`."""
 
 import tomllib
 from dataclasses import replace
@@ -22,7 +22,7 @@ def test_rows_run_and_agree(name):
     assert all("reached |" in x or "not run" in x for x in lines)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [n for n in bench.GROUPS if n not in IN_PROCESS])
 def test_rows_of_processes(name):
     lines, code = bench.run([name], TINY)

@@ -220,7 +220,7 @@ def test_document_of_a_reproduction():
     assert complaints("reproduce", json.loads(json.dumps(made))) == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("inputs", ["drive", "campaign"])
 def test_document_of_a_diagnosis(inputs, campaign):
     given = (MONDAY, *CAR, "--holdout", FRIDAY) if inputs == "drive" else (campaign / "campaign.toml",)

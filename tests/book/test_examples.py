@@ -11,7 +11,7 @@ def test_examples_are_true(page, tmp_path):
     assert not faults, "run `python -m tests.book.examples`\n" + "\n\n".join(map(str, faults))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("page", [p for p in examples.pages() if any("long" in b.marks for b in examples.runnable(p))])
 def test_long_examples_are_true(page, tmp_path):
     _, faults = examples.check(page, tmp_path, long=True)

@@ -135,7 +135,7 @@ def test_no_workers_is_said_after_a_while(campaign, tmp_path, monkeypatch):
         assert f"{made.scheduler_address}: has no workers after 0 s. Try: `dask worker" in result.stderr
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_last_worker_leaves(monkeypatch):
     monkeypatch.setattr(asking, "_ALONE_S", 0.5)
     monkeypatch.setattr(asking, "_WATCH_S", 0.1)
@@ -225,7 +225,7 @@ def command(campaign, store, address):
     ]  # fmt: skip
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_scheduler_that_is_lost_half_way(tmp_path):
     campaign = make_campaign(tmp_path, speeds=(70, 80, 90, 100), repeats=24)
     plain, store = tmp_path / "plain", tmp_path / "s"
@@ -262,7 +262,7 @@ def test_a_scheduler_that_is_lost_half_way(tmp_path):
         assert (store / path.relative_to(plain)).read_bytes() == path.read_bytes()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_workers_with_another_aqualog(campaign, tmp_path):
     shutil.copytree(Path(aqualog.__file__).parent, tmp_path / "other" / "aqualog")
     with (tmp_path / "other" / "aqualog" / "core" / "units.py").open("a") as source:
@@ -276,7 +276,7 @@ def test_workers_with_another_aqualog(campaign, tmp_path):
     assert not (tmp_path / "s" / "samples").exists() or not list((tmp_path / "s" / "samples").iterdir())
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_answers_but_is_no_scheduler(campaign, tmp_path):
     with subprocess.Popen(
         [sys.executable, "-u", "-m", "http.server", "0", "--bind", "127.0.0.1"],

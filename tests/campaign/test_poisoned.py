@@ -10,7 +10,7 @@ from campaign.poisoned import batch, disturbed, left_in, make, reasons, unlike
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
 @pytest.mark.parametrize(
-    "hooks", [(), pytest.param(("crash.csv",), marks=pytest.mark.long)], ids=["no logs", "a crash, too"]
+    "hooks", [(), pytest.param(("crash.csv",), marks=pytest.mark.nightly)], ids=["no logs", "a crash, too"]
 )
 def test_a_batch_with_poison_in_it_that_is_killed_ends_as_one_that_is_not(tmp_path, hooks):
     count = 30

@@ -123,7 +123,7 @@ def test_a_batch_writes_the_same_store_and_every_command_reads_it(plain, url, tm
     assert files_of(url) == files_of(store)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_pages_and_figures_read_it(plain, url, tmp_path):
     campaign, store = plain
     assert run("batch", campaign, "-o", url, "-q").exit_code == 0
@@ -355,7 +355,7 @@ def s3(tmp_path_factory):
         server.wait()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_s3_by_processes_and_by_a_cluster(plain, s3, tmp_path):
     campaign, store = plain
     by_processes = run("batch", campaign, "-o", s3, "--json", "--jobs", "2", "--limit-s", "100")
@@ -369,7 +369,7 @@ def test_s3_by_processes_and_by_a_cluster(plain, s3, tmp_path):
     assert files_of(s3 + "-2") == files_of(store)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_s3_that_is_not_there(plain, s3, monkeypatch):
     result = run("batch", plain[0], "-o", "s3://no-such-bucket/store")
     assert (result.exit_code, result.stderr.count("\n")) == (1, 1)

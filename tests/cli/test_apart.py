@@ -170,7 +170,7 @@ LIMIT = {"hang": {"S": 3}, "spin": {"CPU_S": 0.1}, "memory": {"MB": 500}, "write
 
 
 @pytest.mark.parametrize(
-    "kind", ["crash", "hang", "write", *(pytest.param(k, marks=pytest.mark.long) for k in ("memory", "spin"))]
+    "kind", ["crash", "hang", "write", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("memory", "spin"))]
 )
 def test_one_bad_log_is_one_line_and_the_others_are_read(folder, kind):
     code, out, lines = ended(started(folder, "good.csv", f"{kind}.csv", "good2.csv", **LIMIT.get(kind, {})))
@@ -193,7 +193,7 @@ def test_a_command_on_one_log_that_crashes_it_fails(folder):
     assert (code, out, lines) == (1, "", [f"error: crash.csv: {LINES['crash']}"])
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_command_on_many_logs_one_of_which_crashes_it_goes_on(folder):
     (folder / "logs").mkdir()
     for name in ("good", "crash"):
@@ -219,7 +219,7 @@ def gone(number):
 
 @pytest.mark.parametrize(
     ("kind", "to_all"),
-    [("sleep", False), ("sleep", True), ("hang", False), pytest.param("hang", True, marks=pytest.mark.long)],
+    [("sleep", False), ("sleep", True), ("hang", False), pytest.param("hang", True, marks=pytest.mark.nightly)],
 )
 def test_an_interrupt_ends_both_at_once(folder, kind, to_all):
     """Also while a library does not come back; the group gets it as from a terminal, once more than needed."""

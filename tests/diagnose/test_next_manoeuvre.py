@@ -128,7 +128,7 @@ def test_wind_and_drag_need_the_way_back(wind, monkeypatch):
     assert "head wind from aero drag" in alone.sentence
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_rolling_resistance_and_dragging_brakes_stay_one():
     bench, credible, noises = case(
         [log(model("rolling_resistance", delta_r_w=0.004))], [["rolling_resistance"], ["brake_drag"]]

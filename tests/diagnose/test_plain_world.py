@@ -21,7 +21,7 @@ def diagnosed(folder, seed, *of, **hidden):
 
 @pytest.mark.parametrize(
     ("seed", "programme", "noise"),
-    [(2, "mixed", "ou1"), pytest.param(20, "stop_and_go", "white", marks=pytest.mark.long)],
+    [(2, "mixed", "ou1"), pytest.param(20, "stop_and_go", "white", marks=pytest.mark.nightly)],
 )
 def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     assert diagnosed(tmp_path, seed, programme, noise).verdict == "no_effect"
@@ -31,7 +31,7 @@ def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     ("effect", "parameter", "value"),
     [("aero_drag", "delta_drag_area", 0.15)],
 )
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_is_hidden_is_named_with_its_size(tmp_path, effect, parameter, value):
     found = diagnosed(tmp_path, 24, **{effect: value})
     assert found.verdict == "named"

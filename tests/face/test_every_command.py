@@ -239,7 +239,7 @@ def test_cache(tmp_path, monkeypatch):
     assert not aq.cache().entries
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_reproduce(tmp_path):
     result = aq.thesis.reproduce(tmp_path, jobs=os.cpu_count())
     result.save(tmp_path)

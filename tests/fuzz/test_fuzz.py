@@ -258,7 +258,7 @@ def test_without_atheris_one_line_says_so(capsys, monkeypatch):
     assert capsys.readouterr().err == "--guided needs atheris, which is not installed. Try: pip install -e '.[fuzz]'\n"
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_turn_of_the_command(capsys):
     assert command.main(["labels", "--seconds", "1", "--seed", "3"]) == 0
     out = capsys.readouterr()
@@ -277,13 +277,13 @@ def test_one_case_again(capsys):
     assert resource.getrlimit(resource.RLIMIT_DATA) == before  # a browser that another test starts would inherit it
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", TARGETS)
 def test_much_damage_drawn_by_chance(name, capsys):
     assert command.main([name, "--seconds", "60"]) == 0, capsys.readouterr()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_guided_by_coverage(capsys):
     pytest.importorskip("atheris")
     assert command.main(["mcap", "--seconds", "20", "--guided"]) == 0, capsys.readouterr()

@@ -150,7 +150,7 @@ def hilly(real_logs, bmw):
     return diagnose([("A12", trip_of(real_logs, bmw, "A12"))], bmw, options=QUICK)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_road_of_the_hilly_trip_is_a_cause_and_the_withheld_elevation_agrees(real_logs, bmw, hilly):
     assert hilly.verdict in ("named", "compound", "cannot_tell")
     (road,) = (c for c in hilly.causes if c.effect == "road_grade")
@@ -166,14 +166,14 @@ def test_road_of_the_hilly_trip_is_a_cause_and_the_withheld_elevation_agrees(rea
     assert mean.high - mean.low > 0.01  # without elevation a mean slope is an offset of the accelerometer as well
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_both_trips_say_the_same_of_the_torques_delay(hilly, loaded):
     delays = [c.parameters["delay"] for d in (hilly, loaded) for c in d.causes if c.key == "signal_delay@torque"]
     assert len(delays) == 2
     assert max(d.low for d in delays) < min(d.high for d in delays)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_nothing_about_tyres_without_wheel_speeds(hilly):
     named = {c.effect for c in hilly.causes}
     assert not named & {"slip_stiffness_drift", "slip_stiffness", "pressure_loss", "tyre_radius"}
@@ -241,7 +241,7 @@ def porsche(real_logs):
     return diagnose([("porsche", load_signals(paths, vehicle=car, signal_map=signal_map))], car, options=QUICK)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_porsche_offset_and_road_are_named(porsche):
     assert porsche.verdict in ("named", "compound", "cannot_tell")
     found = {c.key: c for c in porsche.causes}
@@ -254,13 +254,13 @@ def test_porsche_offset_and_road_are_named(porsche):
     assert "road grade" in certain
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_without_torque_nothing_is_told_about_forces(porsche):
     assert not {c.effect for c in porsche.causes} & {"torque_gain", "payload_mass", "aero_drag", "head_wind"}
     assert porsche.untested["payload_mass"] == "no wheel torque in the log"
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_nobody_told_of_the_porsche_is_no_finding(porsche):
     """No inertia is in its file, and the radii in its wheel speeds are the control unit's."""
     assert not {c.effect for c in porsche.causes} & {"wheel_inertia", "tyre_radius", "pressure_loss"}

@@ -73,7 +73,7 @@ def test_a_name_is_text(page, tmp_path):
 
 @pytest.mark.browser  # the other pages have names of this kind in browser tests of their own
 @pytest.mark.parametrize(
-    "page", ["eventful drive", *(pytest.param(p, marks=pytest.mark.long) for p in ("figures", "evaluation"))]
+    "page", ["eventful drive", *(pytest.param(p, marks=pytest.mark.nightly) for p in ("figures", "evaluation"))]
 )
 def test_a_browser_shows_names_and_does_nothing(browser, page, tmp_path):
     name = "".join(NAMES[k] for k in ("script", "image", "attribute", "link", "terminal", "comment", "long"))
