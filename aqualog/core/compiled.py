@@ -121,7 +121,7 @@ def _user_cache() -> str:
 
 def _stamp_of(function: FunctionType) -> str:
     """Return the state of all sources of a function's machine code."""
-    folders = {Path(__file__).resolve().parent / "physics"}
+    folders = {Path(__file__).resolve().parents[1] / "physics"}
     constants: set[str] = set()
     _gather(function, folders, constants, set())
     return hashlib.sha256(repr((sorted(map(_stamp, folders)), sorted(constants))).encode()).hexdigest()
