@@ -117,6 +117,7 @@ def changed_files(paths: Iterable[Path], before: Seen) -> tuple[str, ...]:
 def sources_stamp(names: tuple[str, ...]) -> str:
     """Hash of aqualog's own modules and folders of these names: it changes with the code."""
     package = Path(__file__).resolve().parents[1]
+    assert all((package / n).exists() for n in names), names  # a folder of another name would leave results stale
     paths = [p for n in names for p in ([package / n] if n.endswith(".py") else (package / n).rglob("*.py"))]
     return hash_of(f"{p.relative_to(package)}:{hashlib.sha256(p.read_bytes()).hexdigest()}" for p in sorted(paths))
 
