@@ -1,33 +1,35 @@
-"""Clean the samples of one channel: convert to SI, remove bad samples, repair and count time stamps."""
+"""Clean the samples of one signal: convert to SI, leave out what no car can have made, count.
+
+A signal arrives in any pieces, a whole drive in one. The result does not depend on the cuts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import freeze_note, in_freezes, watch_of, while_moving
-from aqualog.align.glitches import Glitches, glitches_of
+from aqualog.align.freezes import Freeze, freeze_note, in_freezes, stand_watch_of, watch_of
+from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.resample import median_period_ns
-from aqualog.align.shared import OfLast
-from aqualog.align.standing import StandWatch, Stretch
-from aqualog.align.timebase import ClockRepair
+from aqualog.align.resample import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS, Symbol
-from aqualog.core.records import BoolArray, Channel, FloatArray, Origin, TimeArray
+from aqualog.core.records import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
 from aqualog.core.units import convert, parse_unit
 from aqualog.core.vehicle import Vehicle
 
-__all__ = [
-    "Clean", "Judged", "Span", "Stamps", "clean_channel", "corrected", "glitch_note", "judged", "mean_of_steps",
-    "out_note", "symbol_of",
-]  # fmt: skip
+__all__ = ["Clean", "Cleaner", "Samples", "Span", "SpanWatch", "Taken", "corrected", "span_of"]
 
 _ROUNDING = 1e-7  # of a number in 32 bits, at most
-BURST = 5  # median sample times; longer steps are gaps and no sample time
+_BURST = 5  # median sample times; longer steps are gaps and no sample time
+_NO_TIMES: TimeArray = np.zeros(0, dtype=np.int64)
+_NO_VALUES: FloatArray = np.zeros(0)
+
+Samples = tuple[TimeArray, FloatArray]
+"""Strictly increasing stamps (n,) [ns] and values (n,)."""
 
 
 class Span(NamedTuple):
@@ -43,18 +45,260 @@ class Span(NamedTuple):
     mean_period_ns: int
 
 
+class SpanWatch:
+    """Find the span of strictly increasing stamps, in any pieces."""
+
+    def __init__(self) -> None:
+        self.first_ns: int | None = None
+        self._last_ns = self._samples = 0
+        self._first_steps: list[TimeArray] = []
+        self._room = MEDIAN_OF
+        self._median: int | None = None
+        self._total = self._count = 0
+
+    def push(self, t_ns: TimeArray) -> TimeArray:
+        """Take stamps (n,); return the steps that lead to them, n - 1 for the first ones. [ns]"""
+        if not t_ns.size:
+            return t_ns
+        steps = np.diff(t_ns) if self.first_ns is None else np.diff(t_ns, prepend=self._last_ns)
+        if self.first_ns is None:
+            self.first_ns = int(t_ns[0])
+        self._last_ns = int(t_ns[-1])
+        self._samples += t_ns.size
+        early, late = steps[: self._room], steps[self._room :]
+        if self._median is None:
+            self._first_steps.append(early.copy())
+            self._room -= early.size
+            if not self._room:
+                self._settle()
+        if late.size:
+            self._add(late)
+        return steps
+
+    def _settle(self) -> None:
+        steps = np.concatenate([_NO_TIMES, *self._first_steps])
+        self._median = int(np.median(steps)) if steps.size else 0
+        self._first_steps = []
+        self._add(steps)
+
+    def _add(self, steps: TimeArray) -> None:
+        assert self._median is not None
+        steps = steps[steps < _BURST * self._median]
+        self._total += int(steps.sum())
+        self._count += steps.size
+
+    def finish(self) -> Span:
+        """Return the span; no stamps may follow."""
+        if self._median is None:
+            self._settle()
+        assert self._median is not None
+        mean = round(self._total / self._count) if self._count else 0
+        return Span(self.first_ns or 0, self._last_ns, self._samples, self._median, mean)
+
+
+def span_of(t_ns: TimeArray) -> Span:
+    """Return the span of stamps (n,)."""
+    watch = SpanWatch()
+    watch.push(t_ns)
+    return watch.finish()
+
+
 @dataclass(frozen=True, slots=True)
 class Clean:
-    """One signal in SI on its own repaired time stamps."""
+    """One signal that was cleaned, without its samples."""
 
     symbol: Symbol
     origin: Origin
     span: Span
-    t_ns: TimeArray
-    x: FloatArray
 
 
-class Judged(NamedTuple):
+class Taken(NamedTuple):
+    """What is known of a signal once all its samples have gone through a cleaner.
+
+    `samples`: of the channel; `every`, `used`: spans of the stamps in order and of the samples that are used;
+    `absolute`: whether its clock counts from 1970.
+    """
+
+    samples: int
+    every: Span
+    used: Span
+    faults: TimeFaults
+    absolute: bool
+
+
+class Cleaner:
+    """Clean one signal.
+
+    Parameters
+    ----------
+    name : str
+        As the map has it.
+    entry : Entry
+    info : ChannelInfo
+    signal_map : SignalMap
+    vehicle : Vehicle
+    freezes : tuple of Freeze, optional
+        Where the signal is frozen, from `frozen` of an earlier pass; without them no sample is left out as frozen.
+
+    Raises
+    ------
+    SignalError, ConfigError
+        If the unit does not fit the signal; ConfigError where the map gives the unit.
+    """
+
+    def __init__(
+        self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle,
+        freezes: tuple[Freeze, ...] | None = None,
+    ) -> None:  # fmt: skip
+        self.info, self.where = info, f"{info.file}:{info.path}"
+        self._name, self._symbol = name, SYMBOLS.get(name) or ACCEPTED[name]
+        self._unit = entry.unit or info.unit
+        self._entry, self._vehicle = entry, vehicle
+        self._is_explicit = name in signal_map.entries
+        try:
+            _judged(self._symbol, entry, _NO_VALUES, self._unit, vehicle, self.where)
+        except SignalError as error:
+            if self._is_explicit:
+                raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
+            raise
+        r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
+        self._rule = glitches_of(name, r_e)
+        self._freezes = freezes or ()
+        self._watch = watch_of(name, r_e) if freezes is None else None
+        # when the car stands by this signal, if it is a speed; complete once all samples of the first pass are through
+        self.stands = stand_watch_of(name, r_e) if freezes is None else None
+        # counts, and where something was first found
+        self._in_order = self._bad = self._code = self._out = self._glitches = self._frozen = self._through = 0
+        self._first_glitch_ns: int | None = None
+        self._first_out: tuple[int, float] | None = None
+        # the time in which a jump may turn back
+        self._wait_t, self._wait_x = _NO_TIMES, _NO_VALUES
+        self._done = 0  # of these, let through already
+        self._dead: float | None = None  # the value at which a sensor stands since a step that no wheel can make
+
+    def push(self, t_ns: TimeArray, raw: FloatArray, *, is_last: bool = False) -> Samples:
+        """Take samples (n,) as the file has them; return those in SI that are now certain.
+
+        The rest comes with later pieces, with the last one all of it. Stamps increase strictly.
+        """
+        self._in_order += t_ns.size
+        own = _judged(self._symbol, self._entry, raw, self._unit, self._vehicle, self.where)
+        self._bad += int(own.is_bad.sum())
+        self._code += int(own.is_code.sum())
+        self._out += int(own.is_out.sum())
+        if self._first_out is None and own.is_out.any():
+            k = int(np.argmax(own.is_out))
+            self._first_out = int(t_ns[k]), float(own.values[k])
+        t, x = _where(own.keep, t_ns, own.values)
+        return (
+            self._let_through(t, x) if self._rule is None else self._without_glitches(self._rule, t, x, is_last=is_last)
+        )
+
+    def _let_through(self, t: TimeArray, x: FloatArray) -> Samples:
+        self._through += t.size
+        if self._watch is not None:
+            self._watch.push(t, x)
+        if self.stands is not None:
+            self.stands.push(t, x)
+        if self._freezes:
+            repeats = in_freezes(t, self._freezes)
+            self._frozen += int(repeats.sum())
+            t, x = t[~repeats], x[~repeats]
+        return t, x
+
+    def _without_glitches(self, rule: Glitches, t: TimeArray, x: FloatArray, *, is_last: bool) -> Samples:
+        """Return samples whose next second is known, without those that no car can have made."""
+        if self._dead is not None:
+            moving = np.flatnonzero(x != self._dead)
+            dead = int(moving[0]) if moving.size else x.size
+            self._note_glitches(t[:dead])
+            t, x = t[dead:], x[dead:]
+            if not moving.size:
+                return _NO_TIMES, _NO_VALUES
+            self._dead, self._wait_t, self._wait_x, self._done = None, _NO_TIMES, _NO_VALUES, 0
+        if self._wait_t.size:
+            t, x = np.concatenate([self._wait_t, t]), np.concatenate([self._wait_x, x])
+        if not t.size:
+            return t, x
+        glitch = self._judged_glitches(rule, t, x)
+        # a jump is judged once what may lead back, and the stamps behind that, are known
+        certain = t.size if is_last else int(np.searchsorted(t, t[-1] - KNOWN_NS, side="left"))
+        if not is_last and glitch[-1] and _dead_since(glitch, x) < certain:
+            self._dead, certain = float(x[-1]), t.size
+        while 0 < certain < t.size and glitch[max(certain - 2, 0) : certain + 1].any():
+            certain -= 1  # neither in a glitch nor at its end, nor behind that
+        new = slice(self._done, max(certain, self._done))
+        self._note_glitches(t[new][glitch[new]])
+        start = max(new.stop - 2, 0)  # the samples before are what the next one is compared with
+        self._wait_t, self._wait_x, self._done = t[start:].copy(), x[start:].copy(), new.stop - start
+        if new.stop - new.start < t.size:
+            t, x, glitch = t[new], x[new], glitch[new]
+        return self._let_through(*_where(~glitch, t, x))
+
+    def _judged_glitches(self, rule: Glitches, t: TimeArray, x: FloatArray) -> BoolArray:
+        before = self._through + self._glitches - self._done  # samples to the left of these
+        if not before:
+            return rule.find(t, x)
+        # a rest of two samples is part of a long signal: something is to the left of it
+        t, x = np.concatenate([t[0] + np.array([-2, -1]), t]), np.concatenate([[np.nan, np.nan], x])
+        return rule.find(t, x)[2:]
+
+    def _note_glitches(self, t: TimeArray) -> None:
+        self._glitches += t.size
+        if self._first_glitch_ns is None and t.size:
+            self._first_glitch_ns = int(t[0])
+
+    def frozen(self) -> tuple[Freeze, ...]:
+        """Return where the signal is frozen; complete once all samples are through."""
+        return self._freezes if self._watch is None else self._watch.finish()
+
+    def cleaned(self, taken: Taken) -> tuple[Clean, list[str]]:
+        """Return the signal, and the notes on it, once all samples are through."""
+        begin = taken.every.first_ns
+        notes = []
+        if not self._unit and self._is_explicit:
+            notes.append(f"{self.where} has no unit; taken as {self._symbol.unit}")
+        if self._rule is not None and self._first_glitch_ns is not None:
+            after_s = float(self._first_glitch_ns - begin) * 1e-9
+            notes.append(f"{self.where}: {self._glitches} samples (first at {after_s:.2f} s) {self._rule.what}")
+        if self._first_out is not None:
+            at, value = self._first_out
+            notes.append(
+                f"{self.where}: {self._out} of {self._in_order} samples outside {self._symbol.low:g} ... "
+                f"{self._symbol.high:g} {self._symbol.unit} (first: {value:.6g} at {float(at - begin) * 1e-9:.2f} s) "
+                "are left out"
+            )
+        if self._freezes:
+            notes.append(freeze_note(self.where, self._frozen, begin, self._freezes))
+        origin = Origin(
+            symbol=self._name,
+            channel=self.info.path,
+            file=self.info.file,
+            unit=self._unit or self._symbol.unit,
+            rate_hz=1e9 / taken.every.period_ns if taken.every.period_ns else 0.0,
+            samples=taken.samples,
+            not_finite=self._bad,
+            out_of_range=self._out + self._glitches,
+            invalid_code=self._code,
+            frozen=self._frozen,
+            faults=taken.faults,
+        )
+        return Clean(self._symbol, origin, taken.used), notes
+
+
+def _where(keep: BoolArray, t: TimeArray, x: FloatArray) -> Samples:
+    """Return these samples: the same arrays if all, so that signals with the same stamps are still known by them."""
+    return (t, x) if keep.all() else (t[keep], x[keep])
+
+
+def _dead_since(glitch: BoolArray, x: FloatArray) -> int:
+    """Return where the constant value of the glitch at the end begins; beyond the end if the sensor is not dead."""
+    last = np.flatnonzero(~glitch)
+    start = int(last[-1]) + 1 if last.size else 0
+    return start if bool((x[start:] == x[-1]).all()) else glitch.size
+
+
+class _Judged(NamedTuple):
     """Samples (n,) in SI, and flags for those that are not finite, that are error codes, or that are out of range."""
 
     values: FloatArray
@@ -68,117 +312,13 @@ class Judged(NamedTuple):
         return ~(self.is_bad | self.is_code | self.is_out)
 
 
-class Stamps:
-    """State of the time stamps of a drive's files while its channels are read."""
-
-    def __init__(self) -> None:
-        self._repairs: dict[str, ClockRepair] = {}
-        self.period_ns = OfLast(median_period_ns)
-        self.span = OfLast(_span)
-
-    def repair(self, file: str) -> ClockRepair:
-        """The repair of a file's stamps."""
-        return self._repairs.setdefault(file, ClockRepair())
-
-
-def clean_channel(
-    name: str,
-    entry: Entry,
-    channel: Channel,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    stamps: Stamps,
-    notes: list[str],
-    *,
-    standing: Callable[[], Sequence[Stretch]] = tuple,
-    stands: StandWatch | None = None,
-) -> Clean | None:
-    """Clean one channel; return None (with a note) for a channel without a map whose unit is unknown.
-
-    `standing` gives the stretches at standstill, for a torque that stays the same for long; `stands` sees the samples.
-    """
-    symbol = symbol_of(name)
-    info = channel.info
-    where = f"{info.file}:{info.path}"
-    unit = entry.unit or info.unit
-    is_explicit = name in signal_map.entries
-    t_ns = corrected(channel.t_ns, signal_map, info.file)
-    t_ns, order, faults = stamps.repair(info.file).repair(t_ns)
-    is_changed = faults.back_steps or faults.duplicates or faults.strays
-    raw = channel.values[order] if is_changed else channel.values
-    try:
-        own = judged(symbol, entry, raw, unit, vehicle, where)
-    except SignalError as error:
-        if is_explicit:
-            raise ConfigError(error.what, where=error.where, expected=error.expected, hint=error.hint) from error
-        notes.append(f"{error.line()}; the signal is left out")
-        return None
-    if not unit and is_explicit:
-        notes.append(f"{where} has no unit; taken as {symbol.unit}")
-    keep, is_out = own.keep, own.is_out
-    r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
-    rule = glitches_of(name, r_e)
-    glitch = np.zeros(keep.size, dtype=np.bool_)
-    if rule is not None and keep.any():
-        glitch[keep] = rule.find(t_ns[keep], own.values[keep])
-        if glitch.any():
-            notes.append(glitch_note(where, rule, int(glitch.sum()), int(t_ns[np.argmax(glitch)] - t_ns[0])))
-            keep = keep & ~glitch
-    if is_out.any():
-        k = int(np.argmax(is_out))
-        after_ns = int(t_ns[k] - t_ns[0])
-        notes.append(out_note(where, symbol, int(is_out.sum()), keep.size, float(own.values[k]), after_ns))
-    if stands is not None:
-        stands.push(t_ns[keep], own.values[keep])
-    frozen, watch = 0, watch_of(name, r_e)
-    if watch is not None:
-        watch.push(t_ns[keep], own.values[keep])
-        freezes = watch.finish()
-        if freezes and name.startswith("torque_"):
-            freezes = while_moving(freezes, standing())
-        if freezes:
-            repeats = keep & in_freezes(t_ns, freezes)
-            frozen = int(repeats.sum())
-            notes.append(freeze_note(where, frozen, int(t_ns[0]), freezes))
-            keep = keep & ~repeats
-    period = stamps.period_ns(t_ns)
-    origin = Origin(
-        symbol=name,
-        channel=info.path,
-        file=info.file,
-        unit=unit or symbol.unit,
-        rate_hz=1e9 / period if period else 0.0,
-        samples=int(channel.values.size),
-        not_finite=int(own.is_bad.sum()),
-        out_of_range=int((is_out | glitch).sum()),
-        invalid_code=int(own.is_code.sum()),
-        frozen=frozen,
-        faults=faults,
-    )
-    values = own.values
-    if not keep.all():
-        t_ns, values = t_ns[keep], values[keep]
-    return Clean(symbol, origin, stamps.span(t_ns), t_ns, values)
-
-
-def symbol_of(name: str) -> Symbol:
-    """The symbol of a name that a map may have."""
-    return SYMBOLS.get(name) or ACCEPTED[name]
-
-
-def judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> Judged:
-    """Convert the samples (n,) of a channel, each by itself.
-
-    Raises
-    ------
-    SignalError
-        If the unit is not one of the symbol.
-    """
+def _judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> _Judged:
+    """Convert samples (n,), each by itself; raise SignalError if the unit is not one of the symbol."""
     values = _to_si(symbol, raw, unit, vehicle, where) * entry.scale + entry.offset
     is_code = _is_any_of(raw, entry.invalid)
     is_bad = ~np.isfinite(values)
     is_out = ~is_bad & ~is_code & ((values < symbol.low) | (values > symbol.high))
-    return Judged(values, is_bad, is_code, is_out)
+    return _Judged(values, is_bad, is_code, is_out)
 
 
 def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
@@ -187,33 +327,6 @@ def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
     for code in codes:
         found |= np.isclose(raw, code, rtol=_ROUNDING, atol=0.0)
     return found
-
-
-def glitch_note(where: str, rule: Glitches, count: int, after_ns: int) -> str:
-    """Describe the samples that were left out because no car can make such a step."""
-    return f"{where}: {count} samples (first at {float(after_ns) * 1e-9:.2f} s) {rule.what}"
-
-
-def out_note(where: str, symbol: Symbol, count: int, of: int, first: float, after_ns: int) -> str:
-    """Describe the samples that were left out because they are out of range."""
-    return (
-        f"{where}: {count} of {of} samples outside {symbol.low:g} ... {symbol.high:g} "
-        f"{symbol.unit} (first: {first:.6g} at {float(after_ns) * 1e-9:.2f} s) are left out"
-    )
-
-
-def _span(t_ns: TimeArray) -> Span:
-    if t_ns.size == 0:
-        return Span(0, 0, 0, 0, 0)
-    period = median_period_ns(t_ns)
-    steps = np.diff(t_ns)
-    steps = steps[steps < BURST * period]
-    return Span(int(t_ns[0]), int(t_ns[-1]), t_ns.size, period, mean_of_steps(int(steps.sum()), steps.size))
-
-
-def mean_of_steps(total_ns: int, count: int) -> int:
-    """Return the mean sample time, 0 without samples. [ns]"""
-    return round(total_ns / count) if count else 0
 
 
 def _to_si(symbol: Symbol, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> FloatArray:

@@ -10,15 +10,15 @@ import polars as pl
 
 from aqualog.align.clean import Clean, Span
 from aqualog.align.mapping import SignalMap
-from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear, placed
+from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import WHEELS, Symbol
-from aqualog.core.records import BoolArray, Channel, FloatArray, TimeArray
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["Grid", "columns_of", "common_clock", "frame_of", "grid_of", "missing_samples", "onto_grid"]
+__all__ = ["MAX_ROWS", "Grid", "columns_of", "common_clock", "frame_of", "grid_of", "missing_samples", "onto_grid"]
 
-_MAX_ROWS = 60_000_000
+MAX_ROWS = 60_000_000
 _SPARSE_ROWS = 1_000_000  # beyond, a grid with one sample in 50 points is a jump of the time stamps, not a drive
 _NICE_HZ = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 80, 100, 125, 200, 250, 400, 500, 1000)
 
@@ -39,15 +39,16 @@ class Grid(NamedTuple):
         return np.asarray((self.points(first, last) - self.start_ns) * 1e-9)
 
 
-def common_clock(channels: Sequence[Channel], signal_map: SignalMap) -> bool:
+def common_clock(clocks: Sequence[tuple[str, bool]], signal_map: SignalMap) -> bool:
     """Return whether the drive has absolute time; refuse to join clocks that have nothing in common.
 
-    A file whose offset the map gives is already on the others' clock.
+    `clocks` holds the file of each signal and whether its time is absolute. A file whose offset the map gives is
+    already on the others' clock.
     """
-    free = [c for c in channels if not signal_map.joins(c.info.file)]
-    kinds = {c.absolute for c in free or channels}
+    free = [c for c in clocks if not signal_map.joins(c[0])]
+    kinds = {absolute for _, absolute in free or clocks}
     if len(kinds) > 1:
-        by_kind = {k: sorted({c.info.file for c in channels if c.absolute == k}) for k in kinds}
+        by_kind = {k: sorted({file for file, absolute in clocks if absolute == k}) for k in kinds}
         raise SignalError(
             "the files do not share a clock",
             where=", ".join(by_kind[False]),
@@ -57,7 +58,7 @@ def common_clock(channels: Sequence[Channel], signal_map: SignalMap) -> bool:
     return kinds.pop()
 
 
-def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int = _MAX_ROWS) -> Grid:
+def grid_of(cleaned: Sequence[Clean], rate_hz: float | None, *, most_rows: int = MAX_ROWS) -> Grid:
     """Build the grid at the rate asked for, else at that of the wheel speeds, else at that of the fastest signal.
 
     Raises
@@ -118,7 +119,7 @@ def onto_grid(
     x: FloatArray,
     points: TimeArray,
     dt_ns: int,
-    at: Placed | None = None,
+    at: Placed | None,
 ) -> tuple[FloatArray, bool]:
     """Put a signal on points of the grid; flag points where a sample was missing.
 
@@ -134,12 +135,10 @@ def onto_grid(
     dt_ns : int
         Step of the grid. [ns]
     at : Placed, optional
-        Where the points lie among these stamps, if known.
+        Where the points lie among these stamps; None without samples.
     """
     is_state = symbol.kind == "state"
     gap_ns = gap_limit_ns(span.period_ns, is_state=is_state)
-    if at is None and t_ns.size:
-        at = placed(t_ns, points, dt_ns)
     bridged: BoolArray
     if is_state:
         return hold(t_ns, x, points, gap_ns=gap_ns, at=at), False

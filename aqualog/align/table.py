@@ -1,26 +1,113 @@
-"""Build one table of the channels of a drive."""
+"""Build one table of the signals of a drive."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import polars as pl
 
-from aqualog.align.clean import Stamps, clean_channel
-from aqualog.align.grid import columns_of, common_clock, frame_of, grid_of, missing_samples, onto_grid
+from aqualog.align.clean import Clean, Cleaner, Samples, Taken, corrected, span_of
+from aqualog.align.freezes import SPEEDS, Freeze, standing_by, while_moving
+from aqualog.align.grid import (
+    MAX_ROWS,
+    Grid,
+    columns_of,
+    common_clock,
+    frame_of,
+    grid_of,
+    missing_samples,
+    onto_grid,
+)
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.quality import missing_notes, quality_of
 from aqualog.align.resample import placed
-from aqualog.align.shared import OfLast
-from aqualog.align.standing import SPEEDS, StandWatch, Stretch, stand_watch_of, standing_by
+from aqualog.align.timebase import ClockRepair, OfLast
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import Channel, FileFaults, Origin, Signals
+from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Signals
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["build_signals"]
+__all__ = ["Found", "Freezes", "Plan", "build_signals", "cleaners_of", "plan_drive"]
+
+Found = Mapping[str, tuple[Entry, ChannelInfo]]
+Freezes = Mapping[str, tuple[Freeze, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A drive whose signals have gone through their cleaners once.
+
+    `cleaned`: its signals; `notes` on them; `absolute`: whether the grid counts from 1970; `freezes`: where signals are
+    frozen.
+    """
+
+    grid: Grid
+    absolute: bool
+    cleaned: tuple[Clean, ...]
+    notes: tuple[str, ...]
+    freezes: Freezes
+    vehicle: Vehicle
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Return canonical signals in their usual order."""
+        names = {n for c in self.cleaned for n, _ in columns_of(c.symbol, np.zeros(0), self.vehicle)}
+        return tuple(n for n in SYMBOLS if n in names)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Return files of its signals."""
+        return tuple(dict.fromkeys(c.origin.file for c in self.cleaned))
+
+    def table(
+        self, samples: Mapping[str, Samples], first: int = 0, last: int | None = None
+    ) -> tuple[Signals, Mapping[str, bool]]:
+        """Return the rows from `first` to before `last` without origins and quality, and which signals were bridged.
+
+        `samples`: of each signal of the map, at least those around these rows. A signal is bridged where a sample of it
+        was missing somewhere in these rows.
+        """
+        points = self.grid.points(first, last)
+        place = OfLast(lambda t_ns: placed(t_ns, points, self.grid.dt_ns))
+        columns: dict[str, pl.Series] = {}
+        bridged: dict[str, bool] = {}
+        for clean in self.cleaned:
+            name = clean.origin.symbol
+            t, x = samples[name]
+            at = place(t) if t.size else None
+            y, bridged[name] = onto_grid(clean.symbol, clean.span, t, x, points, self.grid.dt_ns, at)
+            for column, series in columns_of(clean.symbol, y, self.vehicle):
+                columns.setdefault(column, series)  # a signal under its canonical name wins over a derived one
+        return self._signals(frame_of(self.grid.seconds(first, last), columns, self.symbols)), bridged
+
+    def _signals(self, frame: pl.DataFrame) -> Signals:
+        start = self.grid.start_ns if self.absolute else None
+        return Signals(frame, self.grid.dt_ns, start, {}, quality_of((), (), ()), ())
+
+    def facts(self, missing: Mapping[str, int], bridged: frozenset[str], faults: Sequence[FileFaults]) -> Signals:
+        """Return origins and quality of the whole drive, with an empty table.
+
+        Parameters
+        ----------
+        missing : mapping symbol -> int
+            Rows without a value, of the whole table.
+        bridged : frozenset of str
+            Signals of the map of which a sample was missing.
+        faults : sequence of FileFaults
+            What the readers lost.
+        """
+        origins: dict[str, Origin] = {}
+        for clean in self.cleaned:
+            seen = missing_samples(clean.span, self.grid) if clean.origin.symbol in bridged else 0.0
+            for name, _ in columns_of(clean.symbol, np.zeros(0), self.vehicle):
+                share = max(missing[name] / self.grid.rows, seen)
+                origins.setdefault(name, replace(clean.origin, symbol=name, missing_fraction=share))
+        ordered = {n: origins[n] for n in SYMBOLS if n in origins}
+        quality = quality_of(self.cleaned, faults, [*self.notes, *missing_notes(ordered.values())])
+        empty = self._signals(pl.DataFrame({"t": pl.Series([], dtype=pl.Float64)}))
+        return replace(empty, origins=ordered, quality=quality, files=self.files)
 
 
 def build_signals(
@@ -55,50 +142,94 @@ def build_signals(
     SignalError
         If no signal is usable, units do not fit, or the sources' clocks cannot be joined.
     """
+    repairs: dict[str, ClockRepair] = {}
+    span = OfLast(span_of)  # channels of one group share their stamps
+    samples: dict[str, Samples] = {}
+
+    def take(cleaners: Mapping[str, Cleaner]) -> dict[str, Taken]:
+        taken = {}
+        for name, cleaner in cleaners.items():
+            channel = mapped[name][1]
+            repair = repairs.setdefault(channel.info.file, ClockRepair())
+            t_ns, order, faults = repair.repair(corrected(channel.t_ns, signal_map, channel.info.file))
+            is_changed = faults.back_steps or faults.duplicates or faults.strays
+            raw = channel.values[order] if is_changed else channel.values
+            samples[name] = cleaner.push(t_ns, raw, is_last=True)
+            every, t_used = span(t_ns), samples[name][0]
+            used = every if t_used is t_ns else span_of(t_used)
+            taken[name] = Taken(channel.values.size, every, used, faults, channel.absolute)
+        return taken
+
+    found = {name: (entry, channel.info) for name, (entry, channel) in mapped.items()}
+    plan = plan_drive(found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz)
+    table, bridged = plan.table(samples)
+    missing = {name: table.frame[name].null_count() for name in plan.symbols}
+    facts = plan.facts(missing, frozenset(name for name, gaps in bridged.items() if gaps), file_faults)
+    return replace(facts, frame=table.frame)
+
+
+def plan_drive(
+    found: Found,
+    take: Callable[[Mapping[str, Cleaner]], Mapping[str, Taken]],
+    *,
+    signal_map: SignalMap,
+    vehicle: Vehicle,
+    rate_hz: float | None = None,
+    most_rows: int = MAX_ROWS,
+) -> Plan:
+    """Clean the signals of a drive and plan its grid.
+
+    `take` passes all samples of some signals through their cleaners; signals without a sample may be left out. A frozen
+    signal, which is rare, goes through twice.
+
+    Raises
+    ------
+    SignalError, ConfigError
+        As `build_signals`.
+    """
+    faults: dict[str, str] = {}
+    cleaners = cleaners_of(found, signal_map, vehicle, faults=faults)
+    taken = dict(take(cleaners))
+    standing = standing_by(w for name in SPEEDS if name in cleaners and (w := cleaners[name].stands) is not None)
+    freezes = {
+        name: while_moving(cleaner.frozen(), standing) if name.startswith("torque_") else cleaner.frozen()
+        for name, cleaner in cleaners.items()
+    }
+    frozen = {name: found[name] for name, own in freezes.items() if own}
+    if frozen:  # sample times and counts are those without what is frozen
+        again = cleaners_of(frozen, signal_map, vehicle, freezes)
+        cleaners |= again
+        taken |= take(again)
+    cleaned: list[Clean] = []
     notes: list[str] = []
-    stamps = Stamps()
-
-    def watched() -> Iterator[StandWatch]:
-        """Yield the speeds of the drive one by one, each on demand."""
-        for name in SPEEDS:
-            watch = stand_watch_of(name, vehicle.r_e(name[-2:]) if name != "v_x" else None)
-            if watch is not None and name in mapped:
-                clean = clean_channel(name, *mapped[name], signal_map, vehicle, stamps, [], stands=watch)
-                if clean is not None and clean.origin.samples:
-                    yield watch
-
-    def standing() -> tuple[Stretch, ...]:
-        """Return when the car stands, by the best speed of the drive."""
-        return standing_by(watched())
-
-    cleaned = [
-        c
-        for symbol, (entry, channel) in mapped.items()
-        if (c := clean_channel(symbol, entry, channel, signal_map, vehicle, stamps, notes, standing=standing))
-        is not None
-    ]
-    cleaned = [c for c in cleaned if c.span.samples > 0]
+    for name in found:
+        if name in faults:
+            notes.append(faults[name])
+        if name in taken:
+            clean, own_notes = cleaners[name].cleaned(taken[name])
+            notes += own_notes
+            cleaned += [clean] if clean.span.samples else []
     if not cleaned:
         raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
-    absolute = common_clock([mapped[c.origin.symbol][1] for c in cleaned], signal_map)
-    grid = grid_of(cleaned, rate_hz)
-    points = grid.points()
-    place = OfLast(lambda t_ns: placed(t_ns, points, grid.dt_ns))
-    columns: dict[str, pl.Series] = {}
-    origins: dict[str, Origin] = {}
-    for clean in cleaned:
-        at = place(clean.t_ns)
-        y, bridged = onto_grid(clean.symbol, clean.span, clean.t_ns, clean.x, points, grid.dt_ns, at)
-        missing = max(float(np.mean(np.isnan(y))), missing_samples(clean.span, grid) if bridged else 0.0)
-        for name, series in columns_of(clean.symbol, y, vehicle):
-            if name in columns:
-                continue  # a signal that the log has by its canonical name wins over one that is derived
-            columns[name] = series
-            origins[name] = replace(clean.origin, symbol=name, missing_fraction=missing)
-    ordered = [name for name in SYMBOLS if name in columns]
-    frame = frame_of(grid.seconds(), columns, ordered)
-    files = tuple(dict.fromkeys(c.origin.file for c in cleaned))
-    start = grid.start_ns if absolute else None
-    origins = {n: origins[n] for n in ordered}
-    quality = quality_of(cleaned, file_faults, [*notes, *missing_notes(origins.values())])
-    return Signals(frame, grid.dt_ns, start, origins, quality, files)
+    absolute = common_clock([(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned], signal_map)
+    grid = grid_of(cleaned, rate_hz, most_rows=most_rows)
+    return Plan(grid, absolute, tuple(cleaned), tuple(notes), freezes, vehicle)
+
+
+def cleaners_of(
+    found: Found,
+    signal_map: SignalMap,
+    vehicle: Vehicle,
+    freezes: Freezes | None = None,
+    faults: dict[str, str] | None = None,
+) -> dict[str, Cleaner]:
+    """Return a cleaner for each signal whose unit fits, and in `faults` a note on each other."""
+    cleaners = {}
+    for name, (entry, info) in found.items():
+        try:
+            known = None if freezes is None else freezes.get(name, ())
+            cleaners[name] = Cleaner(name, entry, info, signal_map, vehicle, known)
+        except SignalError as error:
+            if faults is not None:
+                faults[name] = f"{error.line()}; the signal is left out"
+    return cleaners

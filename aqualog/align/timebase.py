@@ -14,13 +14,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.align.resample import MEDIAN_OF
-from aqualog.align.shared import OfLast
 from aqualog.core.records import BoolArray, TimeArray, TimeFaults
 
-__all__ = ["DAY_NS", "ClockRepair"]
+__all__ = ["DAY_NS", "ClockRepair", "OfLast"]
+
+_Value = TypeVar("_Value")
 
 _SECOND = 1_000_000_000
 _EVEN, _LEAST_UNEVEN = 1e-3, 3  # of the sample time; steps by which a block of stamps is known again
@@ -32,6 +37,26 @@ DAY_NS = 24 * 3600 * _SECOND
 _STRAYS = 100  # samples, at most, that have a stamp from elsewhere
 _SET_BACK = 5  # samples, at least, that a clock that was set back goes through once more
 _MOST_AGAIN = 20_000  # samples that are looked at
+
+
+class OfLast(Generic[_Value]):
+    """A function of an array that is called repeatedly with the same object; the last answer is kept.
+
+    Parameters
+    ----------
+    function : callable
+        Function of one array, which must not change in between.
+    """
+
+    def __init__(self, function: Callable[[NDArray[Any]], _Value]) -> None:
+        self._function = function
+        self._last: tuple[NDArray[Any], _Value] | None = None
+
+    def __call__(self, array: NDArray[Any]) -> _Value:
+        """Return the answer for this array, from before if it is the same object."""
+        if self._last is None or self._last[0] is not array:
+            self._last = (array, self._function(array))
+        return self._last[1]
 
 
 class ClockRepair:

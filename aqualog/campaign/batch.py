@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from polars.exceptions import PanicException
 
-from aqualog.align.load_long import load_drive
+from aqualog.align.load import load_drive
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.key import Contents, Seen, change_since, result_key
 from aqualog.campaign.loaded import loaded

@@ -86,7 +86,7 @@ def measure_long(
     Only the thinned samples are held as a whole: 3 MB of an hour.
     """
     present = present_in(drive, rows)
-    thinning = Thinning(vehicle, drive.grid.dt_ns * 1e-9)
+    thinning = Thinning(vehicle, drive.plan.grid.dt_ns * 1e-9)
 
     def keep(window: DriveResult) -> None:
         thinning.push({s: window.signals.array(s) for s in present}, *_seen(window))

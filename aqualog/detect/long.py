@@ -62,13 +62,13 @@ def detect_long(
         Events equal those of `detect_drive`; signals, features and tracks are a picture of the drive, or empty.
     """
     present = present_in(drive, rows) if present is None else present
-    dt_ns = drive.grid.dt_ns
+    dt_ns = drive.plan.grid.dt_ns
     stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
     plausibility = Plausibility(present, vehicle, stream.dt)
-    missing = dict.fromkeys(drive.symbols, 0)
+    missing = dict.fromkeys(drive.plan.symbols, 0)
     bridged: set[str] = set()
     events: list[Event] = []
-    picture = Picture(drive.grid.rows, dt_ns)
+    picture = Picture(drive.plan.grid.rows, dt_ns)
     tracks: tuple[Track, ...] = ()
     for signals, gaps in drive.windows(rows):
         columns = {s: signals.array(s) for s in (present or ["v_x"])}
@@ -89,9 +89,9 @@ def detect_long(
                 **{("statistic", str(i)): t.statistic for i, t in enumerate(tracks)},
                 **{("bit", str(i)): t.active.astype(np.float64) for i, t in enumerate(tracks)},
             })  # fmt: skip
-        tell(float(signals.frame["t"][-1]) / max(drive.grid.rows * dt_ns * 1e-9, 1e-9))
+        tell(float(signals.frame["t"][-1]) / max(drive.plan.grid.rows * dt_ns * 1e-9, 1e-9))
     slopes = tuple(w.summary() for w in stream.slope_watches)
-    whole = drive.facts(missing, frozenset(bridged), faults)
+    whole = drive.plan.facts(missing, frozenset(bridged), faults)
     seen: dict[tuple[str, str], FloatArray] = picture.columns()
     return DriveResult(
         signals=_pictured(whole, drive, seen, picture.dt_ns),
@@ -111,18 +111,18 @@ def present_in(drive: LongDrive, rows: int = ROWS) -> list[str]:
     seen: set[str] = set()
     for signals, _ in drive.windows(rows):
         seen |= {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
-        if len(seen) == len(drive.symbols):
+        if len(seen) == len(drive.plan.symbols):
             break
-    return [s for s in drive.symbols if s in seen]
+    return [s for s in drive.plan.symbols if s in seen]
 
 
 def _pictured(whole: Signals, drive: LongDrive, seen: Mapping[tuple[str, str], FloatArray], dt_ns: int) -> Signals:
     columns = {name: pl.Series(x).fill_nan(None) for (kind, name), x in seen.items() if kind == "signal"}
     columns = {s: x.cast(pl.Boolean) if SYMBOLS[s].unit == "bool" else x for s, x in columns.items()}
     n = next(iter(columns.values())).len() if columns else 0
-    empty = {s: pl.Series([], dtype=pl.Float64) for s in drive.symbols}
+    empty = {s: pl.Series([], dtype=pl.Float64) for s in drive.plan.symbols}
     frame = pl.DataFrame({"t": np.arange(n) * dt_ns * 1e-9, **(columns or empty)})
-    return replace(whole, frame=frame, dt_ns=dt_ns, full=(drive.grid.rows, drive.grid.dt_ns))
+    return replace(whole, frame=frame, dt_ns=dt_ns, full=(drive.plan.grid.rows, drive.plan.grid.dt_ns))
 
 
 def _tracks(tracks: Sequence[Track], seen: Mapping[tuple[str, str], FloatArray]) -> tuple[Track, ...]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from aqualog.align.freezes import longest_stop
+from aqualog.align.freezes import Stretch, longest_stop
 from aqualog.align.overview import ChannelOverview
-from aqualog.align.standing import Stretch
 from aqualog.core.records import Channel, TimeFaults
 from aqualog.doctor.records import Finding, Level
 

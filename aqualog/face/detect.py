@@ -302,8 +302,8 @@ def detect(
         else:
             from aqualog.face.detect_long import detect_in_windows
 
-            grid = loaded.drive.grid
-            check_something_to_do(loaded.drive.symbols, 1e9 / grid.dt_ns, loaded.drive.notes, car, one.name)
+            grid = loaded.drive.plan.grid
+            check_something_to_do(loaded.drive.plan.symbols, 1e9 / grid.dt_ns, loaded.drive.plan.notes, car, one.name)
             hear.detail(f"{grid.rows} samples at {1e9 / grid.dt_ns:g} Hz, gone through in windows")
             out = None if windows is None else file_of(windows, "windows")
             result = detect_in_windows(loaded, car, settings=settings, memory=memory, out=out, report=hear)

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from aqualog.align.load_long import LoadedLong
+from aqualog.align.load import LoadedLong
 from aqualog.core.records import DriveResult
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.long import detect_long

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.align.cache import SignalCache
-    from aqualog.align.load_long import LoadedLong
+    from aqualog.align.load import LoadedLong
 
 __all__ = ["Drive", "DriveLike", "drive_of", "read", "sources_of", "vehicle_needed", "vehicle_of"]
 
@@ -109,7 +109,7 @@ class Drive:
         key = _reading(vehicle)
         if self.given is not None or key in self._loaded:
             return self.load(vehicle)
-        from aqualog.align.load_long import load_drive
+        from aqualog.align.load import load_drive
 
         found = load_drive(
             self.paths, vehicle=vehicle, signal_map=self.signal_map, dbc=self.dbc, rate_hz=self.rate_hz,

@@ -6,9 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.align.freezes import FreezeWatch, in_freezes, watch_of
+from aqualog.align.freezes import FreezeWatch, StandWatch, in_freezes, is_standing, watch_of
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.standing import StandWatch, is_standing
 from aqualog.align.table import build_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.records import Channel, ChannelInfo

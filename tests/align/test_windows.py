@@ -49,8 +49,8 @@ def both(channels, *, rows=700, size=300, seed=0, entries=None, rate_hz=None):
     )  # fmt: skip
     windows = list(drive.windows(rows))
     bridged = frozenset(s for _, gaps in windows for s, b in gaps.items() if b)
-    missing = {n: sum(w.frame[n].null_count() for w, _ in windows) for n in drive.symbols}
-    return whole, pl.concat([w.frame for w, _ in windows]), drive.facts(missing, bridged, ())
+    missing = {n: sum(w.frame[n].null_count() for w, _ in windows) for n in drive.plan.symbols}
+    return whole, pl.concat([w.frame for w, _ in windows]), drive.plan.facts(missing, bridged, ())
 
 
 def same(channels, **kw):

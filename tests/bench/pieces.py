@@ -22,7 +22,7 @@ from tests.bench.logs import CAR, PERIOD_S, RATE, drive, one_log
 LEAD_H = 1.0
 RTOL, ATOL = 1e-8, 1e-9  # the document has nine digits
 ONE_PASS = (
-    "import sys; from aqualog.align import load_long as l; l.LONG = 10**12\n"
+    "import sys; from aqualog.align import load as l; l.LONG = 10**12\n"
     "from aqualog.cli.main import run; run()"
 )  # fmt: skip
 

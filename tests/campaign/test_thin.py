@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from campaign.made import make_campaign
 
-from aqualog.align.load import load_signals
-from aqualog.align.load_long import LoadedLong, load_drive
+from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.campaign import thin
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.measure import measure, measure_long

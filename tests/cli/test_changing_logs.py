@@ -8,8 +8,8 @@ import pytest
 from conftest import ROOT
 from typer.testing import CliRunner
 
-from aqualog.align import load_long
-from aqualog.align.load_long import load_drive
+from aqualog.align import load
+from aqualog.align.load import load_drive
 from aqualog.cli.main import app
 from aqualog.io import open_log
 from aqualog.io.content import changed_files, state_of
@@ -79,7 +79,7 @@ def test_it_is_a_note_and_a_loss(log, monkeypatch, args, act):
 
 
 def test_it_is_told_of_a_drive_in_windows_between_its_passes(log, monkeypatch):
-    monkeypatch.setattr(load_long, "LONG", 1)
+    monkeypatch.setattr(load, "LONG", 1)
     monkeypatch.setattr(load_drive, "__kwdefaults__", {**load_drive.__kwdefaults__, "least": 1})
     assert run("detect", log, "--vehicle", CAR).exit_code == 0
     calls = []

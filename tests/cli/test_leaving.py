@@ -12,13 +12,13 @@ from aqualog.model.programme import PROGRAMMES
 
 WAITING = """
 import sys, time
-from aqualog.align import load, load_long
+from aqualog.align import load
 from aqualog.evaluate import run as evaluation
 def wait(*_, **__):
     sys.stderr.write("READY\\n")
     sys.stderr.flush()
     time.sleep(30)
-load.load_signals = load_long.load_drive = wait
+load.load_signals = load.load_drive = wait
 evaluation.evaluate = wait
 from aqualog.cli.main import run
 sys.argv = ["aqualog", *sys.argv[1:]]

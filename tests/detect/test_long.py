@@ -7,9 +7,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.align import load_long
-from aqualog.align.load import load_signals
-from aqualog.align.load_long import LoadedLong, load_drive
+from aqualog.align import load
+from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect import plausibility
@@ -94,7 +93,7 @@ def test_table_and_page_of_the_command(tmp_path, monkeypatch):
         return json.loads((out / "events.json").read_text()), pl.read_parquet(out / "signals.parquet")
 
     events, table = detect(tmp_path / "whole")
-    monkeypatch.setattr(load_long, "LONG", 1)
+    monkeypatch.setattr(load, "LONG", 1)
     monkeypatch.setattr(load_drive, "__kwdefaults__", {**load_drive.__kwdefaults__, "least": 1})
     monkeypatch.setattr(command, "detect_long", lambda *a, **k: detect_long(*a, **k, rows=300))
     long_events, long_table = detect(tmp_path / "long")
