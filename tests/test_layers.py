@@ -16,7 +16,7 @@ ORDER = (
     "core", "physics", "io", "workers", "align", "features", "calibrate",
     "detect", "rivals", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "figures", "reproduce", "config", "face", "book", "cli",
 )  # fmt: skip
-# align/carrier and align/load read a map, which is a record of align; config turns TOML into these records
+# align/quantity and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from aqualog.align.carrier import Carrier, find_carrier
 from aqualog.align.clean import corrected
 from aqualog.align.clock import estimate_clock
 from aqualog.align.mapping import SignalMap
+from aqualog.align.quantity import Quantity, find_quantity
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Channel
 from aqualog.core.vehicle import Vehicle
@@ -21,21 +21,21 @@ _SENSOR_S = 0.3  # delay of a GNSS speed without a fault of its clock
 _MAX_OFFSET_S = 10.0
 
 
-def speed_of(channels: Sequence[Channel], *, signal_map: SignalMap, vehicle: Vehicle) -> Carrier | None:
+def speed_of(channels: Sequence[Channel], *, signal_map: SignalMap, vehicle: Vehicle) -> Quantity | None:
     """The speed in the channels of one file, by its own clock; None if it carries none."""
     try:
-        found = find_carrier(channels, quantity="speed", signal_map=signal_map, vehicle=vehicle)
+        found = find_quantity(channels, quantity="speed", signal_map=signal_map, vehicle=vehicle)
     except SignalError:
         return None
     return found if found.t_ns.size else None
 
 
-def on_clock(speed: Carrier, signal_map: SignalMap) -> Carrier:
+def on_clock(speed: Quantity, signal_map: SignalMap) -> Quantity:
     """A speed on the clock that the map gives its file."""
     return replace(speed, t_ns=corrected(speed.t_ns, signal_map, speed.file))
 
 
-def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
+def clock_findings(speeds: Sequence[Quantity]) -> Iterator[Finding]:
     """Yield findings for each file whose clock runs at another rate than the first one's, or differs by an offset.
 
     Clocks are not compared where the match of the speeds is weak or their common time short.
@@ -69,5 +69,5 @@ def clock_findings(speeds: Sequence[Carrier]) -> Iterator[Finding]:
             yield Finding("doubt", "offset", source.file, source.label, what, _advice(reference, source), 1)
 
 
-def _advice(reference: Carrier, source: Carrier) -> str:
+def _advice(reference: Quantity, source: Quantity) -> str:
     return f"aqualog align {reference.file} {source.file} --write-map"

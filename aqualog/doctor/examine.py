@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from aqualog.align.carrier import Carrier
 from aqualog.align.freezes import StandWatch, Stretch
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
+from aqualog.align.quantity import Quantity
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FileFaults
 from aqualog.core.vehicle import Vehicle
@@ -74,7 +74,7 @@ def _examined(
     report: Callable[[str], None],
 ) -> Examination:
     files, findings = [], []
-    speeds: list[Carrier] = []
+    speeds: list[Quantity] = []
     for path in paths:
         report(f"reading {path.name}")
         state, own, speed = _file(path, read_options(signal_map, dbc), signal_map=signal_map, vehicle=vehicle)
@@ -102,7 +102,7 @@ def _examined(
 
 def _file(
     path: Path, options: ReadOptions, *, signal_map: SignalMap, vehicle: Vehicle
-) -> tuple[FileState, list[Finding], Carrier | None]:
+) -> tuple[FileState, list[Finding], Quantity | None]:
     """Return the state of one file, its faults, and the speed that it carries."""
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
@@ -131,7 +131,7 @@ def _file(
     return state, findings, speed
 
 
-def _standing(speed: Carrier | None) -> tuple[Stretch, ...]:
+def _standing(speed: Quantity | None) -> tuple[Stretch, ...]:
     """Return the times at standstill; unknown in a file without a speed."""
     watch = StandWatch()
     if speed is not None:

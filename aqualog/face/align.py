@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.align.carrier import Carrier
     from aqualog.align.clock import ClockFit
+    from aqualog.align.quantity import Quantity
 
 __all__ = ["Alignment", "align", "check_quantity"]
 
@@ -31,11 +31,11 @@ __all__ = ["Alignment", "align", "check_quantity"]
 class Alignment(Result):
     """Clock offset, drift and scale of each source against a reference.
 
-    `fits` and `refused` have an entry for each source that could and could not be aligned. `carriers` are the compared
+    `fits` and `refused` have an entry for each source that could and could not be aligned. `compared` are the
     samples, that of the reference first; `before` is the signal map that was given.
     """
 
-    carriers: tuple[Carrier, ...]
+    compared: tuple[Quantity, ...]
     fits: Mapping[str, ClockFit]
     refused: Mapping[str, AqualogError]
     quantity: str
@@ -69,7 +69,7 @@ class Alignment(Result):
         """The JSON document of `aqualog align`."""
         from aqualog.report.alignment_document import alignment_document
 
-        return alignment_document(self.carriers, {**self.fits, **self.refused}, self.quantity)
+        return alignment_document(self.compared, {**self.fits, **self.refused}, self.quantity)
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -82,11 +82,11 @@ class Alignment(Result):
         """Return offset, drift, scale and match of each source."""
         from aqualog.report.alignment_document import alignment_text
 
-        return alignment_text(self.carriers, {**self.fits, **self.refused}, self.quantity)
+        return alignment_text(self.compared, {**self.fits, **self.refused}, self.quantity)
 
     def headline(self) -> str:
         """Return the offset of each source with its interval."""
-        reference = self.carriers[0]
+        reference = self.compared[0]
         lines = [f"{self.quantity.replace('_', ' ')} against {reference.file} ({reference.label})"]
         for file, fit in self.fits.items():
             low, high = fit.offset_ci95
@@ -102,8 +102,8 @@ class Alignment(Result):
         if not self.fits:
             sentence = {"text": "; ".join(e.what for e in self.refused.values()), "showarrow": False}
             return figure({"data": [], "layout": {"annotations": [sentence]}})
-        found = [(c, self.fits[c.file]) for c in self.carriers[1:] if c.file in self.fits]
-        return side_by_side(alignment_figures(self.carriers[0], found, self.quantity), columns=1)
+        found = [(c, self.fits[c.file]) for c in self.compared[1:] if c.file in self.fits]
+        return side_by_side(alignment_figures(self.compared[0], found, self.quantity), columns=1)
 
     def files(self) -> Writers:
         """Return `alignment.json`, and `map.toml` if any source was aligned."""
@@ -198,18 +198,18 @@ def align(
         raise ConfigError("align compares files", expected="a reference and at least one source")
     _check_channels(channels or {}, [p.name for p in drive.paths])
     with drive.reading():
-        carriers = _carriers(drive, vehicle_of(vehicle, drive), quantity, channels or {}, hear)
+        compared = _compared(drive, vehicle_of(vehicle, drive), quantity, channels or {}, hear)
         fits: dict[str, ClockFit] = {}
         refused: dict[str, AqualogError] = {}
-        for source in carriers[1:]:
-            hear(f"comparing {source.file} with {carriers[0].file}")
+        for source in compared[1:]:
+            hear(f"comparing {source.file} with {compared[0].file}")
             try:
-                fits[source.file] = _compare(carriers[0], source, quantity, max_offset_s, start_offset_s)
+                fits[source.file] = _compare(compared[0], source, quantity, max_offset_s, start_offset_s)
             except AqualogError as error:
                 refused[source.file] = error
     for file, refusal in refused.items():
         hear.failed(file, refusal.line())
-    return Alignment(tuple(carriers), fits, refused, quantity, drive.signal_map, drive.changes(), drive.sources)
+    return Alignment(tuple(compared), fits, refused, quantity, drive.signal_map, drive.changes(), drive.sources)
 
 
 def check_quantity(quantity: str) -> None:
@@ -219,7 +219,7 @@ def check_quantity(quantity: str) -> None:
     ------
     ConfigError
     """
-    from aqualog.align.carrier import QUANTITIES
+    from aqualog.align.quantity import QUANTITIES
 
     if text_of(quantity, "quantity") not in QUANTITIES:
         raise ConfigError(f'quantity "{quantity[:60]}"', expected=" or ".join(QUANTITIES))
@@ -233,18 +233,18 @@ def _check_channels(channels: Mapping[str, str], files: Sequence[str]) -> None:
             )
 
 
-def _carriers(
+def _compared(
     drive: Drive, vehicle: Vehicle, quantity: str, channels: Mapping[str, str], hear: Listener
-) -> list[Carrier]:  # fmt: skip
-    from aqualog.align.carrier import find_carrier
+) -> list[Quantity]:  # fmt: skip
     from aqualog.align.load import read_options
+    from aqualog.align.quantity import find_quantity
     from aqualog.io.open_log import DriveLog
 
     with DriveLog(list(drive.paths), read_options(drive.signal_map, list(drive.dbc))) as log:
         hear("reading")
         found = log.read(log.channels())
         return [
-            find_carrier(
+            find_quantity(
                 [c for (file, _), c in found.items() if file == p.name],
                 quantity=quantity, signal_map=drive.signal_map, vehicle=vehicle, named=channels.get(p.name),
             )
@@ -253,7 +253,7 @@ def _carriers(
 
 
 def _compare(
-    reference: Carrier, source: Carrier, quantity: str, max_offset: float, start_offset: float | None
+    reference: Quantity, source: Quantity, quantity: str, max_offset: float, start_offset: float | None
 ) -> ClockFit:
     from aqualog.align.clock import estimate_clock
 

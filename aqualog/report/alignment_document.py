@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from aqualog import __version__
-from aqualog.align.carrier import QUANTITIES, Carrier
 from aqualog.align.clock import ClockFit
+from aqualog.align.quantity import QUANTITIES, Quantity
 from aqualog.core.errors import AqualogError
 
 __all__ = ["alignment_document", "alignment_text"]
@@ -17,17 +17,17 @@ __all__ = ["alignment_document", "alignment_text"]
 Fits = Mapping[str, ClockFit | AqualogError]
 
 
-def alignment_text(carriers: Sequence[Carrier], fits: Fits, quantity: str) -> str:
-    """Return offset, drift, scale and match of each source; the first carrier is the reference."""
-    return "".join(_text(carriers[0], c, fits[c.file], quantity) for c in carriers[1:])
+def alignment_text(compared: Sequence[Quantity], fits: Fits, quantity: str) -> str:
+    """Return offset, drift, scale and match of each source; the first source is the reference."""
+    return "".join(_text(compared[0], c, fits[c.file], quantity) for c in compared[1:])
 
 
-def alignment_document(carriers: Sequence[Carrier], fits: Fits, quantity: str) -> dict[str, Any]:
+def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) -> dict[str, Any]:
     """Return the JSON document; NaN and infinities become null."""
     sources = []
-    for carrier in carriers[1:]:
-        fit = fits[carrier.file]
-        entry: dict[str, Any] = {"file": carrier.file, "channel": carrier.label}
+    for source in compared[1:]:
+        fit = fits[source.file]
+        entry: dict[str, Any] = {"file": source.file, "channel": source.label}
         if isinstance(fit, AqualogError):
             entry["refused"] = fit.line()
         else:
@@ -37,7 +37,7 @@ def alignment_document(carriers: Sequence[Carrier], fits: Fits, quantity: str) -
         "schema_version": 1,
         "tool_version": __version__,
         "quantity": quantity,
-        "reference": {"file": carriers[0].file, "channel": carriers[0].label},
+        "reference": {"file": compared[0].file, "channel": compared[0].label},
         "sources": sources,
     }
 
@@ -48,7 +48,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _text(reference: Carrier, source: Carrier, fit: ClockFit | AqualogError, quantity: str) -> str:
+def _text(reference: Quantity, source: Quantity, fit: ClockFit | AqualogError, quantity: str) -> str:
     unit = QUANTITIES[quantity]
     head = f"{source.file} ({source.label}) against {reference.file} ({reference.label})\n"
     head += "".join(f"  {c.file}: {c.note}\n" for c in (reference, source) if c.note)

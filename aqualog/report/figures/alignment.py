@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.align.carrier import QUANTITIES, Carrier
 from aqualog.align.clock import ClockFit
+from aqualog.align.quantity import QUANTITIES, Quantity
 from aqualog.core.records import FloatArray, TimeArray
 from aqualog.report.figures.slope_axes import axis, layout, rounded
 from aqualog.report.reduce import ALL_SAMPLES, reduce_indices
@@ -19,7 +19,7 @@ __all__ = ["alignment_figures"]
 
 
 def alignment_figures(
-    reference: Carrier, sources: Sequence[tuple[Carrier, ClockFit]], quantity: str
+    reference: Quantity, sources: Sequence[tuple[Quantity, ClockFit]], quantity: str
 ) -> list[dict[str, Any]]:  # fmt: skip
     """Return two figures: the quantity over the time of the reference, and each source less the reference.
 

@@ -17,13 +17,13 @@ from aqualog.core.records import Channel, FloatArray, TimeArray
 from aqualog.core.units import convert, is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["QUANTITIES", "Carrier", "find_carrier"]
+__all__ = ["QUANTITIES", "Quantity", "find_quantity"]
 
 QUANTITIES = {"speed": "m/s", "yaw_rate": "rad/s"}
 
 
 @dataclass(frozen=True, slots=True)
-class Carrier:
+class Quantity:
     """Samples of a quantity in one file. `t_ns` strictly increasing, `x` in m/s or rad/s."""
 
     file: str
@@ -34,9 +34,9 @@ class Carrier:
     note: str = ""
 
 
-def find_carrier(
+def find_quantity(
     channels: Sequence[Channel], *, quantity: str, signal_map: SignalMap, vehicle: Vehicle, named: str | None = None
-) -> Carrier:
+) -> Quantity:
     """Find the quantity in the channels of ONE file.
 
     Order of preference: the channel that is named; the signal map; names and units. A reference speed is preferred to
@@ -87,7 +87,7 @@ def _channel(channels: Sequence[Channel], entry: Entry) -> Channel:
 
 def _from_entries(
     channels: Sequence[Channel], entries: dict[str, Entry], quantity: str, vehicle: Vehicle
-) -> Carrier | None:
+) -> Quantity | None:
     if quantity == "yaw_rate":
         return (
             _single(_channel(channels, entries["yaw_rate"]), entries["yaw_rate"], quantity)
@@ -103,30 +103,30 @@ def _from_entries(
     t = parts[0].t_ns
     mean = np.mean([p.x if p.t_ns is t else linear(p.t_ns, p.x, t, gap_ns=10**9)[0] for p in parts], axis=0)
     label = f"mean of {len(wheels)} wheels"
-    return Carrier(parts[0].file, label, t, mean, parts[0].absolute, parts[0].note)
+    return Quantity(parts[0].file, label, t, mean, parts[0].absolute, parts[0].note)
 
 
-def _rim_speed(channel: Channel, entry: Entry, r_e: float) -> Carrier:
+def _rim_speed(channel: Channel, entry: Entry, r_e: float) -> Quantity:
     unit = entry.unit or channel.info.unit
     if unit and parse_unit(unit).dimension == "angular_speed":
         own = _clean(channel, convert(channel.values, unit, "rad/s") * entry.scale * r_e)
-        return Carrier(own.file, own.label, own.t_ns, own.x, own.absolute, f"r_e = {r_e:g} m")
+        return Quantity(own.file, own.label, own.t_ns, own.x, own.absolute, f"r_e = {r_e:g} m")
     return _single(channel, entry, "speed")
 
 
-def _single(channel: Channel, entry: Entry, quantity: str) -> Carrier:
+def _single(channel: Channel, entry: Entry, quantity: str) -> Quantity:
     unit = entry.unit or channel.info.unit
     target = QUANTITIES[quantity]
     if not unit or not is_unit(unit):
         own = _clean(channel, channel.values)
-        return Carrier(own.file, own.label, own.t_ns, own.x, own.absolute, f"no unit: taken as {target}")
+        return Quantity(own.file, own.label, own.t_ns, own.x, own.absolute, f"no unit: taken as {target}")
     where = f"{channel.info.file}:{channel.info.path}"
     values = convert(channel.values, unit, target, where=where) * entry.scale + entry.offset
     return _clean(channel, values)
 
 
-def _clean(channel: Channel, values: FloatArray) -> Carrier:
+def _clean(channel: Channel, values: FloatArray) -> Quantity:
     t, order, _ = ClockRepair().repair(channel.t_ns)
     x = values[order]
     good = np.isfinite(x)
-    return Carrier(channel.info.file, channel.info.path, t[good], x[good], channel.absolute)
+    return Quantity(channel.info.file, channel.info.path, t[good], x[good], channel.absolute)
