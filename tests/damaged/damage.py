@@ -107,3 +107,6 @@ DAMAGES: tuple[Damage, ...] = (
     double(0),
     tail(0),
 )
+
+DAMAGED_EACH = len(DAMAGES) + 2
+"""Damaged logs of a format: every damage, and two bombs."""

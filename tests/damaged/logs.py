@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +31,7 @@ def mf4(folder: Path, compression: int) -> Path:
     from aqualog.io.write_mdf import MdfGroup, write_mf4
 
     path = folder / f"mf4_{compression}.mf4"
-    write_mf4(path, [MdfGroup("signals", T, WITH_META)], START_NS, "", compression=compression)
+    write_mf4(path, [MdfGroup("signals", T, WITH_META)], START_NS, "", compression=compression, written_ns=START_NS)
     return path
 
 
@@ -64,9 +66,14 @@ def mdf3(folder: Path) -> Path:
 
     path = folder / "old.mdf"
     out = asammdf.MDF(version="3.30")
+    out.header.start_time = datetime.fromtimestamp(START_NS // 10**9, UTC)
     out.append([asammdf.Signal(x, T, name=n, unit=SYMBOLS[n].unit) for n, x in SIGNALS.items()], common_timebase=True)
     out.save(path)
     out.close()
+    # the library writes the time of day into a comment: the same log every time instead
+    path.write_bytes(
+        re.sub(rb"\w{3} \w{3} [ \d]\d [\d:]{8} \d{4}(?=: updated)", b"Sun Jun 15 15:06:40 2025", path.read_bytes())
+    )
     return path
 
 
@@ -187,3 +194,8 @@ FORMATS: dict[str, Callable[[Path], Path]] = {
     "Parquet, zstd": lambda p: parquet(p, "zstd"),
     "Parquet, plain": lambda p: parquet(p, "uncompressed"),
 }
+
+
+def folder_of(name: str) -> str:
+    """A format's name as that of a folder."""
+    return name.replace(" ", "_").replace(",", "")

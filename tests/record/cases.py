@@ -1,12 +1,16 @@
 """The command lines of the record, in the order in which they run: later ones read what earlier ones wrote.
 
 Every case runs in one folder that holds `sample_logs`, `real_logs` (where the measured drives are there), `given` (the
-maps and vehicle files beside this module) and `cars` (those of `tests/real`). `{o}` is the case's own folder `out/NAME`.
+maps and vehicle files beside this module), `cars` (those of `tests/real`) and `damaged` (see `tests/damaged`). `{o}` is the case's own folder `out/NAME`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from random import Random
+
+from tests.damaged.damage import DAMAGED_EACH
+from tests.damaged.logs import FORMATS, folder_of
 
 S = "sample_logs"
 CAR = f"--vehicle {S}/vehicle.toml"
@@ -22,6 +26,7 @@ CANEDGE = "real_logs/canedge"
 CANEDGE_LOG = f"{CANEDGE}/00000001-60FE3F04.MF4 --dbc {CANEDGE}/canmod-gps.dbc"
 THESIS = "given/few.toml"
 TRIPS = "given/trips.toml"
+DAMAGED = "damaged/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,8 @@ class Case:
         Keys of the JSON document that are kept; empty: all.
     is_long : bool
         Left out unless asked for.
+    is_digest : bool
+        Whether the document is kept as one digest of its results, without its sentences.
     """
 
     name: str
@@ -47,11 +54,17 @@ class Case:
     keep: str = "**/*"
     only: tuple[str, ...] = ()
     is_long: bool = False
+    is_digest: bool = False
 
     @property
     def needs_drives(self) -> bool:
         """Whether it reads the measured drives."""
         return "real_logs" in self.line or TRIPS in self.line
+
+    @property
+    def needs_damaged(self) -> bool:
+        """Whether it reads a damaged log."""
+        return DAMAGED in self.line
 
 
 ONE_DRIVE = (
@@ -185,4 +198,20 @@ CAMPAIGNS = (
     Case("reproduce", "reproduce -o {o} --jobs 2 --json", keep="*.json", is_long=True),
 )
 
-CASES = (*ONE_DRIVE, *PROGRAMMES, *CAMPAIGNS)
+
+def _damaged() -> tuple[Case, ...]:
+    """A hundred of the damaged logs, drawn over all formats: every other one is inspected, the others go through `detect`."""
+    lots = Random(11)
+    by_format = {name: lots.sample(range(DAMAGED_EACH), k=DAMAGED_EACH) for name in FORMATS}
+    drawn = [(name, numbers[k]) for k in range(DAMAGED_EACH) for name, numbers in by_format.items()][:100]
+    return tuple(
+        Case(
+            f"damaged_{folder_of(name)}_{number}",
+            f"{'detect' if number % 2 else 'inspect'} {DAMAGED}{folder_of(name)}/{number} --json",
+            is_digest=True,
+        )
+        for name, number in sorted(drawn)
+    )
+
+
+CASES = (*ONE_DRIVE, *PROGRAMMES, *CAMPAIGNS, *_damaged())

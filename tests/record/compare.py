@@ -65,6 +65,15 @@ def changes(old: Any, new: Any, place: str = "", *, is_prose: bool = False) -> I
         yield Change(place, old, new, is_wording=texts and (is_prose or _is_sentence(old) or _is_sentence(new)))
 
 
+def results_of(document: Any) -> Any:
+    """The document without what `changes` leaves out, and without prose."""
+    if isinstance(document, dict):
+        return {k: results_of(x) for k, x in document.items() if k not in LEFT_OUT and k.split(" ")[-1] not in PROSE}
+    if isinstance(document, list):
+        return [results_of(x) for x in document]
+    return "words" if isinstance(document, str) and _is_sentence(document) else document
+
+
 def case_changes(old: Path, new: Path) -> list[Change]:
     """Differences between two files of a record."""
     return list(changes(json.loads(old.read_text()), json.loads(new.read_text())))

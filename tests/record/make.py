@@ -16,8 +16,11 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
+from tests.damaged.damage import DAMAGES, bombs
+from tests.damaged.logs import FORMATS, folder_of
 from tests.record.cases import Case
-from tests.record.values import masked, values_below
+from tests.record.compare import results_of
+from tests.record.values import digest_of, masked, values_below
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -48,6 +51,8 @@ def make(cases: list[Case], folder: Path, tool: Tool, drives: Path) -> Iterator[
     with TemporaryDirectory(prefix="aqualog-record-") as place:
         work = Path(place).resolve()
         _furnish(work, drives)
+        if any(case.needs_damaged for case in cases):
+            _damage(work / "damaged")
         for case in cases:
             if case.needs_drives and not drives.is_dir():
                 continue
@@ -81,6 +86,8 @@ def run(case: Case, work: Path, tool: Tool, drives: Path) -> dict[str, Any]:
         document = json.loads(printed)
     except json.JSONDecodeError:
         return kept | {"stdout": printed}
+    if case.is_digest:
+        return kept | {"digest": digest_of(results_of(document))}
     return kept | {"document": {k: document[k] for k in case.only if k in document} if case.only else document}
 
 
@@ -91,6 +98,17 @@ def _furnish(work: Path, drives: Path) -> None:
     shutil.copytree(ROOT / "tests" / "real", work / "cars", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     if drives.is_dir():
         (work / "real_logs").symlink_to(drives.resolve())
+
+
+def _damage(folder: Path) -> None:
+    """Damaged logs of every format, each in a folder of its number."""
+    with TemporaryDirectory() as place:
+        for name, make_log in FORMATS.items():
+            log = make_log(Path(place))
+            for number, damage in enumerate((*DAMAGES, *bombs(name))):
+                path = folder / folder_of(name) / str(number) / log.name
+                path.parent.mkdir(parents=True)
+                path.write_bytes(damage.make(log.read_bytes()))
 
 
 def _environment(work: Path, tool: Tool) -> dict[str, str]:

@@ -89,6 +89,11 @@ def _mcap(data: bytes) -> dict[str, str]:
     return {name: _digest(messages) for name, messages in sorted(topics.items())}
 
 
+def digest_of(document: Any) -> str:
+    """One digest of a document."""
+    return _digest([masked(json.dumps(document, sort_keys=True)).encode()])
+
+
 def _digest(parts: Iterable[bytes]) -> str:
     total = hashlib.sha256()
     for part in parts:
