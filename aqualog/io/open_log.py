@@ -20,7 +20,7 @@ __all__ = ["DriveLog", "open_log"]
 
 
 def _mdf(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.mdf import MdfReader
+    from aqualog.io.mdf.reader import MdfReader
 
     return MdfReader(path, options)
 

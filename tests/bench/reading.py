@@ -40,7 +40,7 @@ def made_mf4(path: Path, *, records: int, channels: int, compression: int) -> Pa
 def read_by_aqualog(path: Path, names: list[str]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Time stamps and values of channels, by the reader of the package."""
     from aqualog.io.base import ReadOptions
-    from aqualog.io.mdf import MdfReader
+    from aqualog.io.mdf.reader import MdfReader
 
     with MdfReader(path, ReadOptions()) as reader:
         wanted = {c.name: c for c in reader.channels()}

@@ -11,14 +11,16 @@ import numpy as np
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, FileFaults
-from aqualog.io import batches, csv_rows, mdf, mdf_blocks, messages, parquet, text_file
+from aqualog.io import batches, csv_rows, messages, parquet, text_file
 from aqualog.io.base import ReadOptions
+from aqualog.io.mdf import columns as mdf_columns
+from aqualog.io.mdf import reader as mdf
 from aqualog.io.open_log import open_log
 
 T0_NS = 1_700_000_000 * 10**9
 LONGEST_LINE = 2000
 _SMALL = (
-    (messages, "_PIECE", 50), (batches, "_ENOUGH", 1000), (mdf, "_PIECE", 25), (mdf, "_FRAGMENT", 500), (mdf_blocks, "_PIECE", 400),
+    (messages, "_PIECE", 50), (batches, "_ENOUGH", 1000), (mdf, "_PIECE", 25), (mdf_columns, "_PIECE", 400),
     (parquet, "_PIECE", 60), (text_file, "LARGE", 1), (text_file, "_BLOCK", 333), (csv_rows, "PIECE", 200),
 )  # fmt: skip
 

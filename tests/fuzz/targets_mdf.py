@@ -13,11 +13,11 @@ from functools import cache
 from pathlib import Path
 
 import asammdf
-import mdf_by_hand
 import numpy as np
 from asammdf.blocks.conversion_utils import from_dict
 
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
+from tests import mdf_by_hand
 from tests.fuzz.readers import Outcome, outcome
 from tests.fuzz.registry import Target, target
 

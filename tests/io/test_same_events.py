@@ -242,7 +242,7 @@ def test_samples_are_small():
 
 
 def test_only_mapped_channels_are_decoded(tmp_path, monkeypatch):
-    from aqualog.io.mdf import MdfReader
+    from aqualog.io.mdf.reader import MdfReader
 
     asked = []
     read = MdfReader.read

@@ -11,17 +11,15 @@ from pathlib import Path
 import asammdf
 import numpy as np
 import pytest
-from mdf_by_hand import Blocks, describe, records, streamed, unsorted
 from typer.testing import CliRunner
 
-import aqualog.io.mdf as reader
 from aqualog.cli.main import app
 from aqualog.core.errors import LogError
-from aqualog.io import mdf4_survey, mdf_blocks, mdf_harness
 from aqualog.io.base import ReadOptions
-from aqualog.io.mdf import MdfReader
-from aqualog.io.patched_file import PatchedFile
+from aqualog.io.mdf import columns, describe4, groups, reader, walk4
+from aqualog.io.mdf.reader import MdfReader
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
+from tests.mdf_by_hand import Blocks, describe, records, streamed, unsorted
 
 K = np.arange(200)
 X = (np.sin(K) + K) * 2 + 1
@@ -134,12 +132,12 @@ def test_the_temporary_folder_is_private_and_goes_with_an_error(tmp_path, monkey
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     modes = []
 
-    def failing(*_, temporary_folder, **__):
-        modes.append(Path(temporary_folder).stat().st_mode & 0o777)
+    def failing(_path, _groups, into):
+        modes.append(Path(into.name).parent.stat().st_mode & 0o777)
         raise KeyError("block")
 
     with monkeypatch.context() as m:
-        m.setattr(asammdf, "MDF", failing)
+        m.setattr(groups, "sorted_groups", failing)
         assert "cannot be read as MDF" in refused(tmp_path, unsorted(unfinished=5))
     assert modes == [0o700]
     assert [p.name for p in tmp_path.iterdir()] == ["a.mf4"]
@@ -190,7 +188,6 @@ def test_what_precedes_a_damaged_block_is_kept(tmp_path, monkeypatch, which, pie
         x = found["group0.x"]
     else:
         monkeypatch.setattr(reader, "_PIECE", 25)
-        monkeypatch.setattr(reader, "_FRAGMENT", 500)
         with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
             (part,) = r.parts([c for c in r.channels() if c.path == "group0.x"])
             x = np.concatenate([c.values for piece in part.pieces for c in piece])
@@ -457,8 +454,8 @@ def test_frames_that_were_never_written_are_counted_and_are_no_frames(tmp_path):
     options = ReadOptions(dbc=(tmp_path / "a.dbc",))
     with MdfReader(tmp_path / "f.mf4", options) as r:
         sound = r.read(r.channels())[0]
-        (group,) = r._inner.groups
-        size = int(group.channel_group.samples_byte_nr)
+        (group,) = r._groups
+        size = group.size
     data = bytearray((tmp_path / "f.mf4").read_bytes())
     at = find(data, b"DT") + 24
     data[at + 20 * size : at + 35 * size] = bytes(15 * size)
@@ -541,9 +538,9 @@ def deflated(raw, *, size=None, invalidation=0, kind=0):
     return numbers_at(data, find(data, b"CG") + 24 + 48 + 28, "<I", invalidation)
 
 
-@pytest.mark.parametrize("size", [2**40, mdf4_survey.LARGEST_BLOCK + 1])
+@pytest.mark.parametrize("size", [2**40, walk4.LARGEST_BLOCK + 1])
 def test_a_block_of_no_sensible_size_is_refused_before_it_is_inflated(tmp_path, monkeypatch, size):
-    monkeypatch.setattr(mdf_blocks, "inflated", None)
+    monkeypatch.setattr(columns, "inflated", None)
     line = refused(tmp_path, deflated(records(200), size=size))
     assert "a data block of it declares" in line
     assert ("1.1e+03 GB" if size == 2**40 else "268 MB") in line
@@ -556,17 +553,16 @@ def test_a_block_of_no_sensible_size_is_refused_before_it_is_inflated(tmp_path, 
 def test_inflating_ends_at_the_size_that_is_told(tmp_path, monkeypatch, library, invalidation, kind):
     """8 MB in a block that tells of 4800 bytes, by the short cut and through asammdf."""
     if library == "zlib":
-        monkeypatch.setattr(mdf_blocks, "_libdeflate", None)
+        monkeypatch.setattr(columns, "_libdeflate", None)
     taken = []
-    original = mdf_blocks.inflated
+    original = columns.inflated
 
     def watched(data, size):
         out = original(data, size)
         taken.append(len(out))
         return out
 
-    monkeypatch.setattr("aqualog.io.mdf_harness.inflated", watched)
-    monkeypatch.setattr(mdf_blocks, "inflated", watched)
+    monkeypatch.setattr(columns, "inflated", watched)
     monkeypatch.setattr(zlib, "decompress", None)
     line = refused(tmp_path, deflated(bytes(1 << 23), size=200 * RECORD, invalidation=invalidation, kind=kind))
     assert "cannot be decoded" in line
@@ -591,7 +587,7 @@ def test_a_constant_channel_is_no_bomb(tmp_path):
 
 def test_what_does_not_fit_into_memory_is_refused_by_its_size(tmp_path, monkeypatch):
     (tmp_path / "a.mf4").write_bytes(streamed())
-    monkeypatch.setattr(reader, "free_memory", lambda: 10_000)
+    monkeypatch.setattr(groups, "free_memory", lambda: 10_000)
     with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
         with pytest.raises(LogError, match=r"have 200 samples each and would take 14.4 kB; expected at most 10 kB"):
             r.read(r.channels())
@@ -689,10 +685,9 @@ def test_names_in_any_encoding(tmp_path, text, name):
     path.encode()  # no halves of characters
 
 
-def test_an_encoding_is_told_from_the_beginning(tmp_path, monkeypatch):
-    """asammdf would look at all of a text of megabytes."""
+def test_an_encoding_is_guessed_from_the_beginning(tmp_path, monkeypatch):
     seen = []
-    monkeypatch.setattr(mdf_harness, "_guess_encoding", lambda text: seen.append(len(text)) or {"encoding": "cp1252"})
+    monkeypatch.setattr(describe4, "_encoding", lambda text: seen.append(len(text)) or "cp1252")
     read_bytes(tmp_path, commented(bytes([200, 201, 32, 230] * 400_000), "TX"))
     assert seen == [512]
 
@@ -729,38 +724,12 @@ def test_an_external_attachment_is_listed_and_never_opened(tmp_path):
     try:
         with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
             r.read(r.channels())
-            assert len(r._inner.attachments) == 1
-            assert r._inner.extract_attachment(0) == (b"", Path(), b"")
             faults = r.faults
     finally:
         WATCHED[0] = False
     assert any("a.mf4" in name for name in OPENED)
     assert not any("secret" in name for name in OPENED)
     assert f"1 attachments are never opened: '{secret}'" in " ".join(faults.notes)
-
-
-# --- a file with other bytes in it ---
-
-
-def test_a_patched_file_reads_as_the_patched_bytes(tmp_path):
-    raw = bytes(range(200))
-    (tmp_path / "a").write_bytes(raw)
-    patches = {3: b"abc", 50: bytes(20), 55: b"later", 195: b"0123456789", 210: b"end"}
-    expected = bytearray(raw) + bytes(13)
-    for at in sorted(patches):
-        expected[at : at + len(patches[at])] = patches[at]
-    rng = np.random.default_rng(1)
-    with PatchedFile(tmp_path / "a", patches) as file:
-        assert file.read() == expected
-        assert file.seek(0, 2) == 213
-        for _ in range(300):
-            at, n = (int(rng.integers(220)) for _ in range(2))
-            file.seek(at)
-            assert file.read(n) == expected[at : at + n]
-            assert file.tell() == min(at + n, 213) or at > 213
-        assert file.seek(10**30) == 213
-        assert file.read(10**30) == b""
-    assert (tmp_path / "a").read_bytes() == raw
 
 
 @pytest.mark.parametrize(("kind", "at"), [(b"DG", 4), (b"CN", 4)])

@@ -1,8 +1,7 @@
-"""Check the blocks of an MDF file before any library opens it.
+"""What the walks through MDF 3 and MDF 4 have in common.
 
-The walk checks every block that a reader would follow: whether it is there, is what its link says, and is linked once.
-A cut or damaged file can then be read as if its missing parts had never been linked. The survey gives the few bytes
-that say so (`patches`), in place of a copy of the file.
+A walk checks every block that it follows: whether it is there, is what its link says, and is linked once. What is cut
+or damaged is left out as if nothing had led to it, and noted.
 """
 
 from __future__ import annotations
@@ -14,15 +13,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from aqualog.core.errors import LogError
+from aqualog.io.mdf.records import FileHead, Group
 
-__all__ = ["BlockError", "Survey", "Walk", "mapped"]
+__all__ = ["BlockError", "Survey", "Walk", "mapped", "plain_text", "short"]
 
 _COMPLETE = "a complete MDF file"
 _COPY_AGAIN = "copy it from the logger again or stop the recording properly"
 _OWN_TOOL = "check it with the logger's own tool"
 _MOST_NOTES = 30
+_LARGEST_XML = 1 << 20
 
 
 class BlockError(Exception):
@@ -47,34 +49,19 @@ class BlockError(Exception):
 
 @dataclass(slots=True)
 class Survey:
-    """What was found: lost parts in words, and what makes the rest readable.
+    """What a walk has found: the groups that can be read, and lost parts in words.
 
-    `patches`: bytes in place of the file's own, by address. `refused`: why a channel is left out, by the address of its
-    block. `recount`: groups whose number of records is only known when their records have been sorted, by address.
-    `inferred`: groups whose records were reconstructed from their channels, by address; valid only if their time goes
-    up. `zeros`: what such a file ends in behind the records of these groups. [bytes]
-    `deflated`: addresses of deflated blocks of data.
-    `inflated`: size of the inflated records of a group, by address of the group. [bytes]
+    `deflated`: addresses of packed blocks of data. `unsorted`: size of records of several kinds in a row. [bytes]
     """
 
-    size: int
-    patches: dict[int, bytes] = field(default_factory=dict)
-    refused: dict[int, str] = field(default_factory=dict)
-    recount: set[int] = field(default_factory=set)
-    zeros: dict[int, int] = field(default_factory=dict)
-    inferred: set[int] = field(default_factory=set)
-    inflated: dict[int, int] = field(default_factory=dict)
+    groups: list[Group] = field(default_factory=list)
+    head: FileHead = field(default_factory=FileHead)
     deflated: list[int] = field(default_factory=list)
     unsorted: int = 0
     notes: list[str] = field(default_factory=list)
     truncated: bool = False
     finalised: bool = False
     lost_samples: int = 0
-    attachments: list[str] = field(default_factory=list)
-
-    def patch(self, at: int, layout: str, *values: int) -> None:
-        """Numbers in place of those in the file."""
-        self.patches[at] = struct.pack(layout, *values)
 
     def lost(self, what: str, broken: BlockError, samples: int = 0) -> None:
         """Note a part that is left out because of a block."""
@@ -97,7 +84,7 @@ class Survey:
 
 
 class Walk:
-    """What both formats' walks begin with: the file, what is found, and which blocks were seen.
+    """The file, what is found, and which blocks were seen.
 
     Parameters
     ----------
@@ -107,12 +94,11 @@ class Walk:
 
     def __init__(self, data: Any, path: Path) -> None:
         self._data, self._path, self._size = data, path, len(data)
-        self._found = Survey(self._size)
+        self._found = Survey()
         self._linked: set[int] = set()  # blocks that one link alone may lead to
         self._begins: set[int] = set()  # of all blocks seen
-        self._conversions: dict[int, str | None] = {}
 
-    def _head(self, name: str, at: int, layout: struct.Struct, mark: bytes) -> tuple[int, ...]:
+    def _block_head(self, name: str, at: int, layout: struct.Struct, mark: bytes) -> tuple[int, ...]:
         """Numbers behind the mark of a block, which must be the right one and inside the file."""
         if at + layout.size > self._size:
             raise BlockError(name, at, f"is missing, the file ends at byte {self._size}", is_cut=True)
@@ -136,7 +122,7 @@ class Walk:
 
 @contextmanager
 def mapped(path: Path) -> Iterator[Any]:
-    """The bytes of a file, which is not empty, without reading them."""
+    """The bytes of a file, without reading them."""
     with path.open("rb") as file:
         if file.seek(0, 2) == 0:
             yield b""
@@ -146,3 +132,27 @@ def mapped(path: Path) -> Iterator[Any]:
             yield view
         finally:
             view.close()
+
+
+def plain_text(text: str) -> str:
+    """Content of a text that may be an XML comment; empty if that has definitions of its own, or is too long."""
+    if not text.startswith("<"):
+        return text
+    if len(text) > _LARGEST_XML or "<!" in text.replace("<![CDATA[", "").replace("<!--", ""):
+        return ""
+    try:
+        root = ElementTree.fromstring(text.replace(' xmlns="http://www.asam.net/mdf/v4"', ""))
+    except ElementTree.ParseError:
+        return ""
+    content = root.find(".//TX")
+    if content is not None:
+        found = content.text or ""
+    else:
+        properties = root.find(".//common_properties")
+        found = "\n".join(f"{e.get('name')}: {e.text}" for e in (() if properties is None else properties))
+    return "" if found.startswith("<") else found
+
+
+def short(text: str) -> str:
+    """The first line of a comment, at most 120 characters."""
+    return " ".join(text.strip().split("\n")[0].split())[:120]

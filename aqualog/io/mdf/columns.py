@@ -1,0 +1,425 @@
+"""Read raw samples of a group of records straight from its data blocks.
+
+Blocks are read, unpacked and cut into columns without a copy of whole records. Of a transposed block only the bytes of
+the wanted channels are touched.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.core.records import BoolArray
+from aqualog.io.mdf.records import Field, Group, Stored
+
+try:
+    from deflate import zlib_decompress as _libdeflate  # comes along with another library where it can
+except ImportError:
+    _libdeflate = None
+
+__all__ = ["Raw", "damaged_blocks", "is_sound_field", "raw_columns", "raw_pieces", "unpacked_blocks"]
+
+_LARGEST_BLOCK = 1 << 28  # [bytes] stored or unpacked; the standard allows 4 MiB
+_PIECE = 1 << 21  # [bytes] read at a time where nothing is packed: what the cache still holds when it is cut
+_DZ_HEAD = 48
+_WHOLE_BITS = {"u": (8, 16, 32, 64), "i": (8, 16, 32, 64), "f": (16, 32, 64)}
+
+_Array = NDArray[Any]
+_Bytes = memoryview | bytes | bytearray
+
+
+class Raw(NamedTuple):
+    """Raw samples by channel, and which of them are invalid, for channels with an invalidation bit.
+
+    `first` is the number of the first record, `records` how many there are.
+    """
+
+    samples: dict[int, _Array]
+    invalid: dict[int, BoolArray]
+    first: int
+    records: int
+
+
+class _Block(NamedTuple):
+    """Whole records: where their stored bytes are, and the first record. More than one part only if none is packed."""
+
+    parts: tuple[Stored, ...]
+    size: int
+    first: int
+
+
+class _Plan(NamedTuple):
+    """Fields of the wanted channels, places of invalidation bits (byte, bit), blocks, size of a record. [bytes]"""
+
+    fields: Mapping[int, Field]
+    invalid: Mapping[int, tuple[int, int]]
+    blocks: Sequence[_Block]
+    size: int
+
+
+def is_sound_field(field: Field, size: int) -> bool:
+    """Whether a channel lies inside a record of this size and is a number that can be read there. [bytes]"""
+    if not (size > 0 and field.bits > 0 and field.at >= 0 and field.at + field.octets <= size):
+        return False
+    if field.letter == "V":
+        return True
+    if field.letter == "f":
+        return not field.shift and field.bits in _WHOLE_BITS["f"]
+    return field.octets <= 8
+
+
+def raw_columns(path: Path, group: Group, wanted: Sequence[int]) -> Raw:
+    """Raw samples of channels of a group, all of its records.
+
+    Parameters
+    ----------
+    path : Path
+        The file with the records.
+    group : Group
+    wanted : sequence of int
+        Channels of the group, none of them virtual.
+
+    Raises
+    ------
+    OSError, zlib.error, ...
+        If a block cannot be read or unpacked to the size that it declares.
+    """
+    pieces = list(raw_pieces(path, group, wanted, 1 << 62))
+    if len(pieces) == 1:
+        return pieces[0]
+    return Raw(
+        {i: np.concatenate([p.samples[i] for p in pieces]) if pieces else np.zeros(0) for i in wanted},
+        {i: np.concatenate([p.invalid[i] for p in pieces]) for i in (pieces[0].invalid if pieces else ())},
+        0,
+        sum(p.records for p in pieces),
+    )
+
+
+def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) -> Iterator[Raw]:
+    """The same in pieces of whole blocks with at least so many records, in order."""
+    size = group.record
+    if not 0 < size <= _LARGEST_BLOCK:
+        return
+    fields = {i: group.channels[i].field for i in wanted}
+    bits = {i: b for i in wanted if (b := group.channels[i].invalidation_bit) is not None}
+    invalid = {i: (group.size + b // 8, b % 8) for i, b in bits.items()}
+    blocks = None if group.invalid_data else _blocks(group.data, size, group.cycles)
+    if blocks is None:
+        yield from _streamed(path, _Plan(fields, invalid, (), size), group, records)
+        return
+    plan = _Plan(fields, invalid, blocks, size)
+    for run in _runs(blocks, size, records):
+        raw = _decoded(path, plan, run)
+        yield raw if raw.first + raw.records <= group.cycles else _head_of(raw, group.cycles - raw.first)
+
+
+def _head_of(raw: Raw, count: int) -> Raw:
+    """The first records of some."""
+    return Raw(
+        {i: x[:count] for i, x in raw.samples.items()}, {i: x[:count] for i, x in raw.invalid.items()}, raw.first, count
+    )
+
+
+def unpacked_blocks(path: Path, blocks: Iterable[Stored]) -> Iterator[_Bytes]:
+    """Content of blocks in turn, no longer transposed; of a plain one in pieces."""
+    with path.open("rb", buffering=0) as file:
+        for block in blocks:
+            for part in _in_pieces(block):
+                data = _unpacked(_stored(file, (part,), np.empty(part.size, dtype=np.uint8).data), part)
+                if len(data) != part.unpacked:
+                    raise OSError(f"a data block inflates to {len(data)} bytes, not {part.unpacked}")
+                yield _turned_back(data, part.columns) if part.columns else data
+
+
+def damaged_blocks(path: Path, blocks: Iterable[int]) -> frozenset[int]:
+    """Return the packed blocks at these addresses that do not unpack to the size that they declare.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    found = set()
+    with path.open("rb") as file:
+        for at in blocks:
+            file.seek(at)
+            head = file.read(_DZ_HEAD)
+            kind, unpacked, size = (
+                head[26],
+                int.from_bytes(head[32:40], "little"),
+                int.from_bytes(head[40:48], "little"),
+            )
+            data = file.read(size)
+            try:
+                if kind // 2:
+                    _unpacked(memoryview(data), Stored(at, size, unpacked, ("zstd", "lz4")[kind // 2 - 1]))
+                elif _inflated_size(data) != unpacked:
+                    found.add(at)
+            except Exception:  # what its library raises is of no one kind
+                found.add(at)
+    return frozenset(found)
+
+
+def _inflated_size(data: bytes) -> int:
+    """Return the size of deflated data, a piece at a time; the declared size may be far more than there is. [bytes]"""
+    inflater, size = zlib.decompressobj(), 0
+    while not inflater.eof:
+        piece = inflater.decompress(data, 1 << 20)
+        data = inflater.unconsumed_tail
+        if not piece and not data:
+            return -1  # its end is missing
+        size += len(piece)
+    return size
+
+
+# --- what lies where ---
+
+
+def _in_pieces(block: Stored) -> Iterator[Stored]:
+    if block.packing or block.size <= _PIECE:
+        yield block
+        return
+    for at in range(0, block.size, _PIECE):
+        size = min(_PIECE, block.size - at)
+        yield Stored(block.address + at, size, size)
+
+
+def _blocks(stored: Sequence[Stored], size: int, cycles: int) -> list[_Block] | None:
+    """Blocks of whole records, up to the declared number of them; None if a packed one ends inside a record."""
+    out: list[_Block] = []
+    plain: list[Stored] = []  # stored one behind the other; a record may begin in one and end in the next
+    for block in stored:
+        if not block.packing:
+            plain.append(block)
+            continue
+        if block.unpacked % size or max(block.unpacked, block.size) > _LARGEST_BLOCK:
+            return None
+        if block.columns not in (0, size) or sum(s.size for s in plain) % size:
+            return None
+        _put_plain(out, plain, size)
+        out.append(_Block((block,), block.unpacked, _records(out, size)))
+    _put_plain(out, plain, size)
+    return [b for b in out if b.first < cycles]
+
+
+def _records(blocks: Sequence[_Block], size: int) -> int:
+    return blocks[-1].first + blocks[-1].size // size if blocks else 0
+
+
+def _put_plain(out: list[_Block], plain: list[Stored], size: int) -> None:
+    """Cut consecutive stored bytes into pieces of whole records, and forget them; an incomplete record is left out."""
+    left = sum(s.size for s in plain) // size * size
+    piece = max(_PIECE // size, 1) * size
+    parts: list[Stored] = []
+    missing = min(piece, left)
+    for address, length in ((s.address, s.size) for s in plain):
+        while length and missing:
+            taken = min(length, missing)
+            parts.append(Stored(address, taken, taken))
+            address, length, missing, left = address + taken, length - taken, missing - taken, left - taken
+            if not missing:
+                out.append(_Block(tuple(parts), sum(p.size for p in parts), _records(out, size)))
+                parts, missing = [], min(piece, left)
+    plain.clear()
+
+
+def _runs(blocks: Sequence[_Block], size: int, records: int) -> Iterator[list[_Block]]:
+    run: list[_Block] = []
+    for block in blocks:
+        run.append(block)
+        if block.first - run[0].first + block.size // size >= records:
+            yield run
+            run = []
+    if run:
+        yield run
+
+
+# --- from bytes to columns ---
+
+
+def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> Raw:
+    """Raw samples of consecutive blocks."""
+    begin = blocks[0].first
+    out = _empty(plan, begin, sum(b.size for b in blocks) // plan.size)
+    pending = deque(blocks)
+    longest = max(sum(p.size for p in b.parts) for b in blocks)
+
+    def work() -> None:
+        # one room for all blocks: pages of memory that are fresh for each cost as much as reading them
+        room = np.empty(longest, dtype=np.uint8).data
+        try:
+            with path.open("rb", buffering=0) as file:
+                while pending:
+                    try:
+                        block = pending.popleft()
+                    except IndexError:  # another thread took the last one
+                        return
+                    data = _unpacked(_stored(file, block.parts, room), block.parts[0])
+                    if len(data) != block.size:
+                        raise OSError(f"a data block inflates to {len(data)} bytes, not {block.size}")
+                    _fill(out, plan, block.first - begin, data, is_transposed=block.parts[0].columns > 0)
+        except BaseException:
+            pending.clear()  # the other threads need not go on
+            raise
+
+    threads = min(len(blocks), _threads())
+    if threads < 2:
+        work()
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            for done in [pool.submit(work) for _ in range(threads)]:
+                done.result()
+    return out
+
+
+def _streamed(path: Path, plan: _Plan, group: Group, records: int) -> Iterator[Raw]:
+    """Pieces of records that begin in one block and end in another, or whose invalidation bits are stored apart."""
+    streams = [(plan.size, unpacked_blocks(path, group.data))]
+    if group.invalid_data:
+        bits = group.invalidation, unpacked_blocks(path, group.invalid_data)
+        streams = [(group.size, streams[0][1]), bits]
+    done = 0
+    waiting = [bytearray() for _ in streams]
+    is_more = True
+    while is_more and done < group.cycles:
+        is_more = False
+        for held, (size, stream) in zip(waiting, streams, strict=True):
+            while len(held) < size * min(records, max(_PIECE // size, 1)) and (data := next(stream, None)) is not None:
+                held += data
+                is_more = True
+        n = min(*(len(h) // s for h, (s, _) in zip(waiting, streams, strict=True)), group.cycles - done)
+        if not n:
+            continue
+        parts = [
+            np.frombuffer(bytes(h[: n * s]), np.uint8).reshape(n, s) for h, (s, _) in zip(waiting, streams, strict=True)
+        ]
+        for held, (size, _) in zip(waiting, streams, strict=True):
+            del held[: n * size]
+        raw = _empty(plan, done, n)
+        _fill(raw, plan, 0, np.hstack(parts).tobytes(), is_transposed=False)
+        yield raw
+        done += n
+
+
+def _empty(plan: _Plan, first: int, count: int) -> Raw:
+    return Raw(
+        {i: np.empty((count, f.octets) if f.letter == "V" else count, dtype=_dtype(f)) for i, f in plan.fields.items()},
+        {i: np.empty(count, dtype=np.bool_) for i in plan.invalid},
+        first,
+        count,
+    )
+
+
+def _dtype(field: Field) -> np.dtype[Any]:
+    if field.letter == "V":
+        return np.dtype(np.uint8)
+    order = ">" if field.is_big_endian and _is_whole(field) else "<"
+    return np.dtype(f"{order}{field.letter}{1 << (field.octets - 1).bit_length()}")
+
+
+def _is_whole(field: Field) -> bool:
+    """Whether NumPy has the type as it stands."""
+    return not field.shift and field.bits in _WHOLE_BITS.get(field.letter, ())
+
+
+def _threads() -> int:
+    """As many as polars has: one in a worker of a batch."""
+    given = os.environ.get("POLARS_MAX_THREADS", "")
+    return int(given) if given.isdigit() and int(given) > 0 else min(os.cpu_count() or 1, 4)
+
+
+def _stored(file: BinaryIO, parts: Sequence[Stored], room: memoryview) -> memoryview:
+    """Stored bytes as they are in the file; they stand in `room`."""
+    at = 0
+    for part in parts:
+        file.seek(part.address)
+        end = at + part.size
+        while at < end:
+            read = file.readinto(room[at:end])  # type: ignore[attr-defined]
+            if not read:
+                raise OSError(f"{end - at} of {part.size} bytes of a data block are not there")
+            at += read
+    return room[:at]
+
+
+def _unpacked(data: memoryview, block: Stored) -> _Bytes:
+    """A packed block, no more of it than it declares; of the ways without a checksum exactly that much."""
+    if not block.packing:
+        return data
+    if block.packing == "deflate":
+        return inflated(data, block.unpacked)
+    if block.packing == "lz4":
+        import lz4.frame
+
+        out: bytes = lz4.frame.LZ4FrameDecompressor().decompress(bytes(data), max_length=block.unpacked + 1)
+    else:
+        import zstandard
+
+        out = zstandard.ZstdDecompressor().stream_reader(bytes(data)).read(block.unpacked + 1)
+    if len(out) != block.unpacked:
+        raise ValueError(f"a data block inflates to another size than the {block.unpacked} bytes that it declares")
+    return out
+
+
+def inflated(data: bytes | memoryview, size: int) -> bytes | bytearray:
+    """A deflated block, whose checksum is right, of at most so many bytes; it may be shorter.
+
+    Raises
+    ------
+    OSError, zlib.error, deflate.DeflateError
+        If it is damaged or would be longer.
+    """
+    if _libdeflate is not None:
+        found: bytearray = _libdeflate(data, size)
+        return found
+    # no more than declared: a block that inflates without end is invalid; the checksum stands behind the last byte
+    inflater = zlib.decompressobj()
+    out = inflater.decompress(data, size)
+    if not inflater.eof and (inflater.decompress(inflater.unconsumed_tail, 1) or not inflater.eof):
+        raise OSError(f"a data block inflates to more than {size} bytes, or its end is missing")
+    return out
+
+
+def _turned_back(data: _Bytes, columns: int) -> bytes:
+    """Records of a transposed block; what is behind the last whole one was not turned round."""
+    whole = len(data) // columns * columns
+    octets = np.frombuffer(data, dtype=np.uint8)
+    return octets[:whole].reshape(columns, -1).T.tobytes() + octets[whole:].tobytes()
+
+
+def _fill(out: Raw, plan: _Plan, first: int, data: _Bytes, *, is_transposed: bool) -> None:
+    n = len(data) // plan.size
+    rows = slice(first, first + n)
+    octets = np.frombuffer(data, dtype=np.uint8)
+    planes = octets.reshape(plan.size, n) if is_transposed else octets.reshape(n, plan.size).T
+    for i, f in plan.fields.items():
+        here = out.samples[i][rows]
+        if f.letter == "V":
+            here[:] = planes[f.at : f.at + f.octets].T
+        elif _is_whole(f) and not is_transposed:
+            here[:] = np.ndarray((n,), here.dtype, data, f.at, (plan.size,))
+        else:
+            _gather(here, f, planes)
+    for i, (at, bit) in plan.invalid.items():
+        out.invalid[i][rows] = planes[at] >> bit & 1
+
+
+def _gather(here: _Array, f: Field, planes: NDArray[np.uint8]) -> None:
+    """Samples out of the bytes of which they are made; `planes[k]` is byte k of each record."""
+    width = here.dtype.itemsize
+    into = here.view(np.uint8).reshape(-1, width)
+    is_turned = f.is_big_endian and not _is_whole(f)  # what is no whole number of bytes is made little-endian
+    for k in range(f.octets):
+        into[:, k] = planes[f.at + (f.octets - 1 - k if is_turned else k)]
+    if not _is_whole(f):
+        # the highest bit to the top, then the lowest to the bottom: spreads the sign, and whatever lay above is gone
+        here <<= 8 * width - f.shift - f.bits
+        here >>= 8 * width - f.bits
