@@ -21,7 +21,7 @@ def absent():
     return [what for what, found in names.items() if not any(shutil.which(n) for n in found)]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser(tmp_path_factory):
     missing = absent()
     if missing:

@@ -67,7 +67,7 @@ class Alignment(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog align`."""
-        from aqualog.report.alignment_document import alignment_document
+        from aqualog.report.alignment import alignment_document
 
         return alignment_document(self.compared, {**self.fits, **self.refused}, self.quantity)
 
@@ -80,7 +80,7 @@ class Alignment(Result):
 
     def text(self) -> str:
         """Return offset, drift, scale and match of each source."""
-        from aqualog.report.alignment_document import alignment_text
+        from aqualog.report.alignment import alignment_text
 
         return alignment_text(self.compared, {**self.fits, **self.refused}, self.quantity)
 
@@ -96,7 +96,7 @@ class Alignment(Result):
 
     def plot(self) -> go.Figure:
         """Return the quantity of all sources on the clock of the reference, and each source less the reference."""
-        from aqualog.report.figures.alignment import alignment_figures
+        from aqualog.report.alignment import alignment_figures
         from aqualog.report.standalone import figure, side_by_side
 
         if not self.fits:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from aqualog.campaign.slip_slope import SlopeTable
     from aqualog.campaign.spin_downs import SpinDownRow
     from aqualog.face.campaign import CampaignRuns
-    from aqualog.report.campaign_findings import Curve
+    from aqualog.report.campaign.findings import Curve
 
 __all__ = ["BinnedResistance", "BinnedSlopes", "binned_resistance", "binned_slopes", "check_table"]
 
@@ -108,7 +108,7 @@ class BinnedSlopes(_Binned):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog bin-slipslope`."""
-        from aqualog.report.campaign_document import slope_document
+        from aqualog.report.campaign.bins import slope_document
 
         return slope_document(self.campaign.data.name, self.slopes, self.speeds, self.spin_ups, self.spin_downs)
 
@@ -120,13 +120,13 @@ class BinnedSlopes(_Binned):
 
     def text(self) -> str:
         """Return the tables that the command prints."""
-        from aqualog.report.campaign_tables import slope_text
+        from aqualog.report.campaign.bins import slope_text
 
         return slope_text(self.slopes, self.speeds, self.spin_ups, self.spin_downs)
 
     def plot(self) -> go.Figure:
         """Return slip slope over speed with 95 % intervals, a line for each configuration and wheel."""
-        from aqualog.report.campaign_findings import slope_curves
+        from aqualog.report.campaign.findings import slope_curves
 
         return _curves(slope_curves(self.slopes), "slip slope C_s/F_z", self.campaign.data.name)
 
@@ -142,7 +142,7 @@ class BinnedResistance(_Binned):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog bin-resistance`."""
-        from aqualog.report.campaign_document import resistance_document
+        from aqualog.report.campaign.bins import resistance_document
 
         return resistance_document(self.campaign.data.name, self.table)
 
@@ -153,13 +153,13 @@ class BinnedResistance(_Binned):
 
     def text(self) -> str:
         """Return the table that the command prints."""
-        from aqualog.report.campaign_tables import resistance_text
+        from aqualog.report.campaign.bins import resistance_text
 
         return resistance_text(self.table)
 
     def plot(self) -> go.Figure:
         """Return the resistance measure over speed with 95 % intervals, a line for each configuration."""
-        from aqualog.report.campaign_findings import resistance_curves
+        from aqualog.report.campaign.findings import resistance_curves
 
         return _curves(resistance_curves(self.table), "resistance measure [m/s²]", self.campaign.data.name)
 
@@ -209,7 +209,7 @@ def binned_resistance(
 def _frame(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
     import polars as pl
 
-    from aqualog.report.campaign_document import flat_rows
+    from aqualog.report.campaign.bins import flat_rows
 
     return pl.DataFrame(flat_rows(rows), infer_schema_length=None)
 
@@ -218,8 +218,8 @@ def _write(rows: Sequence[Mapping[str, Any]], suffix: str, path: Path) -> None:
     """Write rows of a document as CSV or Parquet; a text that a spreadsheet would run is made harmless in CSV."""
     import polars as pl
 
-    from aqualog.report.campaign_csv import safe_cell
-    from aqualog.report.campaign_document import flat_rows
+    from aqualog.report.campaign.bins import flat_rows
+    from aqualog.report.campaign.folder import safe_cell
 
     if suffix == ".parquet":
         _frame(rows).write_parquet(path)
@@ -231,7 +231,7 @@ def _write(rows: Sequence[Mapping[str, Any]], suffix: str, path: Path) -> None:
 def _curves(curves: Sequence[Curve], unit: str, title: str) -> go.Figure:
     import plotly.graph_objects as go
 
-    from aqualog.report.campaign_labels import group_text
+    from aqualog.report.campaign.labels import group_text
 
     made = go.Figure()
     for c in curves:

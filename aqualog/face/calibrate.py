@@ -13,7 +13,7 @@ from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 from aqualog.face.tables import flat
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Calibration(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog calibrate`."""
-        from aqualog.report.calibration_document import calibration_document
+        from aqualog.report.calibration import calibration_document
 
         logs = [str(p) for d in self.drives for p in d.paths]
         return calibration_document(self.found, logs=logs, notes=self.file_notes)
@@ -84,20 +84,20 @@ class Calibration(Result):
 
     def text(self) -> str:
         """Return parameters, drives and polynomials, and what could not be estimated."""
-        from aqualog.report.calibration_document import calibration_text
+        from aqualog.report.calibration import calibration_report
+        from aqualog.report.text import report_text
 
-        return calibration_text(self.found)
+        return report_text(calibration_report(self.found))
 
     def headline(self) -> str:
         """Return the estimated parameters of the car, and the names of those that the drives do not determine."""
-        from aqualog.report.calibration_document import parameter_cells
-        from aqualog.report.diagnosis_numbers import unit_text
+        from aqualog.report.calibration import parameter_cells
 
         found = self.found
         known = [p for p in found.parameters if p.identified]
         # an offset of each drive follows: the tables have it
         rows = [parameter_cells(p) for p in known if "[" not in p.name]
-        values = [f"{name} {value} {'' if unit == '-' else f'{unit_text(unit)} '}({interval or 'given'})"
+        values = [f"{name} {value} {'' if unit == '–' else f'{unit} '}({interval or 'given'})"
                   for name, value, interval, unit, *_ in rows]  # fmt: skip
         not_found = ", ".join(p.name for p in found.parameters if not p.identified and "[" not in p.name)
         return "\n".join(
@@ -111,7 +111,7 @@ class Calibration(Result):
 
     def plot(self) -> go.Figure:
         """Return the residual of the force balance before and after, over speed and over wheel force."""
-        from aqualog.report.figures.balance_residual import balance_residuals
+        from aqualog.report.calibration import balance_residuals
         from aqualog.report.standalone import side_by_side
 
         return side_by_side(balance_residuals(self.found))
@@ -119,14 +119,15 @@ class Calibration(Result):
     def files(self) -> Writers:
         """Return `calibration.json`, `calibrated.toml` and `calibration.html`."""
         from aqualog.config.vehicle_edit import calibrated_toml
-        from aqualog.report.calibration_page import write_calibration_page
+        from aqualog.report.calibration import calibration_report
+        from aqualog.report.page import report_page
 
         title = f"{self.found.vehicle_name}, {len(self.drives)} drives"
         return {
             "calibration.json": text_file(lambda: self.to_json() + "\n"),
             "calibrated.toml": text_file(lambda: calibrated_toml(self.before, self.found)),
-            "calibration.html": lambda path: write_calibration_page(
-                self.found, path, title=title, notes=self.file_notes
+            "calibration.html": page_file(
+                lambda: report_page(calibration_report(self.found, self.file_notes), title=title)
             ),
         }
 

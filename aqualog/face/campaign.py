@@ -242,7 +242,7 @@ class Campaign:
         ConfigError
         """
         from aqualog.campaign.batch import name_of
-        from aqualog.report.campaign_folder import check_folder, targets_of
+        from aqualog.report.campaign.folder import check_folder, targets_of
 
         check_folder(folder, force=force)
         campaign = self.configured.campaign
@@ -557,8 +557,8 @@ class CampaignRuns(Result):
         ------
         ConfigError
         """
-        from aqualog.report.campaign_findings import find
-        from aqualog.report.campaign_folder import write_report
+        from aqualog.report.campaign.findings import find
+        from aqualog.report.campaign.folder import write_report
 
         out, hear = file_of(folder, "folder"), listener(progress)
         self.campaign.check_report(out, force=force)

@@ -72,7 +72,7 @@ def convert(
         import numpy as np
 
         from aqualog.io.write_log import write_log
-        from aqualog.report.document import signal_groups
+        from aqualog.report.drive.document import signal_groups
 
         t_ns = np.arange(signals.frame.height, dtype=np.int64) * signals.dt_ns
         write_whole(

@@ -16,7 +16,7 @@ from aqualog.face.arguments import file_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -63,7 +63,7 @@ class Detection(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog detect`."""
-        from aqualog.report.document import document
+        from aqualog.report.drive.document import document
 
         return {**document(self.drive_result, log=self.drive.name), "model": _model_document(self.model)}
 
@@ -111,7 +111,7 @@ class Detection(Result):
         """Statistic and detection bit of each detector over `t` [s]."""
         import polars as pl
 
-        from aqualog.report.document import track_name
+        from aqualog.report.drive.document import track_name
 
         self._check_samples()
         columns: dict[str, Any] = {"t": self.signals["t"]}
@@ -128,13 +128,13 @@ class Detection(Result):
 
     def text(self) -> str:
         """Return the table of events, and what could not be judged."""
-        from aqualog.report.text import event_table
+        from aqualog.report.drive.words import event_table
 
         return event_table(self.drive_result)
 
     def headline(self) -> str:
         """Return the verdict: how many events, the most important ones, and which detectors could not judge."""
-        from aqualog.report.verdict import verdict
+        from aqualog.report.drive.words import verdict
 
         found, signals = verdict(self.drive_result), self.drive_result.signals
         rate = 1e9 / signals.step_ns
@@ -149,7 +149,7 @@ class Detection(Result):
 
     def plot(self) -> go.Figure:
         """Return the panels of the page: speeds, detectors, differences, accelerations, statistics, slopes."""
-        from aqualog.report.page import drive_rows
+        from aqualog.report.drive.panels import drive_rows
         from aqualog.report.standalone import rows_figure
 
         self._check_samples()
@@ -161,12 +161,12 @@ class Detection(Result):
 
         The table only of a drive that was read whole; without samples only the events.
         """
-        from aqualog.report.page import write_page
+        from aqualog.report.drive.page import drive_page
 
         files = {
             "events.json": text_file(lambda: self.to_json() + "\n"),
             "signals.parquet": lambda path: self._write(path, ".parquet"),
-            "report.html": lambda path: write_page(self.drive_result, path, title=self.drive.title),
+            "report.html": page_file(lambda: drive_page(self.drive_result, title=self.drive.title)),
         }
         if self.drive_result.signals.full is not None:
             del files["signals.parquet"]
@@ -193,7 +193,7 @@ class Detection(Result):
         import numpy as np
 
         from aqualog.io.write_log import write_log
-        from aqualog.report.document import result_groups
+        from aqualog.report.drive.document import result_groups
 
         signals = self.drive_result.signals
         t_ns = np.arange(signals.frame.height, dtype=np.int64) * signals.dt_ns

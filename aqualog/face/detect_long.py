@@ -74,7 +74,7 @@ class _Table:
         import numpy as np
 
         from aqualog.io.write_log import write_log
-        from aqualog.report.document import result_groups
+        from aqualog.report.drive.document import result_groups
 
         n, dt_ns = window.signals.frame.height, window.signals.dt_ns
         t_ns = (self._rows + np.arange(n, dtype=np.int64)) * dt_ns

@@ -16,7 +16,7 @@ from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, Grouped, Loaded, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 from aqualog.face.tables import flat, table
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Diagnosis(Result):
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog diagnose`."""
         from aqualog import __version__
-        from aqualog.report.diagnosis_document import diagnosis_document
+        from aqualog.report.diagnosis.document import diagnosis_document
 
         return diagnosis_document(
             self.found, logs=self.logs, tool_version=__version__, notes=self.file_notes, vehicle=self.vehicle_name,
@@ -113,14 +113,16 @@ class Diagnosis(Result):
 
     def text(self) -> str:
         """Return the verdict and its basis."""
-        from aqualog.report.diagnosis_document import diagnosis_text
+        from aqualog.report.diagnosis.sections import diagnosis_report
+        from aqualog.report.text import report_text
 
-        return diagnosis_text(self.document)
+        return report_text(diagnosis_report(self.document))
 
     def headline(self) -> str:
         """Return the verdict, the causes with their intervals, and the next drive if one is proposed."""
-        from aqualog.report.diagnosis_numbers import interval_text, ordinary, unit_text
-        from aqualog.report.diagnosis_words import effect_title, sentences
+        from aqualog.report.diagnosis.words import effect_title, sentences
+        from aqualog.report.numbers import interval_text, ordinary
+        from aqualog.report.wording import pretty_unit
 
         d = self.document
         said = sentences(d)
@@ -130,13 +132,13 @@ class Diagnosis(Result):
             for name, p in c["parameters"].items():
                 value, interval = interval_text(p)
                 lines.append(f"  {effect_title(c['key'])}, {name.replace('_', ' ')}: {value} ({interval}) "
-                             f"{unit_text(p['unit'])}")  # fmt: skip
+                             f"{pretty_unit(p['unit'])}")  # fmt: skip
         return ordinary("\n".join([*lines[:6], *said["manoeuvre"][:1]]))
 
     def plot(self) -> go.Figure:
         """Return residuals before and after, errors of each channel, and what is not explained."""
-        from aqualog.report.diagnosis_figures import plots
-        from aqualog.report.diagnosis_views import view_figures
+        from aqualog.report.diagnosis.figures import plots
+        from aqualog.report.diagnosis.views import view_figures
         from aqualog.report.standalone import side_by_side
 
         explained = [x for c in self.found.causes for x in c.explains]
@@ -148,14 +150,17 @@ class Diagnosis(Result):
 
     def files(self) -> Writers:
         """Return `diagnosis.json`, `model.toml` and `diagnosis.html`."""
-        from aqualog.report.diagnosis_page import write_diagnosis_page
+        from aqualog.report.diagnosis.sections import diagnosis_report
+        from aqualog.report.page import report_page
 
         drives = self.found.drives
         title = ", ".join([self.vehicle_name, *drives[:3]]) + (" …" if len(drives) > 3 else "")
         return {
             "diagnosis.json": text_file(lambda: self.to_json() + "\n"),
             "model.toml": text_file(lambda: _model_text(self.found, self.vehicle_name)),
-            "diagnosis.html": lambda path: write_diagnosis_page(self.document, self.found.views, path, title),
+            "diagnosis.html": page_file(
+                lambda: report_page(diagnosis_report(self.document, self.found.views), title=title)
+            ),
         }
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:

@@ -147,7 +147,7 @@ class Drive:
 
     def plot(self) -> go.Figure:
         """Return the signals over time, a row for each unit."""
-        from aqualog.report.figures.signals import signals_figure
+        from aqualog.report.drive.panels import signals_figure
 
         return signals_figure(self.signals, self.title)
 

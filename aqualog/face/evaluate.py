@@ -12,7 +12,7 @@ from aqualog.face.arguments import file_of, names_of
 from aqualog.face.campaign import Campaign, is_campaign, split
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import refuse_existing, write_text, write_whole
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -57,7 +57,7 @@ class Comparison(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog evaluate`."""
-        from aqualog.report.evaluation_document import evaluation_document
+        from aqualog.report.evaluation import evaluation_document
 
         return evaluation_document(self.evaluation, by=self.keys)
 
@@ -73,9 +73,10 @@ class Comparison(Result):
 
     def text(self) -> str:
         """Return the tables that the command prints."""
-        from aqualog.report.evaluation_text import evaluation_text
+        from aqualog.report.evaluation import evaluation_report
+        from aqualog.report.text import report_text
 
-        return evaluation_text(self.evaluation, by=self.keys)
+        return report_text(evaluation_report(self.evaluation, by=self.keys))
 
     def headline(self) -> str:
         """Return the answer in one sentence."""
@@ -86,7 +87,7 @@ class Comparison(Result):
 
     def plot(self) -> go.Figure:
         """Return the recall of each detector; curves over the threshold where they were asked for."""
-        from aqualog.report.evaluation_page import evaluation_figures
+        from aqualog.report.evaluation_figures import evaluation_figures
         from aqualog.report.standalone import side_by_side
 
         return side_by_side(list(evaluation_figures(self.evaluation).values()))
@@ -95,7 +96,7 @@ class Comparison(Result):
         """Return `evaluation.json` and `evaluation.html`; `thresholds.toml` where thresholds were tuned."""
         files = {
             "evaluation.json": text_file(lambda: self.to_json() + "\n"),
-            "evaluation.html": self._page,
+            "evaluation.html": page_file(self._page),
             "thresholds.toml": text_file(self._thresholds),
         }
         if self.evaluation.tuning is None:
@@ -110,7 +111,7 @@ class Comparison(Result):
         ConfigError
         """
         refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
-        write_whole(Path(path), self._page)
+        write_whole(Path(path), page_file(self._page))
         return Path(path)
 
     def write_thresholds(self, path: PathLike, *, force: bool = False) -> Path:
@@ -124,10 +125,11 @@ class Comparison(Result):
         write_text(Path(path), self._thresholds())
         return Path(path)
 
-    def _page(self, path: Path) -> None:
-        from aqualog.report.evaluation_page import write_evaluation_page
+    def _page(self) -> str:
+        from aqualog.report.evaluation import evaluation_report
+        from aqualog.report.page import report_page
 
-        write_evaluation_page(self.evaluation, path, title=self.name, by=self.keys)
+        return report_page(evaluation_report(self.evaluation, by=self.keys), title=self.name)
 
     def _thresholds(self) -> str:
         from aqualog.config.settings import joint_text

@@ -38,13 +38,13 @@ class Matrix(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog inspect campaign.toml`."""
-        from aqualog.report.matrix_text import matrix_document
+        from aqualog.report.campaign.matrix import matrix_document
 
         return matrix_document(self.campaign, *self.parts)
 
     def text(self) -> str:
         """Return the matrix as the command prints it."""
-        from aqualog.report.matrix_text import matrix_text
+        from aqualog.report.campaign.matrix import matrix_text
 
         return matrix_text(self.campaign, *self.parts)
 
@@ -64,7 +64,7 @@ class Matrix(Result):
         """Return the number of runs of each configuration."""
         import plotly.graph_objects as go
 
-        from aqualog.report.campaign_labels import group_text
+        from aqualog.report.campaign.labels import group_text
 
         count: dict[str, int] = {}
         for run in self.campaign.runs:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-__all__ = ["PathLike", "Result", "Writers", "printable", "text_file"]
+__all__ = ["PathLike", "Result", "Writers", "page_file", "printable", "text_file"]
 
 PathLike = str | Path
 Writers = Mapping[str, Callable[[Path], None]]
@@ -115,6 +115,17 @@ def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
 
     def write(path: Path) -> None:
         path.write_text(text(), encoding="utf-8")
+
+    return write
+
+
+def page_file(page: Callable[[], str]) -> Callable[[Path], None]:
+    """Return a writer of a page; the page is made when it is written."""
+
+    def write(path: Path) -> None:
+        from aqualog.report.offline import write_page
+
+        write_page(path, page())
 
     return write
 

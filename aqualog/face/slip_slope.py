@@ -13,7 +13,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 from aqualog.face.tables import table
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class SlipSlope(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog slip-slope`."""
-        from aqualog.report.slope_document import slope_document
+        from aqualog.report.slope import slope_document
 
         return slope_document(self.slopes, log=self.drive.name, notes=self.file_notes)
 
@@ -89,13 +89,14 @@ class SlipSlope(Result):
 
     def text(self) -> str:
         """Return slopes, stability, and which part of the drive was used."""
-        from aqualog.report.slope_document import slope_text
+        from aqualog.report.slope import slope_report
+        from aqualog.report.text import report_text
 
-        return slope_text(self.slopes)
+        return report_text(slope_report(self.slopes))
 
     def headline(self) -> str:
         """Return a line for each place: slope, 95 % interval, stability."""
-        from aqualog.report.slope_document import slope_lines, way_sentence
+        from aqualog.report.slope import slope_lines, way_sentence
 
         found = self.slopes
         return "\n".join(
@@ -108,21 +109,21 @@ class SlipSlope(Result):
 
     def plot(self) -> go.Figure:
         """Return slip over traction of each place, the slope over the session, and the time used."""
-        from aqualog.report.slope_page import slope_plots
+        from aqualog.report.slope_figures import slope_plots
         from aqualog.report.standalone import side_by_side
 
         return side_by_side(list(slope_plots(self.slopes).values()))
 
     def files(self) -> Writers:
         """Return `slip_slope.json`, `slip_slope.csv` and `slip_slope.html`."""
-        from aqualog.report.slope_document import slope_csv
-        from aqualog.report.slope_page import write_slope_page
+        from aqualog.report.page import report_page
+        from aqualog.report.slope import slope_csv, slope_report
 
         return {
             "slip_slope.json": text_file(lambda: self.to_json() + "\n"),
             "slip_slope.csv": text_file(lambda: slope_csv(self.slopes)),
-            "slip_slope.html": lambda path: write_slope_page(
-                self.slopes, path, title=self.drive.title, notes=self.file_notes
+            "slip_slope.html": page_file(
+                lambda: report_page(slope_report(self.slopes, self.file_notes), title=self.drive.title)
             ),
         }
 

@@ -6,9 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from markupsafe import Markup
-
-from aqualog import __version__
 from aqualog.figures.draw import panel_figure
 from aqualog.figures.record import BORNE_OUT, IN_PART, NOT_BORNE_OUT, Figure
 from aqualog.report import offline
@@ -33,20 +30,19 @@ def render_figures(figures: Sequence[Figure], *, title: str) -> str:
     """
     ids = {f.stem: panel_ids(f) for f in figures}
     plots = {i: panel_figure(p) for f in figures for i, p in zip(ids[f.stem], f.panels, strict=True)}
-    scripts = {"plotly": offline.plotly_js(), "page": (offline.TEMPLATES / "figures.js").read_text(encoding="utf-8")}
-    css = [offline.TEMPLATES / "page.css", _TEMPLATES / "figures.css"]
-    return offline.environment(_TEMPLATES).get_template("figures.html.j2").render(
+    return offline.render(
+        "figures.html.j2",
+        folders=(_TEMPLATES,),
+        css=("figures.css",),
+        islands={"figure-data": plots},
         title=title,
-        version=__version__,
-        policy=offline.content_policy(scripts.values()),
-        # Markup only for the package's own files, plotly.js and what json_island has escaped
-        css=Markup("".join(p.read_text(encoding="utf-8") for p in css)),
-        scripts={name: Markup(text) for name, text in scripts.items()},
-        data=offline.json_island(plots),
+        kind="",
+        about="the thesis' figures, made again",
+        facts=(),
         figures=figures,
         panels={f.stem: list(zip(ids[f.stem], f.panels, strict=True)) for f in figures},
         counts=_counts(figures),
-    )  # fmt: skip
+    )
 
 
 def _counts(figures: Sequence[Figure]) -> str:

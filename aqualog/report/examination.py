@@ -7,8 +7,7 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.doctor.records import Examination, Finding
-from aqualog.report.names import cut
-from aqualog.report.text import CELL, NOTE, lacking
+from aqualog.report.wording import CELL, NOTE, cut, lacking
 
 __all__ = ["examination_document", "examination_text"]
 

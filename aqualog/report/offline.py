@@ -1,11 +1,11 @@
-"""Builds pages as single files that need no network: scripts inside, a policy that names them, data as JSON."""
+"""Builds pages that need no network: scripts inside, a policy that names them, data as JSON."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,18 +14,79 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from aqualog import __version__
 from aqualog.core.units import displayed_text
 from aqualog.report.wording import readable
 
-__all__ = [
-    "PLOTLY_HERE", "TEMPLATES", "content_policy", "environment", "json_island", "plotly_js", "with_plotly",
-]  # fmt: skip
+__all__ = ["content_policy", "plotly_js", "render", "write_page"]
 
 TEMPLATES = Path(__file__).parent / "templates"
+# Stands for plotly.js while a template is filled, so that megabytes need not go through it; nothing that is escaped can
+# hold it.
+_PLOTLY_HERE = "/*<plotly.js>*/"
+
+
+def render(
+    template: str,
+    *,
+    islands: Mapping[str, Any],
+    folders: Sequence[Path] = (),
+    css: Sequence[str] = (),
+    scripts: Sequence[str] = ("figures.js",),
+    plotly: str = "inside",
+    **values: Any,
+) -> str:
+    """A page as HTML; the same text for the same values.
+
+    Parameters
+    ----------
+    template : str
+        Extends `base.html.j2`, which asks for `title`, `kind` and `about`.
+    islands : mapping
+        Documents that the scripts read, by the id of their element.
+    folders : sequence of Path
+        Where templates, styles and scripts are looked for before the folder of this package.
+    css, scripts : sequence of str
+        File names. `page.css` and `common.js` are on every page. All scripts are one, without global names.
+    plotly : str
+        `inside`; empty for a page without figures; else the address of a `plotly.min.js` that the pages of a folder
+        share.
+    values
+        Of the template; texts may hold anything, they are escaped.
+    """
+    places = (*folders, TEMPLATES)
+    script = _script(places, ("common.js", *scripts))
+    inside = [_PLOTLY_HERE] if plotly == "inside" else []
+    page = _environment(*places).get_template(template).render(
+        version=__version__,
+        policy=content_policy([*inside, script], loads=plotly not in ("", "inside")),
+        plotly_at="" if inside else plotly,
+        # Markup only for the package's own files, plotly.js and what _json has escaped
+        css=Markup("".join(_text(places, name) for name in ("page.css", *css))),
+        scripts=[Markup(x) for x in (*inside, script)],
+        islands={name: _json(document) for name, document in islands.items()},
+        **values,
+    )  # fmt: skip
+    before, found, after = page.partition(_PLOTLY_HERE)
+    return f"{before}{plotly_js()}{after}" if found else page
+
+
+def write_page(path: Path, page: str) -> None:
+    """Write a page; what UTF-8 cannot hold, as the lone surrogate of a file name, becomes a question mark."""
+    path.write_bytes(page.encode("utf-8", "replace"))
 
 
 @cache
-def environment(*folders: Path) -> Environment:
+def _script(places: tuple[Path, ...], names: tuple[str, ...]) -> str:
+    return '"use strict";\n(function () {\n' + "\n".join(_text(places, n) for n in names) + "})();\n"
+
+
+def _text(places: Sequence[Path], name: str) -> str:
+    return next(p / name for p in places if (p / name).is_file()).read_text(encoding="utf-8")
+
+
+@cache
+def _environment(*folders: Path) -> Environment:
     """Templates of folders, compiled once; what is put into one is escaped and made readable unless it is Markup.
 
     The filter `units` shows units in a text one way.
@@ -64,17 +125,6 @@ def _plotly_digest() -> str:
     return _digest(plotly_js())
 
 
-# Stands for plotly.js while a template is filled, so that megabytes need not go through it; nothing that is escaped can
-# hold it.
-PLOTLY_HERE = "/*<plotly.js>*/"
-
-
-def with_plotly(page: str) -> str:
-    """A page with plotly.js in the place of its stand-in, if it has one."""
-    before, found, after = page.partition(PLOTLY_HERE)
-    return f"{before}{plotly_js()}{after}" if found else page
-
-
 def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
@@ -85,13 +135,13 @@ def content_policy(scripts: Iterable[str], *, loads: bool = False) -> str:
     Parameters
     ----------
     scripts : iterable of str
-        Texts of the scripts in the page; `PLOTLY_HERE` for plotly.js.
+        Texts of the scripts in the page; `_PLOTLY_HERE` for plotly.js.
     loads : bool
         Whether these scripts may load further ones themselves, as pages that share one plotly.js do. A page on a disk
         has no origin: `'self'` names nothing there in some browsers and the whole disk in others. So trust goes by who
         asks: a script element that stands in the document stays forbidden.
     """
-    digests = [_plotly_digest() if s == PLOTLY_HERE else _digest(s) for s in scripts]
+    digests = [_plotly_digest() if s == _PLOTLY_HERE else _digest(s) for s in scripts]
     allowed = " ".join([*(f"'sha256-{d}'" for d in digests), *(["'strict-dynamic'"] if loads else [])])
     # plotly sets style attributes and style elements; data: and blob: are for its "save as picture"
     return (
@@ -100,7 +150,7 @@ def content_policy(scripts: Iterable[str], *, loads: bool = False) -> str:
     )
 
 
-def json_island(document: Any) -> Markup:
+def _json(document: Any) -> Markup:
     """A document as JSON that no HTML parser can leave."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
     for character, escaped in (("<", "\\u003c"), (">", "\\u003e"), ("&", "\\u0026")):

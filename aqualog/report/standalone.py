@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aqualog.core.units import convert
-from aqualog.report.figures.row import Lane, Line, Row
-from aqualog.report.figures.stack import stack
 from aqualog.report.reduce import ALL_SAMPLES, make_plan, reduce_indices
+from aqualog.report.row import Lane, Line, Row
+from aqualog.report.stack import stack
 from aqualog.report.theme import LIGHT, in_light
 
 if TYPE_CHECKING:

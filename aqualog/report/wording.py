@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from aqualog.core.records import Event
 from aqualog.core.units import displayed_unit
 
 __all__ = [
-    "caption", "detector_name", "evidence_parts", "number", "place", "plot_text", "pretty_unit", "readable",
-    "speed_kmh",
+    "CELL", "NOTE", "caption", "cut", "detector_name", "evidence_parts", "lacking", "name_digest", "number", "place",
+    "plot_text", "pretty_unit", "readable", "speed_kmh",
 ]  # fmt: skip
 
 _KMH = 3.6
+LONGEST = 90  # characters of a name that are shown
+CELL = 200  # of a cell in a terminal
+NOTE = 1000  # of a sentence that names what a log holds
 LONGEST_WORD = 200  # characters without a space that a page shows
 LONGEST_TEXT = 4000  # characters in one place of a page
 # characters that a terminal or a browser acts on instead of showing: controls and marks of writing direction
@@ -140,3 +144,22 @@ def plot_text(text: str, most: int = 80) -> str:
     """
     text = readable(text if len(text) <= most else f"{text[: most - 1]}…")
     return text.replace("&", "＆").replace("<", "‹").replace(">", "›").replace("%{", "％{").replace("$", "＄")
+
+
+def cut(text: str, most: int = LONGEST) -> str:
+    """One line of at most so many characters; what is cut gets a hash, so that two long names stay two."""
+    line = "".join(c if c.isprintable() else "\ufffd" for c in text[:most])
+    return line if len(text) <= most else f"{line[: most - 12]}… #{name_digest(text)[:8]}"
+
+
+def name_digest(text: str) -> str:
+    """A digest that distinguishes two names whose shown parts are equal."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def lacking(missing: Sequence[str]) -> str:
+    """Missing signals of a detector, with possible replacements."""
+    text = ", ".join(missing)
+    for axle in "fr":  # an axle's torque will do
+        text = text.replace(f"torque_{axle}l, torque_{axle}r", f"torque_{axle}l, torque_{axle}r (or torque_{axle})")
+    return text

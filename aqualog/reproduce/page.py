@@ -6,9 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from markupsafe import Markup
-
-from aqualog import __version__
 from aqualog.figures.draw import panel_figure
 from aqualog.figures.page import panel_ids
 from aqualog.figures.record import Figure, stem_of
@@ -41,19 +38,15 @@ def render_reproduction(
     """
     ids = {f.stem: panel_ids(f) for f in figures}
     plots = {i: panel_figure(p) for f in figures for i, p in zip(ids[f.stem], f.panels, strict=True)}
-    scripts = {
-        "plotly": offline.plotly_js(),
-        "page": (offline.TEMPLATES / "figures.js").read_text(encoding="utf-8"),
-        "claims": (_TEMPLATES / "reproduction.js").read_text(encoding="utf-8"),
-    }
-    css = [offline.TEMPLATES / "page.css", _FIGURES / "figures.css", _TEMPLATES / "reproduction.css"]
-    return offline.environment(_TEMPLATES, _FIGURES).get_template("reproduction.html.j2").render(
-        version=__version__,
-        policy=offline.content_policy(scripts.values()),
-        # Markup only for the package's own files, plotly.js and what json_island has escaped
-        css=Markup("".join(p.read_text(encoding="utf-8") for p in css)),
-        scripts={name: Markup(text) for name, text in scripts.items()},
-        data=offline.json_island(plots),
+    return offline.render(
+        "reproduction.html.j2",
+        folders=(_TEMPLATES, _FIGURES),
+        css=("figures.css", "reproduction.css"),
+        scripts=("figures.js", "reproduction.js"),
+        islands={"figure-data": plots},
+        title=f"{len(figures)} figures and {len(conclusions)} claims of the thesis",
+        kind="the thesis reproduced",
+        about="Fichtinger, TU Wien 2024, made again",
         figures=figures,
         panels={f.stem: list(zip(ids[f.stem], f.panels, strict=True)) for f in figures},
         missing=missing,
@@ -64,7 +57,7 @@ def render_reproduction(
         facts=facts,
         number_told=_number_told,
         anchor_of=_anchor_of,
-    )  # fmt: skip
+    )
 
 
 def _number_told(check: Check) -> str:

@@ -12,7 +12,7 @@ from aqualog.align.table import build_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.records import Channel, ChannelInfo
 from aqualog.detect.stream import detect_drive
-from aqualog.report.document import document
+from aqualog.report.drive.document import document
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 S = 1_000_000_000

@@ -39,9 +39,9 @@ def lines_of(result: DriveResult) -> dict[str, np.ndarray]:
 
 def with_aqualog(result: DriveResult) -> str:
     """The page of `detect -o`."""
-    from aqualog.report.page import render_page
+    from aqualog.report.drive.page import drive_page
 
-    return render_page(result, title="drive")
+    return drive_page(result, title="drive")
 
 
 def with_plotly(result: DriveResult) -> str:

@@ -12,7 +12,7 @@ from aqualog.campaign.full_speed import EVENTS, FullSpeed, _drawn, _from_passes,
 from aqualog.campaign.slip_slope import SlopeRow, _with_dry, contact, fit_slope
 from aqualog.campaign.spin_downs import Pass
 from aqualog.physics.tyre_brush import brush_force
-from aqualog.report.campaign_document import slope_document
+from aqualog.report.campaign.bins import slope_document
 
 TANGENT, DRY, WET = 27.0, 1.02, 0.816
 S = np.linspace(-0.1, 0.3, 8001)

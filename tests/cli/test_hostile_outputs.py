@@ -13,7 +13,7 @@ from mcap.writer import Writer
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
-from aqualog.report.campaign_csv import safe_cell
+from aqualog.report.campaign.folder import safe_cell
 
 CAR = Path(__file__).resolve().parents[2] / "sample_logs" / "vehicle.toml"
 LONG = "y" * 1_000_000

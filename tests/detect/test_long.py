@@ -17,7 +17,7 @@ from aqualog.detect.picture import Picture
 from aqualog.detect.stream import detect_drive
 from aqualog.io import batches, csv_rows, messages, parquet, text_file
 from aqualog.io.mdf import reader as mdf
-from aqualog.report.document import document
+from aqualog.report.drive.document import document
 
 LOGS = Path(__file__).parents[2] / "sample_logs"
 CAR = load_vehicle(LOGS / "vehicle.toml")

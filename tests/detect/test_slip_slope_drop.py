@@ -24,8 +24,8 @@ from aqualog.detect.stream import DriveStream, detect_drive
 from aqualog.model.scenario import Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.surface import SURFACES
-from aqualog.report.figures.slip_slope import slip_slope
-from aqualog.report.text import event_table
+from aqualog.report.drive.panels import drive_rows
+from aqualog.report.drive.words import event_table
 
 DT = 0.01
 RWD = Vehicle(name="rwd", given=frozenset({"mass", "tyre.slip_slope_r"}))
@@ -322,7 +322,7 @@ def test_text_and_page_of_a_drive():
     for line in told:
         assert "dry 31.0 (vehicle file)" in line
         assert 90 <= sum(int(x) for x in re.findall(r"(\d+)%", line)) <= 101
-    (row,) = slip_slope(result)
+    row = next(r for r in drive_rows(result) if r.title == "Slip slope")
     assert [x.label for x in row.lines] == ["RL", "RL, dry", "RR", "RR, dry"]
     assert np.nanmin(row.lines[0].values) < 15.0 < 30.0 < np.nanmax(row.lines[1].values)
 

@@ -14,7 +14,7 @@ from aqualog.detect.needs import check_needs
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import Thresholds
 from aqualog.physics.load import wheel_loads
-from aqualog.report.document import result_groups
+from aqualog.report.drive.document import result_groups
 
 DT, N = 0.01, 2000
 POLYNOMIAL = {"c0": (20.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,), "sigma": (40.0,)}

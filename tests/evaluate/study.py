@@ -208,9 +208,10 @@ def main() -> None:
     from aqualog.evaluate.run import Evaluation
     from aqualog.evaluate.tune import applied, choose
     from aqualog.model.situations import SITUATIONS
-    from aqualog.report.evaluation_document import evaluation_document
-    from aqualog.report.evaluation_page import write_evaluation_page
-    from aqualog.report.evaluation_text import evaluation_text
+    from aqualog.report.evaluation import evaluation_document, evaluation_report
+    from aqualog.report.offline import write_page
+    from aqualog.report.page import report_page
+    from aqualog.report.text import report_text
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hours", type=float, default=1.0, help="driving in nuisance situations")
@@ -246,7 +247,7 @@ def main() -> None:
     roc = curve_points(by_factor, thresholds=own, rivals=asked) if a.roc else ()
     evaluation = Evaluation(tuple(by_factor[1.0]), own, asked, roc, failed)
     print(f"pool {a.pool}, seeds {found[0]['seed']} ... {found[-1]['seed']}, code {options['code']}")
-    print(evaluation_text(evaluation))
+    print(report_text(evaluation_report(evaluation)))
     print("\n".join(sentences(evaluation.records)))
     print()
     print(by_margin(evaluation.records))
@@ -256,7 +257,8 @@ def main() -> None:
         json.dumps(evaluation_document(evaluation, by=["margin_kmh"]), indent=1, allow_nan=False) + "\n",
         encoding="utf-8",
     )
-    write_evaluation_page(evaluation, a.out / "evaluation.html", title=f"situations, pool {a.pool}")
+    page = report_page(evaluation_report(evaluation), title=f"situations, pool {a.pool}")
+    write_page(a.out / "evaluation.html", page)
     if a.tune:
         choices = choose(roc)
         tuned, tuned_rivals = applied(choices, own, dict(rivals))

@@ -21,15 +21,16 @@ from aqualog.evaluate.records import DetectorRun, RunRecord
 from aqualog.evaluate.run import Evaluation
 from aqualog.figures.page import render_figures
 from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table
-from aqualog.report.calibration_page import render_calibration_page
-from aqualog.report.campaign_findings import find
-from aqualog.report.campaign_folder import page_names
-from aqualog.report.campaign_page import render_campaign_page
-from aqualog.report.diagnosis_page import render_diagnosis_page
-from aqualog.report.evaluation_page import render_evaluation_page
-from aqualog.report.page import render_page
-from aqualog.report.run_page import render_run_page
-from aqualog.report.slope_page import render_slope_page
+from aqualog.report.calibration import calibration_report
+from aqualog.report.campaign.findings import find
+from aqualog.report.campaign.folder import page_names
+from aqualog.report.campaign.page import campaign_page
+from aqualog.report.campaign.run_page import run_page
+from aqualog.report.diagnosis.sections import diagnosis_report
+from aqualog.report.drive.page import drive_page
+from aqualog.report.evaluation import evaluation_report
+from aqualog.report.page import report_page
+from aqualog.report.slope import slope_report
 from aqualog.reproduce.catalogue import claims
 from aqualog.reproduce.check import Check
 from aqualog.reproduce.page import render_reproduction
@@ -85,7 +86,7 @@ def reproduction(name):
 
 def slopes(name):
     result = DirectResult(name, "axle", "torque", 0.3, 10.0, 100.0, (), (), (name,))
-    return render_slope_page(result, title=name, notes=(name,))
+    return report_page(slope_report(result, (name,)), title=name)
 
 
 def named(value, name):
@@ -99,7 +100,7 @@ def named(value, name):
 
 def diagnosis(name):
     document = json.loads(json.dumps(document_of("named"), allow_nan=False))
-    return render_diagnosis_page(named(document, name), views_of("named")[:1], name)
+    return report_page(diagnosis_report(named(document, name), views_of("named")[:1]), title=name)
 
 
 def calibration(name):
@@ -113,7 +114,7 @@ def calibration(name):
         Parameter("mass", 1.0, (0.0, 2.0), "kg", False, name),
     )
     made = Calibration(name, parameters, (fit, fit), {}, (name,), (name,))
-    return render_calibration_page(made, title=name, notes=(name,))
+    return report_page(calibration_report(made, (name,)), title=name)
 
 
 def evaluation(name):
@@ -123,7 +124,7 @@ def evaluation(name):
                   ("tie_rod",), (name,), is_lossy=True) for k in range(2)
     )  # fmt: skip
     made = Evaluation(records, DEFAULT, None, failed={name: name})
-    return render_evaluation_page(made, title=name, by=("tyre",))
+    return report_page(evaluation_report(made, by=("tyre",)), title=name)
 
 
 def campaign(name, folder):
@@ -145,26 +146,26 @@ def campaign(name, folder):
     return CampaignData(named, Store(folder / "store"), told)
 
 
-def campaign_page(name, folder):
+def campaign_pages(name, folder):
     data = campaign(name, folder)
     findings = find(data, plan(data, ()))
-    return render_campaign_page(data, findings, [None] * len(data.runs), page_names([r.name for r in data.runs]))
+    return campaign_page(data, findings, [None] * len(data.runs), page_names([r.name for r in data.runs]))
 
 
-def run_page(name, folder):
+def run_pages(name, folder):
     data = campaign(name, folder)
-    return render_run_page(data, data.runs[0], None, None, back="../index.html")
+    return run_page(data, data.runs[0], None, None, back="../index.html")
 
 
 PAGES = {
-    "drive": lambda name, _: render_page(drive(name), title=name),
-    "eventful drive": lambda name, _: render_page(eventful(name), title=name),
+    "drive": lambda name, _: drive_page(drive(name), title=name),
+    "eventful drive": lambda name, _: drive_page(eventful(name), title=name),
     "slip slope": lambda name, _: slopes(name),
     "figures": lambda name, _: render_figures([figure(name), figure(name)], title=name),
     "reproduction": lambda name, _: reproduction(name),
     "diagnosis": lambda name, _: diagnosis(name),
     "calibration": lambda name, _: calibration(name),
     "evaluation": lambda name, _: evaluation(name),
-    "campaign": campaign_page,
-    "run": run_page,
+    "campaign": campaign_pages,
+    "run": run_pages,
 }

@@ -8,7 +8,8 @@ import fake_result as fake
 import pytest
 from headless import PATIENCE, click, requests, severe, wait_for
 
-from aqualog.report.page import write_page
+from aqualog.report.drive.page import drive_page
+from aqualog.report.offline import write_page
 from aqualog.report.theme import EVENT_SHADE, FULL_SHADE
 
 pytestmark = pytest.mark.browser
@@ -20,7 +21,7 @@ def show(browser, tmp_path):
 
     def opened(result, title="run"):
         path = tmp_path / "page.html"
-        write_page(result, path, title=title)
+        write_page(path, drive_page(result, title=title))
         for kind in ("browser", "performance"):
             browser.get_log(kind)
         browser.get(path.as_uri())

@@ -5,8 +5,8 @@ from campaign_case import load_case, make_case
 from headless import click, requests, severe, wait_for
 
 from aqualog.campaign.bins import plan
-from aqualog.report.campaign_findings import find
-from aqualog.report.campaign_folder import write_report
+from aqualog.report.campaign.findings import find
+from aqualog.report.campaign.folder import write_report
 
 pytestmark = pytest.mark.browser
 

@@ -18,15 +18,14 @@ from aqualog.campaign.bins import plan
 from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
-from aqualog.report.campaign_answers import answers_of
-from aqualog.report.campaign_crossing import crossing
-from aqualog.report.campaign_findings import Curve, Point, find
-from aqualog.report.campaign_folder import MARK, check_folder, page_names, write_report
-from aqualog.report.campaign_labels import file_name, group_text, value_text
-from aqualog.report.campaign_quality import MOST_KINDS, problems_of
-from aqualog.report.campaign_runs import facts_of
-from aqualog.report.names import cut
-from aqualog.report.run_page import command_of, render_run_page
+from aqualog.report.campaign.answers import answers_of
+from aqualog.report.campaign.findings import Curve, Point, crossing, find
+from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
+from aqualog.report.campaign.labels import file_name, group_text, value_text
+from aqualog.report.campaign.quality import MOST_KINDS, problems_of
+from aqualog.report.campaign.run_page import command_of, run_page
+from aqualog.report.campaign.runs import facts_of
+from aqualog.report.wording import cut
 
 SECTIONS = ("verdict", "quality", "filters", "answers-section", "matrix-section", "slopes-section",
             "resistance-section", "full-section", "detections-section", "runs-section", "made-section")  # fmt: skip
@@ -203,7 +202,7 @@ def test_long_drive_makes_a_small_page(case):
     values = {"tyre": "t" * 10**6, "x_a": SCRIPT * 1000}
     run = type(info.run)(info.run.logs, info.run.vehicle, None, None, values)
     huge = RunInfo(9, "l" * 10**6, run, info.key, "done", "", info.vehicle, about, "lane times")
-    html = render_run_page(case, huge, samples, facts_of(huge, samples), back="../index.html")
+    html = run_page(case, huge, samples, facts_of(huge, samples), back="../index.html")
     assert len(html) < 100_000
 
 
@@ -213,7 +212,7 @@ def test_rim_of_a_wheel_that_stops_stands_still(case):
     columns = {"v_x": np.full(n, 30.0), "slip_fl": np.full(n, -19.0), "slip_min_fl": np.full(n, -1.0)}
     frame = pl.DataFrame(columns | {"slip_max_fl": np.full(n, -0.9)})
     samples = RunSamples(frame, np.arange(n) * 0.1, np.zeros(n))
-    data = data_of(render_run_page(case, info, samples, None, back=""), "run-data")
+    data = data_of(run_page(case, info, samples, None, back=""), "run-data")
     speeds = {name: values for name, _, values in data["lines"]["speed"]}
     assert speeds["v_x"] == [108.0] * n
     assert speeds["FL"] == pytest.approx([0.05 * 108.0] * n)

@@ -6,7 +6,9 @@ from diagnosis_case import HOSTILE, cases, views_of
 from headless import click, requests, severe, wait_for
 from test_diagnosis_document import document_of
 
-from aqualog.report.diagnosis_page import write_diagnosis_page
+from aqualog.report.diagnosis.sections import diagnosis_report
+from aqualog.report.offline import write_page
+from aqualog.report.page import report_page
 
 pytestmark = pytest.mark.browser
 DRAWN = "return document.querySelectorAll('#views .js-plotly-plot').length"
@@ -17,7 +19,8 @@ FIRST = "document.querySelector('#views .js-plotly-plot')"
 def show(browser, tmp_path):
     def opened(verdict):
         path = tmp_path / "page.html"
-        write_diagnosis_page(document_of(verdict), views_of(verdict), path, f"car {HOSTILE}")
+        report = diagnosis_report(document_of(verdict), views_of(verdict))
+        write_page(path, report_page(report, title=f"car {HOSTILE}"))
         for kind in ("browser", "performance"):
             browser.get_log(kind)
         browser.get(path.as_uri())

@@ -10,11 +10,19 @@ import pytest
 from diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, cases, numbers_in
 
 from aqualog.diagnose.records import Estimate
-from aqualog.report.diagnosis_document import diagnosis_document, diagnosis_text
-from aqualog.report.diagnosis_numbers import interval_text, measured, ordinary, percent, short
-from aqualog.report.diagnosis_words import effect_title, limit_sentences, sentences
+from aqualog.report.diagnosis.document import diagnosis_document
+from aqualog.report.diagnosis.sections import diagnosis_report
+from aqualog.report.diagnosis.words import effect_title, limit_sentences, sentences
+from aqualog.report.numbers import interval_text, measured, ordinary, percent, short
+from aqualog.report.text import report_text
 
 VERDICTS = list(cases())
+
+
+def text_of(document):
+    return report_text(diagnosis_report(document))
+
+
 SCALES = {"%": 100.0, "km/h": 3.6, "ms": 1e3, "mm": 1e3, "": 1.0}
 NUMBER = re.compile(r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[-+]?\d+)?")
 GRAMMAR = {"per 100 km": "per km"}  # numbers that are words of a unit
@@ -137,24 +145,24 @@ def test_a_number_from_nowhere_is_found_out():
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_terminal_text(verdict):
     d = document_of(verdict)
-    text = diagnosis_text(round_trip(d))
+    text = text_of(round_trip(d))
     assert text.startswith(d["sentence"] + "\n")
     assert len(text.splitlines()) < 45
     assert "nan" not in text.lower().replace("nano", "")
-    assert text == diagnosis_text(d)
+    assert text == text_of(d)
     assert all(ord(c) < 128 or c in "²³·±" for c in text)
 
 
 def test_terminal_text_tells_what_counts():
-    text = diagnosis_text(document_of("cannot_tell"))
+    text = text_of(document_of("cannot_tell"))
     for part in ("240 ... 285", "payload mass from torque gain: the right name in 67 %", "Drive a staircase of speeds",
                  "0.118 -> 0.0451 m/s²", "812 natural units (95 %: 700 ... 930)", "achieved 0.0101 in 99 simulations with noise only"):  # fmt: skip
         assert part in text
-    assert "14.3 times less likely" in diagnosis_text(document_of("named"))
+    assert "14.3 times less likely" in text_of(document_of("named"))
 
 
 def test_nothing_but_a_sentence_of_what_is_not_testable():
-    assert diagnosis_text(document_of("not_testable")) == "These drives cannot be tested: there is no wheel torque.\n"
+    assert text_of(document_of("not_testable")) == "These drives cannot be tested: there is no wheel torque.\n"
 
 
 def test_without_calibration():
@@ -168,7 +176,7 @@ def test_an_open_interval_is_told_as_such():
     cause = replace(MASS, parameters={"delta_mass": Estimate(262.0, NAN, math.inf, "kg")})
     d = document_of(causes=(cause,))
     assert d["causes"][0]["parameters"]["delta_mass"]["ci95"] == [None, None]
-    assert "not available" in diagnosis_text(d)
+    assert "not available" in text_of(d)
 
 
 def test_confused_sets_are_told_once_and_exact_relations_apart():
@@ -260,6 +268,6 @@ def test_sets_that_are_told_apart_are_in_the_matrix_alone():
 
 
 def test_powers_of_ten_stay_numbers_in_plain_text():
-    from aqualog.report.diagnosis_numbers import ordinary
+    from aqualog.report.numbers import ordinary
 
     assert ordinary("p = 1.00·10⁻¹² at 3 m/s²") == "p = 1.00e-12 at 3 m/s²"

@@ -10,10 +10,16 @@ import pytest
 from diagnosis_case import HOSTILE, cases, view, views_of
 from test_diagnosis_document import VERDICTS, document_of, round_trip
 
-from aqualog.report.diagnosis_figures import gain_bars, isolability, remainder
-from aqualog.report.diagnosis_page import render_diagnosis_page, write_diagnosis_page
-from aqualog.report.diagnosis_views import binned, view_data
-from aqualog.report.diagnosis_words import by_sharpness, sentences
+from aqualog.report.diagnosis.figures import gain_bars, isolability, remainder
+from aqualog.report.diagnosis.sections import diagnosis_report
+from aqualog.report.diagnosis.views import binned, view_data
+from aqualog.report.diagnosis.words import by_sharpness, sentences
+from aqualog.report.offline import write_page
+from aqualog.report.page import report_page
+
+
+def render_page(document, views, title):
+    return report_page(diagnosis_report(document, views), title=title)
 
 
 def body(page):
@@ -24,7 +30,7 @@ def body(page):
 
 @pytest.fixture(scope="module")
 def pages():
-    return {v: render_diagnosis_page(round_trip(document_of(v)), views_of(v), "car, drive") for v in VERDICTS}
+    return {v: render_page(round_trip(document_of(v)), views_of(v), "car, drive") for v in VERDICTS}
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
@@ -41,7 +47,7 @@ def test_all_sentences_are_on_the_page(pages, verdict):
 
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_the_page_is_a_function_of_the_document(pages, verdict):
-    assert render_diagnosis_page(document_of(verdict), views_of(verdict), "car, drive") == pages[verdict]
+    assert render_page(document_of(verdict), views_of(verdict), "car, drive") == pages[verdict]
 
 
 def test_what_the_page_tells_changes_with_the_document():
@@ -54,14 +60,14 @@ def test_what_the_page_tells_changes_with_the_document():
         (d["untested"], "relaxation_length", "because of 11", "because of 11"),
         (d["causes"][1]["parameters"]["gain"], "value", 0.8777, "0.878"),
     ):
-        assert said not in body(render_diagnosis_page(d, (), "t"))
+        assert said not in body(render_page(d, (), "t"))
         place[key] = value
-        assert said in body(render_diagnosis_page(d, (), "t"))
+        assert said in body(render_page(d, (), "t"))
 
 
 def test_names_of_drives_are_no_markup(pages, tmp_path):
     evil = '"><img src=x onerror=alert(9)>\udcff'
-    write_diagnosis_page(document_of(), views_of("named"), tmp_path / "p.html", evil)
+    write_page(tmp_path / "p.html", render_page(document_of(), views_of("named"), evil))
     page = (tmp_path / "p.html").read_text(encoding="utf-8")
     assert "<img" not in page.replace("<image", "").split("</style>")[1].split('<script type="application/json"')[0]
     assert "<script>alert(1)" not in page
@@ -181,7 +187,7 @@ def test_long_lists_are_folded():
     d = document_of()
     one = next(c for c in d["isolability"] if c["relation"])
     d["isolability"] = [dict(one, relation=f"relation {i}") for i in range(30)]
-    page = render_diagnosis_page(d, (), "t")
+    page = render_page(d, (), "t")
     assert page.index("relation 7<") < page.index("<summary>22 more</summary>") < page.index("relation 8<")
 
 

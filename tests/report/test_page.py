@@ -16,9 +16,10 @@ import pytest
 
 import aqualog.report
 from aqualog.core.records import Quality, Unavailable
-from aqualog.report.page import FIRST_EVENTS, MOST_ROWS, render_page, write_page
+from aqualog.report.drive.page import FIRST_EVENTS, MOST_ROWS, drive_page
+from aqualog.report.drive.tables import event_rows
+from aqualog.report.offline import write_page
 from aqualog.report.reduce import POINTS
-from aqualog.report.tables import event_rows
 
 TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
 
@@ -30,7 +31,7 @@ def short():
 
 @pytest.fixture(scope="module")
 def page(short):
-    return render_page(short, title="run 12")
+    return drive_page(short, title="run 12")
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +82,8 @@ def without_plotly(text):
 
 
 def test_same_result_same_bytes(short, tmp_path):
-    write_page(short, tmp_path / "a.html", title="t")
-    write_page(fake.make_result(), tmp_path / "b.html", title="t")
+    write_page(tmp_path / "a.html", drive_page(short, title="t"))
+    write_page(tmp_path / "b.html", drive_page(fake.make_result(), title="t"))
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
     assert [p.name for p in tmp_path.iterdir() if p.name not in ("a.html", "b.html")] == []
 
@@ -113,12 +114,12 @@ def test_templates_switch_no_escaping_off():
         text = path.read_text(encoding="utf-8")
         assert "|safe" not in text.replace(" ", "")
         assert "autoescape" not in text
-    assert "innerHTML" not in (TEMPLATES / "page.js").read_text(encoding="utf-8")
+    assert "innerHTML" not in (TEMPLATES / "drive.js").read_text(encoding="utf-8")
 
 
 def test_hostile_names_are_text_everywhere():
     result = fake.hostile_result()
-    text = render_page(result, title="".join(fake.HOSTILE))
+    text = drive_page(result, title="".join(fake.HOSTILE))
     own = without_plotly(text)
     assert "<script>alert" not in own
     assert "<img" not in own
@@ -142,34 +143,34 @@ def test_verdict_comes_first_and_names_the_events(page, short):
 
 def test_few_events_are_named_one_by_one(short):
     spin = [e for e in short.events if e.detector == "minor_spin_down" and e.wheel == "fr"][:1]
-    words = Reader(render_page(replace(short, events=tuple(spin)), title="t")).words
+    words = Reader(drive_page(replace(short, events=tuple(spin)), title="t")).words
     assert "1 event Minor spin-down FR 8.4–8.9 s at 104 km/h" in words
 
 
 def test_no_event_says_what_was_judged_and_what_was_not(short):
-    words = Reader(render_page(replace(short, events=()), title="t")).words
+    words = Reader(drive_page(replace(short, events=()), title="t")).words
     assert "No event Judged: Spin-down, Minor spin-down" in words
     assert "Not judged:" in words
-    assert 'id="events"' not in render_page(replace(short, events=()), title="t")
+    assert 'id="events"' not in drive_page(replace(short, events=()), title="t")
 
 
 def test_braking_is_told(short):
     event = replace(short.events[0], evidence={"braking": True, "braking_at_start": True, "v_x": 20.0})
-    words = Reader(render_page(replace(short, events=(event,)), title="t")).words
+    words = Reader(drive_page(replace(short, events=(event,)), title="t")).words
     assert "1 event (1 while braking)" in words
     assert "at 72 km/h (full) (while braking)" in words
 
 
 def test_problems_are_in_a_box(short):
-    words = Reader(render_page(short, title="t")).words
+    words = Reader(drive_page(short, title="t")).words
     assert "5 samples were not used. The time jumps once. a_x: 3 samples out of range" in words
     quality = Quality(truncated=True, dropped_samples=9, lost_in_files=4)
     cut = replace(short, signals=replace(short.signals, quality=quality))
-    words = Reader(render_page(cut, title="t")).words
+    words = Reader(drive_page(cut, title="t")).words
     assert "The log is cut off" in words
     assert "9 samples were not used, 4 of them lost in damaged files." in words
     good = replace(short, signals=replace(short.signals, quality=Quality()))
-    assert 'id="problems"' not in render_page(good, title="t")
+    assert 'id="problems"' not in drive_page(good, title="t")
 
 
 def test_tables_of_detectors_signals_and_time_stamps(page):
@@ -211,7 +212,7 @@ def test_absent_signals_leave_no_row(short):
         short, features=features.drop("a_w_delta_fr", "a_w_delta_rl", "a_w_delta_rr"), tracks=(), events=(),
         signals=replace(short.signals, frame=short.signals.frame.drop("^water_.*$", "on_water")),
     )  # fmt: skip
-    text = render_page(bare, title="t")
+    text = drive_page(bare, title="t")
     assert len(data_of(text)["rows"]) == 2
     assert "Nothing could be judged" in text
 
@@ -222,7 +223,7 @@ def test_empty_drive_is_still_a_page(short):
         short, signals=signals, features=short.features.head(0), tracks=(), events=(),
         unavailable=(Unavailable("spin_down", ("omega_fl",)),),
     )  # fmt: skip
-    assert "plotly.js v" not in render_page(result, title="t")
+    assert "plotly.js v" not in drive_page(result, title="t")
 
 
 def test_short_drive_holds_every_sample_and_its_gaps(page, short):
@@ -248,7 +249,7 @@ def test_two_thousand_events_go_into_columns_and_stay_small(short):
                           key=lambda e: e.start_s))  # fmt: skip
     assert len(events) > 2000
     many, few = replace(short, events=events), replace(short, events=events[:MOST_ROWS])
-    text = render_page(many, title="t")
+    text = drive_page(many, title="t")
     rows = [a["data-event"] for t, a in Reader(text).elements if "data-event" in a]
     assert rows == [str(i) for i in range(FIRST_EVENTS)]
     assert f"The first {FIRST_EVENTS} events; the other {len(events) - FIRST_EVENTS} need JavaScript" in text
@@ -260,15 +261,15 @@ def test_two_thousand_events_go_into_columns_and_stay_small(short):
     assert [table["detectors"][table["detector"][777]], table["peak"][777], table["evidence"][777]] == [
         row["detector"], row["peak"].text, row["evidence"],
     ]  # fmt: skip
-    short_text = render_page(few, title="t")
+    short_text = drive_page(few, title="t")
     assert "table" not in data_of(short_text)
     assert short_text.count("data-event=") == MOST_ROWS
     assert "events.json" not in short_text
-    assert len(text) - len(render_page(short, title="t")) < 300 * len(events)
+    assert len(text) - len(drive_page(short, title="t")) < 300 * len(events)
 
 
 def test_an_hour_is_reduced_said_so_and_small(hour):
-    text = render_page(hour, title="t")
+    text = drive_page(hour, title="t")
     assert len(text) < 15e6
     data = data_of(text)
     assert "The page holds about 4000 minima and maxima per line over the whole drive" in text

@@ -9,7 +9,9 @@ from headless import requests, severe, wait_for
 from straight_drive import AWD, RWD, drive
 
 from aqualog.detect.slip_slope.direct import slip_slopes
-from aqualog.report.slope_page import render_slope_page, write_slope_page
+from aqualog.report.offline import write_page
+from aqualog.report.page import report_page
+from aqualog.report.slope import slope_report
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
 
@@ -17,6 +19,10 @@ HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
 @pytest.fixture(scope="module")
 def found():
     return slip_slopes(drive(RWD), RWD)
+
+
+def render_slope_page(result, title, notes=()):
+    return report_page(slope_report(result, notes), title=title)
 
 
 def data_of(html):
@@ -72,7 +78,7 @@ def test_delay_and_reasons_are_on_the_page():
 @pytest.mark.browser
 def test_browser_draws_it_without_requests(browser, found, tmp_path):
     path = tmp_path / "page.html"
-    write_slope_page(found, path, title=HOSTILE)
+    write_page(path, render_slope_page(found, title=HOSTILE))
     for kind in ("browser", "performance"):
         browser.get_log(kind)
     browser.get(path.as_uri())

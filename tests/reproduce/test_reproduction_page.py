@@ -65,7 +65,7 @@ def test_page_has_all_claims_numbers_and_missing_figures(page):
         assert f'id="{name}"' in page
     assert "1.5 [1, 2] m/s²" in page
     assert 'href="#figure_2_03"' in page
-    assert page.count("<script>") == 3
+    assert page.count("<script>") == 2
     assert "no runs &lt;/script&gt;" in page
 
 

@@ -8,7 +8,6 @@ const WAYS = {
   spin_down: ["from spin-downs", "#D55E00", "diamond"],
 };
 const FEW = 9; // panels that are drawn without being asked for
-const PRINT_WIDTH = 700; // [px]
 const drawn = new Map(); // id -> function that draws it
 const stale = new Set();
 let observer = null, colourKey = -1;
@@ -42,7 +41,7 @@ function layout(title, x, y, height) {
 function paint(id, data, lay) {
   const plot = byId(id);
   plot.style.height = lay.height + "px";
-  return Plotly.react(plot, coloured(data), coloured(lay), plotConfig);
+  return Plotly.react(plot, coloured(data), coloured(lay), sharedConfig);
 }
 
 // Drawn when it comes into view: a campaign has more panels than a screen. Its height is kept free, so that nothing moves.

@@ -1,14 +1,10 @@
-"use strict";
 // Residual channels before and after: one panel a channel, all over the same coordinate.
 (function () {
   const D = JSON.parse(document.getElementById("view-data").textContent);
   const box = document.getElementById("views");
   if (!box || !D.coordinates.length) { document.body.dataset.views = "ready"; return; }
-  const BEFORE = "#D55E00", AFTER = "#0072B2", HEIGHT = 250, PRINT_WIDTH = 700; // [px]
-  const config = {
-    displaylogo: false, responsive: true, showTips: false, plotlyServerURL: "", showSendToCloud: false,
-    showEditInChartStudio: false, modeBarButtonsToRemove: ["select2d", "lasso2d"],
-  };
+  const BEFORE = "#D55E00", AFTER = "#0072B2", HEIGHT = 250; // [px]
+  const config = { ...plotConfig, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const now = { coordinate: D.start, drive: 0, raw: true };
   const byId = function (id) { return document.getElementById(id); };
   const stale = new Set();

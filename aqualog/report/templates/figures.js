@@ -1,20 +1,6 @@
-"use strict";
+// The figures of a page, each in the element of its name.
 (function () {
   const figures = JSON.parse(document.getElementById("figure-data").textContent);
-  const PRINT_WIDTH = 700; // [px] inside the margins of A4 and Letter
-  const config = {
-    displaylogo: false, responsive: true, showTips: false, plotlyServerURL: "", showSendToCloud: false,
-    showEditInChartStudio: false,
-  };
-
-  function coloured(value) {
-    const style = getComputedStyle(document.documentElement);
-    const get = function (name) { return style.getPropertyValue(name).trim(); };
-    const known = { "@ink": get("--ink"), "@muted": get("--muted"), "@paper": get("--paper") };
-    return JSON.parse(JSON.stringify(value), function (_, v) {
-      return typeof v === "string" && Object.hasOwn(known, v) ? known[v] : v;
-    });
-  }
 
   // A narrow window breaks the legend into more lines than were reckoned with.
   function fitLegend(plot) {
@@ -34,7 +20,7 @@
         const plot = document.getElementById(id);
         if (width) figure.layout.width = width;
         plot.style.height = figure.layout.height + "px"; // plotly measures it when the window changes
-        return Plotly.react(plot, figure.data, figure.layout, config).then(function () { return fitLegend(plot); });
+        return Plotly.react(plot, figure.data, figure.layout, plotConfig).then(function () { return fitLegend(plot); });
       });
     }, Promise.resolve());
   }
@@ -44,7 +30,5 @@
   }
 
   build().then(function () { document.body.dataset.ready = "true"; });
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { build(); });
-  window.addEventListener("beforeprint", function () { build(PRINT_WIDTH); });
-  window.addEventListener("afterprint", function () { build().then(resize); });
+  redrawn(build, function () { build().then(resize); });
 })();

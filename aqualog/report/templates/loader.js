@@ -14,26 +14,4 @@ function withPlotly(draw) {
   document.head.appendChild(script);
 }
 
-const plotConfig = {
-  displaylogo: false, responsive: true, showTips: false, plotlyServerURL: "", showSendToCloud: false,
-  showEditInChartStudio: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-};
-
-function schemeColours() {
-  const style = getComputedStyle(document.documentElement);
-  const get = function (name) { return style.getPropertyValue(name).trim(); };
-  return { "@ink": get("--ink"), "@muted": get("--muted"), "@paper": get("--paper") };
-}
-
-function coloured(value) {
-  const known = schemeColours();
-  return JSON.parse(JSON.stringify(value), function (_, v) {
-    return typeof v === "string" && Object.hasOwn(known, v) ? known[v] : v;
-  });
-}
-
-// plotly reads <b>, entities and %{...} as markup: those characters become look-alikes.
-function plotText(text) {
-  return String(text).replaceAll("&", "＆").replaceAll("<", "‹").replaceAll(">", "›").replaceAll("%{", "％{")
-    .replaceAll("$", "＄");
-}
+const sharedConfig = { ...plotConfig, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };

@@ -72,7 +72,7 @@ function draw() {
   if (plot) {
     const [data, layout] = build();
     plot.style.height = layout.height + "px";
-    return Plotly.react(plot, coloured(data), coloured(layout), plotConfig).then(function () {
+    return Plotly.react(plot, coloured(data), coloured(layout), sharedConfig).then(function () {
       document.body.dataset.ready = "true";
     });
   }

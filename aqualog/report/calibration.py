@@ -1,0 +1,158 @@
+"""A calibration for a reader: the JSON document, the sections of text and page, and figures of the residual."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from aqualog import __version__
+from aqualog.calibrate.records import Calibration, DriveFit, Parameter, TieRodFit
+from aqualog.calibrate.words import left_out
+from aqualog.core.records import FloatArray
+from aqualog.core.units import displayed_text
+from aqualog.report.axes import axis, layout, rounded
+from aqualog.report.plain import fields_of, plain
+from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
+from aqualog.report.theme import MUTED, wheel_colour
+from aqualog.report.wording import pretty_unit
+
+__all__ = ["balance_residuals", "calibration_document", "calibration_report", "parameter_cells"]
+
+_PARAMETERS = ("Parameter", "Value", "95 %", "Unit", "Vehicle file", "Remark")
+_DRIVES = (
+    "Drive", "Used [s]", "Mass [kg]", "SD [kg]", "Against the others [kg]", "Offset [m/s²]", "Drift [1e-4 m/s³]",
+    "Torque delay [s]", "Before [m/s²]", "After [m/s²]",
+)  # fmt: skip
+_MOST_DOTS = 6000
+_DOTS = (
+    "Each dot is the mean of 2 s of straight, unbraked driving. It shows measured acceleration minus the acceleration "
+    "expected from torques, drag and rolling resistance. One colour uses the vehicle file's values, the other the "
+    "calibrated ones."
+)
+
+
+def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence[str] = ()) -> dict[str, Any]:
+    """The JSON document; NaN and infinities become null."""
+    parameters = ("name", "value", "ci95", "unit", "identified", "why_not", "remark", "file_value")
+    return {
+        "schema_version": 1,
+        "tool_version": __version__,
+        "vehicle": c.vehicle_name,
+        "logs": list(logs),
+        "fixed": dict(c.fixed),
+        "parameters": [fields_of(p, *parameters, digits=None) for p in c.parameters],
+        "drives": [_drive(d) for d in c.drives],
+        "transfers": {
+            section: fields_of(fit, "coefficients", "ci95", "sigma", "explained", "seconds", digits=None)
+            for section, fit in c.transfers.items()
+        },
+        "cannot_tell": list(c.cannot_tell),
+        "notes": [*notes, *c.notes],
+    }
+
+
+def _drive(d: DriveFit) -> dict[str, Any]:
+    difference, low, high = plain(d.against_others, None)
+    return {
+        **fields_of(d, "name", "mass", "mass_sd", digits=None),
+        "against_others": {"value": difference, "ci95": [low, high], "unit": "kg"},
+        **fields_of(
+            d, digits=None, accelerometer_offset="offset", accelerometer_offset_sd="offset_sd",
+            accelerometer_drift="drift", torque_lag_s="torque_lag_s", velocity_lag_s="v_lag_s", used_s="used_s",
+            driven_s="driven_s", left_out_s="left_out", rmse_before="rmse_before", rmse_after="rmse_after",
+        ),
+    }  # fmt: skip
+
+
+def calibration_report(c: Calibration, notes: Sequence[str] = ()) -> Report:
+    """Parameters, drives and polynomials, what could not be estimated, and the residual of the force balance.
+
+    Parameters
+    ----------
+    c : Calibration
+    notes : sequence of str
+        On the files, beside those of the result.
+    """
+    known = [p for p in c.parameters if p.identified]
+    head = f"{c.vehicle_name}: {len(known)} of {len(c.parameters)} parameters estimated from {len(c.drives)} drives"
+    plots = {f"residual-{i}": figure for i, figure in enumerate(balance_residuals(c))}
+    sections = [
+        Section("", [Para(head, where="text")]),
+        Section("Parameters", [Table(_PARAMETERS, [parameter_cells(p) for p in known], "parameters", (0, 3, 5))],
+                "parameters-section"),
+        Section("Not determined by these drives", [Lines([displayed_text(x) for x in c.cannot_tell], most=1000)],
+                "cannot-tell", look="problems"),
+        Section("Drives", [
+            Table(_DRIVES, [_drive_cells(d) for d in c.drives], "drives"),
+            Lines([f"{d.name}: left out {why}" for d in c.drives if (why := left_out(d.left_out))]),
+        ], "drives-section"),
+        *(_transfer(name, fit) for name, fit in c.transfers.items()),
+        Section("Notes", [Lines([*notes, *c.notes], most=1000)], "notes", look="problems", where="page"),
+        Section("Balance of forces", [Figures(list(plots)), Para(_DOTS)], "plot-section"),
+    ]  # fmt: skip
+    facts = [("vehicle", c.vehicle_name), ("estimated", f"{len(known)} of {len(c.parameters)} parameters")]
+    return Report("calibration", "calibration from dry drives", sections, facts, plots)
+
+
+def parameter_cells(p: Parameter) -> tuple[str, ...]:
+    """One row of the table: name, value, interval, unit, value of the vehicle file, remark."""
+    why = p.remark or p.why_not
+    return p.name, _short(p.value), _interval(p.ci95), pretty_unit(p.unit), _short(p.file_value), why
+
+
+def _drive_cells(d: DriveFit) -> tuple[str, ...]:
+    difference, low, high = d.against_others
+    against = f"{difference:+.0f} ({low:+.0f} ... {high:+.0f})" if math.isfinite(difference) else ""
+    mass, sd = (f"{x:.0f}" if math.isfinite(x) else "" for x in (d.mass, d.mass_sd))
+    offset = f"{d.offset:+.3f} ± {1.96 * d.offset_sd:.3f}" if math.isfinite(d.offset) else ""
+    return (
+        d.name, f"{d.used_s:.0f}", mass, sd, against, offset, f"{1e4 * d.drift:+.1f}", f"{d.torque_lag_s:+.2f}",
+        f"{d.rmse_before:.3f}", f"{d.rmse_after:.3f}",
+    )  # fmt: skip
+
+
+def _transfer(name: str, fit: TieRodFit) -> Section:
+    rows = [
+        (key if len(values) == 1 else f"{key}[{i}]", _short(x), _interval(fit.ci95[key][i]))
+        for key, values in fit.coefficients.items()
+        for i, x in enumerate(values)
+    ]
+    title = f"{name}: explains {fit.explained:.1%} of the variance in {fit.seconds:.0f} s"
+    return Section(title, [Table(("Coefficient", "Value", "95 %"), [*rows, ("sigma", _short(fit.sigma), "")])])
+
+
+def _short(x: float) -> str:
+    return f"{x:.5g}" if math.isfinite(x) else ""
+
+
+def _interval(ci: tuple[float, float]) -> str:
+    low, high = ci
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ""
+    return "" if low == high else f"{low:.5g} ... {high:.5g}"
+
+
+def balance_residuals(c: Calibration) -> list[dict[str, Any]]:
+    """Two figures: residual of the force balance over speed, and over wheel force, before and after."""
+    v, force, before, after = (
+        np.concatenate([getattr(d, name) for d in c.drives]) for name in ("v", "force", "before", "after")
+    )
+    return [
+        _residual(3.6 * v, before, after, "residual over speed", "speed [km/h]"),
+        _residual(1e-3 * force, before, after, "residual over wheel force", "force of the wheel torques [kN]"),
+    ]
+
+
+def _residual(x: FloatArray, before: FloatArray, after: FloatArray, title: str, label: str) -> dict[str, Any]:
+    step = max(1, -(-x.size // _MOST_DOTS))
+    data = [
+        {
+            "type": "scatter", "mode": "markers", "name": name, "x": rounded(x[::step]), "y": rounded(y[::step]),
+            "marker": {"color": colour, "size": 5, "opacity": 0.5}, "hoverinfo": "skip",
+        }
+        for name, y, colour in (("vehicle file", before, MUTED), ("calibrated", after, wheel_colour("fl")))
+    ]  # fmt: skip
+    return {"data": data, "layout": layout(title, axis(label), axis("measured minus expected [m/s²]"))}

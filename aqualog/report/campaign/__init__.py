@@ -1,0 +1,1 @@
+"""A campaign for a reader: regressions, test matrix, and the folder of pages and tables."""

@@ -1,0 +1,161 @@
+"""The numbers of each configuration that an engineer asks for first, and the lines that open the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from aqualog.campaign.bins import Group
+from aqualog.campaign.full_speed import FullSpeed
+from aqualog.campaign.samples import CampaignData
+from aqualog.report.campaign.findings import Curve, Findings, crossing
+from aqualog.report.campaign.labels import group_text
+from aqualog.report.campaign.runs import RunFacts
+from aqualog.report.wording import number, place
+
+__all__ = ["RESISTANCE_LEVEL", "WAYS", "Answer", "Number", "answers_of", "headline", "off_water", "summaries"]
+
+RESISTANCE_LEVEL = 0.2  # [m/s^2] resistance from which a driver feels it, after the thesis (C46)
+HALF = 0.5  # of the dry slip slope
+WAYS = ("slip_slope", "minor_spin_down", "spin_down")
+_WAY_NAMES = ("slip slope", "minor spin-downs", "spin-downs")
+_KMH = 3.6
+
+
+class Number(NamedTuple):
+    """A speed [km/h] with its 95 % interval and its wheel or side; without a value NaN, and `why` gives the reason."""
+
+    v: float
+    low: float
+    high: float
+    place: str
+    why: str
+
+
+NOTHING = Number(math.nan, math.nan, math.nan, "", "no values")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Speeds of one configuration: full aquaplaning by each method, resistance above its level, half of the dry slip
+    slope lost. Where several wheels have a value, the lowest speed counts.
+    """
+
+    group: Group
+    full: tuple[Number, ...]
+    resistance: Number
+    half: Number
+
+
+class _Own(NamedTuple):
+    """The speeds of one configuration."""
+
+    slopes: list[Curve]
+    resistance: list[Curve]
+    full: list[FullSpeed]
+
+
+def answers_of(findings: Findings) -> tuple[Answer, ...]:
+    """The speeds of all configurations that have values on water."""
+    of: dict[Group, _Own] = {}
+    for curve in findings.slopes:
+        of.setdefault(curve.group, _Own([], [], [])).slopes.append(curve)
+    for curve in findings.resistance:
+        of.setdefault(curve.group, _Own([], [], [])).resistance.append(curve)
+    for speed in findings.full:
+        of.setdefault(speed.group, _Own([], [], [])).full.append(speed)
+    return tuple(
+        Answer(
+            group,
+            tuple(_full([f for f in of[group].full if f.way == way]) for way in WAYS),
+            _lowest([_crossed(c, RESISTANCE_LEVEL, rising=True) for c in of[group].resistance]),
+            _lowest([_crossed(c, HALF * c.dry, rising=False) for c in of[group].slopes if c.told]),
+        )
+        for group in findings.groups
+        if group in of
+    )
+
+
+def _full(found: Sequence[FullSpeed]) -> Number:
+    return _lowest([Number(_KMH * f.v, _KMH * f.ci[0], _KMH * f.ci[1], f.place, f.reason or f.rests_on) for f in found])
+
+
+def _crossed(curve: Curve, level: float, *, rising: bool) -> Number:
+    if not math.isfinite(level):
+        return Number(math.nan, math.nan, math.nan, curve.place, "no dry level")
+    found = crossing(curve, level, rising=rising)
+    if found is None:
+        return Number(math.nan, math.nan, math.nan, curve.place, "fewer than two bins with an interval")
+    why = "" if math.isfinite(found.v_kmh) else f"not reached up to {found.to_kmh:.0f} km/h"
+    return Number(found.v_kmh, *found.ci, curve.place, why)
+
+
+def _lowest(found: Sequence[Number]) -> Number:
+    told = [n for n in found if math.isfinite(n.v)]
+    if told:
+        return min(told, key=lambda n: n.v)
+    # of speeds that are only bounded below, the lowest bound holds for the car
+    return min(found, key=lambda n: n.low if math.isfinite(n.low) else math.inf) if found else NOTHING
+
+
+def headline(data: CampaignData, findings: Findings) -> str:
+    """Runs, logs, failures, configurations."""
+    logs = len({r.run.logs for r in data.runs})
+    failed = sum(not r.is_done for r in data.runs)
+    bad = f"{failed} without results" if failed else "all with results"
+    groups = _count(len(findings.groups), "configuration")
+    return f"{_count(len(data.runs), 'run')} of {_count(logs, 'log')}, {bad}, {groups}"
+
+
+class Summary(NamedTuple):
+    """One line of the page's head: lowest and highest value as (speed, interval, configuration), and their number."""
+
+    what: str
+    lowest: tuple[str, str, str]
+    highest: tuple[str, str, str]
+    told: str
+
+
+def summaries(answers: Sequence[Answer]) -> list[Summary]:
+    """Lowest and highest speed over all configurations, by kind; a kind without any value shows dashes."""
+    kinds = [
+        *((f"Full aquaplaning, from the {w}", [(a, a.full[i]) for a in answers]) for i, w in enumerate(_WAY_NAMES)),
+        (f"Resistance reaches {RESISTANCE_LEVEL:g} m/s²", [(a, a.resistance) for a in answers]),
+        ("Half of the dry slip slope lost", [(a, a.half) for a in answers]),
+    ]  # fmt: skip
+    return [_summary(what, found) for what, found in kinds if found]
+
+
+def _summary(what: str, found: Sequence[tuple[Answer, Number]]) -> Summary:
+    told = sorted((n.v, i) for i, (_, n) in enumerate(found) if math.isfinite(n.v))
+    nothing = ("–", "", "")
+    lowest = _one(*found[told[0][1]]) if told else nothing
+    highest = _one(*found[told[-1][1]]) if len(told) > 1 else nothing
+    return Summary(what, lowest, highest, f"{len(told)} of {len(found)}")
+
+
+def _one(answer: Answer, n: Number) -> tuple[str, str, str]:
+    free = "free wheels" if n.place == "free" else place(n.place if len(n.place) == 2 else None, n.place)
+    return f"{number(n.v, 0)} km/h", interval_text(n), " · ".join(x for x in (group_text(answer.group), free) if x)
+
+
+def interval_text(n: Number) -> str:
+    """`95 % 93 … 101`, `95 % 93 and up`; `interval open` where both ends are open."""
+    low, high = (number(x, 0) if math.isfinite(x) else "" for x in (n.low, n.high))
+    if low and high:
+        return f"95 % {low} … {high}"
+    return f"95 % {low} and up" if low else f"95 % up to {high}" if high else "interval open"
+
+
+def off_water(facts: Sequence[RunFacts | None]) -> str:
+    """Events off the water and the distance driven there; empty where no lane is known."""
+    known = [f for f in facts if f is not None and math.isfinite(f.dry_km)]
+    way = sum(f.dry_km for f in known)
+    count = sum(e.off for f in known for e in f.events)
+    return f"{_count(count, 'event')} off the water in {number(way, 1)} km" if way > 0.0 else ""
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -1,0 +1,212 @@
+"""Regressions on a campaign's page: curves over speed per configuration, and speeds of full aquaplaning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from aqualog.campaign.bins import Group, Plan, group_of
+from aqualog.campaign.full_speed import FullSpeed, full_speeds
+from aqualog.campaign.regress import NOWHERE, Interval
+from aqualog.campaign.resistance import MeanRow, ResistanceTable, resistances
+from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
+
+__all__ = [
+    "Crossing", "Curve", "Findings", "Point", "crossing", "find", "groups_of", "resistance_curves", "slope_curves",
+]  # fmt: skip
+
+KMH = 3.6
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One speed bin. `value` is NaN where no estimate exists, and `reason` states why; `reliable`: `ci` exists too."""
+
+    low_kmh: float
+    high_kmh: float
+    v_kmh: float
+    value: float
+    ci: Interval
+    runs: int
+    samples: int
+    reliable: bool
+    reason: str
+    expected: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Values of one configuration at one place (wheel, side; empty: the car), by speed; `dry` level with interval."""
+
+    group: Group
+    place: str
+    points: tuple[Point, ...]
+    dry: float = math.nan
+    dry_ci: Interval = NOWHERE
+    dry_runs: int = 0
+
+    @property
+    def told(self) -> bool:
+        """Whether any bin has a value."""
+        return any(math.isfinite(p.value) for p in self.points)
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """Results of all regressions. `groups`: configurations of all runs, in order; `left_out`: samples by reason, per
+    kind of regression; `notes`: remarks on the regressions for the reader.
+    """
+
+    plan: Plan
+    groups: tuple[Group, ...]
+    slopes: tuple[Curve, ...] = ()
+    resistance: tuple[Curve, ...] = ()
+    full: tuple[FullSpeed, ...] = ()
+    left_out: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    robust: bool = False
+
+
+def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report = lambda _: None) -> Findings:
+    """Run the regressions of a campaign.
+
+    Parameters
+    ----------
+    data : CampaignData
+    plan : Plan
+        Configurations and bins.
+    robust : bool
+        Use Huber's weights [huber1981].
+    report : callable
+        Called with the name of each step.
+    """
+    report("slip slopes")
+    slopes = slip_slopes(data, plan, robust=robust)
+    report("resistance")
+    resistance = resistances(data, plan, robust=robust)
+    report("speeds of full aquaplaning")
+    return Findings(
+        plan,
+        groups_of(data, plan.keys),
+        slope_curves(slopes),
+        resistance_curves(resistance),
+        full_speeds(data, plan, slopes),
+        {"slip slope": slopes.left_out, "resistance": resistance.left_out},
+        _delay_notes(slopes),
+        robust,
+    )
+
+
+def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
+    """Configurations of all runs, sorted: numbers, then texts, then missing values."""
+    found = {group_of(info, keys) for info in data.runs}
+    return tuple(sorted(found, key=lambda g: [_rank(v) for _, v in g]))
+
+
+def _rank(value: float | str | None) -> tuple[int, float, str]:
+    if value is None:
+        return 2, 0.0, ""
+    return (1, 0.0, value) if isinstance(value, str) else (0, value, "")
+
+
+def slope_curves(table: SlopeTable) -> tuple[Curve, ...]:
+    """Rows on water as curves, each with the dry level of its configuration."""
+    rows: dict[tuple[Group, str], list[SlopeRow]] = {}
+    for r in table.rows:
+        if r.road == "wet":
+            rows.setdefault((r.group, r.wheel), []).append(r)
+    return tuple(
+        Curve(group, place, tuple(_slope_point(r) for r in own), own[0].slope_dry, own[0].slope_dry_ci, own[0].runs_dry)
+        for (group, place), own in rows.items()
+    )
+
+
+def resistance_curves(table: ResistanceTable) -> tuple[Curve, ...]:
+    """Rows on water as curves."""
+    rows: dict[tuple[Group, str], list[MeanRow]] = {}
+    for r in table.rows:
+        if r.road == "wet":
+            rows.setdefault((r.group, r.place), []).append(r)
+    return tuple(Curve(group, place, tuple(_mean_point(r) for r in own)) for (group, place), own in rows.items())
+
+
+def _slope_point(r: SlopeRow) -> Point:
+    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
+    return Point(
+        r.low_kmh, r.high_kmh, v, r.slope, r.slope_ci, r.runs, r.samples, r.reliable, r.reason, r.expected.slope
+    )  # fmt: skip
+
+
+def _mean_point(r: MeanRow) -> Point:
+    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
+    return Point(r.low_kmh, r.high_kmh, v, r.value, r.ci, r.runs, r.samples, r.reliable, r.reason)
+
+
+def _speed(v_mean: float, low_kmh: float, high_kmh: float) -> float:
+    """Mean speed of the bin's samples, or the middle of an empty bin. [km/h]"""
+    return KMH * v_mean if math.isfinite(v_mean) else 0.5 * (low_kmh + high_kmh)
+
+
+def _delay_notes(table: SlopeTable) -> tuple[str, ...]:
+    told = [
+        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms later than the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
+        f"{1e3 * d.ci[1]:+.0f} ms); every slip is corrected for it"
+        for d in table.delays
+        if d.told
+    ]
+    return (*told, *(f"{d.vehicle}: delay of v_x not available ({d.reason})" for d in table.delays if not d.told))
+
+
+# --- where a curve passes a level ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """`v_kmh` where the level is passed for the first time, NaN if it is not; `ci` where the ends of the band pass it
+    (an end that does not is infinite). `to_kmh`: speed up to which there are values.
+    """
+
+    v_kmh: float
+    ci: tuple[float, float]
+    to_kmh: float
+
+
+def crossing(curve: Curve, level: float, *, rising: bool) -> Crossing | None:
+    """Interpolate linearly between the bins that have an interval; None with fewer than two of them.
+
+    Parameters
+    ----------
+    curve : Curve
+    level : float
+        In the unit of the curve.
+    rising : bool
+        Whether the level is passed from below.
+    """
+    points = [p for p in curve.points if p.reliable]
+    if len(points) < 2:
+        return None
+    # the end of the band that passes first gives the lower speed
+    first, last = (1, 0) if rising else (0, 1)
+    low = _passed(points, [p.ci[first] for p in points], level, rising=rising)
+    high = _passed(points, [p.ci[last] for p in points], level, rising=rising)
+    middle = _passed(points, [p.value for p in points], level, rising=rising)
+    begin = points[0].v_kmh
+    return Crossing(
+        middle, (-math.inf if low == begin else low, math.inf if math.isnan(high) else high), points[-1].v_kmh
+    )
+
+
+def _passed(points: Sequence[Point], values: Sequence[float], level: float, *, rising: bool) -> float:
+    """Speed at which values reach the level; the first point's if they have already; NaN if they do not."""
+    sign = 1.0 if rising else -1.0
+    above = [sign * (v - level) for v in values]
+    if above[0] >= 0.0:
+        return points[0].v_kmh
+    for i in range(1, len(above)):
+        if above[i] >= 0.0:
+            share = above[i - 1] / (above[i - 1] - above[i])
+            return points[i - 1].v_kmh + share * (points[i].v_kmh - points[i - 1].v_kmh)
+    return math.nan

@@ -1,0 +1,177 @@
+"""The sections of a diagnosis, from its JSON document and residual samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from aqualog.diagnose.records import ResidualView
+from aqualog.report.diagnosis.figures import plots
+from aqualog.report.diagnosis.views import view_data
+from aqualog.report.diagnosis.words import by_sharpness, channel_title, effect_title, sentences, verdict_title
+from aqualog.report.numbers import interval_text, measured, percent
+from aqualog.report.sections import Bar, Bars, Beside, Figures, Headline, Lines, Para, Report, Residuals, Section, Table
+from aqualog.report.wording import number, pretty_unit
+
+__all__ = ["diagnosis_report"]
+
+_LOOKS = {"no_effect": "", "named": "told", "compound": "told", "cannot_tell": "partial", "unexplained": "partial"}
+_DECADES = (-1.0, 2.0)  # range of the bars: limit over smallest size worth naming
+_MOST_LIMITS, _MOST_CONFUSED, _MOST_CHANNELS = 6, 5, 3  # in the terminal
+
+
+def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] = ()) -> Report:
+    """The verdict first, then its basis.
+
+    Parameters
+    ----------
+    document : mapping
+        As `diagnosis_document` makes it, or as it was read back from JSON.
+    views : sequence of ResidualView
+        Residuals for the figures before and after.
+    """
+    d, said = document, sentences(document)
+    figures = plots(d)
+    causes = [x for c in d["causes"] for x in c["explains"]]
+    answers = [("Test", said["test"]), ("Gain", said["score"]), ("Next", said["manoeuvre"])]
+    head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d["verdict"]))
+    level = percent(d["criteria"]["interval"])
+    sections = [
+        Section("", [head], "verdict", look=f"verdict {_LOOKS.get(d['verdict'], 'open')}"),
+        *_on_causes(d, said, level),
+        Section("Next drive", [
+            Lines(said["manoeuvre"]),
+            Para(f"Distinguishes: {'; '.join(_separates(d))}" if _separates(d) else ""),
+        ], "next", look="next"),
+        Section("Measured minus simulated, before and after", [Residuals()] if views else [], "views-section",
+                "dots: samples; line: median; band: middle 68 % of a bin", where="page"),
+        Section("Not explained", [
+            Lines(said["unexplained"]), Figures([x for x in figures if x.startswith("remainder-")]),
+        ], "unexplained-section"),
+        *_on_gain(said, figures),
+        *_on_limits(d),
+        *_on_isolability(d, said, figures),
+        Section("Not tested", [
+            Table(("Effect", "Why"), [(effect_title(k), why) for k, why in d["untested"].items()], "untested", (0, 1)),
+        ], "untested-section", where="page"),
+        Section("Notes", [Lines(said["notes"], most=1000)], "notes", look="problems", where="page"),
+        Section("Test", [Lines(said["test"])], where="text"),
+    ]  # fmt: skip
+    footer = " ".join([*said["test"][1:], f"Intervals {level}."])
+    return Report(
+        "diagnosis", "what the simulation gets wrong", sections, _facts(d), figures, footer,
+        {"view-data": view_data(views, causes)}, ("diagnosis.js",),
+    )  # fmt: skip
+
+
+def _on_causes(d: Mapping[str, Any], said: Mapping[str, list[str]], level: str) -> list[Section]:
+    title = "Possible causes" if d["verdict"] == "cannot_tell" else "Causes" if d["causes"] else "Closest known effects"
+    header = ("Effect", "Parameter", "Value", f"{level} interval", "Unit", "Explains")
+    same = said["causes_relations"]
+    return [
+        Section(title, [
+            Table(header, _cause_rows(d["causes"]), "causes", (0, 1, 4, 5)),
+            Lines(said["causes"] if d["causes"] else (), where="page"),
+            Beside([
+                Section("Drive by drive", [Lines(said["agreement"] if d["causes"] else (), "agreement")]),
+                Section("Other explanations that fit as well", [Lines(said["alternatives"], "alternatives")]),
+                Section("Looks exactly the same", [Lines(same, "causes-relations", 6)], where="page"),
+                Section("This log cannot distinguish",
+                        [Lines(same + said["causes_confused"], most_text=_MOST_CONFUSED)], where="text"),
+            ]),
+            Para(f"Extended model: {d['extended_model']}" if d["extended_model"] else ""),
+        ], "causes-section"),
+    ]  # fmt: skip
+
+
+def _on_gain(said: Mapping[str, list[str]], figures: Mapping[str, Any]) -> list[Section]:
+    hint = (
+        "log score: natural logarithm of the likelihood of the measurement; errors: root mean square of a channel, "
+        "one sample ahead or in free simulation"
+    )
+    gain = said["score"] + said["channels"] + said["gain_notes"]
+    return [
+        Section("Gain of the extended model", [
+            Lines(gain, "gain", 12, len(said["score"]) + _MOST_CHANNELS),
+            Beside([
+                Section("For the detectors", [Lines(said["consequences"], "consequences")]),
+                Section("", [Figures([x for x in ("gain-bars",) if x in figures])]),
+            ]),
+        ], "gain-section", hint),
+    ]  # fmt: skip
+
+
+def _on_limits(d: Mapping[str, Any]) -> list[Section]:
+    hint = (
+        f"smallest size found with a probability of {number(d['criteria']['power'])}; the line marks the smallest size "
+        "worth naming; bars are logarithmic"
+    )
+    limits, elsewhere = ([_bar(x) for x in some] for some in by_sharpness(d))
+    most = 24 if d["verdict"] == "no_effect" else _MOST_LIMITS  # without an effect the limits are the result
+    return [
+        Section("Smallest effects that would have been detected", [Bars(limits, elsewhere, "at other places", most)],
+                "limits-section", hint),
+    ]  # fmt: skip
+
+
+def _on_isolability(d: Mapping[str, Any], said: Mapping[str, list[str]], figures: Mapping[str, Any]) -> list[Section]:
+    sure = percent(d["criteria"]["told_apart"])
+    return [
+        Section("Effects that this log can distinguish", [
+            Beside([
+                Section("Looks exactly the same", [Lines(said["relations"], "relations")]),
+                Section(f"Right name in less than {sure} of cases", [Lines(said["confused"], "confused")]),
+            ]),
+            Figures([x for x in ("isolability",) if x in figures]),
+        ], "isolability-section",
+        "computed from the log's excitation alone, with each effect at its reference size", where="page"),
+    ]  # fmt: skip
+
+
+def _facts(d: Mapping[str, Any]) -> list[tuple[str, str]]:
+    drives = d["drives"]
+    named = ", ".join(drives) if len(drives) <= 3 else f"{drives[0]} … {drives[-1]} ({len(drives)})"
+    facts = [("vehicle", d["vehicle"])] if d["vehicle"] else []
+    facts += [("drive" if len(drives) == 1 else "drives", named)] if drives else []
+    facts.append(("used", f"{_minutes(d['used_s'])} of {_minutes(d['duration_s'])} min"))
+    facts += [("channels", ", ".join(channel_title(c) for c in d["channels"]))] if d["channels"] else []
+    return facts
+
+
+def _minutes(seconds: float | None) -> str:
+    return number(math.nan if seconds is None else seconds / 60.0, 1)
+
+
+def _cause_rows(causes: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Effect, parameter, value, interval, unit, channels; a cause's name stands in its first row only."""
+    rows: list[tuple[str, ...]] = []
+    for c in causes:
+        explains = ", ".join(channel_title(x) for x in c["explains"])
+        for i, (name, p) in enumerate(c["parameters"].items()):
+            own = (effect_title(c["key"]), explains) if i == 0 else ("", "")
+            rows.append((own[0], name.replace("_", " "), *interval_text(p), pretty_unit(p["unit"]), own[1]))
+        if not c["parameters"]:
+            rows.append((effect_title(c["key"]), "", "", "", "", explains))
+    return rows
+
+
+def _separates(d: Mapping[str, Any]) -> list[str]:
+    m = d["next_manoeuvre"]
+    return [] if m is None else [" / ".join(effect_title(k) for k in pair) for pair in m["separates"]]
+
+
+def _bar(x: Mapping[str, Any]) -> Bar:
+    """A limit; the bar shows it over the smallest size worth naming."""
+    is_sharp = x["ratio"] is not None and x["ratio"] <= 1.0
+    title = f"worth naming from {measured(x['smallest_worth_naming'], x['unit'])}"
+    if x["size"] is None:
+        return Bar(effect_title(x["key"]), "not detectable at any size", "", is_sharp, title)
+    return Bar(effect_title(x["key"]), measured(x["size"], x["unit"]), _width(x["ratio"]), is_sharp, title)
+
+
+def _width(ratio: float | None) -> str:
+    if ratio is None or ratio <= 0.0:
+        return ""
+    low, high = _DECADES
+    return f"{100.0 * min(1.0, max(0.01, (math.log10(ratio) - low) / (high - low))):.1f}"

@@ -1,0 +1,297 @@
+"""The sentences of a diagnosis, made from its JSON document alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from aqualog.report.numbers import interval_text, measured, percent, short
+from aqualog.report.wording import detector_name, pretty_unit
+
+__all__ = [
+    "COORDINATES", "by_change", "by_sharpness", "channel_title", "coordinate_title", "effect_title", "limit_sentences",
+    "sentences", "verdict_title",
+]  # fmt: skip
+
+WORSE = 0.01  # rise of a channel's error that is reported
+_VERDICTS = {
+    "no_effect": "No effect is missing",
+    "named": "One cause",
+    "compound": "Several causes at once",
+    "cannot_tell": "Causes that this log cannot distinguish",
+    "unexplained": "An effect that no known cause explains",
+    "not_testable": "This log cannot be tested",
+}
+_CHANNELS = {
+    "force_balance": "force balance",
+    "kinematic": "acceleration against wheel speeds",
+    "axle_slip": "slip, axle against axle",
+    "side_slip_f": "front wheels, left against right",
+    "side_slip_r": "rear wheels, left against right",
+    "lateral": "lateral acceleration",
+}
+COORDINATES: dict[str, tuple[str, str, float, float]] = {
+    "t": ("time", "s", 1.0, 0.0),
+    "v_x": ("speed", "km/h", 3.6, 0.0),
+    "torque": ("torque of all wheels", "N·m", 1.0, 0.0),
+    "position": ("position", "m", 1.0, 0.0),
+    "a_x": ("acceleration", "m/s²", 1.0, 0.0),
+    "a_y": ("lateral acceleration", "m/s²", 1.0, 0.0),
+    "yaw_rate": ("yaw rate", "rad/s", 1.0, 0.0),
+    "steer_angle": ("steer angle", "rad", 1.0, 0.0),
+    "water_depth": ("water depth", "mm", 1e3, 0.0),
+    "temperature": ("temperature", "°C", 1.0, -273.15),
+    "ambient_temperature": ("ambient temperature", "°C", 1.0, -273.15),
+    "slip": ("slip", "–", 1.0, 0.0),
+    "depth": ("water depth", "mm", 1e3, 0.0),  # those of a campaign's runs
+    "pressure": ("tyre pressure", "bar", 1e-5, 0.0),
+    "load": ("load", "kg", 1.0, 0.0),
+}
+"""Name of a coordinate, its unit on pages, and factor and offset to that unit."""
+
+_PLACES = {"f": "front", "r": "rear"}
+_WHEELS = ("fl", "fr", "rl", "rr")
+_MOST_CONFUSED = 12
+
+
+def verdict_title(verdict: str) -> str:
+    """The verdict in words."""
+    return _VERDICTS.get(verdict, verdict.replace("_", " "))
+
+
+def channel_title(channel: str) -> str:
+    """`slip_fl` -> `slip FL`."""
+    stem, _, end = channel.rpartition("_")
+    if channel in _CHANNELS:
+        return _CHANNELS[channel]
+    return f"{stem.replace('_', ' ')} {end.upper()}" if end in _WHEELS else channel.replace("_", " ")
+
+
+def effect_title(key: str) -> str:
+    """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name."""
+    effect, _, where = key.partition("@")
+    place = where.upper() if where in _WHEELS else _PLACES.get(where, where)
+    return effect.replace("_", " ") + (f", {place}" if place else "")
+
+
+def coordinate_title(name: str) -> str:
+    """`v_x` -> `speed`."""
+    return COORDINATES[name][0] if name in COORDINATES else name.replace("_", " ")
+
+
+def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
+    """All sentences of the page by section.
+
+    `headline` holds one; `test`, `score`, `channels` (error of each, the most changed first), `gain_notes`,
+    `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations`, `confused`,
+    `unexplained`, `untested`, `notes` hold any number. `causes_relations` and `causes_confused` hold those that involve
+    one of the causes.
+    """
+    causes = {c["key"] for c in document["causes"]}
+    confused = _confused(document)
+    gain = document["gain"] or {"notes": [], "consequences": []}
+    return {
+        "headline": [document["sentence"] or f"{verdict_title(document['verdict'])}."],
+        "test": _test(document["significance"]),
+        "causes": [c["sentence"] for c in document["causes"] if c["sentence"] not in ("", document["sentence"])],
+        "alternatives": [_alternative(a) for a in document["alternative_sets"]],
+        "relations": _relations(sorted(document["isolability"], key=lambda c: not _parties(c) & causes)),
+        "causes_relations": _relations(c for c in document["isolability"] if _parties(c) & causes),
+        "confused": [_confusion(c) for c in confused][:_MOST_CONFUSED],
+        "causes_confused": [_confusion(c) for c in confused if _parties(c) & causes][:_MOST_CONFUSED],
+        "score": _score(document["gain"]) + _worse(document),
+        "channels": [s for name, c in by_change(document) for s in _channel(name, c)],
+        "gain_notes": list(gain["notes"]),
+        "consequences": [_consequence(c) for c in gain["consequences"]],
+        "manoeuvre": _manoeuvre(document["next_manoeuvre"]),
+        "agreement": [_agreement(a) for a in document["agreement"]],
+        "unexplained": [_unexplained(r) for r in document["unexplained"]],
+        "untested": [f"{effect_title(k)}: {why}" for k, why in document["untested"].items()],
+        "notes": list(document["notes"]),
+    }
+
+
+def by_sharpness(document: Mapping[str, Any]) -> tuple[list[Mapping[str, Any]], list[Mapping[str, Any]]]:
+    """Limits in order: smallest relative to the size worth naming first, undetectable effects last.
+
+    Returns
+    -------
+    tuple
+        One of each effect, for the whole car or else its sharpest place; and those of the other places.
+    """
+
+    def sharpness(x: Mapping[str, Any]) -> tuple[bool, float, str]:
+        return x["size"] is None, math.inf if x["ratio"] is None else x["ratio"], x["key"]
+
+    ordered = sorted(document["limits"], key=sharpness)
+    first: dict[str, Mapping[str, Any]] = {}
+    for x in ordered:
+        if x["effect"] not in first or x["where"] is None:
+            first[x["effect"]] = x
+    chosen = sorted(first.values(), key=sharpness)
+    keys = {x["key"] for x in chosen}
+    return chosen, [x for x in ordered if x["key"] not in keys]
+
+
+def limit_sentences(document: Mapping[str, Any]) -> list[str]:
+    """`payload mass from 14 kg`, one of each effect."""
+    told = [x for x in by_sharpness(document)[0] if x["size"] is not None]
+    return [f"{effect_title(x['key'])} from {measured(x['size'], x['unit'])}" for x in told]
+
+
+def _test(s: Mapping[str, Any] | None) -> list[str]:
+    if s is None:
+        return []
+    p, surrogates = s["p_value"], s["surrogates"]
+    beyond = s["statistic"] is not None and s["threshold"] is not None and s["statistic"] > s["threshold"]
+    said = [
+        f"{'More' if beyond else 'No more'} than noise: largest test value {short(s['statistic'])}, "
+        f"threshold {short(s['threshold'])}, p {'≈' if p == 0.0 else '='} {short(p)}."
+    ]
+    asked = f"False alarm level {short(s['level'])}"
+    if s["achieved_level"] is None:
+        return [*said, f"{asked}; the achieved level was not measured."]
+    of = f" in {surrogates} simulations with noise only" if surrogates else ", without simulated noise"
+    return [*said, f"{asked}, achieved {short(s['achieved_level'])}{of}."]
+
+
+def _alternative(a: Mapping[str, Any]) -> str:
+    names = " with ".join(effect_title(c["key"]) for c in a["causes"])
+    values = "; ".join(
+        f"{name.replace('_', ' ')} {value} ({interval}) {pretty_unit(p['unit'])}".rstrip(" –")
+        for c in a["causes"]
+        for name, p in c["parameters"].items()
+        for value, interval in [interval_text(p)]
+        if value
+    )
+    ratio = a["evidence_ratio"]
+    how = f", {short(ratio)} times less likely" if ratio is not None else ""
+    return f"{names}{f': {values}' if values else ''}{how}"
+
+
+def _agreement(a: Mapping[str, Any]) -> str:
+    """Whether the drives agree on a value, and whether the other drives' value improves the prediction of each."""
+    values = "; ".join(
+        f"{d['drive']} {value} ({interval})" for d in a["drives"] for value, interval in [interval_text(d)] if value
+    )
+    worse = [d["drive"] for d in a["drives"] if d["log_score_gain"] is not None and d["log_score_gain"] <= 0.0]
+    how = "the drives agree" if a["holds"] else "the drives differ" if not worse else "not confirmed by every drive"
+    told = f" (p {short(a['p_value'])})" if a["p_value"] is not None else ""
+    left = f"; {', '.join(worse)} is not predicted better with the value of the others" if worse else ""
+    unit = pretty_unit(a["drives"][0]["unit"])
+    name = a["parameter"].replace("_", " ") + (f" [{unit}]" if unit not in ("", "–", "-") else "")
+    return f"{effect_title(a['key'])}, {name}: {how}{told}: {values}{left}"
+
+
+def _parties(c: Mapping[str, Any]) -> set[str]:
+    return {c["effect"], *c["rivals"]}
+
+
+def _relations(confusions: Iterable[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(c["relation"] for c in confusions if c["relation"]))
+
+
+def _confused(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    limit = document["criteria"]["told_apart"]
+    some = [c for c in document["isolability"] if c["p_correct"] is not None and c["p_correct"] < limit]
+    own = {c["key"] for c in document["causes"]}
+    some.sort(key=lambda c: (not own & _parties(c), c["p_correct"], c["effect"], c["rivals"]))
+    once: dict[frozenset[str], Mapping[str, Any]] = {}
+    for c in some:
+        once.setdefault(frozenset(_parties(c)), c)
+    return [c for c in once.values() if not c["relation"]]
+
+
+def _confusion(c: Mapping[str, Any]) -> str:
+    rivals = " with ".join(effect_title(r) for r in c["rivals"])
+    return f"{effect_title(c['effect'])} from {rivals}: the right name in {percent(c['p_correct'])}"
+
+
+def by_change(document: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Channels of the gain, those first whose error changes most."""
+    channels = (document["gain"] or {"channel": {}})["channel"]
+    return sorted(channels.items(), key=lambda item: -abs(item[1]["rmse_change"] or 0.0))
+
+
+def _score(g: Mapping[str, Any] | None) -> list[str]:
+    if g is None:
+        return []
+    if g["in_sample"]:
+        score, (low, high) = g["in_sample_log_score_gain"], g["in_sample_ci95"]
+        where = "On the diagnosed drives (no held-out data)"
+    else:
+        score, (low, high) = g["heldout_log_score_gain"], g["ci95"]
+        where = f"On held-out drives ({', '.join(g['heldout'])})" if g["heldout"] else "On held-out parts"
+    if score is None:
+        return []
+    interval = f" (95 %: {short(low)} … {short(high)})" if low is not None and high is not None else ""
+    unit = pretty_unit(g["unit"])
+    if high is not None and high < 0.0:
+        return [f"{where} the log score falls by {short(-score)} {unit}{interval}: the model predicts worse."]
+    if low is not None and low <= 0.0:
+        return [f"{where} the log score changes by {short(score)} {unit}{interval}: no measurable gain."]
+    change = "rises" if score >= 0.0 else "falls"
+    return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}."]
+
+
+def _worse(document: Mapping[str, Any]) -> list[str]:
+    """Channels whose error grows; the full list shows only the largest changes first."""
+    grown = [
+        f"{channel_title(name)} +{percent(c[f'{kind}_change'])} {words}"
+        for name, c in by_change(document)
+        for kind, words in (("rmse", "for the next sample"), ("free", "in free simulation"))
+        if (c[f"{kind}_change"] or 0.0) > WORSE
+    ]
+    return [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
+
+
+def _channel(name: str, c: Mapping[str, Any]) -> list[str]:
+    parts = []
+    for kind, words in (("rmse", "error one sample ahead"), ("free", "error in free simulation")):
+        before, after, change = c[f"{kind}_before"], c[f"{kind}_after"], c[f"{kind}_change"]
+        if before is None or after is None:
+            continue
+        told = (
+            f" ({'+' if change > 0 else '−' if change < 0 else ''}{percent(abs(change))})" if change is not None else ""
+        )
+        parts.append(f"{words} {short(before)} → {short(after)} {pretty_unit(c['unit'])}".rstrip(" –") + told)
+    return [f"{_capital(channel_title(name))}: {', '.join(parts)}."] if parts else []
+
+
+def _consequence(c: Mapping[str, Any]) -> str:
+    parts = [f"false alarms {c['false_alarms_before']} → {c['false_alarms_after']} in {short(c['distance_km'])} km"]
+    if c["per_100km_before"] is not None:
+        parts[0] += f" ({short(c['per_100km_before'])} → {short(c['per_100km_after'])} per 100 km)"
+    if c["passes"]:
+        parts.append(f"detected {c['found_before']} → {c['found_after']} of {c['passes']} passes")
+    if c["latency_before_s"] is not None and c["latency_after_s"] is not None:
+        parts.append(f"latency {short(c['latency_before_s'])} → {short(c['latency_after_s'])} s")
+    return f"{detector_name(c['detector'])}: {', '.join(parts)}."
+
+
+def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
+    if m is None:
+        return []
+    said = [m["sentence"]] if m["sentence"] else [f"{_capital(m['name'].replace('_', ' '))}."]
+    if m["p_correct_now"] is None or m["p_correct_then"] is None or m["name"] in ("none", "sensor"):
+        return said
+    lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""
+    now, then = percent(m["p_correct_now"]), percent(m["p_correct_then"])
+    return [*said, f"Probability of the right name: {now} now, {then} after this drive{lasting}."]
+
+
+def _unexplained(r: Mapping[str, Any]) -> str:
+    coordinates = " and ".join(coordinate_title(x) for x in r["depends_on"])
+    said = r["sentence"] or f"{_capital(channel_title(r['channel']))} depends on {coordinates}."
+    parts = [f"{percent(r['share'])} of the variance"] if r["share"] is not None else []
+    parts += [f"p = {short(r['p_value'])}"] if r["p_value"] is not None else []
+    parts += [f"{', '.join(coordinate_title(x) for x in r['proxies'])} explains it as well"] if r["proxies"] else []
+    if r["nearest"]:
+        alike = f" (similarity {short(r['cosine'])})" if r["cosine"] is not None else ""
+        parts.append(f"nearest known effect {effect_title(r['nearest'])}{alike}")
+    return f"{said} {_capital('; '.join(parts))}." if parts else said
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,1 @@
+"""The result of one drive for a reader."""

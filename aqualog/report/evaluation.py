@@ -1,0 +1,297 @@
+"""An evaluation for a reader: the JSON document, and the sections of text and page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from aqualog import __version__
+from aqualog.evaluate.compare import better_rivals, coverage, situation_scores
+from aqualog.evaluate.match import Cell as Counts
+from aqualog.evaluate.records import RunRecord
+from aqualog.evaluate.roc import RocPoint
+from aqualog.evaluate.run import Evaluation, Tuning
+from aqualog.evaluate.score import Rate, Recall, Score, confusion, grouped, score_all
+from aqualog.report.evaluation_figures import evaluation_figures
+from aqualog.report.evaluation_words import (
+    better_sentences,
+    coverage_sentences,
+    headline,
+    notes_of,
+    rate_text,
+    recall_text,
+    seconds_text,
+    short,
+    title_of,
+    tuning_sentences,
+    verdicts,
+)
+from aqualog.report.plain import fields_of, plain
+from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
+from aqualog.report.wording import number
+from aqualog.rivals.catalogue import RIVALS
+
+__all__ = ["evaluation_document", "evaluation_report"]
+
+_LEGEND = (
+    "Full: detected within 0.5 s of the beginning; partial: within 2 s.\n"
+    "Latency 50 / 95 %: over all partial episodes, `never` where more episodes are missed.\n"
+    "Before: the detector was already on, on the same water.\n"
+    "On water: events with contact above 0.7, counted neither as right nor as wrong."
+)
+_SCORES = (
+    "Detector", "Drives", ("Full within 0.5 s", "full"), ("Partial within 2 s", "partial"),
+    ("Partial, its wheels", "its wheels"), ("Latency 50 / 95 % [s]", "50 / 95 % s"), ("Warned before [%]", "before %"),
+    "False alarms", ("Per hour (95 %)", "per h (95 %)"), "Per 100 km", ("On water, contact above 0.7", "on water"),
+)  # fmt: skip
+_ROC = ("Detector", "Times", "Threshold", "Full", "Partial", "False alarms", ("Per hour (95 %)", "per h (95 %)"))
+_FOOTER = (
+    "Intervals: Wilson [wilson1927] for shares, exact Poisson [garwood1936] for rates, 95 %. A false alarm is an event "
+    "that begins outside water and the second after it."
+)
+
+
+# --- sections --------------------------------------------------------------------------------------------------------
+
+
+def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Report:
+    """Verdicts, tables of detectors and configurations, confusion, situations, thresholds, rivals.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    by : sequence of str
+        Keys of the configuration by which the table is repeated.
+    """
+    records, tuning = evaluation.records, evaluation.tuning
+    scores, situations = score_all(records), situation_scores(records)
+    plots = evaluation_figures(evaluation)
+    tuned = tuning_sentences(tuning, score_all(tuning.before), scores) if tuning else []
+    sections = [
+        Section("", [
+            Para(f"{len(records)} drives, {sum(r.duration_s for r in records) / 3600.0:.3g} h", where="text"),
+            Headline(headline(evaluation), verdicts(records)), Lines(verdicts(records), where="text"),
+        ], "verdict", look="verdict open"),
+        Section("Not evaluated", [Lines(list(evaluation.failed.items()), most=1000)], "failed", look="problems",
+                where="page"),
+        Section("All drives", [Table(_SCORES, _score_rows(scores), "detectors"), Para(_LEGEND, where="text")]),
+        *(
+            Section(f"{_group(by, key)} ({len(some)} drives)", [Table(_SCORES, _score_rows(score_all(some)))])
+            for key, some in (grouped(records, by).items() if by else ())
+        ),
+        Section("Confusion: episodes with an event, and events per hour", [_confusion(records)], "confusion-section"),
+        Section("Situations, thresholds, latency", [Figures(list(plots))], "plot-section"),
+        *_situation_sections(records, situations),
+        Section("Over thresholds", [Table(_ROC, [_point_row(p) for p in evaluation.roc])], where="text"),
+        Section("Rivals", [Lines(better_sentences(records), most=1000)], "rivals"),
+        Section("Thresholds proposed", [Lines(tuned, most=1000)], "tuning"),
+        Section("Notes", [Lines(notes_of(records), most=1000)], "notes", where="page"),
+    ]  # fmt: skip
+    return Report("evaluation", "detections against labels", sections, _facts(evaluation), plots, _FOOTER)
+
+
+def _facts(evaluation: Evaluation) -> list[tuple[str, str]]:
+    records = evaluation.records
+    hours, dry, km = (sum(getattr(r, n) for r in records) for n in ("duration_s", "dry_s", "dry_m"))
+    facts = [
+        ("drives", str(len(records))),
+        ("driving", f"{number(hours / 3600.0)} h"),
+        ("outside water", f"{number(dry / 3600.0)} h, {number(km / 1e3)} km"),
+    ]
+    return [*facts, ("not readable", str(len(evaluation.failed)))] if evaluation.failed else facts
+
+
+def _group(by: Sequence[str], key: Sequence[str]) -> str:
+    return ", ".join(f"{k} {v}" for k, v in zip(by, key, strict=True))
+
+
+def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
+    return [
+        (
+            Cell(title_of(n), note="rival" if n in RIVALS else ""),
+            str(s.runs),
+            recall_text(s.full),
+            recall_text(s.partial),
+            recall_text(s.wheel_partial),
+            f"{seconds_text(s.partial.latency(0.5))} / {seconds_text(s.partial.latency(0.95))}",
+            number(100.0 * s.partial.before_share, 0),
+            str(s.false_alarms.count),
+            rate_text(s.false_alarms),
+            number(s.false_alarms.per_100km),
+            str(s.on_water.count),
+        )
+        for n, s in scores.items()
+        if s.runs
+    ]
+
+
+def _point_row(p: RocPoint) -> tuple[str, ...]:
+    return (
+        title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", recall_text(p.full), recall_text(p.partial),
+        str(p.false_alarms.count), rate_text(p.false_alarms),
+    )  # fmt: skip
+
+
+def _confusion(records: Sequence[RunRecord]) -> Table:
+    cells = confusion(records)
+    names = list(dict.fromkeys(n for row in cells.values() for n in row))
+    rows = [(row, *(_counted(columns.get(n)) for n in names)) for row, columns in cells.items()]
+    return Table(("Label", *(title_of(n) for n in names)), rows, "confusion")
+
+
+def _counted(c: Counts | None) -> str:
+    return "–" if c is None else f"{c.hit}/{c.episodes} · {short(Rate(c.events, c.seconds, 0.0).per_hour)}/h"
+
+
+def _situation_sections(records: Sequence[RunRecord], situations: Mapping[str, Mapping[str, Score]]) -> list[Section]:
+    """Tables of the situations for a terminal, where a page has figures, and the coverage."""
+    if len(situations) < 2:
+        return []
+    names = [n for n in next(iter(situations.values())) if any(s[n].runs for s in situations.values())]
+    header = ("Situation", *map(title_of, names))
+    wet = [row for row, scores in situations.items() if any(s.partial.episodes for s in scores.values())]
+    recall = [(row, *(_recall_cell(situations[row][n]) for n in names)) for row in wet]
+    alarms = [(row, *(_alarm_cell(scores[n]) for n in names)) for row, scores in situations.items()]
+    return [
+        Section("Recall of partial aquaplaning by situation", [Table(header, recall)], where="text"),
+        Section("False alarms per hour by situation", [Table(header, alarms)], where="text"),
+        Section("Situations that meet the targets", [Lines(coverage_sentences(records), "coverage")]),
+    ]
+
+
+def _recall_cell(s: Score) -> str:
+    return f"{100 * s.partial.share:.0f} % of {s.partial.episodes}" if s.runs and s.partial.episodes else "–"
+
+
+def _alarm_cell(s: Score) -> str:
+    return short(s.false_alarms.per_hour) if s.runs and s.false_alarms.seconds > 0.0 else "–"
+
+
+# --- JSON ------------------------------------------------------------------------------------------------------------
+
+
+def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> dict[str, Any]:
+    """The JSON document of `evaluate`. NaN and infinities become null.
+
+    Returns
+    -------
+    dict
+        `drives`: evaluated, `seconds`, `failed` {drive: reason};
+        `thresholds` and `rivals` {detector: value} that were used;
+        `detectors`: per detector `drives`, `unavailable`, recalls `full`, `partial`, `wheel_full`, `wheel_partial` (on
+        the wheels that it judges), `own` (labels of its name) - each `episodes`, `found`, `recall`, `ci95`,
+        `warned_before`, `latency_median_s`, `latency_95_s` (null: never) -, `false_alarms` (`count`, `hours`,
+        `per_hour`, `per_hour_ci95`, `per_100km`, `per_100km_ci95`) outside water, `on_water` (events on water, contact
+        above 0.7);
+        `by`: the same per configuration, `groups` {key: value};
+        `confusion` {row: {detector: `episodes`, `with_event`, `events_per_hour`}};
+        `situations` {manoeuvre: {detector: as in `detectors`}} and `coverage` (C78);
+        `roc`: points `detector`, `factor`, `threshold`, `full`, `partial`, `per_hour`, `count`, `hours`;
+        `better_rivals`: measures in which a rival is better; `sentences`: the same in words;
+        `tuning`: null, or `rule`, `tuned_on`, `reported_on`, `unused`, `choices`, `before` (detectors with the
+        thresholds as they were);
+        `runs`: per drive `name`, `groups`, `seconds`, `false_alarms_s` {detector: times}, `unavailable`.
+    """
+    records, tuning = evaluation.records, evaluation.tuning
+    return {
+        "schema_version": 1,
+        "tool_version": __version__,
+        "drives": {
+            "evaluated": len(records),
+            "seconds": plain(sum((r.duration_s for r in records), 0.0)),
+            "failed": dict(evaluation.failed),
+        },
+        "thresholds": fields_of(evaluation.thresholds, *evaluation.thresholds.__dataclass_fields__),
+        "rivals": None if evaluation.rivals is None else dict(evaluation.rivals),
+        "detectors": _scores(score_all(records)),
+        "by": [
+            {"groups": dict(zip(by, key, strict=True)), "detectors": _scores(score_all(some))}
+            for key, some in (grouped(records, by).items() if by else ())
+        ],
+        "confusion": {
+            row: {
+                n: {
+                    "episodes": c.episodes,
+                    "with_event": c.hit,
+                    "events_per_hour": plain(Rate(c.events, c.seconds, 0.0).per_hour),
+                }
+                for n, c in cells.items()
+            }
+            for row, cells in confusion(records).items()
+        },
+        "situations": {row: _scores(scores) for row, scores in situation_scores(records).items()},
+        "coverage": [asdict(c) for c in coverage(situation_scores(records)).values()],
+        "roc": [_point(p) for p in evaluation.roc],
+        "better_rivals": [
+            {"rival": b.rival, "against": b.against, "situation": b.situation or None, "measure": b.measure,
+             "rival_value": plain(b.rival_value), "own_value": plain(b.own_value), "beyond_chance": b.is_sure,
+             "at_a_price": b.at_a_price}
+            for b in better_rivals(records)
+        ],
+        "sentences": [*verdicts(records), *better_sentences(records)],
+        "tuning": None if tuning is None else _tuning(tuning),
+        "runs": [_run(r) for r in records],
+        "notes": notes_of(records),
+    }  # fmt: skip
+
+
+def _tuning(t: Tuning) -> dict[str, Any]:
+    return {
+        **fields_of(t, "rule", "limit_per_hour", "tuned_on", "reported_on", "unused", digits=None),
+        "choices": [{**_point(c.point), "reason": c.reason} for c in t.choices.values()],
+        "before": _scores(score_all(t.before)),
+    }
+
+
+def _recall(r: Recall) -> dict[str, Any]:
+    return {
+        "episodes": r.episodes,
+        "found": r.found,
+        "recall": plain(r.share),
+        "ci95": plain(r.ci95),
+        "warned_before": plain(r.before_share),
+        "latency_median_s": plain(r.latency(0.5)),
+        "latency_95_s": plain(r.latency(0.95)),
+    }
+
+
+def _rate(r: Rate) -> dict[str, Any]:
+    rates = fields_of(r, "per_hour", "per_hour_ci95", "per_100km", "per_100km_ci95")
+    return {"count": r.count, "hours": plain(r.seconds / 3600.0), **rates}
+
+
+def _scores(scores: Mapping[str, Score]) -> dict[str, Any]:
+    return {
+        n: {
+            "drives": s.runs,
+            "unavailable": s.unavailable,
+            **{k: _recall(getattr(s, k)) for k in ("full", "partial", "wheel_full", "wheel_partial", "own")},
+            "false_alarms": _rate(s.false_alarms),
+            "on_water": {"count": s.on_water.count, "per_hour": plain(s.on_water.per_hour)},
+        }
+        for n, s in scores.items()
+    }
+
+
+def _point(p: RocPoint) -> dict[str, Any]:
+    return {
+        "detector": p.detector,
+        "factor": plain(p.factor),
+        "threshold": plain(p.threshold),
+        "full": plain(p.full.share),
+        "partial": plain(p.partial.share),
+        "per_hour": plain(p.false_alarms.per_hour),
+        "count": p.false_alarms.count,
+        "hours": plain(p.false_alarms.seconds / 3600.0),
+    }
+
+
+def _run(r: RunRecord) -> dict[str, Any]:
+    return {
+        "name": r.name,
+        "groups": dict(r.groups),
+        "seconds": plain(r.duration_s),
+        "false_alarms_s": {n: list(d.false_alarms) for n, d in r.detectors.items() if d.false_alarms},
+        "unavailable": list(r.unavailable),
+    }

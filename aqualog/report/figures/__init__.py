@@ -1,1 +1,0 @@
-"""One figure per file: a drive's result into rows of one stack over time."""

@@ -1,0 +1,469 @@
+// The page of one drive.
+(function () {
+  const data = JSON.parse(document.getElementById("drive-data").textContent);
+  const plot = document.getElementById("plots");
+  const POINTS = 3000; // per line in view: about two per pixel
+  const collator = new Intl.Collator("en");
+
+  // --- samples ------------------------------------------------------------------------------------------------
+
+  function bytes(base64) {
+    const text = atob(base64);
+    const out = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) out[i] = text.charCodeAt(i);
+    return out.buffer;
+  }
+
+  // Minima and maxima outside the windows and every sample inside them, in order of time.
+  function unpack(line) {
+    const full = new Float32Array(bytes(line.full));
+    const index = new Uint32Array(bytes(line.index));
+    const value = new Float32Array(bytes(line.value));
+    const t = new Float64Array(full.length + index.length);
+    const y = new Float32Array(t.length);
+    let n = 0, k = 0, f = 0;
+    const takeUntil = function (end) {
+      for (; k < index.length && index[k] < end; k++, n++) { t[n] = index[k] * data.dt; y[n] = value[k]; }
+    };
+    for (const [begin, end] of data.windows) {
+      takeUntil(begin);
+      for (let i = begin; i < end; i++, n++) { t[n] = i * data.dt; y[n] = full[f++]; }
+    }
+    takeUntil(Infinity);
+    return { t: t, y: y, row: line.row };
+  }
+
+  function firstAtOrAfter(t, x) {
+    let a = 0, b = t.length;
+    while (a < b) { const m = (a + b) >> 1; if (t[m] < x) a = m + 1; else b = m; }
+    return a;
+  }
+
+  // Samples from index a to b, or first, least, greatest, last and a gap of each of as many stretches as are visible.
+  function picked(line, a, b) {
+    const x = [], y = [];
+    const take = function (i) { x.push(line.t[i]); y.push(Number.isNaN(line.y[i]) ? null : line.y[i]); };
+    if (b - a <= POINTS) { for (let i = a; i < b; i++) take(i); return [x, y]; }
+    const stretches = POINTS / 4;
+    for (let s = 0; s < stretches; s++) {
+      const from = a + Math.floor((b - a) * s / stretches), to = a + Math.floor((b - a) * (s + 1) / stretches);
+      let low = -1, high = -1, gap = -1;
+      for (let i = from; i < to; i++) {
+        const v = line.y[i];
+        if (Number.isNaN(v)) { if (gap < 0) gap = i; continue; }
+        if (low < 0 || v < line.y[low]) low = i;
+        if (high < 0 || v > line.y[high]) high = i;
+      }
+      const chosen = [from, low, high, gap, to - 1].filter(function (i) { return i >= 0; });
+      chosen.sort(function (p, q) { return p - q; });
+      chosen.forEach(function (i, j) { if (j === 0 || i !== chosen[j - 1]) take(i); });
+    }
+    return [x, y];
+  }
+
+  // --- spans: bars of the lanes, strips, shades ---------------------------------------------------------------------
+
+  const traces = data.figure ? data.figure.data : [];
+  const firstLane = (data.lines || []).length;
+  const laneHover = traces.findIndex(function (trace) { return trace.meta === "lanes"; });
+  const HALF_BAR = 0.31; // of the distance of two lanes
+
+  // Begins and ends [s], in order of time.
+  function spansOf(base64) {
+    const index = new Uint32Array(bytes(base64)), begin = new Float64Array(index.length / 2), end = begin.slice();
+    for (let i = 0; i < begin.length; i++) { begin[i] = index[2 * i] * data.dt; end[i] = index[2 * i + 1] * data.dt; }
+    return { begin: begin, end: end };
+  }
+
+  function seconds(x) { return x.toFixed(2); }
+
+  const lanes = (data.lanes || []).map(function (lane, i) {
+    const trace = traces[firstLane + i];
+    return Object.assign(spansOf(lane.spans), { level: lane.level, name: trace.name, group: trace.legendgroup });
+  });
+  const strips = (data.rows || []).map(function (row) { return row.strips && spansOf(row.strips.spans); });
+
+  // Union of events of one severity.
+  function shaded(isFull) {
+    const begin = [], end = [];
+    for (const [a, b, full] of data.events.slice().sort(function (p, q) { return p[0] - q[0]; })) {
+      const last = end.length - 1;
+      if (Boolean(full) !== isFull) continue;
+      if (last >= 0 && a <= end[last]) end[last] = Math.max(end[last], b);
+      else { begin.push(a); end.push(b); }
+    }
+    return { begin: begin, end: end };
+  }
+  const shades = { partial: shaded(false), full: shaded(true) };
+
+  // Spans in a range, as [begin, end]; those that are closer than can be seen are one, and none is shorter than `least`.
+  function inside(spans, from, to, unseen, least = 0) {
+    const out = [];
+    for (let i = firstAtOrAfter(spans.end, from); i < spans.begin.length && spans.begin[i] <= to; i++) {
+      const last = out[out.length - 1], end = Math.max(spans.end[i], spans.begin[i] + least);
+      if (last && spans.begin[i] - last[1] < unseen) last[1] = Math.max(last[1], end);
+      else out.push([spans.begin[i], end]);
+    }
+    return out;
+  }
+
+  function outlines(spans, level) {
+    const x = [], y = [], low = level - HALF_BAR, high = level + HALF_BAR;
+    for (const [a, b] of spans) {
+      x.push(a, a, b, b, a, null);
+      y.push(low, high, high, low, low, null);
+    }
+    return [x, y];
+  }
+
+  // One shape for all: thousands of rectangles would be slow.
+  function rectangles(spans, yref, top, colour) {
+    const path = spans.map(function ([a, b]) {
+      return `M${a.toFixed(6)},0V${top}H${b.toFixed(6)}V0Z`;
+    }).join("");
+    return path ? [{
+      type: "path", path: path, xref: "x", yref: yref, fillcolor: colour, line: { width: 0 }, layer: "below",
+    }] : [];
+  }
+
+  function shadesAndStrips(from, to, unseen) {
+    const found = ["partial", "full"].flatMap(function (severity) {
+      return rectangles(inside(shades[severity], from, to, unseen, 2 * unseen), "paper", 1, data.shades[severity]);
+    });
+    data.rows.forEach(function (row, k) {
+      // a strip along the bottom, which the colours of the events do not mix with
+      const yref = row.axis.replace("axis", "") + " domain";
+      if (strips[k]) found.push(...rectangles(inside(strips[k], from, to, unseen), yref, 0.05, row.strips.colour));
+    });
+    return found;
+  }
+
+  // What is on in each of some hundred slices of the view; a slice takes in everything that touches it.
+  function slices(range) {
+    const count = 400, width = (range[1] - range[0]) / count;
+    const shown = lanes.filter(function (lane) { return !hidden.has(lane.group); });
+    const next = shown.map(function (lane) { return firstAtOrAfter(lane.end, range[0]); });
+    const x = [], y = [], text = [];
+    for (let s = 0; s < count; s++) {
+      const from = range[0] + s * width, to = from + width, on = [];
+      shown.forEach(function (lane, i) {
+        while (next[i] < lane.end.length && lane.end[next[i]] <= from) next[i]++;
+        const first = next[i], found = firstAtOrAfter(lane.begin, to) - first;
+        if (found > 1) on.push(lane.name + ": " + found + " detections");
+        else if (found === 1) {
+          const a = lane.begin[first], b = lane.end[first];
+          on.push(`${lane.name}: ${seconds(a)} – ${seconds(b)} s (${seconds(b - a)} s)`);
+        }
+      });
+      x.push(from + 0.5 * width);
+      y.push(1);
+      text.push(on.join("<br>") || "all clear");
+    }
+    return { x: x, y: y, customdata: text };
+  }
+
+  // --- view ---------------------------------------------------------------------------------------------------
+
+  const whole = [0, Math.max(data.n || 0, 1) * (data.dt || 1)];
+  const lines = (data.lines || []).map(unpack);
+  const hidden = new Set();
+  const held = {}; // y axes that the user has scaled, until "show all"
+  let view = whole.slice();
+  let selected = -1;
+
+  function isHidden(i) { return hidden.has(data.figure.data[i].legendgroup); }
+
+  function valueRange(k, range) {
+    let low = Infinity, high = -Infinity;
+    lines.forEach(function (line, i) {
+      if (line.row !== k || isHidden(i)) return;
+      const a = Math.max(0, firstAtOrAfter(line.t, range[0]) - 1);
+      const b = Math.min(line.t.length, firstAtOrAfter(line.t, range[1]) + 1);
+      for (let j = a; j < b; j++) {
+        const v = line.y[j];
+        if (v < low) low = v;
+        if (v > high) high = v;
+      }
+    });
+    if (low > high) { low = 0; high = 0; }
+    for (const v of data.rows[k].include) { low = Math.min(low, v); high = Math.max(high, v); }
+    const short = 0.5 * (data.rows[k].least_span - (high - low));
+    if (short > 0) { low -= short; high += short; }
+    const span = high - low || Math.max(1, Math.abs(high)) * 0.1;
+    return [low - 0.06 * span, high + 0.1 * span];
+  }
+
+  function selectionShape() {
+    if (selected < 0) return [];
+    const event = data.events[selected];
+    return [{
+      type: "rect", xref: "x", x0: event[0], x1: event[1], yref: "paper", y0: 0, y1: 1, layer: "above",
+      fillcolor: "rgba(0,0,0,0)", line: { width: 1.5, color: schemeColours()["@accent"], dash: "dot" },
+    }];
+  }
+
+  // What a view shows: samples and bars of each trace by its index, and what changes of the layout.
+  function contents(range) {
+    const width = range[1] - range[0], change = new Map(), layout = { shapes: shapes.slice() };
+    // half a view more on both sides, so that panning does not pull in blank paper
+    const from = range[0] - 0.5 * width, to = range[1] + 0.5 * width, unseen = width / POINTS;
+    lines.forEach(function (line, i) {
+      const a = Math.max(0, firstAtOrAfter(line.t, from) - 1);
+      const b = Math.min(line.t.length, firstAtOrAfter(line.t, to) + 1);
+      const [x, y] = picked(line, a, b);
+      change.set(i, { x: x, y: y });
+    });
+    lanes.forEach(function (lane, i) {
+      const [x, y] = outlines(inside(lane, from, to, unseen), lane.level);
+      change.set(firstLane + i, { x: x, y: y });
+    });
+    if (laneHover >= 0) change.set(laneHover, slices(range));
+    layout.shapes.unshift(...shadesAndStrips(from, to, unseen));
+    layout.shapes.push(...selectionShape());
+    for (const axis of ["xaxis", "xaxis2"]) layout[axis + ".range"] = range.slice();
+    data.rows.forEach(function (row, k) {
+      if (row.has_lines && !held[row.axis]) layout[row.axis + ".range"] = valueRange(k, range);
+    });
+    return [change, layout];
+  }
+
+  function tellView() {
+    document.getElementById("view").textContent =
+      view[0].toFixed(2) + " – " + view[1].toFixed(2) + " s (" + (view[1] - view[0]).toFixed(2) + " s)";
+  }
+
+  function draw(range) {
+    view = range;
+    tellView();
+    const [change, layout] = contents(range), all = Array.from(change.values());
+    const update = { visible: Array.from(change.keys(), function (i) { return !isHidden(i); }) };
+    for (const key of ["x", "y", "customdata"]) update[key] = all.map(function (c) { return c[key] || null; });
+    return Plotly.update(plot, update, layout, Array.from(change.keys()));
+  }
+
+  function showAll() {
+    for (const name of Object.keys(held)) delete held[name];
+    mark(-1);
+    return draw(whole.slice());
+  }
+
+  function onRelayout(change) {
+    const range = change["xaxis.range"] || change["xaxis2.range"];
+    let a = range ? range[0] : change["xaxis.range[0]"], b = range ? range[1] : change["xaxis.range[1]"];
+    if (a === undefined) a = change["xaxis2.range[0]"];
+    if (b === undefined) b = change["xaxis2.range[1]"];
+    for (const name of Object.keys(change)) {
+      const axis = /^(yaxis\d*)\.range/.exec(name);
+      if (axis) held[axis[1]] = true;
+    }
+    if (change["xaxis.autorange"] || change["xaxis2.autorange"]) { showAll(); return; }
+    if (a !== undefined || b !== undefined) draw([a === undefined ? view[0] : +a, b === undefined ? view[1] : +b]);
+  }
+
+  // --- events -------------------------------------------------------------------------------------------------
+
+  const eventTable = document.getElementById("events");
+  const eventBody = eventTable ? eventTable.tBodies[0] : null;
+  const PAGE = 200; // rows of a long table of events at a time
+  // A long table is filled by its pages; `order` has the events that the search leaves, as they are sorted.
+  const long = data.table ? { order: data.events.map(function (_, i) { return i; }), first: 0, words: null } : null;
+
+  function mark(index) {
+    selected = index;
+    if (!eventBody) return;
+    for (const row of eventBody.rows) row.setAttribute("aria-selected", String(Number(row.dataset.event) === index));
+  }
+
+  function zoomTo(index, scroll) {
+    const event = data.events[index];
+    const margin = Math.max(1, 0.35 * (event[1] - event[0]));
+    mark(index);
+    for (const name of Object.keys(held)) delete held[name];
+    if (plot) {
+      draw([Math.max(whole[0], event[0] - margin), Math.min(whole[1], event[1] + margin)]);
+      const bar = document.getElementById("toolbar").getBoundingClientRect();
+      if (scroll && bar.top > 0.6 * window.innerHeight) document.getElementById("plot-section").scrollIntoView();
+    }
+  }
+
+  function step(by) {
+    const order = long ? long.order : Array.from(eventBody.rows, function (r) { return Number(r.dataset.event); });
+    if (!order.length) return;
+    const at = order.indexOf(selected);
+    const next = at < 0 ? (by > 0 ? 0 : order.length - 1) : (at + by + order.length) % order.length;
+    if (long && (next < long.first || next >= long.first + PAGE)) fillEvents(next - next % PAGE);
+    zoomTo(order[next], false);
+  }
+
+  if (eventBody) {
+    eventBody.addEventListener("click", function (e) {
+      const row = e.target.closest("tr");
+      if (row) zoomTo(Number(row.dataset.event), true);
+    });
+    eventBody.addEventListener("keydown", function (e) {
+      const row = e.target.closest("tr");
+      if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(Number(row.dataset.event), true); }
+      const other = e.key === "ArrowDown" ? row.nextElementSibling : e.key === "ArrowUp" ? row.previousElementSibling : null;
+      if (other) { e.preventDefault(); other.focus(); }
+    });
+  }
+
+  // --- a long table of events ---------------------------------------------------------------------------------
+
+  function make(tag, properties, ...children) {
+    const element = Object.assign(document.createElement(tag), properties);
+    element.append(...children);
+    return element;
+  }
+
+  function minus(text) { return text.replace("-", "−"); }
+
+  // Text of a cell and what it is sorted by, as the page has them in a short table.
+  const columns = [
+    function (i) { return [data.table.detectors[data.table.detector[i]]]; },
+    function (i) { return [data.table.places[data.table.place[i]][0]]; },
+    function (i) { return [minus(seconds(data.events[i][0])), data.events[i][0]]; },
+    function (i) { return [minus(seconds(data.events[i][1])), data.events[i][1]]; },
+    function (i) { const d = data.events[i][1] - data.events[i][0]; return [minus(seconds(d)), d]; },
+    function (i) { return [data.table.severities[data.table.severity[i]]]; },
+    function (i) { return [data.table.peak[i], data.table.ratio[i]]; },
+    function (i) { return [data.table.speed[i] < 0 ? "–" : data.table.speed[i].toFixed(0), data.table.speed[i]]; },
+    function (i) { return [data.table.evidence[i]]; },
+  ];
+
+  function eventRow(i) {
+    const line = make("tr", { tabIndex: 0 });
+    line.dataset.event = i;
+    line.setAttribute("aria-selected", String(i === selected));
+    columns.forEach(function (column, c) {
+      const text = column(i)[0], colour = c === 1 ? data.table.places[data.table.place[i]][1] : "";
+      const isNumber = eventTable.tHead.rows[0].cells[c].classList.contains("num");
+      const cell = make("td", { className: isNumber ? "num" : c === 8 ? "wide" : "" });
+      if (colour) cell.append(make("i", { className: "dot" }));
+      if (colour) cell.firstChild.style.background = colour;
+      cell.append(c === 5 ? make("span", { className: "tag " + (text === "full" ? "full" : "partial"), textContent: text }) : text);
+      line.append(cell);
+    });
+    return line;
+  }
+
+  function fillEvents(first, most) {
+    const count = long.order.length, part = long.order.slice(first, first + (most || PAGE));
+    long.first = first;
+    eventBody.replaceChildren(...part.map(eventRow));
+    eventTable.parentNode.scrollTop = 0;
+    document.getElementById("event-count").textContent = count
+      ? `${first + 1}–${first + part.length} of ${count}` + (count < data.events.length ? ` found among ${data.events.length}` : "")
+      : "no event";
+    document.getElementById("event-back").disabled = first === 0;
+    document.getElementById("event-on").disabled = first + part.length >= count;
+  }
+
+  function orderEvents() {
+    const words = document.getElementById("event-search").value.trim().toLowerCase().split(/\s+/);
+    long.words = long.words || data.events.map(function (_, i) {
+      return columns.map(function (column) { return column(i)[0]; }).join(" ").toLowerCase();
+    });
+    const found = data.events.map(function (_, i) { return i; }).filter(function (i) {
+      return words.every(function (word) { return long.words[i].includes(word); });
+    });
+    const heads = Array.from(eventTable.tHead.rows[0].cells);
+    const column = heads.findIndex(function (head) { return head.hasAttribute("aria-sort"); });
+    if (column >= 0) {
+      const sign = heads[column].getAttribute("aria-sort") === "ascending" ? 1 : -1;
+      const keys = data.events.map(function (_, i) { const c = columns[column](i); return c.length > 1 ? c[1] : c[0]; });
+      const compare = heads[column].classList.contains("num")
+        ? function (p, q) { return keys[p] - keys[q]; } : function (p, q) { return collator.compare(keys[p], keys[q]); };
+      found.sort(function (p, q) { return sign * compare(p, q); });
+    }
+    long.order = found;
+    fillEvents(0);
+  }
+
+  if (long) {
+    document.getElementById("event-search").addEventListener("input", orderEvents);
+    document.getElementById("event-back").addEventListener("click", function () { fillEvents(long.first - PAGE); });
+    document.getElementById("event-on").addEventListener("click", function () { fillEvents(long.first + PAGE); });
+    document.getElementById("event-controls").hidden = false;
+    fillEvents(0);
+    let first = 0;
+    window.addEventListener("beforeprint", function () { first = long.first; fillEvents(0, Infinity); });
+    window.addEventListener("afterprint", function () { fillEvents(first); });
+  }
+
+  // --- sorting ------------------------------------------------------------------------------------------------
+
+  function sortBy(table, head, column) {
+    const down = head.getAttribute("aria-sort") === "ascending";
+    for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    if (long && table === eventTable) { orderEvents(); return; }
+    const body = table.tBodies[0];
+    const key = function (row) { return row.cells[column].dataset.key; };
+    const isNumber = head.classList.contains("num");
+    const sorted = Array.from(body.rows).sort(function (p, q) {
+      const order = isNumber ? Number(key(p)) - Number(key(q)) : collator.compare(key(p), key(q));
+      return down ? -order : order;
+    });
+    body.append(...sorted);
+  }
+
+  for (const table of document.querySelectorAll("table.sortable")) {
+    Array.from(table.tHead.rows[0].cells).forEach(function (head, column) {
+      head.tabIndex = 0;
+      head.addEventListener("click", function () { sortBy(table, head, column); });
+      head.addEventListener("keydown", function (e) {
+        if (e.key === "Enter" || e.key === " ") { e.preventDefault(); sortBy(table, head, column); }
+      });
+    });
+  }
+
+  if (!plot) { document.body.dataset.ready = "true"; return; }
+
+  // --- start --------------------------------------------------------------------------------------------------
+
+  let shapes = [];
+
+  function build(width) {
+    const figure = coloured(data.figure);
+    shapes = figure.layout.shapes;
+    if (width) figure.layout.width = width;
+    figure.data.forEach(function (trace) { trace.visible = !hidden.has(trace.legendgroup); });
+    tellView();
+    const [change, layout] = contents(view);
+    change.forEach(function (values, i) { Object.assign(figure.data[i], values); });
+    for (const axis of Object.keys(held)) layout[axis + ".range"] = plot.layout[axis].range.slice();
+    for (const [key, value] of Object.entries(layout)) {
+      const [axis, range] = key.split(".");
+      if (range) figure.layout[axis].range = value;
+      else figure.layout[axis] = value;
+    }
+    const config = {
+      ...plotConfig, doubleClick: false,
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
+    };
+    return Plotly.react(plot, figure.data, figure.layout, config);
+  }
+
+  for (const button of document.querySelectorAll(".toggle")) {
+    button.addEventListener("click", function () {
+      const group = button.dataset.group, show = hidden.has(group);
+      if (show) hidden.delete(group); else hidden.add(group);
+      button.setAttribute("aria-pressed", String(show));
+      draw(view);
+    });
+  }
+  document.getElementById("show-all").addEventListener("click", showAll);
+  for (const [id, by] of [["previous", -1], ["next", 1]]) {
+    const button = document.getElementById(id);
+    if (button) button.addEventListener("click", function () { step(by); });
+  }
+
+  build().then(function () {
+    plot.on("plotly_relayout", onRelayout);
+    plot.on("plotly_doubleclick", showAll);
+    plot.dataset.ready = document.body.dataset.ready = "true";
+  });
+  // without a width plotly keeps the last one until it has to measure again
+  redrawn(build, function () { build().then(function () { Plotly.Plots.resize(plot); }); });
+})();
