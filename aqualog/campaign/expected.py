@@ -14,10 +14,9 @@ from aqualog.campaign.samples import RunInfo
 from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, P_NOMINAL
+from aqualog.model.plant import P_NOMINAL
 from aqualog.model.tyre import P_REFERENCE, TYRES, Tyre
 from aqualog.physics.contact import contact_share, slip_stiffness_ratio
-from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.rolling import load_factor, pressure_factor
 from aqualog.physics.tyre_brush import brush_parts
@@ -256,11 +255,7 @@ def _share(info: RunInfo, wheel: str, v: float, film: float, tyre: Tyre) -> floa
     if p is None:
         return "the tyre pressure is not given"
     F_z = np.array([_load(info.vehicle, wheel)])
-    v_full = full_aquaplaning_speed(
-        np.array([film]), F_z, p=p, tread_capacity=tyre.tread_capacity, v_anchor=tyre.v_anchor, h_anchor=H_ANCHOR,
-        p_anchor=P_ANCHOR, F_z_anchor=F_Z_ANCHOR, h_bulk=tyre.h_bulk, h_onset=tyre.h_onset,
-        exponent=tyre.contact_exponent,
-    )  # fmt: skip
+    v_full = tyre.full_speed(np.array([film]), F_z, p=p)
     if float(v_full[0]) > NO_WEDGE:
         return 1.0
     return float(contact_share(np.array([v]), v_full, exponent=tyre.contact_exponent)[0])

@@ -17,7 +17,7 @@ from numba.core.runtime import rtsys
 
 from aqualog.core.user_folders import code_folder
 
-__all__ = ["compiled", "inlined", "kept_code"]
+__all__ = ["compiled", "inlined", "kept_code", "part"]
 
 _inlined: dict[FunctionType, Any] = {}
 
@@ -47,6 +47,11 @@ def compiled(function: Callable[..., Any]) -> Any:
         assert isinstance(function, FunctionType)
         index._source_stamp = (index._source_stamp, _stamp_of(function))
     return dispatcher
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """Compile a part of a recursion into the code of its caller: small functions with names cost no call."""
+    return njit(function, error_model="numpy", forceinline=True)
 
 
 def kept_code() -> frozenset[tuple[str, int]]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH
-from aqualog.model.tyre import TYRES
+from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH
+from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, TYRES
 from aqualog.physics.contact import contact_half_length, contact_share
-from aqualog.physics.hydroplaning import full_aquaplaning_speed
 
 __all__ = ["DEPTH", "LOAD", "TYRE", "full_speed", "half_length", "share"]
 
@@ -27,12 +26,7 @@ def half_length(p: float) -> float:
 
 def full_speed(h: float, p: float) -> float:
     """Speed of full aquaplaning in a depth [m] at a pressure [Pa]. [m/s]"""
-    v = full_aquaplaning_speed(
-        np.array([h]), np.array([LOAD]), p=p, tread_capacity=TYRE.tread_capacity, v_anchor=TYRE.v_anchor,
-        h_anchor=H_ANCHOR, p_anchor=P_ANCHOR, F_z_anchor=F_Z_ANCHOR, h_bulk=TYRE.h_bulk, h_onset=TYRE.h_onset,
-        exponent=TYRE.contact_exponent,
-    )  # fmt: skip
-    return float(v[0])
+    return float(TYRE.full_speed(np.array([h]), np.array([LOAD]), p=p)[0])
 
 
 def share(v: FloatArray, h: float, p: float) -> FloatArray:

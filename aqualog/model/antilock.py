@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import part
+from aqualog.model.state import AT
 
 __all__ = ["antilock"]
 
@@ -13,22 +14,21 @@ BUILD_RATE = 2.5  # [1/s] stepwise build-up, on average (K)
 V_OFF = 2.0  # [m/s] below, wheels may lock: 3-10 km/h on series cars (K)
 
 
-@compiled
-def antilock(released, releasing, row, omega_at, v_at, r_at, dt):  # type: ignore[no-untyped-def]
-    """One step of a two-state controller per wheel, in place.
+@part
+def antilock(m, dt):  # type: ignore[no-untyped-def]
+    """One step of a two-state controller per wheel, in place, by the speeds that the step recorded.
 
-    `released` (4,) is the share of the brake torque that is held off, `releasing` (4,) 1 while it falls. `row` is the
-    record of the step with wheel speeds, speeds over ground and radii from `omega_at`, `v_at`, `r_at` on. The cycle of
-    3 to 10 Hz follows from rates, thresholds and the wheel's inertia.
+    `m.released` (4,) is the share of the brake torque that is held off, `m.releasing` (4,) 1 while it falls. The cycle
+    of 3 to 10 Hz follows from rates, thresholds and the wheel's inertia.
     """
     for i in range(4):
-        v = row[v_at + i]
-        slip = 1.0 - row[omega_at + i] * row[r_at + i] / max(v, 0.1)
+        v = m.out[AT.v_along + i]
+        slip = 1.0 - m.out[AT.omega + i] * m.out[AT.r_e + i] / max(v, 0.1)
         if v < V_OFF or slip < SLIP_BUILD:
-            releasing[i] = 0.0
+            m.releasing[i] = 0.0
         elif slip > SLIP_RELEASE:
-            releasing[i] = 1.0
-        if releasing[i] > 0.0:
-            released[i] = min(released[i] + RELEASE_RATE * dt, 1.0)
+            m.releasing[i] = 1.0
+        if m.releasing[i] > 0.0:
+            m.released[i] = min(m.released[i] + RELEASE_RATE * dt, 1.0)
         else:
-            released[i] = max(released[i] - BUILD_RATE * dt, 0.0)
+            m.released[i] = max(m.released[i] - BUILD_RATE * dt, 0.0)

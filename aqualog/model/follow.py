@@ -19,6 +19,7 @@ from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
 from aqualog.model.start import resistance_at, rolling_state
+from aqualog.model.state import DRIVE, column, wheel_columns
 from aqualog.model.term import Model, Setup
 from aqualog.physics.load import G
 
@@ -186,7 +187,7 @@ def _start(plant: Plant, torque: FloatArray, v: float, theta: float) -> FloatArr
     drag, rolling = resistance_at(plant, v, G * math.sin(theta))
     a = (drive / float(plant.r_l.mean()) - float(rolling.sum()) - drag) / (plant.mass + plant.towed_mass)
     state = rolling_state(plant, v=v, a=a, drive=0.0, split_rear=0.5)
-    state[kernel.DRIVE] = 0.0
+    state[DRIVE] = 0.0
     return state
 
 
@@ -194,17 +195,13 @@ _SCALARS = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
 
 
 def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) -> dict[str, FloatArray]:
-    def of_wheels(name: str) -> list[FloatArray]:
-        first = kernel.COLUMNS[name]
-        return [np.ascontiguousarray(rows[:, first + i]) for i in range(4)]
-
-    columns = {n: np.ascontiguousarray(rows[:, kernel.COLUMNS[n]]) for n in _SCALARS}
-    omega, angle, torque = (of_wheels(n) for n in ("omega", "angle", "torque"))
+    columns = {n: column(rows, n) for n in _SCALARS}
+    omega, angle, torque = (wheel_columns(rows, n) for n in ("omega", "angle", "torque"))
     for i, w in enumerate(WHEELS):
         columns[f"omega_{w}"] = omega[i]
         columns[f"angle_{w}"] = angle[i]
         columns[f"torque_{w}"] = torque[i] / plant.torque_gain
     if rods:
         names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "aligning", "braking", "contact")
-        columns |= steering_columns({n: of_wheels(n) for n in names}, plant, scenario)
+        columns |= steering_columns({n: wheel_columns(rows, n) for n in names}, plant, scenario)
     return columns

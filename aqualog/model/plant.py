@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,11 +15,10 @@ from aqualog.model.tyre import P_REFERENCE, Tyre
 from aqualog.physics.load import G, centre_shift
 from aqualog.physics.rolling import pressure_factor
 
-__all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "understeer_gradient", "with_mass_at"]
+__all__ = ["FRONT_COMPLIANCE", "Plant", "build_plant", "flat", "records", "understeer_gradient", "with_mass_at"]
 
 P_NOMINAL = 2.2e5  # [Pa] nominal pressure of the MF6.1 pressure law
 P_HALF_LENGTH, F_Z_HALF_LENGTH = 2.2e5, 4000.0  # [Pa, N] reference of a tyre's half_length
-H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
 BRAKE_SHARE_FRONT = 0.64  # of the brake torque (K)
 POWER_PER_MASS = 110.0  # [W/kg] a lively car (K)
 FRONT_COMPLIANCE = 0.8  # the steering yields: cornering slope of the front axle over the tyre's, understeer (K)
@@ -197,18 +197,21 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
     )
 
 
-def flat(plant: Plant) -> tuple[Any, Any, FloatArray]:
+def flat(plant: Plant, **scalars: float) -> tuple[Any, Any, FloatArray]:
     """Pack the plant for the compiled simulation: one record of the car, four of the wheels, the table of drag.
 
-    Records are plain memory; a tuple of arrays would cost reference counting at every access.
+    `scalars` of the run go into the record of the car. Records are plain memory; a tuple of arrays would cost reference
+    counting at every access.
     """
     fields = plant._asdict()
     wheels = {n: np.asarray(x, dtype=np.float64) for n, x in fields.items() if np.shape(x) == (4,)}
-    car = {n: float(x) for n, x in fields.items() if np.ndim(x) == 0}
-    car_record = np.zeros(1, dtype=[(n, np.float64) for n in car])
-    wheel_records = np.zeros(4, dtype=[(n, np.float64) for n in wheels])
-    for n, x in car.items():
-        car_record[n] = x
-    for n, w in wheels.items():
-        wheel_records[n] = w
-    return car_record, wheel_records, np.ascontiguousarray(plant.drag_over_v)
+    car = {n: float(x) for n, x in fields.items() if np.ndim(x) == 0} | scalars
+    return records(car, 1), records(wheels, 4), np.ascontiguousarray(plant.drag_over_v)
+
+
+def records(columns: Mapping[str, Any], n: int) -> Any:
+    """Return `n` records of these float columns."""
+    out = np.zeros(n, dtype=[(name, np.float64) for name in columns])
+    for name, x in columns.items():
+        out[name] = x
+    return out

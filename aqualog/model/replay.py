@@ -12,6 +12,7 @@ from aqualog.model import kernel
 from aqualog.model.plant import Plant
 from aqualog.model.road import DRY
 from aqualog.model.start import resistance_at, rolling_state
+from aqualog.model.state import column, wheel_columns
 
 __all__ = ["Replay", "replay"]
 
@@ -97,10 +98,4 @@ def replay(
     a_0 = (drive / float(plant.r_l.mean()) - rolling.sum() - drag) / plant.mass
     start = rolling_state(plant, v=v_0, a=a_0, drive=drive, split_rear=split_rear)
     rows = kernel.run(n, dt, every, start, plant, DRY, controls)
-    first = kernel.COLUMNS["omega"]
-    return Replay(
-        t,
-        rows[:, kernel.COLUMNS["v_x"]],
-        rows[:, kernel.COLUMNS["a_x"]],
-        np.ascontiguousarray(rows[:, first : first + 4].T),
-    )
+    return Replay(t, column(rows, "v_x"), column(rows, "a_x"), np.array(wheel_columns(rows, "omega")))

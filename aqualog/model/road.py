@@ -11,7 +11,7 @@ from aqualog.core.records import FloatArray
 from aqualog.model.scenario import Kick, Lane, Scenario
 from aqualog.model.surface import Surface
 
-__all__ = ["DRY", "Road", "build_road"]
+__all__ = ["DRY", "Road", "at_position", "build_road", "stretch_at", "track_row"]
 
 DS = 0.1  # [m] grid of the fields
 DS_LONG = 0.5  # [m] on drives beyond 20 km
@@ -118,3 +118,35 @@ def _recursive(keep, noise):  # type: ignore[no-untyped-def]
     for i in range(1, noise.size):
         y[i] = keep * y[i - 1] + noise[i]
     return y
+
+
+@compiled
+def at_position(field, column, position, ds):  # type: ignore[no-untyped-def]
+    """Linear interpolation of a field over the position; constant beyond its ends."""
+    x = position / ds
+    last = field.shape[0] - 1
+    if not x > 0.0:  # also a position that is no number
+        return field[0, column]
+    if x >= last:
+        return field[last, column]
+    j = int(x)
+    return field[j, column] + (x - j) * (field[j + 1, column] - field[j, column])
+
+
+@compiled
+def stretch_at(lanes, t, position):  # type: ignore[no-untyped-def]
+    """Return the index of the stretch under the front axle, -1 for dry asphalt."""
+    found = -1
+    for i in range(lanes.shape[0]):
+        x = position if lanes[i, IN_METRES] > 0.0 else t
+        if lanes[i, START] <= x < lanes[i, END]:
+            found = i
+    return found
+
+
+@compiled
+def track_row(track, position, ds):  # type: ignore[no-untyped-def]
+    """Return the row of the front axle's record of a position: stretch and film; before the start: dry."""
+    if not 0.0 <= position < ds * track.shape[0]:
+        return -1
+    return min(int(position / ds), track.shape[0] - 1)

@@ -16,6 +16,7 @@ from aqualog.model.road import GRADE, build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
 from aqualog.model.start import resistance_at, rolling_state
+from aqualog.model.state import COLUMNS, column, wheel_columns
 from aqualog.model.term import Model, Setup
 from aqualog.physics.contact import contact_half_length
 from aqualog.physics.load import G
@@ -133,10 +134,10 @@ def drive_truth(setup: Setup, *, dt: float = STEP_S) -> Truth:
 
 
 def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
-    """Raw record (n, columns of `kernel.COLUMNS`) of every `every`-th step."""
+    """Raw record (n, columns of `state.COLUMNS`) of every `every`-th step."""
     scenario, plant = setup.scenario, setup.plant
     n = round(scenario.duration_s / dt)
-    bytes_needed = 8.0 * (n / every) * 2.5 * len(kernel.COLUMNS) * 3.0
+    bytes_needed = 8.0 * (n / every) * 2.5 * len(COLUMNS) * 3.0
     if bytes_needed > LARGEST_RECORD:
         raise ConfigError(
             f"{scenario.duration_s:g} s at {scenario.rate_hz:g} Hz would need {bytes_needed / 1e9:.0f} GB of memory",
@@ -202,41 +203,34 @@ def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
 
 
 def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
-    def scalar(name: str) -> FloatArray:
-        return np.ascontiguousarray(rows[:, kernel.COLUMNS[name]])
-
-    def of_wheels(name: str) -> list[FloatArray]:
-        first = kernel.COLUMNS[name]
-        return [np.ascontiguousarray(rows[:, first + i]) for i in range(4)]
-
-    wheels = {name: of_wheels(name) for name in ("omega", "angle", "torque", *_WHEEL_TRUTH)}
+    wheels = {name: wheel_columns(rows, name) for name in ("omega", "angle", "torque", *_WHEEL_TRUTH)}
     columns = {
-        "v_x": scalar("v_x"),
-        "a_x": scalar("a_x"),
-        "a_y": scalar("a_y"),
-        "yaw_rate": scalar("yaw_rate"),
-        "steer_angle": scalar("steer_angle"),
-        "brake_pressure": scalar("brake_torque") * PRESSURE_PER_TORQUE,
+        "v_x": column(rows, "v_x"),
+        "a_x": column(rows, "a_x"),
+        "a_y": column(rows, "a_y"),
+        "yaw_rate": column(rows, "yaw_rate"),
+        "steer_angle": column(rows, "steer_angle"),
+        "brake_pressure": column(rows, "brake_torque") * PRESSURE_PER_TORQUE,
     }
     for i, w in enumerate(WHEELS):
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
         columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
-    rod_wheels = {n: of_wheels(n) for n in ("aligning", "braking", "wave_drag")}
+    rod_wheels = {n: wheel_columns(rows, n) for n in ("aligning", "braking", "wave_drag")}
     columns |= steering_columns(wheels | rod_wheels, plant, scenario)
     if scenario.lanes:
-        columns |= _labels(scenario, scalar("lane_front").astype(int), scalar("lane_rear").astype(int))
-    v_w = np.array(wheels["omega"]) * np.array(of_wheels("r_e"))
-    wheels["s_x"] = list(slip_of_wheel_speed(v_w, np.array(of_wheels("v_along"))))
+        columns |= _labels(scenario, column(rows, "lane_front").astype(int), column(rows, "lane_rear").astype(int))
+    v_w = np.array(wheels["omega"]) * np.array(wheel_columns(rows, "r_e"))
+    wheels["s_x"] = list(slip_of_wheel_speed(v_w, np.array(wheel_columns(rows, "v_along"))))
     wheels["v_full"] = [np.where(x < NO_WEDGE, x, np.nan) for x in wheels["v_full"]]
     for name, (label, _, _) in _WHEEL_TRUTH.items():
         columns |= {f"true_{label}_{w}": wheels[name][i] for i, w in enumerate(WHEELS)}
     return columns | {
-        "true_grade": scalar("grade"),
-        "true_v_x": scalar("v_x"),
-        "true_v_y": scalar("v_y"),
-        "true_position": scalar("position"),
-        "true_wave_drag": np.sum(of_wheels("wave_drag"), axis=0),
+        "true_grade": column(rows, "grade"),
+        "true_v_x": column(rows, "v_x"),
+        "true_v_y": column(rows, "v_y"),
+        "true_position": column(rows, "position"),
+        "true_wave_drag": np.sum(wheel_columns(rows, "wave_drag"), axis=0),
     }
 
 

@@ -9,14 +9,13 @@ import numpy as np
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.model.effects import EFFECTS
-from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, understeer_gradient
+from aqualog.model.plant import understeer_gradient
 from aqualog.model.pools import Pool
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Sensors
 from aqualog.model.surface import SURFACES, Surface
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import Tyre
-from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G
 
 __all__ = ["KMH", "Drawn", "Sketch", "Taken", "full_speed", "lagging_torque", "slalom_angle", "terms"]
@@ -109,12 +108,7 @@ def full_speed(sketch: Sketch, depth: float) -> float:
     """Return the full aquaplaning speed of a static front wheel in even water; over 1e4 if drained. [m/s]"""
     car, tyre = sketch.vehicle, sketch.tyre
     load = 0.5 * car.mass * G * car.l_r / car.wheelbase
-    v = full_aquaplaning_speed(
-        np.array(depth), np.array(load), p=sketch.p, tread_capacity=tyre.tread_capacity, v_anchor=tyre.v_anchor,
-        h_anchor=H_ANCHOR, p_anchor=P_ANCHOR, F_z_anchor=F_Z_ANCHOR, h_bulk=tyre.h_bulk, h_onset=tyre.h_onset,
-        exponent=tyre.contact_exponent,
-    )  # fmt: skip
-    return float(v)
+    return float(tyre.full_speed(np.array(depth), np.array(load), p=sketch.p))
 
 
 def slalom_angle(vehicle: Vehicle, tyre: Tyre, v: float, a_y: float) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.model import kernel
 from aqualog.model.plant import Plant
+from aqualog.model.state import A_X, DRIVE, N_STATES, OMEGA, SLIP_X, V_X
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag
 from aqualog.physics.rolling import effective_radius
@@ -35,14 +35,14 @@ def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear:
 
     `v` [m/s], `a` specific force forward [m/s²], `drive` torque of all wheels [N·m], its rear share.
     """
-    y = np.zeros(kernel.N_STATES)
-    y[kernel.V_X], y[kernel.A_X], y[kernel.DRIVE] = v, a, drive
+    y = np.zeros(N_STATES)
+    y[V_X], y[A_X], y[DRIVE] = v, a, drive
     _, rolling = resistance_at(plant, v, a)
     share = 0.5 * np.array([1.0 - split_rear, 1.0 - split_rear, split_rear, split_rear])
     force = share * drive / plant.r_l - rolling
     radii = zip(plant.r_e, plant.radius_growth, strict=True)
     slip = np.clip(force / np.maximum(plant.slip_slope * _loads(plant, a), 1.0), -0.1, 0.1)
     r_e = np.array([float(effective_radius(np.array([r]), np.array([v]), growth=g)[0]) for r, g in radii])
-    y[kernel.OMEGA : kernel.OMEGA + 4] = v / (r_e * (1.0 - slip))
-    y[kernel.SLIP_X : kernel.SLIP_X + 4] = slip
+    y[OMEGA : OMEGA + 4] = v / (r_e * (1.0 - slip))
+    y[SLIP_X : SLIP_X + 4] = slip
     return y

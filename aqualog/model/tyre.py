@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Key
+from aqualog.physics.hydroplaning import Anchor, full_aquaplaning_speed
 
 __all__ = ["P_REFERENCE", "TYRES", "TYRE_KEYS", "Tyre"]
 
 P_REFERENCE = 1.9e5  # [Pa] pressure at which a vehicle file's slip slope holds, the thesis' "low"; default of scenarios
+
+H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
 
 
 def _key(name: str, unit: str, default: float, low: float, high: float, meaning: str, source: str) -> Key:
@@ -90,6 +94,14 @@ class Tyre:
     def tread_capacity(self) -> float:
         """Water that the grooves can take, as a depth. [m]"""
         return self.tread_depth * self.void_ratio
+
+    def full_speed(self, h_w: FloatArray, F_z: FloatArray, *, p: float) -> FloatArray:
+        """Return the speed of full aquaplaning in even water: depth [m], wheel load [N], pressure [Pa] to [m/s]."""
+        return full_aquaplaning_speed(
+            h_w, F_z, p=p, tread_capacity=self.tread_capacity,
+            anchor=Anchor(self.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR), h_bulk=self.h_bulk, h_onset=self.h_onset,
+            exponent=self.contact_exponent,
+        )  # fmt: skip
 
 
 TYRES: dict[str, Tyre] = {

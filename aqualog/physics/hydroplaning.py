@@ -6,12 +6,15 @@ not checked against the original report. Sources in square brackets are keys of 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aqualog.core.records import FloatArray
 
 __all__ = [
     "SPIN_UP_RATIO",
+    "Anchor",
     "depth_factor",
     "full_aquaplaning_speed",
     "gallaway_speed",
@@ -192,16 +195,22 @@ def depth_factor(h_w: FloatArray | float, *, h_bulk: float) -> FloatArray | floa
     return (1.0 + ratio * ratio) ** -0.25
 
 
+class Anchor(NamedTuple):
+    """One measured point of full aquaplaning: speed [m/s], water [m], inflation pressure [Pa], wheel load [N]."""
+
+    v: float
+    h_w: float
+    p: float
+    F_z: float
+
+
 def full_aquaplaning_speed(
     h_w: FloatArray,
     F_z: FloatArray,
     *,
     p: float,
     tread_capacity: float,
-    v_anchor: float,
-    h_anchor: float,
-    p_anchor: float,
-    F_z_anchor: float,
+    anchor: Anchor,
     h_bulk: float,
     h_onset: float,
     exponent: float,
@@ -218,8 +227,8 @@ def full_aquaplaning_speed(
         Inflation pressure. [Pa]
     tread_capacity : float
         Water that the tread's grooves can take, as a depth. [m]
-    v_anchor, h_anchor, p_anchor, F_z_anchor : float
-        Full aquaplaning of a tyre whose grooves take none of the anchor's water. [m/s, m, Pa, N]
+    anchor : Anchor
+        Full aquaplaning of a tyre whose grooves take none of the anchor's water.
     h_bulk : float
         See `depth_factor`. [m]
     h_onset : float
@@ -241,7 +250,7 @@ def full_aquaplaning_speed(
     is a pass of [fichtinger2024], C16; treaded tyres below 2 mm: [gengenbach1968], as [gallaway1979] quotes it.
     """
     wedge = np.minimum(np.maximum((h_w - tread_capacity) / h_onset, 0.0), 1.0)
-    depth = depth_factor(h_w, h_bulk=h_bulk) / depth_factor(h_anchor, h_bulk=h_bulk)
-    v = v_anchor * np.sqrt(p / p_anchor) * (np.maximum(F_z, 1.0) / F_z_anchor) ** 0.2 * depth
+    depth = depth_factor(h_w, h_bulk=h_bulk) / depth_factor(anchor.h_w, h_bulk=h_bulk)
+    v = anchor.v * np.sqrt(p / anchor.p) * (np.maximum(F_z, 1.0) / anchor.F_z) ** 0.2 * depth
     v_full: FloatArray = np.minimum(v / np.maximum(wedge, 1e-30) ** (1.0 / exponent), 1e6)
     return v_full

@@ -255,11 +255,7 @@ def water_law():
     h = np.linspace(0.3e-3, 4.0e-3, 150)
     fig = panels(["full aquaplaning [km/h]"], height=400)
     for name, colour in (("worn_summer", WHEEL_COLOURS["fr"]), ("new_summer", WHEEL_COLOURS["fl"])):
-        y = TYRES[name]
-        v = hydroplaning.full_aquaplaning_speed(
-            h, np.full_like(h, 4000.0), p=1.9e5, tread_capacity=y.tread_capacity, v_anchor=y.v_anchor, h_anchor=1.3e-3, p_anchor=1.9e5,
-            F_z_anchor=4000.0, h_bulk=y.h_bulk, h_onset=y.h_onset, exponent=y.contact_exponent,
-        )  # fmt: skip
+        v = TYRES[name].full_speed(h, np.full_like(h, 4000.0), p=1.9e5)
         line(fig, 1, 1e3 * h, np.where(v < 100.0, v * KMH, np.nan), f"aqualog, {name}", colour, width=2.6)
     line(fig, 1, 1e3 * h, hydroplaning.gallaway_speed(h, 1.9e5, tread_depth=1.6e-3, texture_depth=0.78e-3) * KMH, "Gallaway, 1.6 mm", MUTED, dash="dash")  # fmt: skip
     thin = h < 2.4e-3

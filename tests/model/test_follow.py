@@ -7,7 +7,7 @@ import pytest
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
-from aqualog.model import kernel
+from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.follow import Course, follow
@@ -147,7 +147,7 @@ def kernel_rows(applied=None, follow_rate=0.0, torque=0.0):
         scatter=0.0, follow=follow_rate,
     )  # fmt: skip
     start = rolling_state(setup.plant, v=20.0, a=0.0, drive=torque, split_rear=1.0)
-    start[kernel.DRIVE] = torque
+    start[state.DRIVE] = torque
     road = build_road(setup.scenario, 200.0)
     args = () if applied is None else (np.ascontiguousarray(applied),)
     return kernel.run(n, 1e-3, 10, start, setup.plant, road, controls, *args)
@@ -157,14 +157,14 @@ def test_no_applied_torque_leaves_every_bit():
     bare = kernel_rows()
     assert np.array_equal(bare, kernel_rows(np.zeros((1, 4))))
     assert np.array_equal(bare, kernel_rows(np.zeros((2001, 4))))
-    assert np.all(bare[:, kernel.COLUMNS["nudge"]] == 0.0)
+    assert np.all(bare[:, state.COLUMNS["nudge"]] == 0.0)
 
 
 def test_one_row_of_torque_holds_for_the_whole_drive():
     one = np.array([[0.0, 0.0, 80.0, 60.0]])
     assert np.array_equal(kernel_rows(one), kernel_rows(np.repeat(one, 2001, axis=0)))
     rows = kernel_rows(one)
-    assert rows[-1, kernel.COLUMNS["v_x"]] > kernel_rows()[-1, kernel.COLUMNS["v_x"]] + 0.05
+    assert rows[-1, state.COLUMNS["v_x"]] > kernel_rows()[-1, state.COLUMNS["v_x"]] + 0.05
 
 
 def test_a_driven_simulation_knows_no_nudge():

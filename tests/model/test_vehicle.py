@@ -10,7 +10,7 @@ from thesis.passes import SEDAN, resistance, slip_and_traction
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
-from aqualog.model import kernel
+from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Excitation, Lane, Scenario, Steering
 from aqualog.model.sensors import IDEAL
@@ -18,7 +18,6 @@ from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
 from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
-from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.load import G, wheel_loads
 
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
@@ -42,7 +41,7 @@ def raw(sc, dt=1e-3, every=1):
 
 
 def col(rows, name, wheel=None):
-    return rows[:, kernel.COLUMNS[name] + (wheel or 0)]
+    return rows[:, state.COLUMNS[name] + (wheel or 0)]
 
 
 def lane(start=6.0, end=14.0, h=1.3e-3, **kw):
@@ -251,11 +250,7 @@ def test_lane_in_metres_starts_where_it_says():
 
 def test_anchor_of_the_full_aquaplaning_speed():
     tyre = TYRES["worn_summer"]
-    v = full_aquaplaning_speed(
-        1.3e-3, 4000.0, p=1.9e5, tread_capacity=tyre.tread_capacity, v_anchor=tyre.v_anchor, h_anchor=1.3e-3,
-        p_anchor=1.9e5, F_z_anchor=4000.0, h_bulk=tyre.h_bulk, h_onset=tyre.h_onset, exponent=tyre.contact_exponent,
-    )  # fmt: skip
-    assert v == pytest.approx(tyre.v_anchor)
+    assert tyre.full_speed(1.3e-3, 4000.0, p=1.9e5) == pytest.approx(tyre.v_anchor)
 
 
 @pytest.mark.parametrize("name", ["snow", "ice", "wet_ice", "gravel", "rough", "damp"])

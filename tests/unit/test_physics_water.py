@@ -321,7 +321,7 @@ def test_depth_factor():
 
 
 ANCHOR = {
-    "tread_capacity": 0.4 * MM, "v_anchor": 33.0, "h_anchor": 1.3 * MM, "p_anchor": 1.9e5, "F_z_anchor": 4000.0,
+    "tread_capacity": 0.4 * MM, "anchor": hydroplaning.Anchor(33.0, 1.3 * MM, 1.9e5, 4000.0),
     "h_bulk": 2 * MM, "h_onset": 0.15 * MM, "exponent": 4.0,
 }  # fmt: skip
 
@@ -568,12 +568,12 @@ def test_parts_of_the_wheel_loads():
 MODULES = (contact, hydroplaning, kinematics, load, resistance, rolling, slip, surface, tyre_brush, water)
 RANGES = {
     "L": (0, 1), "L_front": (0, 1), "b": (-0.07, 0.07), "a": (0.05, 0.1), "v": (0, 50), "v_full": (20, 50),
-    "F_z": (500, 9000), "p": (1.5e5, 3e5), "p_ref": (1.5e5, 3e5), "p_nominal": (1.5e5, 3e5), "p_anchor": (1.5e5, 3e5),
+    "F_z": (500, 9000), "p": (1.5e5, 3e5), "p_ref": (1.5e5, 3e5), "p_nominal": (1.5e5, 3e5),
     "h_w": (1e-4, 3e-3), "s_x": (-0.3, 0.3), "s_y": (-0.3, 0.3), "mu": (0.05, 1.2), "C_s": (2e4, 2e5),
     "C_x": (2e4, 2e5), "C_y": (2e4, 2e5), "theta": (0, 1.5), "mass": (1e3, 3e3), "slope": (5, 60),
     "tread_capacity": (0, 1e-3), "h_film": (1e-4, 2e-3), "h_wave": (1e-4, 2e-3), "h_track": (1e-4, 1e-3),
-    "F_z_ref": (2e3, 6e3), "F_z_anchor": (2e3, 6e3), "width": (0.1, 0.3), "exponent": (2, 6), "h_onset": (1e-4, 5e-4),
-    "h_bulk": (1e-3, 3e-3), "h_anchor": (1e-3, 2e-3), "v_anchor": (25, 40), "texture_depth": (2e-4, 2e-3),
+    "F_z_ref": (2e3, 6e3), "width": (0.1, 0.3), "exponent": (2, 6), "h_onset": (1e-4, 5e-4),
+    "h_bulk": (1e-3, 3e-3), "texture_depth": (2e-4, 2e-3),
     "tread_depth": (1e-3, 8e-3), "growth": (0, 5e-6), "v_w": (-5, 50), "v_along": (0, 50), "c_px": (1e6, 1e7),
     "l_f": (1, 2), "l_r": (1, 2), "h_cg": (0.3, 1), "track": (1.3, 1.8), "t": (0, 600),
 }  # fmt: skip
@@ -590,6 +590,9 @@ def test_inlined_equals_numpy(function):
     scalar = inlined(function)
     for _ in range(40):
         values = {q.name: float(rng.uniform(*RANGES.get(q.name, (0.1, 1.0)))) for q in parameters}
+        if "anchor" in values:
+            low, high = np.array([(25, 40), (1e-3, 2e-3), (1.5e5, 3e5), (2e3, 6e3)]).T
+            values["anchor"] = hydroplaning.Anchor(*rng.uniform(low, high).tolist())
         arrays = {q.name: one(values[q.name]) if q.kind is not q.KEYWORD_ONLY else values[q.name] for q in parameters}
         expected = np.ravel(np.array(function(**arrays)))
         assert np.ravel(np.array(scalar(*values.values()))) == pytest.approx(expected, rel=1e-13, abs=1e-13)

@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from aqualog.core.compiled import compiled, inlined
 from aqualog.core.records import FloatArray
-from aqualog.model.plant import F_Z_ANCHOR, F_Z_HALF_LENGTH, H_ANCHOR, P_ANCHOR, P_HALF_LENGTH, flat
+from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, flat
 from aqualog.model.term import Setup
+from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
 from aqualog.physics import contact, hydroplaning, load, rolling, water
 from aqualog.physics.contact import friction_ratio
+from aqualog.physics.hydroplaning import Anchor
 from aqualog.physics.tyre_brush import brush_parts
 
 __all__ = ["NODES", "S_MAX", "Driven", "Response", "respond"]
@@ -148,8 +150,8 @@ def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  #
                     friction = q.mu * q.wet_friction
                     noise = _FIELD_SHARE * (points[node, 1] + points[node, 2 + rear])
                     v_full = _v_full(
-                        film, F_z, q.p, q.tread_capacity, q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR, q.h_bulk,
-                        q.h_onset, q.contact_exponent,
+                        film, F_z, q.p, q.tread_capacity, Anchor(q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR),
+                        q.h_bulk, q.h_onset, q.contact_exponent,
                     )  # fmt: skip
                     v_full *= max(1.0 + lanes[k, 4] * q.contact_scatter * noise, 0.2)
                     for _ in range(2):  # a wheel that has slowed down floats sooner, and slips more

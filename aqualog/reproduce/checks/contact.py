@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.model.plant import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
-from aqualog.model.tyre import TYRES
+from aqualog.model.tyre import F_Z_ANCHOR, TYRES
 from aqualog.physics.contact import contact_share, friction_ratio, remaining_share, slip_stiffness_ratio
-from aqualog.physics.hydroplaning import full_aquaplaning_speed
 from aqualog.physics.tyre_brush import brush_force, brush_stiffness
 from aqualog.reproduce.check import Check, Checks, Maker, Plan
 from aqualog.reproduce.verdict import judged
@@ -148,22 +146,7 @@ def _early(_: Plan) -> Checks:
 
 
 def _v_full(h: float, p: float) -> float:
-    t = TYRES["worn_summer"]
-    return float(
-        full_aquaplaning_speed(
-            np.array(h),
-            np.array(F_Z_ANCHOR),
-            p=p,
-            tread_capacity=t.tread_capacity,
-            v_anchor=t.v_anchor,
-            h_anchor=H_ANCHOR,
-            p_anchor=P_ANCHOR,
-            F_z_anchor=F_Z_ANCHOR,
-            h_bulk=t.h_bulk,
-            h_onset=t.h_onset,
-            exponent=t.contact_exponent,
-        )
-    )
+    return float(TYRES["worn_summer"].full_speed(np.array(h), np.array(F_Z_ANCHOR), p=p))
 
 
 def _wedge(_: Plan) -> Checks:

@@ -1,0 +1,351 @@
+"""One wheel in the compiled simulation: rolling, road, water, tyre, balance of torques, and what is recorded of it.
+
+Each function is one term of the physics, on scalars, and gives a record that later terms read. `wheel` calls them in
+order: another term is one function and one line there. Equations are those of `aqualog.physics`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.core.compiled import inlined, part
+from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH
+from aqualog.model.road import (
+    BUMPS,
+    CONTACT_ROAD,
+    CONTACT_WHEEL,
+    DEPTH,
+    DEPTH_LEFT,
+    IRREGULARITY_LEFT,
+    KICK_LOAD,
+    KICK_TORQUE,
+    LANE_COMPLIANCE,
+    LANE_MU,
+    ROLLING,
+    ROUGHNESS,
+    SURFACE_WIDTH,
+    at_position,
+)
+from aqualog.model.state import ANGLE, AT, J_V, J_W, OMEGA, SLIP_X, SLIP_Y, V_X, V_Y, YAW_RATE
+from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
+from aqualog.physics import contact, hydroplaning, kinematics, rolling, slip, steering, surface, tyre_brush, water
+from aqualog.physics.hydroplaning import Anchor
+from aqualog.physics.resistance import rolling_resistance_force
+
+__all__ = ["Body", "Command", "Ground", "Now", "Place", "ground_under", "wheel"]
+
+_wheel_velocity = inlined(kinematics.wheel_velocity)
+_bounded_slip = inlined(slip.bounded_slip)
+_brush_forces = inlined(tyre_brush.brush_forces)
+_friction_ratio = inlined(contact.friction_ratio)
+_stiffness_ratio = inlined(contact.slip_stiffness_ratio)
+_lost_contact = inlined(contact.lost_contact)
+_half_length = inlined(contact.contact_half_length)
+_load_shift = inlined(contact.load_shift)
+_v_full = inlined(hydroplaning.full_aquaplaning_speed)
+_film_drag = inlined(water.film_drag)
+_wave_drag = inlined(water.wave_drag)
+_series_slope = inlined(surface.series_slope)
+_rolling_force = inlined(rolling_resistance_force)
+_aligning_moment = inlined(steering.aligning_moment)
+_effective_radius = inlined(rolling.effective_radius)
+_load_factor = inlined(rolling.load_factor)
+_SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
+_FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
+
+
+class Now(NamedTuple):
+    """Time [s], angle of the front wheels [rad] with cosine and sine, share of a leak so far. [-]"""
+
+    t: float
+    steer: float
+    cos: float
+    sin: float
+    leak: float
+
+
+class Command(NamedTuple):
+    """Drive torque and sum of the brake torques [N·m], force of the excitation [N], rear share of the drive."""
+
+    drive: float
+    brake: float
+    excitation: float
+    split_rear: float
+
+
+class Place(NamedTuple):
+    """An axle on the road: way [m], stretch (-1: dry asphalt), row of the front axle's track (-1: none)."""
+
+    way: float
+    lane: int
+    behind: int
+
+
+class Body(NamedTuple):
+    """Forces on the body [N] in its axes, and their moment about the vertical. [N·m]"""
+
+    x: float
+    y: float
+    moment: float
+
+
+class _Rolling(NamedTuple):
+    """Lever arms from the centre of mass, speeds over ground along and across, radii, rim speed. [m, m/s]"""
+
+    x: float
+    y: float
+    omega: float
+    along: float
+    across: float
+    r_e: float
+    r_l: float
+    rim: float
+
+
+class Ground(NamedTuple):
+    """Load [N], friction, yield and rolling resistance coefficient [-], torque of bumps [N·m], film [m].
+
+    `noise` is the fluctuation of the contact where there is a film, of unit variance.
+    """
+
+    F_z: float
+    mu: float
+    compliance: float
+    r_w: float
+    bump: float
+    film: float
+    noise: float
+
+
+class _Water(NamedTuple):
+    """Remaining contact and friction [-], force of film and wave [N], torque of the load's shift, full speed."""
+
+    contact: float
+    mu: float
+    film_force: float
+    wave: float
+    shift: float
+    v_full: float
+
+
+class _Stiffness(NamedTuple):
+    """Slip slope [-], and stiffness along and across. [N]"""
+
+    slope: float
+    C_x: float
+    C_y: float
+
+
+class _Slip(NamedTuple):
+    """Slip along and across, and derivatives of the first by wheel speed and velocity."""
+
+    s_x: float
+    s_y: float
+    by_omega: float
+    by_v: float
+
+
+class _Balance(NamedTuple):
+    """Torques [N·m]; `turn` is the sign of the turning, smooth within `standstill` [rad/s]."""
+
+    torque: float
+    braking: float
+    water: float
+    resisting: float
+    standstill: float
+    turn: float
+
+
+@part
+def ground_under(i, warm, F_z, place, p, q, lanes, fields, track):  # type: ignore[no-untyped-def]
+    """Return the road under wheel `i`; the film of a rear wheel is what the front one has left."""
+    lane, side = place.lane, i % 2
+    mu = q.mu
+    compliance = 0.0
+    r_w = q.r_w * warm
+    bump = 0.0
+    film = 0.0
+    noise = 0.0
+    of_side = SURFACE_WIDTH * side
+    if lane >= 0:
+        if lanes[lane, LANE_MU + of_side] >= 0.0:
+            mu = lanes[lane, LANE_MU + of_side]
+        compliance = lanes[lane, LANE_COMPLIANCE + of_side]
+        r_w += lanes[lane, ROLLING + of_side]
+        bump = lanes[lane, ROUGHNESS + of_side] * at_position(fields, BUMPS + side, place.way, p.ds)
+        if i < 2:
+            uneven = 1.0 + lanes[lane, IRREGULARITY_LEFT + side] * at_position(fields, DEPTH + side, place.way, p.ds)
+            film = lanes[lane, DEPTH_LEFT + side] * max(uneven, 0.0)
+        else:
+            film = track[place.behind, 1 + side]
+    if p.kicks > 0.0:
+        bump += at_position(fields, KICK_TORQUE + side, place.way, p.ds)
+        F_z = max(F_z + at_position(fields, KICK_LOAD + side, place.way, p.ds), 0.0)
+    if film > 0.0:
+        noise = _FIELD_SHARE * (
+            at_position(fields, CONTACT_ROAD + side, place.way, p.ds)
+            + at_position(fields, CONTACT_WHEEL + i, place.way, p.ds)
+        )
+    return Ground(F_z, mu, compliance, r_w, bump, film, noise)
+
+
+@part
+def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
+    """Fill what wheel `i` contributes to derivative, Jacobian and record; return its forces on the body."""
+    roll = _rolling(i, now, m, p, q)
+    wet = _water(roll, ground, p.scatter, q)
+    stiff = _stiffness(now, ground, q)
+    slips = _slip(i, m, roll, q.relaxation_length)
+    F_x, F_y = _brush_forces(slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact)
+    balance = _balance(i, roll, ground, wet, command, m, p, q)
+    m.f[OMEGA + i] = (
+        balance.torque - F_x * roll.r_l - (balance.resisting + balance.braking) * balance.turn + ground.bump
+    ) / q.inertia
+    m.f[ANGLE + i] = roll.omega
+    _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q.inertia)
+    if m.is_recorded > 0.0:
+        out = m.out
+        _record(i, out, roll, ground, wet, balance, stiff.slope)
+        out[AT.angle + i] = m.y[ANGLE + i]
+        out[AT.F_x + i] = F_x
+        out[AT.F_y + i] = F_y
+        out[AT.s_x + i] = slips.s_x
+        out[AT.v_full + i] = wet.v_full * max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
+        if i < 2:
+            half = _half_length(ground.F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
+            out[AT.aligning + i] = _aligning_moment(
+                slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact, half
+            )
+    return _on_body(i, now, roll, F_x - wet.wave, F_y)
+
+
+@part
+def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
+    front = i < 2
+    x = p.l_f if front else -p.l_r
+    side = 0.5 * p.track if i % 2 == 0 else -0.5 * p.track
+    angle = now.steer if front else 0.0
+    along, across = _wheel_velocity(m.y[V_X], m.y[V_Y], m.y[YAW_RATE], angle, x, side)
+    r_e = _effective_radius(q.r_e, along, q.radius_growth) * (1.0 - q.leak_radius * now.leak)
+    r_l = q.r_l * (1.0 - q.leak_radius * now.leak)
+    omega = m.y[OMEGA + i]
+    return _Rolling(x, side, omega, along, across, r_e, r_l, omega * r_e)
+
+
+@part
+def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
+    """Return what the water does to the contact, and its resistance."""
+    film, F_z = ground.film, ground.F_z
+    if not film > 0.0:
+        return _Water(1.0, ground.mu, 0.0, 0.0, 0.0, 1e6)
+    v_full = _v_full(
+        film, F_z, q.p, q.tread_capacity, Anchor(q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR), q.h_bulk, q.h_onset,
+        q.contact_exponent,
+    )  # fmt: skip
+    # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
+    rolling_share = min(max(roll.rim / max(abs(roll.along), 0.5), 0.0), 1.0)
+    v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share
+    v_full *= max(1.0 + scatter * q.contact_scatter * ground.noise, 0.2)
+    lost = _lost_contact(roll.along, v_full, q.contact_exponent) * q.contact_gain
+    L = 1.0 - min(max(lost, 0.0), 1.0)
+    half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
+    shift = _load_shift(L, half, q.wedge_peak) * F_z
+    gain = q.water_drag_gain
+    ahead = max(roll.along, 0.0)
+    film_force = gain * _film_drag(film, ahead, roll.rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    skid = max(roll.along - roll.rim, 0.0)  # a slower tread pushes what it no longer throws
+    wave = gain * (
+        _wave_drag(film, ahead, q.width, q.h_wave)
+        + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    )
+    return _Water(L, ground.mu * q.wet_friction, film_force, wave, shift, v_full)
+
+
+@part
+def _stiffness(now, ground, q):  # type: ignore[no-untyped-def]
+    drifted = np.exp(min(max(q.slip_slope_drift * now.t, -3.0), 3.0))
+    slope = q.slip_slope * (1.0 + q.leak_slope * now.leak) * drifted
+    slope = _series_slope(slope * _load_factor(ground.F_z, q.F_z_ref, q.load_sensitivity), ground.compliance)
+    across = _series_slope(q.cornering_slope, ground.compliance)
+    return _Stiffness(slope, slope * ground.F_z, across * ground.F_z)
+
+
+@part
+def _slip(i, m, roll, sigma):  # type: ignore[no-untyped-def]
+    """Return the slips, with a first-order build-up where the tyre has a relaxation length."""
+    s_x = _bounded_slip(roll.rim, roll.along)
+    speed = max(abs(roll.rim), 0.5)
+    s_y = -roll.across / speed
+    if sigma > 0.0:
+        rate = speed / sigma
+        m.f[SLIP_X + i] = rate * (s_x - m.y[SLIP_X + i])
+        m.f[SLIP_Y + i] = rate * (s_y - m.y[SLIP_Y + i])
+        m.jac[SLIP_X + i] = -rate
+        m.jac[SLIP_Y + i] = -rate
+        return _Slip(m.y[SLIP_X + i], m.y[SLIP_Y + i], 0.0, 0.0)
+    m.f[SLIP_X + i] = 0.0
+    m.f[SLIP_Y + i] = 0.0
+    m.jac[SLIP_X + i] = 0.0
+    m.jac[SLIP_Y + i] = 0.0
+    by_omega = max(roll.along, 0.0) * roll.r_e / (speed * speed) if abs(roll.rim) > 0.5 else 2.0 * roll.r_e
+    return _Slip(s_x, s_y, by_omega, -1.0 / speed)
+
+
+@part
+def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped-def]
+    front = i < 2
+    share = 1.0 - command.split_rear if front else command.split_rear
+    torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_l
+    torque += m.applied[i] * p.torque_gain
+    braking = q.brake_split * command.brake * (1.0 - m.released[i])
+    water_torque = wet.film_force * roll.r_l + wet.shift
+    resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_l + water_torque + q.brake_drag
+    # resistance fades out near standstill instead of jumping, over what one step of it can change
+    standstill = max(1.0, p.dt * (resisting + braking) / q.inertia)
+    turn = min(max(roll.omega / standstill, -1.0), 1.0)
+    return _Balance(torque, braking, water_torque, resisting, standstill, turn)
+
+
+@part
+def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, inertia):  # type: ignore[no-untyped-def]
+    # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
+    dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else stiff.C_x * _stiffness_ratio(L)
+    jac = m.jac
+    arm = roll.r_l / inertia
+    jac[OMEGA + i] = -dF_dsx * slips.by_omega * arm
+    jac[J_W + i] = -dF_dsx * slips.by_v * arm
+    jac[J_V + i] = dF_dsx * slips.by_omega / p.mass
+    jac[V_X] += dF_dsx * slips.by_v / p.mass
+    across = stiff.C_y * slips.by_v * (dF_dsx / max(stiff.C_x, 1.0))
+    jac[V_Y] += across / p.mass
+    jac[YAW_RATE] += across * roll.x * roll.x / p.I_zz
+    if abs(roll.omega) < balance.standstill:
+        jac[OMEGA + i] -= (balance.resisting + balance.braking) / (inertia * balance.standstill)
+
+
+@part
+def _on_body(i, now, roll, along, F_y):  # type: ignore[no-untyped-def]
+    cos, sin = (now.cos, now.sin) if i < 2 else (1.0, 0.0)
+    x = along * cos - F_y * sin
+    y = along * sin + F_y * cos
+    return Body(x, y, roll.x * y - roll.y * x)
+
+
+@part
+def _record(i, out, roll, ground, wet, balance, slope):  # type: ignore[no-untyped-def]
+    out[AT.omega + i] = roll.omega
+    out[AT.torque + i] = balance.torque - balance.braking * balance.turn
+    out[AT.F_z + i] = ground.F_z
+    out[AT.slip_angle + i] = -np.arctan2(roll.across, max(abs(roll.along), 0.5))
+    out[AT.contact + i] = wet.contact
+    out[AT.slope + i] = slope * _stiffness_ratio(wet.contact)
+    out[AT.mu_max + i] = wet.mu * _friction_ratio(wet.contact)
+    out[AT.film + i] = ground.film
+    out[AT.water_torque + i] = balance.water * balance.turn
+    out[AT.wave_drag + i] = wet.wave
+    out[AT.resisting_torque + i] = balance.resisting * balance.turn
+    out[AT.v_along + i] = roll.along
+    out[AT.r_e + i] = roll.r_e
+    out[AT.braking + i] = balance.braking * balance.turn
