@@ -9,7 +9,7 @@ from aqualog.figures.evidence import KMH
 from aqualog.figures.levels import PALETTE
 from aqualog.figures.record import Axis, Figure, Finding, Line, Note, Panel, judged
 from aqualog.figures.wedge import DEPTH, LOAD, TYRE, full_speed, half_length, share
-from aqualog.model.plant import P_ANCHOR
+from aqualog.model.tyre import P_ANCHOR
 from aqualog.physics.contact import friction_ratio, load_shift
 from aqualog.report.theme import INK, MUTED, WATER
 
