@@ -233,7 +233,7 @@ def sources_page() -> str:
     by_number = {f"[{n}]": _of_reference(known, r) for n, r in sorted(known.references.items())}
     parts += _section("References of the thesis", by_number, _ON_REFERENCES)
     parts += _section("Audit of the thesis' equations", known.equations, _ON_EQUATIONS)
-    places = tomllib.loads((DOCS.parent / "reproduce" / "claims.toml").read_text(encoding="utf-8"))
+    places = tomllib.loads((DOCS.parent / "thesis" / "claims.toml").read_text(encoding="utf-8"))
     claims = {key: _of_claim(line, places[key]["where"]) for key, line in known.claims.items()}
     return "\n\n".join([*parts, *_section("Claims of the thesis", claims, _ON_CLAIMS)]) + "\n"
 

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.figures.evidence import Evidence
-    from aqualog.figures.image import Pictures
-    from aqualog.figures.record import Figure, Finding
-    from aqualog.reproduce.run import Conclusion, Made
+    from aqualog.thesis.claims import Check, Conclusion
+    from aqualog.thesis.evidence.campaign import Evidence
+    from aqualog.thesis.image import Pictures
+    from aqualog.thesis.record import Figure
+    from aqualog.thesis.run import Made
 
 __all__ = ["FORMATS", "FUNCTIONS", "Figures", "Reproduction", "figure", "figures", "reproduce"]
 
@@ -62,14 +63,14 @@ class Figures(Result):
     @property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog figures`."""
-        from aqualog.figures.export import document
+        from aqualog.thesis.export import figures_document
 
-        return document(self.made, [str(p) for p in self.written], self.not_made)
+        return figures_document(self.made, [str(p) for p in self.written], self.not_made)
 
     @property
-    def findings(self) -> list[tuple[Figure, Finding]]:
+    def findings(self) -> list[tuple[Figure, Check]]:
         """What each figure says about each of its claims."""
-        return [(f, c) for f in self.made for c in f.findings]
+        return [(f, c) for f in self.made for c in f.checks]
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -78,7 +79,7 @@ class Figures(Result):
 
         import polars as pl
 
-        from aqualog.figures.export import figure_csv
+        from aqualog.thesis.export import figure_csv
 
         rows = [{"figure": f["figure"], **{k: v if k != "ci95" else str(v) for k, v in c.items()}}
                 for f in self.document["figures"] for c in f["findings"]]  # fmt: skip
@@ -91,16 +92,16 @@ class Figures(Result):
 
         from aqualog.report.text import table
 
-        has_values = any(c.ci95 is not None for _, c in self.findings)
+        has_values = any(c.ci95 is not None for _, c in self.checks)
         rows = [
             (
-                c.claim,
+                c.name,
                 f.number,
                 c.verdict,
                 *((_value(c),) if has_values else ()),
                 shorten(c.found, width, placeholder=" ..."),
             )
-            for f, c in self.findings
+            for f, c in self.checks
         ]
         head = ("claim", "figure", "verdict", *(("value, 95 %",) if has_values else ()), "found")
         return table(head, rows, most=_WHOLE) + "\n" if rows else ""
@@ -113,15 +114,15 @@ class Figures(Result):
 
     def plot(self) -> go.Figure:
         """Return all panels in one figure."""
-        from aqualog.figures.draw import panel_figure
         from aqualog.report.standalone import side_by_side
+        from aqualog.thesis.draw import panel_figure
 
         return side_by_side([panel_figure(p) for f in self.made for p in f.panels])
 
     def files(self) -> Writers:
         """Return a page and a table for each figure, and one page of all if there are several."""
-        from aqualog.figures.export import figure_csv
-        from aqualog.figures.page import render_figures
+        from aqualog.thesis.export import figure_csv
+        from aqualog.thesis.page import render_figures
 
         files: dict[str, Any] = {}
         for f in self.made:
@@ -209,7 +210,7 @@ def figures(
     ------
     ConfigError
     """
-    from aqualog.figures.catalogue import chosen
+    from aqualog.thesis.catalogue import chosen
 
     hear = listener(progress)
     asked = [numbers] if isinstance(numbers, str) else list(numbers)
@@ -223,7 +224,7 @@ def figures(
     runs = own.run(jobs=jobs, progress=hear) if isinstance(own, Campaign) else own
     evidence = None
     if runs is not None:
-        from aqualog.figures.evidence import Evidence
+        from aqualog.thesis.evidence.campaign import Evidence
 
         evidence = Evidence(runs.data)
     made, not_made, written = _make_all(chosen_numbers, folder, evidence, wanted, hear)
@@ -253,7 +254,7 @@ def check_formats(formats: Sequence[str]) -> tuple[str, ...]:
 
 def _to_make(asked: Sequence[str], numbers: tuple[str, ...], hear: Listener, *, has_campaign: bool) -> tuple[str, ...]:
     """Without a campaign a chapter means those of its figures that need none; a number that needs one is an error."""
-    from aqualog.figures.catalogue import needs_campaign
+    from aqualog.thesis.catalogue import needs_campaign
 
     left = [n for n in numbers if not has_campaign and needs_campaign(n)]
     typed = [n for n in left if any("." in a and a.replace(".0", ".") == n for a in asked)]
@@ -269,7 +270,7 @@ def _to_make(asked: Sequence[str], numbers: tuple[str, ...], hear: Listener, *, 
 
 def _refuse(numbers: Sequence[str], out: Path, formats: Sequence[str], sources: Sequence[Path], *, force: bool) -> None:
     """Before anything is computed: refuse files that exist. Pictures bear letters that are known only later."""
-    from aqualog.figures.record import stem_of
+    from aqualog.thesis.record import stem_of
 
     paths = [out / f"{stem_of(n)}.{f}" for n in numbers for f in formats]
     paths += [out / f"{stem_of(n)}_a.{f}" for n in numbers for f in formats if f in ("png", "svg")]
@@ -282,8 +283,8 @@ def _make_all(
     numbers: Sequence[str], out: Path | None, evidence: Evidence | None, formats: tuple[str, ...], hear: Listener
 ) -> tuple[tuple[Figure, ...], dict[str, str], list[Path]]:
     """Figures that could be made, why the others could not, and the files written."""
-    from aqualog.figures.catalogue import make
-    from aqualog.figures.selection import NotInCampaign
+    from aqualog.thesis.evidence.selection import NotInCampaign
+    from aqualog.thesis.run import make
 
     made: list[Figure] = []
     not_made: dict[str, str] = {}
@@ -306,19 +307,19 @@ def _make_all(
                     write_whole(out / name, write)
                     written.append(out / name)
                 written += _drawn(found, out, formats, pictures, force=True)
-            hear.detail(f"figure {number}: {len(found.findings)} findings in {time.monotonic() - began:.1f} s")
+            hear.detail(f"figure {number}: {len(found.checks)} findings in {time.monotonic() - began:.1f} s")
     return tuple(made), not_made, written
 
 
 @contextmanager
 def _pictures(formats: Sequence[str]) -> Iterator[Pictures | None]:
     """One browser for all pictures; None where none is asked for."""
-    from aqualog.figures.image import FORMATS as PICTURES
+    from aqualog.thesis.image import FORMATS as PICTURES
 
     if not set(formats) & set(PICTURES):
         yield None
         return
-    from aqualog.figures.image import Pictures
+    from aqualog.thesis.image import Pictures
 
     with Pictures() as pictures:
         yield pictures
@@ -326,7 +327,7 @@ def _pictures(formats: Sequence[str]) -> Iterator[Pictures | None]:
 
 def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures | None, *, force: bool) -> list[Path]:
     """Write the pictures of a figure."""
-    from aqualog.figures.image import image_names
+    from aqualog.thesis.image import image_names
 
     written = []
     for suffix in ("png", "svg"):
@@ -344,7 +345,7 @@ def _put(data: bytes, path: Path) -> None:
     path.write_bytes(data)
 
 
-def _value(c: Finding) -> str:
+def _value(c: Check) -> str:
     """The number judged with its interval, if it has one."""
     if c.value is None or c.ci95 is None:
         return "–"
@@ -373,9 +374,9 @@ class Reproduction(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         """The JSON document of `aqualog reproduce`."""
-        from aqualog.reproduce.document import document
+        from aqualog.thesis.export import claims_document
 
-        return document(self.conclusions, self.made.figures, self.made.missing, {"conditions": list(self.facts)})
+        return claims_document(self.conclusions, self.made.figures, self.made.missing, {"conditions": list(self.facts)})
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -384,7 +385,7 @@ class Reproduction(Result):
 
         import polars as pl
 
-        from aqualog.reproduce.document import claims_csv
+        from aqualog.thesis.export import claims_csv
 
         return {"claims": pl.read_csv(StringIO(claims_csv(self.conclusions)), infer_schema_length=None)}
 
@@ -402,7 +403,7 @@ class Reproduction(Result):
 
     def headline(self) -> str:
         """Return how many claims there are of each verdict."""
-        from aqualog.reproduce.document import counts_of
+        from aqualog.thesis.export import counts_of
 
         counts = ", ".join(f"{n} {verdict}" for verdict, n in counts_of(self.conclusions).items())
         return f"{counts}; {len(self.made.figures)} figures"
@@ -411,7 +412,7 @@ class Reproduction(Result):
         """Return how many claims there are of each verdict."""
         import plotly.graph_objects as go
 
-        from aqualog.reproduce.document import counts_of
+        from aqualog.thesis.export import counts_of
 
         counts = counts_of(self.conclusions)
         made = go.Figure(go.Bar(x=list(counts.values()), y=list(counts), orientation="h"))
@@ -421,9 +422,8 @@ class Reproduction(Result):
 
     def files(self) -> Writers:
         """Return the page, the claims as CSV, the document, and the tables behind the figures."""
-        from aqualog.figures.export import figure_csv
-        from aqualog.reproduce.document import claims_csv
-        from aqualog.reproduce.page import render_reproduction
+        from aqualog.thesis.export import claims_csv, figure_csv
+        from aqualog.thesis.page import render_reproduction
 
         page = partial(render_reproduction, self.conclusions, self.made.figures, self.made.missing, list(self.facts))
         return {
@@ -453,7 +453,7 @@ def reproduce(folder: PathLike, *, jobs: int | None = None, progress: Progress =
     AqualogError
         If a drive of the campaign cannot be simulated or measured.
     """
-    from aqualog.reproduce.run import conclude, make_all
+    from aqualog.thesis.run import conclude, make_all
 
     hear, out, processes = listener(progress), file_of(folder, "folder"), jobs or os.cpu_count() or 1
     campaign = out / _CAMPAIGN

@@ -19,7 +19,7 @@ from aqualog.book.sources import (
     sources_page,
 )
 from aqualog.book.topics import DOCS
-from aqualog.reproduce.catalogue import claims
+from aqualog.thesis.claims import claims
 
 PACKAGE = ROOT / "aqualog"
 HOME = DOCS / "sources.md"

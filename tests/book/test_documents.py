@@ -204,19 +204,17 @@ def test_document_of_figures(tmp_path):
 
 
 def test_document_of_a_reproduction():
-    from aqualog.figures.record import Figure
-    from aqualog.reproduce.catalogue import Claim
-    from aqualog.reproduce.check import Check
-    from aqualog.reproduce.document import document
-    from aqualog.reproduce.run import Conclusion
+    from aqualog.thesis.claims import Check, Claim, Conclusion
+    from aqualog.thesis.export import claims_document
+    from aqualog.thesis.record import Figure
 
     checks = (
         Check("C7", "above 0", "1.5", "reproduced", value=1.5, ci95=(1.0, 2.0), unit="s"),
         Check("C7", "above 0", "none", "reproduced"),
     )
-    conclusions = (Conclusion(Claim("C7", "2.1", "it is", "N"), checks, "reproduced"),)
-    figure = Figure("2.25", "title", "", (), ())
-    made = document(conclusions, [figure], {"2.3": "no runs"}, {"conditions": ["so"]})
+    conclusions = (Conclusion(Claim("C7", "2.1", "it is", "N", {}), checks, "reproduced"),)
+    figure = Figure("2.25", "title", "", ())
+    made = claims_document(conclusions, [figure], {"2.3": "no runs"}, {"conditions": ["so"]})
     assert complaints("reproduce", json.loads(json.dumps(made))) == []
 
 

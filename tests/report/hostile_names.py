@@ -19,8 +19,6 @@ from aqualog.detect.thresholds import DEFAULT
 from aqualog.evaluate.match import Cell
 from aqualog.evaluate.records import DetectorRun, RunRecord
 from aqualog.evaluate.run import Evaluation
-from aqualog.figures.page import render_figures
-from aqualog.figures.record import Axis, Figure, Finding, Line, Panel, Table
 from aqualog.report.calibration import calibration_report
 from aqualog.report.campaign.findings import find
 from aqualog.report.campaign.folder import page_names
@@ -31,11 +29,10 @@ from aqualog.report.drive.page import drive_page
 from aqualog.report.evaluation import evaluation_report
 from aqualog.report.page import report_page
 from aqualog.report.slope import slope_report
-from aqualog.reproduce.catalogue import claims
-from aqualog.reproduce.check import Check
-from aqualog.reproduce.page import render_reproduction
-from aqualog.reproduce.run import Made, conclude
-from aqualog.reproduce.verdict import VERDICTS
+from aqualog.thesis.claims import DIFFERENCE, VERDICTS, Check, claims
+from aqualog.thesis.page import render_figures, render_reproduction
+from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
+from aqualog.thesis.run import Made, conclude
 
 NAMES = {
     "script": "</script><script>alert(1)</script>",
@@ -74,7 +71,7 @@ def figure(name):
     line = Line(name, np.array([0.0, 1.0]), np.array([1.0, np.nan]))
     return Figure(
         "3.1", name, name, (Panel(name, Axis(name, name), Axis(name), (line,)),),
-        (Finding("C81", name, name, name, "in part", name),), (Table(name, (name, "a"), ((name, "1"),)),),
+        (Check("C81", name, name, DIFFERENCE, name, name, reason=name),), (Table(name, (name, "a"), ((name, "1"),)),),
     )  # fmt: skip
 
 

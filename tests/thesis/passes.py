@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from aqualog.model.programme import SEDAN as DRIVEN
-from aqualog.reproduce.passes import resistance, slip_and_traction
+from aqualog.thesis.evidence.passes import resistance, slip_and_traction
 
 __all__ = ["SEDAN", "resistance", "slip_and_traction"]
 

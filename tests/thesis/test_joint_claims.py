@@ -15,8 +15,8 @@ from aqualog.evaluate.records import DetectorRun, RunRecord
 from aqualog.evaluate.roc import JOINT
 from aqualog.evaluate.score import score
 from aqualog.model.pools import TUNING_POOL
-from aqualog.reproduce.checks import joint
-from aqualog.reproduce.checks.joint import (
+from aqualog.thesis.checks import joint
+from aqualog.thesis.checks.joint import (
     MEASURED,
     MORE_ALARMS,
     SINGLE,
@@ -28,7 +28,7 @@ from aqualog.reproduce.checks.joint import (
     variants_of,
     with_velocity,
 )
-from aqualog.reproduce.verdict import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
+from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
 
 FIRST_SEED = 150
 WITHOUT = ("none (estimated from wheels and accelerometer)", "mean of the four wheels")

@@ -2,14 +2,11 @@
 
 import pytest
 
-from aqualog.reproduce.check import Plan
-from aqualog.reproduce.checks.catalogue import makers
-from aqualog.reproduce.verdict import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combined
+from aqualog.thesis.checks import resistance, slip_slope, spins
+from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combined
+from aqualog.thesis.evidence.seeds import Plan
 
 SEEDS = tuple(range(2001, 2007))
-MODULES = (
-    "contact_loss", "spin_down", "spin", "resistance", "resistance_variants", "slip_slope", "slip_slope_variants",
-)  # fmt: skip
 # the driver lets the speed fall by 2.6 km/h (C13); the rear wheels spin up later than the front ones stop (C16); the
 # film's and the shift's drag grow with depth (C38); pressure changes the contact and with it the resistance: C43 and C45
 # cannot both hold (audit E21); a regression lies below the mean initial slope (C49); at high pressure the slope falls
@@ -23,7 +20,7 @@ ELSE = {
 # about as much as runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17): which side
 # they fall on is the business of the seeds
 AT_THE_EDGE = {"C3", "C14", "C17", "C21", "C23", "C50"}
-MAKERS = {ids[0]: make for m in MODULES for ids, make in makers(m)}
+MAKERS = {m.claims[0]: m.make for module in (spins, resistance, slip_slope) for m in module.CHECKS}
 
 
 @pytest.mark.parametrize("claim", [c for c in MAKERS if c not in AT_THE_EDGE])

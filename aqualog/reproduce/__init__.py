@@ -1,1 +1,0 @@
-"""The thesis' claims, one by one, with aqualog's findings."""

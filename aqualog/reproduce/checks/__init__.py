@@ -1,1 +1,0 @@
-"""Checks of the claims, one module a topic."""

@@ -1,0 +1,1 @@
+"""The thesis made again: its claims and figures as data, their evidence, one judge."""

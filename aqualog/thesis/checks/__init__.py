@@ -1,0 +1,1 @@
+"""Checks of the claims beside those that figures hold, one module a topic."""

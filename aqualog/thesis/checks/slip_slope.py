@@ -1,0 +1,379 @@
+"""The slip slope of the driven rear tyres, by passes, and the detector that finds its loss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.evaluate.intervals import wilson
+from aqualog.model.scenario import Lane, Profile, Scenario
+from aqualog.model.thesis_scenes import scene
+from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
+from aqualog.thesis.claims import Check, Checks, judge, limit
+from aqualog.thesis.evidence.passes import HIGH, KMH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass
+from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, known, run_of
+from aqualog.thesis.evidence.seeds import (
+    PASS_SEEDS,
+    Maker,
+    Plan,
+    Rows,
+    Statistic,
+    Table,
+    by_passes,
+    cells_of,
+    estimate,
+    mean,
+    said,
+    scatter,
+    spread_over,
+    told,
+)
+
+__all__ = ["CHECKS"]
+
+WORN = Pass(94, wiggles=True)
+VERY_WORN = Pass(100, tyre="very_worn_summer", h=0.8e-3, wiggles=True)
+DRY_VERY_WORN = Pass(80, tyre="very_worn_summer", h=0.0, wiggles=True)
+FALLING = ("very worn", "very worn 0.6 mm", "very worn 2.0 mm", "worn", "worn medium", "worn high")
+DEPTHS = (0.8e-3, 1.1e-3, 1.3e-3, 2.0e-3)  # [m]
+RAMPS = tuple(Pass(v, a=1.0, wiggles=True) for v in (78, 94))
+STOPPING, TENTH = 0.2, 0.1
+BIN_ERROR, BIN_SAMPLES = limit("bin_error", "C49.passes"), 200
+BELOW_FULL, BELOW_TOLERANCE = limit("below_full", "C48.passes"), limit("below_tolerance", "C48.passes")  # [km/h]
+
+
+def _wiggling(name: str) -> Pass:
+    return replace(CONFIGURATIONS[name], wiggles=True)
+
+
+def slopes_of(table: Table, p: Pass, speeds: Sequence[float], wheel: str = "rr") -> FloatArray:
+    """Slope of a wheel, array (speeds, seeds)."""
+    return cells_of(table, at_speeds(p, speeds), f"slope_{wheel}")
+
+
+def _gradient(values: FloatArray, speeds: Sequence[float]) -> Statistic:
+    return lambda rows: float(np.polyfit(speeds, np.nanmean(values[:, rows], axis=1), 1)[0])
+
+
+def _c48(table: Table) -> Checks:
+    wet, dry = table[VERY_WORN].of("slope_rr"), mean(table[DRY_VERY_WORN].of("slope_rr"))
+    value, ci = estimate(lambda r: mean(wet[r]) / dry, wet.size)
+    away = _full_speed(VERY_WORN) - VERY_WORN.kmh
+    is_near = abs(away - BELOW_FULL) <= BELOW_TOLERANCE
+    outcome = (
+        f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
+        "higher"
+    )
+    return (
+        judge(
+            "C48.passes",
+            outcome,
+            whole=ci[1] < 0.8 and is_near,
+            part=value < 1.0,
+            value=value,
+            ci95=ci,
+            fields={
+                "away": ""
+                if is_near
+                else " The even contact of this tyre ends later than the thesis reports of its own."
+            },
+        ),
+    )
+
+
+def _full_speed(p: Pass) -> float:
+    """Speed of full aquaplaning of the rear right wheel on the lane of a pass, median. [km/h]"""
+    _, columns, _ = drive_pass(p, PASS_SEEDS[0])
+    return float(np.nanmedian(columns["true_full_speed_rr"])) * 3.6
+
+
+def regressed(moments: FloatArray) -> float:
+    """Slope from sums of n, mu, s, mu^2 and mu s, by regression of slip on traction. [-]"""
+    n, mu, s, mu2, mu_s = moments[:5]
+    return float((n * mu2 - mu * mu) / (n * mu_s - mu * s))
+
+
+def _c49(table: Table) -> Checks:
+    moments = cells_of(table, [*at_speeds(WORN), *RAMPS], "moments")
+
+    def errors(rows: Rows) -> tuple[float, float, FloatArray]:
+        sums = moments[:, rows].sum(axis=(0, 1))
+        good = sums[:, 0] >= BIN_SAMPLES
+        truth = sums[good, 5] / sums[good, 0]
+        binned = np.array([regressed(x) for x in sums[good]]) / truth - 1.0
+        whole = regressed(sums[good].sum(axis=0)) / truth - 1.0
+        return float(np.sqrt(np.mean(binned**2))), float(np.sqrt(np.mean(whole**2))), binned
+
+    n = moments.shape[1]
+    value, ci = estimate(lambda r: errors(r)[0], n)
+    without, ci_without = estimate(lambda r: errors(r)[1], n)
+    binned = errors(np.arange(n))[2]
+    at = (SLOPE_EDGES[:-1] + 5.0)[moments.sum(axis=(0, 1))[:, 0] >= BIN_SAMPLES]
+    whole, part = value < BIN_ERROR and value < 0.5 * without, value < without
+    outcome = (
+        f"rms error {told(100 * value, (100 * ci[0], 100 * ci[1]))} % in bins, "
+        f"{told(100 * without, (100 * ci_without[0], 100 * ci_without[1]))} % without; "
+        + ", ".join(f"{v:.0f} km/h: {100 * e:+.1f} %" for v, e in zip(at, binned, strict=True))
+    )
+    return (judge("C49.passes", outcome, whole=whole, part=part, value=value, ci95=ci),)
+
+
+def _c50(table: Table) -> Checks:
+    rows, spans = [], []
+    for v in SLOW:
+        cells = {h: table[replace(WORN, kmh=v, h=h)] for h in DEPTHS}
+        # the thesis' own condition: as long as the front tyres do not aquaplane fully
+        kept = [c.of("slope_rr") for c in cells.values() if c.of("any_stop").mean() < STOPPING]
+        means = [mean(x) for x in kept]
+        rows.append((v, len(kept), max(means) - min(means), max(scatter(x) for x in kept), float(np.mean(means))))
+        spans.append(kept)
+    inside = [s < max(noise, TENTH * m) for _, _, s, noise, m in rows]
+
+    def worst(r: Rows) -> float:
+        means = [[mean(x[r]) for x in kept] for kept in spans]
+        return max((max(m) - min(m)) / float(np.mean(m)) for m in means)
+
+    value, ci = estimate(worst, len(table[WORN].figures))
+    outcome = (
+        "; ".join(f"{v} km/h: {s:.1f} against {noise:.1f} (slope {m:.1f}, {k} depths)" for v, k, s, noise, m in rows)
+        + f"; largest share of the slope {told(value, ci, 2)}"
+    )
+    return (judge("C50.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci),)
+
+
+def _c51(table: Table) -> Checks:
+    found = {}
+    for name in FALLING:
+        for w in ("rl", "rr"):
+            values = slopes_of(table, _wiggling(name), SLOW, w)
+            found[f"{name} {w}"] = estimate(_gradient(values, SLOW), values.shape[1])
+    falling = [x < 0.0 for x, _ in found.values()]
+    value, ci = max(found.values())
+    outcome = "per km/h: " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items())
+    return (judge("C51.passes", outcome, whole=all(falling), part=bool(np.mean(falling) >= 0.8), value=value, ci95=ci),)
+
+
+def _c52(table: Table) -> Checks:
+    left, right = (slopes_of(table, WORN, SLOW, w) for w in ("rl", "rr"))
+    uneven = [float(np.mean([scatter(x) / mean(x) for x in side])) for side in (left, right)]
+    higher = float(np.nanmean(left)) > float(np.nanmean(right))
+    value, ci = estimate(lambda r: float(np.nanmean(left[:, r]) / np.nanmean(right[:, r])), left.shape[1])
+    ratio = said(lambda r: _ratio(_unevenness(left[:, r]), _unevenness(right[:, r])), left.shape[1], 2)
+    outcome = (
+        f"left over right {told(value, ci, 3)}; scatter {uneven[0]:.3f} left, {uneven[1]:.3f} right, ratio {ratio}"
+    )
+    return (
+        judge(
+            "C52.passes",
+            outcome,
+            whole=higher and uneven[0] > uneven[1],
+            part=higher or uneven[0] > uneven[1],
+            value=value,
+            ci95=ci,
+        ),
+    )
+
+
+def _ratio(a: float, b: float) -> float:
+    return a / b if b > 0.0 else float("nan")
+
+
+def _unevenness(values: FloatArray) -> float:
+    return float(np.nanmean(np.nanstd(values, axis=1, ddof=1) / np.nanmean(values, axis=1)))
+
+
+FEW = (70, 86, 102)  # [km/h]
+WINTER_SPEEDS, WINTER_DEPTHS = (70, 90, 110), (1.3e-3, 2.0e-3)
+SLIGHT = limit("slight", "C55.passes")  # of the slope
+
+
+def _levels(values: FloatArray) -> list[float]:
+    return [mean(x) for x in values]
+
+
+def _c53(table: Table) -> Checks:
+    values = {
+        n: slopes_of(table, replace(WORN, p=p), FEW) for n, p in (("low", LOW), ("medium", MEDIUM), ("high", HIGH))
+    }
+    level = {n: _levels(x) for n, x in values.items()}
+    drop = {n: x[0] - x[-1] for n, x in level.items()}
+    gap = [abs(level["low"][i] - level["high"][i]) for i in (0, -1)]
+    smaller = level["high"][0] < level["medium"][0] < level["low"][0] * 1.001
+    flatter = drop["high"] < 0.7 * drop["low"]
+
+    def share(rows: Rows) -> float:
+        high, low = (mean(values[n][0, rows]) - mean(values[n][-1, rows]) for n in ("high", "low"))
+        return high / low
+
+    value, ci = estimate(share, values["low"].shape[1])
+    outcome = (
+        "; ".join(f"{n}: " + ", ".join(f"{x:.1f}" for x in level[n]) for n in level)
+        + f" at {', '.join(map(str, FEW))} km/h; decrease at high over low {told(value, ci, 2)}; gap {gap[0]:.1f} "
+        f"to {gap[1]:.1f}"
+    )
+    return (
+        judge(
+            "C53.passes",
+            outcome,
+            whole=smaller and flatter and gap[1] < gap[0],
+            part=smaller and flatter,
+            value=value,
+            ci95=ci,
+        ),
+    )
+
+
+def _c54(table: Table) -> Checks:
+    winter = {h: slopes_of(table, Pass(90, tyre="new_winter", h=h, wiggles=True), WINTER_SPEEDS) for h in WINTER_DEPTHS}
+    rows = {h: (mean(x[0]) - mean(x[-1]), max(scatter(y) for y in x), mean(x[0])) for h, x in winter.items()}
+    worn = _levels(slopes_of(table, WORN, (70, 102)))
+    falls = worn[1] < 0.8 * worn[0]
+    still, nearly = (all(abs(d) < max(s, k * m) for d, s, m in rows.values()) for k in (0.05, 0.10))
+
+    def worst(r: Rows) -> float:
+        return max((mean(x[0, r]) - mean(x[-1, r])) / mean(x[0, r]) for x in winter.values())
+
+    value, ci = estimate(worst, winter[WINTER_DEPTHS[0]].shape[1])
+    outcome = (
+        "; ".join(f"{1e3 * h:.1f} mm: {d:+.2f} of {m:.1f} (scatter {s:.2f})" for h, (d, s, m) in rows.items())
+        + f", largest loss {told(100 * value, (100 * ci[0], 100 * ci[1]))} %; worn {worn[0]:.1f} to {worn[1]:.1f}"
+    )
+    return (judge("C54.passes", outcome, whole=still and falls, part=nearly and falls, value=value, ci95=ci),)
+
+
+def _c55(table: Table) -> Checks:
+    base = slopes_of(table, replace(UNLOADED, wiggles=True), FEW)
+    cases = {k: slopes_of(table, replace(p, wiggles=True), FEW) for k, p in LOADED.items()}
+    change = {k: np.nanmean(x, axis=0) - np.nanmean(base, axis=0) for k, x in cases.items()}
+    found = {k: estimate(_mean_of(x), x.size) for k, x in change.items()}
+    above = [x > 0.0 for x, _ in found.values()]
+    share = max(x for x, _ in found.values()) / float(np.nanmean(base))
+    is_slight = share <= SLIGHT
+    value, ci = min(found.values())
+    outcome = f"{np.nanmean(base):.1f}; " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items()) + " more"
+    more = "" if all(above) else " Not each of them raises the slope."
+    more += "" if is_slight else f" The largest is {share:.0%} of the slope, which is more than slight."
+    return (
+        judge(
+            "C55.passes",
+            outcome,
+            whole=all(above) and is_slight,
+            part=sum(above) >= 2,
+            value=value,
+            ci95=ci,
+            fields={"more": more},
+        ),
+    )
+
+
+def _mean_of(values: FloatArray) -> Statistic:
+    return lambda rows: float(np.nanmean(values[rows]))
+
+
+SCENE = "2.25"  # rear-wheel drive, worn summer tyres, low pressure, 0.8 mm
+RUNS = 12
+ENTRY, EXIT, END = 12.0, 18.0, 20.0  # [s]
+MANOEUVRES: dict[str, Profile] = {
+    "constant speed": ((0.0, 100.0 * KMH),),
+    "moderate acceleration": ((0.0, 92.0 * KMH), (ENTRY, 92.0 * KMH), (END, 92.0 * KMH + 0.8 * (END - ENTRY))),
+}
+HIGH_UTILISATION = limit(
+    "high", "C47.drives"
+)  # [-] utilisation that is high: what estimators of the maximum friction need (thesis 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One drive.
+
+    `after_s`: time from the entry to the first loss of slope found on the lane, NaN without one [s]; `mu`: largest
+    traction coefficient of a rear wheel until then [-]; `utilisation`: 95 % quantile of it over the residual friction
+    [-]; `is_early`: found before the lane.
+    """
+
+    after_s: float
+    mu: float
+    utilisation: float
+    is_early: bool
+
+
+def scenario_of(manoeuvre: str, seed: int) -> Scenario:
+    """The drive: dry road, 6 s of water."""
+    wet = scene(SCENE)
+    lane = wet.lanes[0]
+    lane = Lane(ENTRY, EXIT, depth_left=lane.depth_left, depth_right=lane.depth_right,
+                irregularity_left=lane.irregularity_left)  # fmt: skip
+    return replace(wet, speed=MANOEUVRES[manoeuvre], lanes=(lane,), duration_s=END, seed=seed)
+
+
+def _found(item: tuple[str, int]) -> Found:
+    r = run_of(scenario_of(*item), known(SCENE))
+    times = r.events("slip_slope_drop")
+    on = [t for t in times if r.entry <= t <= r.exit]
+    mu, share = _used(r, min(on, default=r.exit))
+    return Found(min(on) - r.entry if on else np.nan, mu, share, any(t < r.entry for t in times))
+
+
+def _used(r: SceneRun, until: float) -> tuple[float, float]:
+    span = r.within(r.entry, until + r.result.signals.dt)
+    mu = [np.abs(r.signal(f"true_force_x_{w}") / r.signal(f"true_load_{w}"))[span] for w in ("rl", "rr")]
+    friction = [np.maximum(r.signal(f"true_mu_max_{w}")[span], 1e-3) for w in ("rl", "rr")]
+    return float(np.max(mu)), float(max(np.quantile(a / b, 0.95) for a, b in zip(mu, friction, strict=True)))
+
+
+def _check(manoeuvre: str, found: list[Found]) -> Check:
+    n = len(found)
+    gentle = [np.isfinite(f.after_s) and f.utilisation < HIGH_UTILISATION for f in found]
+    k, early = sum(gentle), sum(f.is_early for f in found)
+    there = [f.after_s for f in found if np.isfinite(f.after_s)]
+    when = f"after {np.median(there):.2f} s (median)" if there else "never"
+    whole = k >= MANY * n and early == 0
+    outcome = (
+        f"{k} of {n} ({len(there)} found at all), {when}; traction coefficient at most {max(f.mu for f in found):.3f}, "
+        f"utilisation {max(f.utilisation for f in found):.2f}; found before the lane in {early}"
+    )
+    return judge(
+        "C47.drives",
+        outcome,
+        whole=whole,
+        part=k >= SOME * n,
+        value=k / n,
+        ci95=wilson(k, n),
+        fields={
+            "manoeuvre": manoeuvre,
+            "speed": "100 km/h" if manoeuvre == "constant speed" else "0.8 m/s^2 from 92 km/h",
+        },
+    )
+
+
+def detected(plan: Plan) -> Checks:
+    """C47 at constant speed and under moderate acceleration."""
+    items = [(m, s) for m in MANOEUVRES for s in plan.first(RUNS)]
+    found = spread_over(_found, items, plan, "drives")
+    by_manoeuvre = {m: [f for (name, _), f in zip(items, found, strict=True) if name == m] for m in MANOEUVRES}
+    return tuple(_check(m, f) for m, f in by_manoeuvre.items())
+
+
+def _winter() -> Iterator[Pass]:
+    yield from at_speeds(WORN, (70, 102))
+    for h in WINTER_DEPTHS:
+        yield from at_speeds(Pass(90, tyre="new_winter", h=h, wiggles=True), WINTER_SPEEDS)
+
+
+CHECKS = (
+    Maker(("C47",), detected, PASS_SEEDS, spreads=True),
+    by_passes("C48", lambda: (VERY_WORN, DRY_VERY_WORN), _c48),
+    by_passes("C49", lambda: (*at_speeds(WORN), *RAMPS), _c49),
+    by_passes("C50", lambda: (WORN, *(q for h in DEPTHS for q in at_speeds(replace(WORN, h=h)))), _c50),
+    by_passes("C51", lambda: (q for name in FALLING for q in at_speeds(_wiggling(name))), _c51),
+    by_passes("C52", lambda: at_speeds(WORN), _c52),
+    by_passes("C53", lambda: (q for p in (LOW, MEDIUM, HIGH) for q in at_speeds(replace(WORN, p=p), FEW)), _c53),
+    by_passes("C54", _winter, _c54),
+    by_passes(
+        "C55",
+        lambda: (replace(q, wiggles=True) for p in (UNLOADED, *LOADED.values()) for q in at_speeds(p, FEW)), _c55,
+    ),
+)  # fmt: skip

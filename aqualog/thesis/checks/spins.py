@@ -1,0 +1,425 @@
+"""Order of the effects over speed, loss of contact, spin-downs and spin-ups, by passes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.evaluate.intervals import wilson
+from aqualog.evaluate.truth import CONTACT_FULL
+from aqualog.thesis.claims import Checks, judge, limit
+from aqualog.thesis.evidence.passes import HIGH, SPIN_EDGES, SPIN_UP, Pass
+from aqualog.thesis.evidence.seeds import (
+    Rows,
+    Statistic,
+    Table,
+    by_passes,
+    cells_of,
+    estimate,
+    first_speed,
+    mean,
+    said,
+    told,
+)
+
+__all__ = ["CHECKS"]
+
+GRID = tuple(range(78, 126, 4))  # [km/h]
+DRY = Pass(80, h=0.0, wiggles=True)
+FLOODED = Pass(150, even=True, scatter=0.0)
+KICKED = tuple(Pass(v, kick=T) for T in (1000.0, 2000.0) for v in range(70, 140, 6))
+SOON, RESISTANCE, SLOPE_LOSS = 0.5, 0.2, 0.2  # [s], [m/s^2], [-]
+NO_FORCE, OVERLOAD_S, SPUN = (
+    limit("no_force", "C4.passes_full"),
+    limit("overload_s", "C4.passes_partial"),
+    0.1,
+)  # [-], [s], [-]
+
+
+def _c3(table: Table) -> Checks:
+    plain, wiggling = [Pass(v) for v in GRID], [Pass(v, wiggles=True) for v in GRID]
+    dry = mean(table[DRY].of("slope_rr"))
+    slope = cells_of(table, wiggling, "slope_rr")
+    reached = {
+        "resistance": cells_of(table, plain, "delta_a") > RESISTANCE,
+        "slope -20 %": slope < (1.0 - SLOPE_LOSS) * dry,
+        "slope -50 %": slope < 0.5 * dry,
+        "first dip": cells_of(table, plain, "dips") > 0,
+        "full": cells_of(table, plain, "stop_s") < SOON,
+    }
+    n = slope.shape[1]
+    at = {k: first_speed(GRID, met) for k, met in reached.items()}
+    v = {k: f(np.arange(n)) for k, f in at.items()}
+    early = max(v["resistance"], v["slope -20 %"])
+    lead, ci = estimate(lambda r: at["first dip"](r) - max(at["resistance"](r), at["slope -20 %"](r)), n)
+    whole = early < v["first dip"] < v["full"] < np.inf
+    outcome = (
+        "; ".join(f"{k} {said(f, n)}" for k, f in at.items()) + f" km/h; first dip after both by {told(lead, ci)} km/h"
+    )
+    return (
+        judge(
+            "C3.passes", outcome, whole=whole, part=max(early, v["first dip"]) < v["full"] < np.inf, value=lead, ci95=ci
+        ),
+    )
+
+
+def _c4(table: Table) -> Checks:
+    force = max(float(table[p].of("afloat_force").max()) for p in (FLOODED, Pass(118), Pass(122)))
+    spun = cells_of(table, KICKED, "rear_spin").ravel() > SPUN
+    partial = cells_of(table, KICKED, "rear_contact").ravel()[spun] > CONTACT_FULL
+    overloaded = cells_of(table, KICKED, "overload_s").ravel() > OVERLOAD_S
+    hit, spared = (float(x.mean()) if x.size else 0.0 for x in (overloaded[spun], ~overloaded[~spun]))
+    balanced = 0.5 * (hit + spared)
+    k, n = int(partial.sum()), int(partial.size)
+    ok = n > 0 and k >= 0.8 * n
+    return (
+        judge(
+            "C4.passes_full",
+            f"at most {force:.2e} of the load (118, 122 and 150 km/h)",
+            whole=force < NO_FORCE,
+            value=force,
+        ),
+        judge(
+            "C4.passes_partial",
+            f"{k} of {n} begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} passes, found "
+            f"{hit:.3f}, spared {spared:.3f}",
+            whole=ok and balanced >= 0.9,
+            part=ok,
+            value=k / n if n else None,
+            ci95=wilson(k, n),
+        ),
+    )
+
+
+def _c5(table: Table) -> Checks:
+    times = table[FLOODED].of("gone_still_s")
+    stops, middle = int((times < 1.0).sum()), float(np.median(times))
+    outcome = (
+        f"{middle:.3f} s ({times.min():.3f} to {times.max():.3f}), {stops} of {times.size} within 1 s "
+        "(150 km/h, even contact)"
+    )
+    return (
+        judge(
+            "C5.passes",
+            outcome,
+            whole=stops == times.size,
+            part=2 * stops >= times.size,
+            value=middle if np.isfinite(middle) else None,
+            ci95=(float(times.min()), float(times.max())),
+        ),
+    )
+
+
+def _c3_needs() -> Iterator[Pass]:
+    yield DRY
+    for v in GRID:
+        yield from (Pass(v), Pass(v, wiggles=True))
+
+
+FINE = tuple(range(84, 124, 2))
+SHOWN = (89, 98, 106, 118)  # thesis Fig. 2.3
+CURVE = tuple(Pass(v) for v in (70, *GRID[:9]))  # up to 110 km/h, below full aquaplaning
+CURVE_A = tuple(Pass(v, a=0.5) for v in (78, 86, 94, 102))
+CONSTANT_KMH, AIC_SURE = limit("constant_kmh", "C13.passes"), limit("aic_sure", "C18.passes")
+
+
+def _c13(table: Table) -> Checks:
+    change = np.max(cells_of(table, [Pass(v) for v in SHOWN], "speed_change"))
+    s = cells_of(table, [Pass(v) for v in SHOWN], "low_slip")
+    low = -s / (1.0 - s)  # over the car's speed: a wheel that stands is 1 below it
+    level = [mean(x) for x in low]
+    grows = bool(np.all(np.diff(level) > 0))
+    constant = bool(change < CONSTANT_KMH)
+    value, ci = estimate(lambda r: float(low[2, r].mean() - low[0, r].mean()), low.shape[1])
+    outcome = (
+        f"speed within {change:.2f} km/h; slip {', '.join(f'{100 * x:.1f}' for x in level)} % below the car; from "
+        f"89 to 106 km/h {told(100 * value, (100 * ci[0], 100 * ci[1]))} points more"
+    )
+    return (
+        judge(
+            "C13.passes",
+            outcome,
+            whole=constant and grows,
+            part=grows,
+            value=value,
+            ci95=ci,
+            fields={"change": "" if constant else " The driver model lets the speed fall by that much on the lane."},
+        ),
+    )
+
+
+def _c14(table: Table) -> Checks:
+    dips = table[Pass(89)].of("dips")
+    k, n = int((dips > 0).sum()), dips.size
+    outcome = f"{dips.mean():.2f} per pass, in {k} of {n} passes"
+    return (judge("C14.passes", outcome, whole=k > 0, value=k / n, ci95=wilson(k, n)),)
+
+
+def _c15(table: Table) -> Checks:
+    cells = [table[Pass(v)] for v in (89, 98, 106)]
+    count = [c.of("dips") for c in cells]
+    depth = [mean(c.of("depth")) for c in cells]
+    yaw, stops = float(np.degrees(cells[2].of("yaw").max())), float(cells[2].of("any_stop").mean())
+    n = count[0].size
+    a, b, c = (float(x.mean()) for x in count)
+    more, ci = estimate(lambda r: float(count[2][r].mean() - count[0][r].mean()), n)
+    whole = a < b < c and depth[2] < depth[1] and yaw < 3.0 and stops < 0.5
+    outcome = (
+        f"{a:.2f}, {b:.2f}, {c:.2f} dips per pass, {told(more, ci)} more at 106 than at 89; depth {depth[1]:.3f}, "
+        f"{depth[2]:.3f}; heading {yaw:.1f} deg; stops {stops:.0%}"
+    )
+    return (judge("C15.passes", outcome, whole=whole, part=a < b < c, value=more, ci95=ci),)
+
+
+def _c16(table: Table) -> Checks:
+    c = table[Pass(118)]
+    stop, up, down = (c.of(k) for k in ("stop_s", "rear_spin_s", "rear_stop_s"))
+    n = stop.size
+    full, ever = float((stop < SOON).mean()), float((c.of("rear_spin") > SPIN_UP).mean())
+    with np.errstate(invalid="ignore"):
+        at_once = (np.abs(up - stop) < 1.0) & (up < down)
+    k = int(at_once.sum())
+    whole, part = full >= 0.5 and 2 * k >= n, full >= 0.5 and ever >= 0.5
+    outcome = (
+        f"front right {full:.0%} (the anchor, fitted on other seeds); rear up at once {k} of {n}, up at all "
+        f"{ever:.0%}, down first {float((down < up).mean()):.0%}"
+    )
+    return (judge("C16.passes", outcome, whole=whole, part=part, value=k / n, ci95=wilson(k, n)),)
+
+
+def _c17(table: Table) -> Checks:
+    cells = [Pass(v) for v in FINE]
+    minor = first_speed(FINE, cells_of(table, cells, "dips") > 0)
+    stop = cells_of(table, cells, "stop_s") < SOON
+    full = first_speed(FINE, stop)
+    n = stop.shape[1]
+    value, ci = estimate(lambda r: full(r) - minor(r), n)
+    there = np.isfinite(value)
+    outcome = f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h"
+    return (
+        judge(
+            "C17.passes",
+            outcome,
+            whole=bool(there and ci[0] >= 15.0 and ci[1] <= 25.0),
+            part=bool(there and 10.0 <= value <= 30.0),
+            value=value if there else None,
+            ci95=ci if np.all(np.isfinite(ci)) else None,
+        ),
+    )
+
+
+def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
+    """By how much an exponential c exp(v / v0) explains y over v better than a straight line.
+
+    Parameters
+    ----------
+    v, y : array (n,)
+        n > 4, y >= 0 mostly.
+
+    Returns
+    -------
+    gain : float
+        Akaike's criterion [akaike1974] of the line minus that of the exponential, both with two parameters and fitted
+        by least squares; positive where the exponential is better.
+    c, v0 : float
+        Of the exponential; v0 in the unit of v, between 1 and 200.
+    """
+    best = (np.inf, 0.0, 0.0)
+    for v0 in np.geomspace(1.0, 200.0, 400):
+        shape = np.exp((v - v.max()) / v0)
+        c = float(shape @ y / (shape @ shape))
+        rss = float(((y - c * shape) ** 2).sum())
+        best = min(best, (rss, float(c * np.exp(-v.max() / v0)), float(v0)))
+    rest = y - np.polyval(np.polyfit(v, y, 1), v)
+    return float(v.size * np.log(float(rest @ rest) / best[0])), best[1], best[2]
+
+
+def _c18(table: Table) -> Checks:
+    passes = [*CURVE, *CURVE_A]
+    v, y = cells_of(table, passes, "mean_kmh"), -cells_of(table, passes, "low_slip")
+    # the slip over the wheel's speed has no bound where the wheel stops: such passes would decide alone
+    rolling = cells_of(table, passes, "any_stop") < 0.5
+    n = v.shape[1]
+
+    def fit(rows: Rows) -> tuple[float, float, float]:
+        some = rolling[:, rows]
+        return aic_gain(v[:, rows][some], y[:, rows][some])
+
+    def part(k: int) -> Statistic:
+        return lambda rows: fit(rows)[k]
+
+    gain, ci = estimate(part(0), n)
+    whole = gain > AIC_SURE and ci[0] > 0.0
+    outcome = f"better by {told(gain, ci)} over {int(rolling.sum())} of {v.size} passes, v0 = {said(part(2), n)} km/h"
+    return (judge("C18.passes", outcome, whole=whole, part=gain > 0.0, value=gain, ci95=ci),)
+
+
+def _c19(table: Table) -> Checks:
+    dips = cells_of(table, list(_c19_needs()), "dips")
+    k, n = int((dips > 0).sum()), dips.size
+    outcome = f"{int(dips.sum())} dips in {n} passes"
+    return (judge("C19.passes", outcome, whole=k == 0, part=k < 0.05 * n, value=k / n, ci95=wilson(k, n)),)
+
+
+def _c19_needs() -> Iterator[Pass]:
+    return (Pass(v, tyre="new_winter") for v in (89, 98, 106, 118, 130))
+
+
+KICKS = (500.0, 1000.0, 1500.0, 2000.0)  # [N m]
+KICK_SPEEDS = tuple(range(70, 140, 6))  # [km/h]
+SPEEDS, ACCELERATIONS = tuple(range(90, 142, 6)), (2.0, 3.0, 4.0)  # [km/h], [m/s^2]
+PUSHED = tuple(Pass(v, a=a, p=HIGH) for v in SPEEDS for a in ACCELERATIONS)
+EVEN_SPEEDS = (102, 108, 114, 120, 126)
+EVEN = tuple(Pass(v, a=3.0, p=HIGH, even=True) for v in EVEN_SPEEDS)
+UNEVEN = tuple(Pass(v, a=3.0, p=HIGH) for v in EVEN_SPEEDS)
+SAMPLES = 500  # that a bin must have, ms
+SPREAD_KMH, IRREGULAR = limit("spread_kmh", "C21.passes"), limit("irregular", "C21.passes")
+
+
+def _bins(spins: FloatArray, wheel: int, rows: Rows) -> tuple[FloatArray, FloatArray]:
+    """Speeds [km/h] of the bins with enough samples, and mean traction in them; spins (passes, seeds, 2, bins, 2)."""
+    count, total = np.moveaxis(spins[:, rows, wheel].sum(axis=(0, 1)), -1, 0)
+    good = count > SAMPLES
+    return SPIN_EDGES[:-1][good] + 5.0, total[good] / count[good]
+
+
+def rank_correlation(x: FloatArray, y: FloatArray) -> float:
+    """Spearman's rank correlation [spearman1904] of arrays (n,) without ties; NaN for fewer than three."""
+    if x.size < 3:
+        return float("nan")
+    return float(np.corrcoef(np.argsort(np.argsort(x)), np.argsort(np.argsort(y)))[0, 1])
+
+
+def _c20(table: Table) -> Checks:
+    spun = {T: cells_of(table, [Pass(v, kick=T) for v in KICK_SPEEDS], "rear_spin") > SPUN for T in KICKS}
+    at = {T: first_speed(KICK_SPEEDS, x) for T, x in spun.items()}
+    n = spun[KICKS[0]].shape[1]
+    v = np.array([f(np.arange(n)) for f in at.values()])
+    whole = bool(np.isfinite(v).all() and np.all(np.diff(v) < 0))
+    fall, ci = estimate(lambda r: at[KICKS[0]](r) - at[KICKS[-1]](r), n)
+    outcome = (
+        ", ".join(f"{T:.0f} N m: {said(f, n)}" for T, f in at.items()) + f" km/h; {told(fall, ci)} km/h sooner in all"
+    )
+    return (
+        judge(
+            "C20.passes",
+            outcome,
+            whole=whole,
+            part=bool(v[-1] < v[0]),
+            value=fall if np.isfinite(fall) else None,
+            ci95=ci if np.isfinite(ci).all() else None,
+        ),
+    )
+
+
+def _c21(table: Table) -> Checks:
+    spun = cells_of(table, PUSHED, "rear_spin") > SPUN
+    onset = np.where(spun, cells_of(table, PUSHED, "rear_spin_v"), np.nan)
+    n = spun.shape[1]
+
+    def spread(rows: Rows) -> float:
+        there = onset[:, rows][np.isfinite(onset[:, rows])]
+        return float(np.quantile(there, 0.9) - np.quantile(there, 0.1)) if there.size else float("nan")
+
+    share = spun.mean(axis=1)
+    mixed = int(((share > 0.1) & (share < 0.9)).sum())
+    value, ci = estimate(spread, n)
+    whole = bool(value >= SPREAD_KMH and mixed >= IRREGULAR)
+    outcome = (
+        f"{int(spun.sum())} of {spun.size} passes spin up; speeds spread over {told(value, ci)} km/h; {mixed} of "
+        f"{share.size} cases are mixed"
+    )
+    return (
+        judge(
+            "C21.passes",
+            outcome,
+            whole=whole,
+            part=bool(value >= SPREAD_KMH or mixed >= IRREGULAR),
+            value=value,
+            ci95=ci,
+        ),
+    )
+
+
+def _c22(table: Table) -> Checks:
+    spins = cells_of(table, PUSHED, "spins")
+    n = spins.shape[1]
+    ranks: dict[str, tuple[float, tuple[float, float]]] = {}
+    text = []
+    for k, w in enumerate(("rl", "rr")):
+        v, mu = _bins(spins, k, np.arange(n))
+        ranks[w] = estimate(_rank(spins, k), n)
+        text.append(
+            f"{w}: "
+            + ", ".join(f"{a:.0f}: {b:.3f}" for a, b in zip(v, mu, strict=True))
+            + f", rank {told(*ranks[w], 2)}"
+        )
+    value, ci = max(ranks.values())
+    whole = all(r < 0.0 for r, _ in ranks.values())
+    there = bool(np.isfinite(value))
+    outcome = "; ".join(text)
+    return (
+        judge(
+            "C22.passes",
+            outcome,
+            whole=whole,
+            part=any(r < 0.0 for r, _ in ranks.values()),
+            value=value if there else None,
+            ci95=ci if there else None,
+        ),
+    )
+
+
+def _rank(spins: FloatArray, wheel: int) -> Statistic:
+    return lambda rows: rank_correlation(*_bins(spins, wheel, rows))
+
+
+def _difference(spins: FloatArray) -> Statistic:
+    """Mean traction left minus right over the bins that both have."""
+
+    def statistic(rows: Rows) -> float:
+        (v_l, left), (v_r, right) = (_bins(spins, k, rows) for k in (0, 1))
+        _, i, j = np.intersect1d(v_l, v_r, return_indices=True)
+        return float(np.mean(left[i] - right[j])) if i.size else float("nan")
+
+    return statistic
+
+
+def _c23(table: Table) -> Checks:
+    uneven, even = (_difference(cells_of(table, p, "spins")) for p in (UNEVEN, EVEN))
+    n = len(table[EVEN[0]].figures)
+    a, ci = estimate(uneven, n)
+    b, ci_even = estimate(even, n)
+    apart = bool(np.isfinite(a) and (ci[0] > 0.0 or ci[1] < 0.0))
+    whole = apart and bool(np.isfinite(b) and abs(a) > 3.0 * abs(b))
+    outcome = f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s², 102 to 126 km/h)"
+    return (
+        judge(
+            "C23.passes",
+            outcome,
+            whole=whole,
+            part=apart,
+            value=a if np.isfinite(a) else None,
+            ci95=ci if np.isfinite(a) else None,
+        ),
+    )
+
+
+CHECKS = (
+    by_passes("C3", _c3_needs, _c3),
+    by_passes("C4", lambda: (FLOODED, Pass(118), Pass(122), *KICKED), _c4),
+    by_passes("C5", lambda: (FLOODED,), _c5),
+    by_passes("C13", lambda: (Pass(v) for v in SHOWN), _c13),
+    by_passes("C14", lambda: (Pass(89),), _c14),
+    by_passes("C15", lambda: (Pass(v) for v in SHOWN[:3]), _c15),
+    by_passes("C16", lambda: (Pass(118),), _c16),
+    by_passes("C17", lambda: (Pass(v) for v in FINE), _c17),
+    by_passes("C18", lambda: (*CURVE, *CURVE_A), _c18),
+    by_passes("C19", _c19_needs, _c19),
+    by_passes("C20", lambda: (Pass(v, kick=T) for v in KICK_SPEEDS for T in KICKS), _c20),
+    by_passes("C21", lambda: PUSHED, _c21),
+    by_passes("C22", lambda: PUSHED, _c22),
+    by_passes("C23", lambda: (*UNEVEN, *EVEN), _c23),
+)

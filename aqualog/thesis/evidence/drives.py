@@ -1,0 +1,241 @@
+"""Drawn situations under the detectors, whole and with single conditions left out, and how an alarm scores on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from aqualog.core.errors import SignalError
+from aqualog.core.notation import SIDES, WHEELS
+from aqualog.core.records import BoolArray, DriveResult, FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect import minor_spin_down
+from aqualog.detect.joint import CRITERIA, GATED
+from aqualog.detect.negative_force import hold_on
+from aqualog.detect.scene import BrakeWatch
+from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
+from aqualog.detect.stream import Settings, detect_drive
+from aqualog.detect.wheel_watch import A_Y_MINOR
+from aqualog.evaluate.drives import labels_in
+from aqualog.evaluate.intervals import poisson, wilson
+from aqualog.evaluate.labels import Labels, Span, joined, without
+from aqualog.evaluate.match import LIMITS_S, beginning_in, hits
+from aqualog.evaluate.truth import spans_of
+from aqualog.model.scenario import Scenario
+from aqualog.model.signals import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.situations import SCORING_POOL, SITUATIONS, draw
+from aqualog.model.term import Model
+from aqualog.thesis.evidence.seeds import Plan, spread_over
+
+__all__ = [
+    "NUISANCE", "WATER", "Score", "Taken", "bits_of", "detected", "drives", "made", "score", "threshold_for",
+    "variants",
+]  # fmt: skip
+
+WATER = tuple(n for n, s in SITUATIONS.items() if s.kind == "aquaplaning")
+NUISANCE = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
+_GAP_S = 1.0  # alarms closer than that are one
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One drive as detectors see it, with the truth for the judgement.
+
+    `signals` has no truth; `truth` the true slip and contact of each wheel, `slip_fl`, `contact_fl`, arrays (n,) [-];
+    `t` (n,) [s]; `dry` the stretches outside water and the second after it.
+    """
+
+    name: str
+    seed: int
+    vehicle: Vehicle
+    signals: Signals
+    labels: Labels
+    truth: Mapping[str, FloatArray]
+    t: FloatArray
+    dry: tuple[Span, ...]
+
+
+def made(name: str, seed: int, scenario: Scenario, believed: Vehicle, model: Model | None = None) -> Taken:
+    """Drive a scenario; `believed` is the car as the vehicle file has it."""
+    signals = as_signals(simulate(scenario, model or Model()), vehicle=believed)
+    labels = labels_in(signals)
+    if labels is None:
+        raise SignalError("a simulated drive without its truth", where=name)
+    truth = {f"{what}_{w}": signals.array(f"true_{what}_{w}") for what in ("slip", "contact") for w in WHEELS}
+    seen = [c for c in signals.frame.columns if not c.startswith("true_")]
+    dry = tuple(without([(0.0, signals.frame.height * signals.dt)], labels.water_widened))
+    return Taken(
+        name, seed, believed, replace(signals, frame=signals.frame.select(seen)), labels, truth, signals.array("t"), dry
+    )
+
+
+_TAKEN: dict[tuple[str, int], Taken] = {}
+
+
+def taken(name: str, seed: int) -> Taken:
+    """A drive of a situation, of the pool that is for reported figures only; made once in a process."""
+    if (name, seed) not in _TAKEN:
+        _TAKEN[name, seed] = _take((name, seed))
+    return _TAKEN[name, seed]
+
+
+def _take(item: tuple[str, int]) -> Taken:
+    d = draw(*item, SCORING_POOL)
+    return made(*item, d.scenario, d.believed, d.model)
+
+
+def drives(names: Iterable[str], plan: Plan, n: int) -> list[Taken]:
+    """Every situation at the first n seeds of a plan, by as many processes as it allows."""
+    wanted = [(name, seed) for name in names for seed in plan.first(n)]
+    todo = [item for item in wanted if item not in _TAKEN]
+    _TAKEN.update(zip(todo, spread_over(_take, todo, plan, "drives"), strict=True))
+    return [_TAKEN[item] for item in wanted]
+
+
+def detected(d: Taken, settings: Settings | None = None) -> DriveResult:
+    """The drive under all detectors."""
+    return detect_drive(d.signals, d.vehicle, settings=settings)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Episodes and those found in time; alarms begun outside water, and over which time [s]."""
+
+    found: int
+    episodes: int
+    false: int
+    dry_s: float
+
+    @property
+    def recall(self) -> float:
+        """Share of the episodes found; 0 without any."""
+        return self.found / self.episodes if self.episodes else 0.0
+
+    def in_words(self) -> str:
+        """Recall and false alarms with their intervals."""
+        low, high = wilson(self.found, self.episodes)
+        few, many = poisson(self.false)
+        return (
+            f"{self.found} of {self.episodes} found ({100 * low:.0f} to {100 * high:.0f} %), {self.false} false "
+            f"alarms in {self.dry_s / 3600:.1f} h ({few:.0f} to {many:.0f})"
+        )
+
+
+def score(
+    water: Sequence[tuple[Taken, BoolArray]], other: Sequence[tuple[Taken, BoolArray]], effect: str = "full"
+) -> Score:
+    """Score an alarm bit of drives on water (episodes of `effect`, "full" or "partial") and of all others.
+
+    False alarms are those of the others: a car that has spun on water says little about a dry road.
+    """
+    found = episodes = false = 0
+    seconds = 0.0
+    for d, bits in water:
+        spans = spans_of(d.t, bits)
+        all_hits = hits(d.labels.of(effect), spans, limit=LIMITS_S[effect], water=d.labels.water_widened)
+        found += sum(h.found for h in all_hits)
+        episodes += len(all_hits)
+    for d, bits in other:
+        alarms = joined(spans_of(d.t, bits), _GAP_S)
+        false += len(beginning_in(alarms, d.dry))
+        seconds += sum(b - a for a, b in d.dry)
+    return Score(found, episodes, false, seconds)
+
+
+def threshold_for(recall: float, values: Sequence[float], of: Callable[[float], Score]) -> tuple[float, Score]:
+    """The largest threshold whose recall is at least that, and its score; where none has it, the one of largest recall.
+
+    A small threshold may find less than a larger one: an alarm that is on before the water does not count.
+    """
+    scores = [(value, of(value)) for value in sorted(values)]
+    enough = [x for x in scores if x[1].recall >= recall]
+    return enough[-1] if enough else max(scores, key=lambda x: x[1].recall)
+
+
+_HOLD_S = 0.5  # [s] as long as a joint warning outlasts its criteria
+
+
+def variants(name: str, seed: int) -> Mapping[str, BoolArray]:
+    """Bits (n,) of a drawn drive by the name of a variant.
+
+    `joint_criteria`, `ungated` (criteria 1 to 4 without the gate), `gate`, `resistance`, `criterion_1` to
+    `criterion_5`, `spin_up`, `spin_down` (criterion 1 under braking forces too), `minor` and
+    `minor_no_difference`, `minor_no_sign`, `minor_no_force`, `minor_no_difference_no_sign` (its conditions left out),
+    `slope` and `slope_uncalm`.
+    """
+    return _variants(name, seed)
+
+
+@lru_cache(maxsize=320)
+def _variants(name: str, seed: int) -> Mapping[str, BoolArray]:
+    return bits_of(taken(name, seed))
+
+
+def bits_of(d: Taken) -> Mapping[str, BoolArray]:
+    """As `variants`, of any drive."""
+    result = detected(d)
+    n = d.t.size
+    f = {c: np.ascontiguousarray(result.features[c].to_numpy()) for c in result.features.columns}
+    none = np.zeros(n, dtype=np.bool_)
+    out: dict[str, BoolArray] = {}
+    for detector in ("joint_criteria", "joint_cusum", "resistance", "spin_down", "spin_up"):
+        out[detector] = _any(result, detector, none)
+    for k in CRITERIA.values():
+        out[f"criterion_{k}"] = f.get(f"criterion_{k}", none.astype(np.float64)) > 0.0
+    out["gate"] = f.get("joint_gate", none.astype(np.float64)) > 0.0
+    met = np.any([out[f"criterion_{k}"] for k in GATED], axis=0)
+    out["ungated"], _ = hold_on(met, 0, seconds=_HOLD_S, dt=d.signals.dt)
+    columns = {s: d.signals.array(s) for s in d.signals.symbols}
+    braking = BrakeWatch(d.vehicle, d.signals.dt).push(f, columns)
+    out |= _minor(d, f, braking)
+    out["slope"] = _any(result, "slip_slope_drop", none)
+    out["slope_uncalm"] = _uncalm(d, f, braking, none)
+    return out
+
+
+def _any(result: DriveResult, detector: str, none: BoolArray) -> BoolArray:
+    bits: BoolArray = np.any([none, *(t.active for t in result.tracks if t.detector == detector)], axis=0)
+    return bits
+
+
+def _minor(d: Taken, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray]) -> dict[str, BoolArray]:
+    p = minor_spin_down.MinorParams.make(d.signals.dt)
+    kinds = ("", "_no_difference", "_no_sign", "_no_force", "_no_difference_no_sign")
+    out = {k: np.zeros(d.t.size, dtype=np.bool_) for k in kinds}
+    with np.errstate(invalid="ignore"):
+        upright = ~(np.abs(f["a_y_slow"]) > A_Y_MINOR)
+    for pair in SIDES.values():
+        watched = next(w for w in pair if w[0] == d.vehicle.watched_axle)
+        other = next(w for w in pair if w[0] != d.vehicle.watched_axle)
+        if any(f"a_w_delta_{w}" not in f for w in (watched, other)):
+            continue
+        a, a_other = f[f"a_w_delta_{watched}"], f[f"a_w_delta_{other}"]
+        dv = f[f"v_w_delta_{watched}"] - f["v_w_delta_common"]
+        free = ~braking[watched] & upright
+        for k in out:
+            _, _, bits, _ = minor_spin_down.scan(
+                p._replace(one_sided=0.0) if "_no_sign" in k else p, minor_spin_down.initial_state(), a,
+                np.zeros_like(a) if "_no_difference" in k else a_other, dv, f["v_x_hat"],
+                upright if k == "_no_force" else free,
+            )  # fmt: skip
+            out[k] |= bits
+    return {f"minor{k}": bits for k, bits in out.items()}
+
+
+class _Uncalm(SlipSlopeWatch):
+    """Criterion 4 on wheels that shake, too."""
+
+    def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
+        return np.ones(f["v_x_hat"].size, dtype=np.bool_)
+
+
+def _uncalm(d: Taken, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], none: BoolArray) -> BoolArray:
+    if any(f"mu_{w}" not in f for w in WHEELS):
+        return none
+    found = [_Uncalm(d.vehicle, p, d.signals.dt).push(f, braking, f["yaw_rate_slow"]).active for p in pairs(d.vehicle)]
+    bits: BoolArray = np.any([none, *found], axis=0)
+    return bits

@@ -1,0 +1,1 @@
+"""Families of figures: what each draws, and the claims it judges."""

@@ -1,0 +1,291 @@
+"""Figures 3.9 and 3.11: the period of the excitation, and the parameters of filter and change detection."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aqualog.detect.slip_slope.tuning import TUNING, Tuning
+from aqualog.thesis.catalogue import figure_of
+from aqualog.thesis.claims import judge, limit
+from aqualog.thesis.evidence.half_car import GATE_OFF, Case, adaption_time, drive, estimate, first_alarm, inputs
+from aqualog.thesis.figures.timeline import (
+    COLOURS,
+    SLOPE,
+    TIME,
+    detection_time,
+    estimate_lines,
+    false_alarms_of,
+    listed,
+    slope_after,
+    told,
+    true_slope,
+)
+from aqualog.thesis.record import Axis, Figure, Line, Panel, Table, seconds
+
+__all__ = ["FIGURES"]
+
+OCTAVES = (64.0, 32.0, 16.0, 8.0, 4.0, 2.0)
+PANELS: dict[str, Case] = {
+    "sine, minimum of differential traction": Case("sine", tuning=TUNING, t_end=30.0),
+    "triangle, every sample": Case("triangle", tuning=GATE_OFF, t_end=30.0),
+}
+_FINE = tuple(float(2.0 ** (k / 4.0)) for k in range(25))  # 1 to 64 s
+_END = 16.0
+_WITHIN = limit("within", "C109.figure")  # largest over smallest adaption time that counts as similar
+_VARIANTS = {
+    "as tuned": (1.0, 1.0), "zeta halved": (0.5, 1.0), "zeta doubled": (2.0, 1.0), "h halved": (1.0, 0.5),
+    "h doubled": (1.0, 2.0),
+}  # fmt: skip
+
+
+def _tuned(tuning: Tuning, zeta: float, h: float) -> Tuning:
+    return tuning._replace(zeta=zeta * tuning.zeta, h=h * tuning.h)
+
+
+def _times(case: Case, periods: tuple[float, ...]) -> list[float]:
+    return [detection_time(replace(case, period=p)) for p in periods]
+
+
+def _fastest(periods: tuple[float, ...], times: list[float]) -> float:
+    """Period of the shortest detection time; NaN without a detection. [s]"""
+    return float("nan") if np.all(np.isnan(times)) else periods[int(np.nanargmin(times))]
+
+
+def _falls_and_rises(times: list[float]) -> bool:
+    """Over the octaves each time is shorter than the one before down to 8 s, and longer from there; all are found."""
+    k = OCTAVES.index(8.0)
+    return bool(np.all(np.diff(times[: k + 1]) < 0.0) and np.all(np.diff(times[k:]) > 0.0))
+
+
+def _at_alarm(case: Case) -> tuple[float, float, float]:
+    """Detection time, size of the differential traction there, and adaption time; NaN without an alarm."""
+    d, e = drive(case), estimate(case)
+    t = first_alarm(d, e)
+    if np.isnan(t):
+        return t, t, t
+    _, mu_i, rho_mu_j = inputs(d, case.car)
+    k = int(np.searchsorted(d.t, t - 1e-6))
+    return t, float(abs(mu_i[k] - e.beta[k] * rho_mu_j[k])), adaption_time(d, e)
+
+
+def figure_3_09() -> Figure:
+    """Estimates over six octaves of the period, and the detection time over a finer grid."""
+    octaves = {n: _times(c, OCTAVES) for n, c in PANELS.items()}
+    best = {n: _fastest(OCTAVES, t) for n, t in octaves.items()}
+    fine = {
+        n: {v: _times(replace(c, tuning=_tuned(c.tuning, *k)), _FINE) for v, k in _VARIANTS.items()}
+        for n, c in PANELS.items()
+    }
+    fine_best = {n: {v: _fastest(_FINE, t) for v, t in f.items()} for n, f in fine.items()}
+    outcome = (
+        "; ".join(
+            f"{n.split(',')[0]}: {listed(octaves[n])} s, least at {_period(best[n])} (finer grid: "
+            f"{_period(fine_best[n]['as tuned'])})"
+            for n in PANELS
+        )
+        + f" for {' / '.join(f'{p:g}' for p in OCTAVES)} s"
+    )
+    c108 = judge(
+        "C108.figure",
+        outcome,
+        whole=all(_falls_and_rises(t) for t in octaves.values()),
+        part=all(b == 8.0 for b in best.values()),
+        value=_finite(best["sine, minimum of differential traction"]),
+        fields={
+            "first": "; ".join(f"{n.split(',')[0]} down to {_period(_first_half(fine[n]['as tuned']))}" for n in PANELS)
+        },
+    )
+    outcome = "; ".join(
+        f"{n.split(',')[0]}: " + ", ".join(f"{v} {_period(p)}" for v, p in fine_best[n].items()) for n in PANELS
+    )
+    optimum = judge(
+        "C108.figure_tuning",
+        outcome,
+        whole=all(_spread(b) > 1.4 for b in fine_best.values()),
+        part=any(_spread(b) > 1.4 for b in fine_best.values()),
+        value=_finite(max(_spread(b) for b in fine_best.values())),
+    )
+    alarms = {n: [_at_alarm(replace(c, period=p)) for p in OCTAVES] for n, c in PANELS.items()}
+    spreads = {n: _spread_of([a[2] for a in rows]) for n, rows in alarms.items()}
+    slowest = max((a[2] for rows in alarms.values() for a in rows if not np.isnan(a[2])), default=0.0)
+    outcome = (
+        "; ".join(f"{n.split(',')[0]}: {listed([a[2] for a in alarms[n]])} s, ratio {spreads[n]:.0f}" for n in PANELS)
+        + f"; none above {slowest:.1f} s"
+    )
+    c109 = judge(
+        "C109.figure",
+        outcome,
+        whole=max(spreads.values()) < _WITHIN,
+        part=min(spreads.values()) < _WITHIN,
+        value=_finite(max(spreads.values())),
+        fields={"why": _why_adaption(alarms)},
+    )
+    panels = []
+    for n, c in PANELS.items():
+        lines: list[Line] = []
+        for p, colour in zip(OCTAVES, COLOURS, strict=True):
+            lines += estimate_lines(
+                f"{p:g} s", replace(c, period=p), colour=colour, t_end=_END, is_split=c.tuning is TUNING
+            )
+        panels.append(Panel(f"Estimated slope: {n}", TIME, SLOPE, (*lines, true_slope(_END))))
+    period = np.array(_FINE)
+    for n in PANELS:
+        curves = tuple(
+            Line(
+                v,
+                period,
+                np.array(t),
+                colour=colour,
+                mode="lines+markers",
+                size=5.0,
+                width=3.0 if v == "as tuned" else 1.5,
+            )
+            for (v, t), colour in zip(fine[n].items(), COLOURS, strict=False)
+        )
+        panels.append(
+            Panel(f"Detection time: {n}", Axis("period", "s", log_base=2), Axis("detection time", "s"), curves)
+        )
+    return figure_of(
+        "3.9",
+        tuple(panels),
+        (c108, optimum, c109),
+        tuple(
+            Table(
+                f"Adaption: {n}",
+                ("period [s]", "drop found [s]", "|mu_delta| there [-]", "adaption time [s]"),
+                tuple(
+                    (f"{p:g}", seconds(t), "–" if np.isnan(mu) else f"{mu:.4f}", seconds(a))
+                    for p, (t, mu, a) in zip(OCTAVES, alarms[n], strict=True)
+                ),
+            )
+            for n in PANELS
+        ),
+    )
+
+
+def _first_half(times: list[float]) -> float:
+    """Shortest period on the finer grid whose first half wave finds the drop. [s]"""
+    return min((p for p, t in zip(_FINE, times, strict=True) if t <= 0.5 * p), default=float("nan"))
+
+
+def _period(p: float) -> str:
+    return "none" if np.isnan(p) else f"{p:.2g} s"
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _spread(best: dict[str, float]) -> float:
+    return _spread_of(list(best.values()))
+
+
+def _spread_of(values: list[float]) -> float:
+    """Largest over smallest of the available ones; infinite if one of them is zero or all are missing."""
+    known = [v for v in values if not np.isnan(v)]
+    return max(known) / min(known) if known and min(known) > 0.0 else float("inf")
+
+
+def _why_adaption(alarms: dict[str, list[tuple[float, float, float]]]) -> str:
+    """How the adaption time goes with the differential traction at the alarm."""
+    rows = [a for of in alarms.values() for a in of if not np.isnan(a[2])]
+    if len(rows) < 2:
+        return "Hardly any run finds the drop, so a comparison is not possible."
+    rows.sort(key=lambda a: a[1])
+    half = len(rows) // 2
+    small, large = rows[:half], rows[-half:]
+    return (
+        "After the reset the filter adapts as fast as the differential traction allows: the half of the runs with "
+        f"the smaller one at the alarm (up to {small[-1][1]:.3f}) takes {np.mean([a[2] for a in small]):.2f} s on "
+        f"average, the other half {np.mean([a[2] for a in large]):.2f} s. Without noise all are short against the "
+        "time that the drop takes to be found; the ratio is then not meaningful."
+    )
+
+
+Q = (0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
+_NEAR = Q[:4]
+THRESHOLDS = (0.5, 1.0, 2.0)
+_TUNED = Case("triangle", 250.0, "force", 8.0, a_x=1.0)
+_CHANGE = 0.2
+_DASHES = ("dot", "solid", "dash")
+
+
+def _tuned_case(q: float, h: float) -> Case:
+    """The tuning with its process noise and threshold scaled; the uncertainty after an alarm stays as it is."""
+    return replace(_TUNED, tuning=TUNING._replace(q_k=q * TUNING.q_k, h=h * TUNING.h))
+
+
+def _change(times: list[float]) -> float:
+    """Largest over smallest less one; infinite if some found the drop and others did not, zero if none did."""
+    found = [t for t in times if not np.isnan(t)]
+    if not found:
+        return 0.0
+    return float("inf") if len(found) < len(times) else max(found) / min(found) - 1.0
+
+
+def figure_3_11() -> Figure:
+    """Estimates over both parameters, and the detection times of all pairs."""
+    times = {(q, h): detection_time(_tuned_case(q, h)) for q in Q for h in THRESHOLDS}
+    false = false_alarms_of(_tuned_case(q, h) for q in Q for h in THRESHOLDS)
+    by_q_near = _change([times[q, 1.0] for q in _NEAR])
+    by_q = _change([times[q, 1.0] for q in Q])
+    by_h = _change([times[1.0, h] for h in THRESHOLDS])
+    known = replace(_TUNED, tuning=TUNING._replace(sd_k=0.0))
+    outcome = (
+        f"over q_k {_percent(by_q_near)} (to 10000 times: {_percent(by_q)}), over h {_percent(by_h)}; false alarms: "
+        f"{false}"
+    )
+    c114 = judge(
+        "C114.figure",
+        outcome,
+        whole=by_q_near > _CHANGE and by_h > _CHANGE,
+        part=by_h > _CHANGE and by_q > _CHANGE,
+        value=by_h if np.isfinite(by_h) else None,
+        fields={
+            "q_k": TUNING.q_k,
+            "known": told(known),
+            "tuned": told(_TUNED),
+            "fast": slope_after(_tuned_case(1e4, 1.0), 2.0),
+            "slow": slope_after(_TUNED, 2.0),
+        },
+    )
+    over_q: list[Line] = []
+    for q, c in zip(Q, COLOURS, strict=True):
+        over_q += estimate_lines(f"q_k x {q:g}", _tuned_case(q, 1.0), colour=c, t_end=_END, is_split=True)
+    over_h: list[Line] = []
+    for h, dash in zip(THRESHOLDS, _DASHES, strict=True):
+        for q, c in ((1.0, COLOURS[1]), (1e3, COLOURS[4])):
+            over_h += estimate_lines(
+                f"h x {h:g}, q_k x {q:g}", _tuned_case(q, h), colour=c, dash=dash, t_end=_END, is_split=True
+            )
+    curves = tuple(
+        Line(f"h x {h:g}", np.array(Q), np.array([times[q, h] for q in Q]), colour=c, mode="lines+markers", dash=dash)
+        for h, c, dash in zip(THRESHOLDS, COLOURS, _DASHES, strict=False)
+    )
+    return figure_of(
+        "3.11",
+        (
+            Panel("Estimated slope over the process noise", TIME, SLOPE, (*over_q, true_slope(_END))),
+            Panel("Estimated slope over the threshold", TIME, SLOPE, (*over_h, true_slope(_END))),
+            Panel("Detection time", Axis("q_k over the tuning's", log_base=10), Axis("detection time", "s"), curves),
+        ),
+        (c114,),
+        (
+            Table(
+                "Detection time [s]",
+                ("q_k over the tuning's", *(f"h x {h:g}" for h in THRESHOLDS)),
+                tuple((f"{q:g}", *(seconds(times[q, h]) for h in THRESHOLDS)) for q in Q),
+            ),
+        ),
+        q_k=TUNING.q_k,
+        h=TUNING.h,
+    )
+
+
+def _percent(change: float) -> str:
+    return "from found to not found" if np.isinf(change) else f"{100 * change:.0f} %"
+
+
+FIGURES = {"3.9": figure_3_09, "3.11": figure_3_11}

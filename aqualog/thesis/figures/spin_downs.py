@@ -1,0 +1,302 @@
+"""Figures 2.3 and 2.4: free wheels spin down in passes over water, over time and over speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from aqualog.campaign.spin_downs import Pass
+from aqualog.core.records import FloatArray
+from aqualog.evaluate.intervals import wilson
+from aqualog.thesis.catalogue import figure_of, needs_of
+from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.evidence.campaign import KMH, Evidence, free_wheels
+from aqualog.thesis.evidence.measures import (
+    TEN,
+    begins,
+    full_speed,
+    half_speeds,
+    has_full,
+    has_minor,
+    over_passes,
+    passes_of,
+)
+from aqualog.thesis.evidence.selection import NotInCampaign, Selected, is_winter, label, value_of, wear_rank
+from aqualog.thesis.figures.run_panels import V_KMH, clouds, speed_panels, spread_over
+from aqualog.thesis.figures.time_panels import WHEEL_WORDS
+from aqualog.thesis.record import Axis, Figure, Panel
+
+__all__ = ["FIGURES"]
+
+_NEAR = 5.0 * KMH  # [m/s] about a speed of the thesis
+_SOON = limit("soon")  # [s] "immediately after entering"
+_BEFORE, _BEFORE_TOL = 20.0, 5.0  # [km/h]
+_LEAST = 3  # passes
+
+
+def _shares(found: Sequence[Pass], kmh: float, holds: Callable[[Pass], bool], claim: str, word: str) -> list[Check]:
+    near = [p for p in found if abs(p.v_mean - kmh * KMH) <= _NEAR]
+    if len(near) < _LEAST:
+        return []
+    hit = sum(holds(p) for p in near)
+    low, high = wilson(hit, len(near))
+    share = hit / len(near)
+    outcome = f"{hit} of {len(near)} passes at {kmh:g} ± {_NEAR / KMH:g} km/h {word}"
+    return [
+        judge(
+            f"{claim}.figure",
+            outcome,
+            whole=share >= 0.5 and low > 0.0,
+            part=hit > 0,
+            value=share,
+            ci95=(low, high),
+            fields={"full": _full(found)},
+        )
+    ]
+
+
+def _full(found: Sequence[Pass]) -> str:
+    v = full_speed(found)
+    return f"{v / KMH:.0f} km/h" if np.isfinite(v) else "no speed that was driven"
+
+
+def at_89(found: Sequence[Pass]) -> list[Check]:
+    """C14: minor spin-downs at 89 km/h."""
+    return _shares(
+        found, 89.0, has_minor, "C14", "with minor spin-downs of a free wheel",
+    )  # fmt: skip
+
+
+def at_118(evidence: Evidence, found: Sequence[Pass]) -> list[Check]:
+    """C16: full spin-down at once at 118 km/h, and the rear spins up."""
+
+    def at_once(p: Pass) -> bool:
+        entry = evidence.of(p.info).entry
+        return any(
+            isinstance(t := e["start_s"], float) and t - entry <= _SOON
+            for e in evidence.events(p.info, "spin_down", wheels=tuple(p.full))
+        )
+
+    rear = [p for p in found if abs(p.v_mean - 118.0 * KMH) <= _NEAR]
+    ups = sum(bool(evidence.events(p.info, "spin_up")) for p in rear)
+    return _shares(
+        found, 118.0, at_once, "C16",
+        f"with a large spin-down of a free wheel within {_SOON:g} s; a driven wheel spins up in {ups}",
+    )  # fmt: skip
+
+
+def rising_number(found: Sequence[Pass]) -> list[Check]:
+    """C15: number and depth of the minor spin-downs rise with speed, up to full aquaplaning."""
+    calm = [p for p in found if not has_full(p)]
+    v_first = min((p.v_mean for p in calm if has_minor(p)), default=np.nan)
+    part = [p for p in calm if p.v_mean >= v_first - TEN]
+    if not np.isfinite(v_first) or len(part) < _LEAST:
+        return []
+    v = np.array([p.v_mean for p in part]) / TEN
+    columns = [np.ones(v.size), v - v.mean()]
+    number = over_passes(columns, np.array([sum(p.minor.values()) / p.seconds for p in part]))
+    deepest = np.array([-min(x for x in p.deepest.values()) for p in part])
+    depth = over_passes(columns, 100.0 * deepest)
+    if number is None or depth is None:
+        return []
+    both = [number[1].is_above, depth[1].is_above]
+    outcome = (
+        f"per 10 km/h {number[1].words(2)} more spin-downs a second, {depth[1].words(1)} % deeper slip "
+        f"({len(part)} "
+        "passes)"
+    )
+    return [
+        judge(
+            "C15.figure",
+            outcome,
+            whole=all(both),
+            part=any(both),
+            value=number[1].value,
+            ci95=number[1].ci,
+            reason=""
+            if all(both)
+            else "Several short dips merge into one longer spin-down."
+            if both[1]
+            else "The passes are few, or cover little speed.",
+        )
+    ]
+
+
+def before_full(found: Sequence[Pass]) -> list[Check]:
+    """C17: minor spin-downs from 20 km/h below full aquaplaning on."""
+    if len(found) < _LEAST:
+        return []
+    (first, firsts), (full, fulls) = half_speeds(found, [begins, has_full])
+    if not (np.isfinite(first) and np.isfinite(full)):
+        return []
+    away = (full - first) / KMH
+    low, high = (float(x) / KMH for x in np.nanquantile(fulls - firsts, (0.025, 0.975)))
+    lo, hi = _BEFORE - _BEFORE_TOL, _BEFORE + _BEFORE_TOL
+    whole = lo <= low and high <= hi
+    outcome = (
+        f"full at {full / KMH:.0f} km/h, minor from {first / KMH:.0f} km/h on: {away:.0f} km/h ({len(found)} passes)"
+    )
+    return [
+        judge(
+            "C17.figure",
+            outcome,
+            whole=whole,
+            part=low <= hi and high >= lo,
+            value=away,
+            ci95=(low, high),
+            fields={"lo": lo, "hi": hi},
+        )
+    ]
+
+
+def exponential(found: Sequence[Pass]) -> list[Check]:
+    """C18: the deepest slip grows with speed like an exponential."""
+    part = [p for p in found if not has_full(p)]
+    deepest = np.array([-min(p.deepest.values()) for p in part])
+    v = np.array([p.v_mean for p in part]) / TEN
+    good = np.isfinite(deepest) & (deepest > 0.0)
+    v, deepest = v[good], deepest[good]
+    grown = over_passes([np.ones(v.size), v - v.mean()], np.log(deepest)) if v.size > _LEAST else None
+    if grown is None:
+        return []
+    rate = grown[1].mapped(lambda x: 100.0 * math.expm1(x))
+    curve, line = _rms_exponential(v, deepest), _rms_line(v, deepest)
+    whole = rate.is_above and curve < line
+    outcome = (
+        f"{rate.words(0)} % deeper per 10 km/h; rms about the exponential {100 * curve:.2f} %, about the line "
+        f"{100 * line:.2f} % of slip ({v.size} passes)"
+    )
+    return [
+        judge(
+            "C18.figure",
+            outcome,
+            whole=whole,
+            part=rate.is_above,
+            value=rate.value,
+            ci95=rate.ci,
+            reason=""
+            if whole
+            else "The slip rises, but not faster than a straight line."
+            if rate.is_above
+            else "No rise exceeds the scatter.",
+        )
+    ]
+
+
+def _rms_line(v: FloatArray, y: FloatArray) -> float:
+    x = np.stack([np.ones(v.size), v - v.mean()], axis=1)
+    return float(np.sqrt(np.mean((y - x @ np.linalg.lstsq(x, y)[0]) ** 2)))
+
+
+def _rms_exponential(v: FloatArray, y: FloatArray) -> float:
+    """y = c exp(v / v_0), v_0 searched on a grid of 1 to 100 km/h: two numbers, as the line has."""
+    best = np.inf
+    for v0 in np.geomspace(0.1, 10.0, 200):
+        e = np.exp((v - v.max()) / v0)
+        best = min(best, float(np.sqrt(np.mean((y - e * (e @ y) / (e @ e)) ** 2))))
+    return best
+
+
+def _where(found: Sequence[Pass]) -> str:
+    """In which water and at which wheels they are."""
+    with_one = [p for p in found if begins(p)]
+    depths = sorted({label("depth", value_of(p.info, "depth")) for p in with_one})
+    wheels = sorted({WHEEL_WORDS[w] for p in with_one for w in p.minor if p.minor[w] or p.full[w]})
+    there = sum(label("depth", value_of(p.info, "depth")) in depths for p in found)
+    return f"They are in {', '.join(depths)} ({there} passes), at {', '.join(wheels)}."
+
+
+def new_tread(found: Sequence[Pass], words: str) -> list[Check]:
+    """C19: no minor spin-downs on new winter tyres."""
+    if len(found) < _LEAST:
+        return []
+    hit = sum(begins(p) for p in found)
+    low, high = wilson(hit, len(found))
+    top = max(p.v_mean for p in found) / KMH
+    outcome = f"{hit} of {len(found)} passes of {words}, up to {top:.0f} km/h"
+    return [
+        judge(
+            "C19.figure",
+            outcome,
+            whole=hit == 0,
+            part=hit <= 0.05 * len(found),
+            value=hit / len(found),
+            ci95=(low, high),
+            fields={"where": _where(found)},
+        )
+    ]
+
+
+_BELOW = (29.0, 20.0, 12.0, 0.0)  # [km/h] below full aquaplaning: the thesis' 89, 98, 106 and 118 km/h
+
+
+def figure_2_03(number: str, evidence: Evidence) -> Figure:
+    """Four passes at constant speed over time; C14 to C17 over all passes of the configuration.
+
+    Raises
+    ------
+    NotInCampaign
+    """
+    selected = evidence.choose(number, evidence.has_water)
+    found = passes_of(evidence, selected.runs)
+    constant = [p.info for p in found if evidence.of(p.info).is_constant]
+    if len(constant) < 2:
+        raise NotInCampaign(f"needs {needs_of(number)}: {len(constant)} in {selected.fixed}", where=f"figure {number}")
+    v_full = full_speed(found)
+    top = v_full if np.isfinite(v_full) else max(p.v_mean for p in found)
+    shown = spread_over(constant, evidence, [top - b * KMH for b in _BELOW])
+    what = "the speed at which half of the passes have a full spin-down" if np.isfinite(v_full) else "the fastest pass"
+    words = {r.index: "drawn, and counted" for r in shown}
+    claims = [*rising_number(found), *before_full(found)]
+    if selected.is_thesis:
+        claims = [*at_89(found), *claims, *at_118(evidence, found)]
+    return figure_of(
+        number,
+        tuple(speed_panels(evidence, shown)),
+        tuple(sorted(claims, key=lambda c: c.claim)),
+        runs=selected.used({r.index: words.get(r.index, "counted") for r in selected.runs}),
+        fixed=selected.fixed,
+        top=top / KMH,
+        what=what,
+    )
+
+
+def _deep(evidence: Evidence, selected: Selected) -> list[Check]:
+    """C19 over the passes of winter tyres that are less worn than the tyres shown."""
+    shown = wear_rank(value_of(selected.runs[0], "tyre"))
+    runs = [
+        r for r in evidence.data.done
+        if not evidence.has_water(r) and is_winter(tyre := value_of(r, "tyre")) and shown is not None
+        and (rank := wear_rank(tyre)) is not None and rank > shown
+    ]  # fmt: skip
+    if not runs:
+        return []
+    return new_tread(passes_of(evidence, runs), label("tyre", value_of(runs[0], "tyre")))
+
+
+def figure_2_04(number: str, evidence: Evidence) -> Figure:
+    """Clouds of slips of the free wheels; C17 to C19.
+
+    Raises
+    ------
+    NotInCampaign
+    """
+    selected = evidence.choose(number, evidence.has_water)
+    lines = clouds(evidence, selected.runs, "slip_min", free_wheels(selected.runs[0]))
+    if not lines:
+        raise NotInCampaign(
+            "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"
+        )
+    found = passes_of(evidence, selected.runs)
+    return figure_of(
+        number,
+        (Panel("Slip of the free wheels", V_KMH, Axis("slip", "%"), tuple(lines)),),
+        (*before_full(found), *exponential(found), *_deep(evidence, selected)),
+        runs=selected.used(),
+        fixed=selected.fixed,
+    )
+
+
+FIGURES = {"2.3": figure_2_03, "2.4": figure_2_04}

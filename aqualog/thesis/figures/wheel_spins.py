@@ -1,0 +1,216 @@
+"""Figures 2.8 and 2.9: large and minor spin-downs and spin-ups over time, as their detectors see them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.detect.minor_spin_down import MinorParams
+from aqualog.model.scenario import Lane
+from aqualog.model.surface import SURFACES
+from aqualog.model.thesis_scenes import scene
+from aqualog.report.theme import MUTED, THRESHOLD, wheel_colour
+from aqualog.thesis.catalogue import figure_of
+from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.evidence.campaign import DriveRun
+from aqualog.thesis.evidence.scenes import (
+    MANY,
+    SEEDS,
+    SOME,
+    SceneRun,
+    in_runs,
+    known,
+    run_of,
+    runs,
+    share,
+    spread,
+    stretches,
+    words_of,
+)
+from aqualog.thesis.figures.time_panels import WHEEL_WORDS, bit_panel, feature_lines, panel, speed_panel
+from aqualog.thesis.record import Axis, Figure, Panel, Table, seconds
+
+__all__ = ["FIGURES", "panels_2_08", "panels_2_09"]
+
+_AFTER_EXIT = 0.5  # [s] the contact comes back
+_ACCELERATION = Axis("acceleration difference", "m/s^2")
+
+
+def _first(r: SceneRun, detector: str, wheel: str) -> float:
+    """First event on the lane, after the entry; NaN without one. [s]"""
+    on = [t for t in r.events(detector, wheel) if r.entry <= t <= r.exit + _AFTER_EXIT]
+    return min(on) - r.entry if on else float("nan")
+
+
+def _is_early(r: SceneRun) -> bool:
+    """Whether a spin-down or spin-up of any wheel is reported on the dry road before the entry."""
+    return any(t < r.entry for d in ("spin_down", "spin_up") for t in r.events(d))
+
+
+def _c28(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
+    down = [_first(r, "spin_down", "fr") for r in all_runs]
+    up = [_first(r, "spin_up", "rr") for r in all_runs]
+    has_down, has_up = (float(np.mean(np.isfinite(x))) for x in (down, up))
+    both = float(np.mean(np.isfinite(down) & np.isfinite(up)))
+    early = share(all_runs, _is_early)
+    outcome = (
+        f"both in {in_runs(both)} runs (spin-down front right {in_runs(has_down)}, after {spread(down)} s; spin-up "
+        f"rear right {in_runs(has_up)}, after {spread(up)} s); alarms before the entry in {in_runs(early)}"
+    )
+    finding = judge(
+        "C28.figure", outcome, whole=both >= MANY and early == 0.0, part=both >= SOME or has_down >= MANY, value=both
+    )
+    table = Table(
+        "First detection after the entry [s]",
+        ("seed", "spin-down front right", "spin-up rear right"),
+        tuple((str(r.seed), seconds(a), seconds(b)) for r, a, b in zip(all_runs, down, up, strict=True)),
+    )
+    return finding, table
+
+
+def panels_2_08(r: DriveRun, front: str = "fr", rear: str = "rr") -> tuple[Panel, ...]:
+    """Speeds, acceleration differences of a front and a rear wheel, and the detection bits of both."""
+    words = {w: WHEEL_WORDS[w] for w in (front, rear)}
+    differences = {n: (r.feature(f"a_w_delta_{w}"), wheel_colour(w), "solid") for w, n in words.items()}
+    bits = {
+        f"spin-down {words[front]}": (2.0, r.active("spin_down", front), wheel_colour(front)),
+        f"spin-up {words[rear]}": (1.0, r.active("spin_up", rear), wheel_colour(rear)),
+    }
+    return (
+        speed_panel(r),
+        panel(r, "Acceleration differences", _ACCELERATION, feature_lines(r, differences)),
+        bit_panel(r, "Detection bits", "detection", bits),
+    )
+
+
+def figure_2_08() -> Figure:
+    """Speeds, acceleration differences front and rear right, detection bits of one run; C28 over all runs."""
+    all_runs = runs("2.8")
+    finding, table = _c28(all_runs)
+    r = all_runs[0]
+    return figure_of("2.8", panels_2_08(r), (finding,), (table,), **words_of(all_runs))
+
+
+_DIP, _LARGE = -0.015, -0.10  # [-] slip of a minor spin-down: beyond the first, not beyond the second
+_LATE = limit("late", "C29.figure")  # [s] after a dip in which its detection still belongs to it
+_SOON = limit("soon")  # [s] "shortly after entering"
+_RATIO = limit("ratio", "C33.figure")  # of the variance that the difference keeps
+_REAR = limit("rear", "C33.figure")  # [-] "only slightly more slip"
+_ROUGH_RATIO = limit("rough_ratio", "C32.figure")
+_ROUGH_S = (10.0, 20.0)
+_ROUGH_RUNS = 8
+_VARIANCE = Axis("variance", "(m/s^2)^2")
+_LIMITS = MinorParams.make(0.01)
+
+
+def _difference(r: SceneRun) -> FloatArray:
+    return r.feature("variance_fr") - r.feature("variance_rr")
+
+
+def _ratio(r: SceneRun) -> float:
+    """Median of difference over variance where the latter is beyond its limit on the lane; NaN if it never is. [-]"""
+    var = r.feature("variance_fr")
+    high = r.on_lane() & (var > _LIMITS.var_min)
+    return float(np.median(_difference(r)[high] / var[high])) if high.any() else float("nan")
+
+
+def _rear_slip(r: SceneRun) -> tuple[float, float]:
+    """Median slip of the rear right wheel before and on the lane. [-]"""
+    slip = r.signal("true_slip_rr")
+    return float(np.nanmedian(slip[r.within(10.0, r.entry)])), float(np.nanmedian(slip[r.on_lane()]))
+
+
+def _c33(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
+    rises = [r.after_entry(r.feature("variance_fr") > _LIMITS.var_min) for r in all_runs]
+    ratios = [_ratio(r) for r in all_runs]
+    rear = [_rear_slip(r) for r in all_runs]
+    soon = [t <= _SOON for t in rises]
+    follows = [x > _RATIO for x in ratios]
+    slight = [dry < wet < _REAR for dry, wet in rear]
+    every = float(np.mean([a and b and c for a, b, c in zip(soon, follows, slight, strict=True)]))
+    outcome = (
+        f"all in {in_runs(every)} runs: rise within {_SOON:g} s {in_runs(float(np.mean(soon)))}, after {spread(rises)} "
+        f"s; difference over variance {spread(ratios)}; rear slip "
+        f"{spread([100.0 * a for a, _ in rear])} % before and {spread([100.0 * b for _, b in rear])} % on the lane"
+    )
+    finding = judge("C33.figure", outcome, whole=every >= MANY, part=float(np.mean(follows)) >= MANY, value=every)
+    table = Table(
+        "Front right wheel on the lane",
+        ("seed", "variance beyond its limit after [s]", "difference over variance [-]"),
+        tuple((str(r.seed), seconds(a), seconds(b)) for r, a, b in zip(all_runs, rises, ratios, strict=True)),
+    )
+    return finding, table
+
+
+def dips(r: SceneRun) -> list[slice]:
+    """Minor spin-downs of the front right wheel on the lane."""
+    slip = r.signal("true_slip_fr")
+    return [s for s in stretches(r, (slip < _DIP) & r.on_lane()) if np.nanmin(slip[s]) > _LARGE]
+
+
+def _found(r: SceneRun, detector: str) -> list[bool]:
+    """Of each dip, whether the detector's bit is set in it or shortly after."""
+    bits, late = r.active(detector, "fr"), round(_LATE / r.result.signals.dt)
+    return [bool(bits[s.start : s.stop + late].any()) for s in dips(r)]
+
+
+def _c29(all_runs: tuple[SceneRun, ...]) -> Check:
+    large = [x for r in all_runs for x in _found(r, "spin_down")]
+    minor = [x for r in all_runs for x in _found(r, "minor_spin_down")]
+    n = len(minor)
+    a, b = (float(np.mean(x)) if n else 0.0 for x in (large, minor))
+    outcome = f"of {n} dips over all runs {a:.0%} are found by the CUSUM, {b:.0%} by the variance"
+    return judge("C29.figure", outcome, whole=a < b and b >= SOME, part=a < b, value=b)
+
+
+@lru_cache(maxsize=1)
+def _rough() -> tuple[SceneRun, ...]:
+    """The same car and speed without water, over broken asphalt."""
+    lanes = (Lane(*_ROUGH_S, surface=SURFACES["rough"]),)
+    wet = scene("2.9")
+    dry = [replace(wet, lanes=lanes, duration_s=_ROUGH_S[1] + 3.0, seed=s) for s in SEEDS[:_ROUGH_RUNS]]
+    return tuple(run_of(s, known("2.9")) for s in dry)
+
+
+def _c32(rough: tuple[SceneRun, ...]) -> Check:
+    level = [float(np.median(r.feature("variance_fr")[r.on_lane()])) for r in rough]
+    ratio = [
+        float(np.median(np.abs(_difference(r)[r.on_lane()])) / v) for r, v in zip(rough, level, strict=True)
+    ]  # fmt: skip
+    quiet = share(rough, lambda r: not r.events("minor_spin_down"))
+    high = all(v > _LIMITS.var_min for v in level)
+    small = all(x < _ROUGH_RATIO for x in ratio)
+    outcome = (
+        f"in {len(rough)} runs: front variance {spread(level)} (m/s²)², difference over it {spread(ratio)}; without "
+        f"an alarm {round(quiet * len(rough))} of {len(rough)}"
+    )
+    return judge(
+        "C32.figure", outcome, whole=high and small and quiet == 1.0, part=quiet == 1.0, value=float(np.median(ratio))
+    )
+
+
+def panels_2_09(r: DriveRun, side: str = "r") -> tuple[Panel, ...]:
+    """Speeds of a side's wheels, and their variances with the difference."""
+    front, rear = f"f{side}", f"r{side}"
+    lines = {
+        "difference": (r.feature(f"variance_{front}") - r.feature(f"variance_{rear}"), THRESHOLD, "solid"),
+        "front": (r.feature(f"variance_{front}"), wheel_colour(front), "dashdot"),
+        "rear": (r.feature(f"variance_{rear}"), wheel_colour(rear), "dashdot"),
+        "limit of the difference": (np.full(r.t.size, _LIMITS.delta_min), MUTED, "dot"),
+    }
+    word = "right" if side == "r" else "left"
+    return speed_panel(r, (front, rear)), panel(r, f"Variances, {word}", _VARIANCE, feature_lines(r, lines))
+
+
+def figure_2_09() -> Figure:
+    """Speeds of the right wheels, variances front and rear and their difference of one run; claims over all runs."""
+    all_runs = runs("2.9")
+    c33, table = _c33(all_runs)
+    r = all_runs[0]
+    return figure_of("2.9", panels_2_09(r), (c33, _c29(all_runs), _c32(_rough())), (table,), **words_of(all_runs))
+
+
+FIGURES = {"2.8": figure_2_08, "2.9": figure_2_09}

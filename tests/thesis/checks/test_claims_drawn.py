@@ -1,0 +1,149 @@
+"""Checks on drawn drives, with few seeds: what must come out, and that a detector without its rule does not pass."""
+
+import numpy as np
+import pytest
+
+from aqualog.evaluate.labels import Label, Labels
+from aqualog.thesis.checks import joint_rules, resistance_rules, slope_rules, wheels
+from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
+from aqualog.thesis.evidence.drives import NUISANCE, WATER, Score, bits_of, detected, score, taken, threshold_for
+from aqualog.thesis.evidence.seeds import Plan
+
+FEW = Plan(range(1, 3))
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """The rules' checks with two drives on water and one other of each situation."""
+    monkeypatch.setattr(joint_rules, "_PER_WATER", 2)
+    monkeypatch.setattr(joint_rules, "_PER_OTHER", 1)
+    return FEW
+
+
+def one(checks):
+    (check,) = checks
+    return check
+
+
+def test_detectors_see_no_truth():
+    d = taken("puddle", 1)
+    assert not [c for c in d.signals.frame.columns if c.startswith("true_")]
+    assert set(d.truth) == {f"{what}_{w}" for what in ("slip", "contact") for w in ("fl", "fr", "rl", "rr")}
+    assert d.truth["slip_fl"].size == d.t.size == d.signals.frame.height
+    assert taken("puddle", 1) is d
+
+
+def test_two_kinds_of_situations():
+    assert len(WATER) == 9
+    assert len(NUISANCE) >= 25
+    assert not set(WATER) & set(NUISANCE)
+
+
+def test_a_score_counts_episodes_found_and_false_alarms():
+    wet, dry = taken("lane_deep", 1), taken("dry_cruise", 1)
+    assert wet.labels.of("full")
+    never, always = (np.full(wet.t.size, x) for x in (False, True))
+    blinking = np.arange(dry.t.size) % 1000 < 100
+    assert score([(wet, never)], [(dry, blinking)]).recall == 0.0
+    seen = score([(wet, never)], [(dry, blinking)])
+    assert seen.false == -(-dry.t.size // 1000)
+    assert seen.dry_s == pytest.approx(dry.t.size * dry.signals.dt)
+    # an alarm that is on all the time has not found anything
+    assert score([(wet, always)], []).found == 0
+    in_water = np.zeros(wet.t.size, dtype=bool)
+    for a, b in wet.labels.water:
+        in_water |= (wet.t >= a) & (wet.t < b)
+    assert score([(wet, in_water)], []).recall == 1.0
+    assert isinstance(wet.labels, Labels)
+    assert isinstance(wet.labels.items[0], Label)
+
+
+def test_the_largest_threshold_with_a_recall():
+    recalls = {1.0: 3, 2.0: 5, 3.0: 4, 4.0: 1}
+    best, found = threshold_for(0.8, list(recalls), lambda x: Score(recalls[x], 5, 0, 1.0))
+    assert (best, found.found) == (3.0, 4)
+    best, found = threshold_for(1.1, list(recalls), lambda x: Score(recalls[x], 5, 0, 1.0))
+    assert (best, found.found) == (2.0, 5)
+
+
+def test_variants_hold_the_detectors_own_bits():
+    d = taken("lane_deep", 1)
+    bits, result = bits_of(d), detected(d)
+    minor = np.any([t.active for t in result.tracks if t.detector == "minor_spin_down"], axis=0)
+    slope = np.any([t.active for t in result.tracks if t.detector == "slip_slope_drop"], axis=0)
+    assert (bits["minor"] == minor).all()
+    assert (bits["slope"] == slope).all()
+    for name in ("joint_criteria", "gate", "ungated", "criterion_1", "spin_down"):
+        assert bits[name].any()
+    # what is asked less is met more often
+    for less, more in (("joint_criteria", "ungated"), ("criterion_1", "spin_down"), ("minor", "minor_no_force")):
+        assert bits[more].sum() >= bits[less].sum()
+
+
+def test_sign_of_the_speed_difference(monkeypatch):
+    monkeypatch.setattr(wheels, "_PER_WATER", 4)
+    more = Plan(range(1, 5))
+    found = one(wheels._sign_of_speed(more))
+    assert found.verdict in (REPRODUCED, DIFFERENCE)
+    assert found.value < 0.1
+    # a detector that is its bare sum is no better than the bare sum
+    from aqualog.detect import cusum, spin
+
+    bare = lambda p, s, a, dv, v, ok: (*cusum.scan(p.cusum, cusum.initial_state(), p.sign * a)[:2], s)  # noqa: E731
+    monkeypatch.setattr(spin, "scan", bare)
+    assert one(wheels._sign_of_speed(more)).verdict == NOT_REPRODUCED
+
+
+def test_the_gate(few, monkeypatch):
+    found = one(joint_rules._gate(few))
+    assert found.verdict == REPRODUCED
+    assert found.value < 0.5
+    without = joint_rules.variants
+    monkeypatch.setattr(
+        joint_rules, "variants", lambda n, s: {**without(n, s), "joint_criteria": without(n, s)["ungated"]}
+    )
+    assert one(joint_rules._gate(few)).verdict == NOT_REPRODUCED
+
+
+def test_braking_forces(few, monkeypatch):
+    assert one(joint_rules._spin_down(few)).verdict in (REPRODUCED, DIFFERENCE)
+    without = joint_rules.variants
+    monkeypatch.setattr(
+        joint_rules, "variants", lambda n, s: {**without(n, s), "criterion_1": without(n, s)["spin_down"]}
+    )
+    assert one(joint_rules._spin_down(few)).verdict == NOT_REPRODUCED
+
+
+def test_resistance_is_its_own_indicator(few):
+    assert one(joint_rules._resistance(few)).verdict in (REPRODUCED, DIFFERENCE)
+
+
+def test_sign_and_balance_of_the_resistance(monkeypatch):
+    assert one(resistance_rules._sign(Plan(range(1, 7)))).verdict == REPRODUCED
+    assert one(resistance_rules._balance(FEW)).verdict == DIFFERENCE
+    measure = resistance_rules._measure
+    monkeypatch.setattr(resistance_rules, "_measure", lambda *a: -measure(*a))
+    assert one(resistance_rules._sign(Plan(range(1, 7)))).verdict == NOT_REPRODUCED
+
+
+def test_mass_and_rolling_resistance_matter_most():
+    effect = resistance_rules._parameters()
+    # a car that is heavier than its file says seems to be held back, the more the harder it accelerates
+    assert 0.0 < effect["mass"]["80 km/h"] < 0.2 * effect["mass"]["80 km/h, 1 m/s^2"]
+    assert effect["rolling_resistance"]["80 km/h"] == pytest.approx(0.3 * 0.0105 * 9.80665, rel=0.02)
+    drag = effect["drag_area"]
+    assert drag["120 km/h"] == pytest.approx(2.25 * drag["80 km/h"], rel=1e-6)
+
+
+def test_high_pressure_and_winter_tyres():
+    assert one(slope_rules._pressure_and_tread(FEW)).verdict == REPRODUCED
+
+
+def test_slopes_of_other_roads(monkeypatch):
+    few = Plan((1,))
+    found = {c.part: c.verdict for c in slope_rules._unchanged(few)}
+    assert found["detection"] == REPRODUCED
+    everywhere = {"slope": np.ones(1, dtype=bool), "joint_criteria": np.ones(1, dtype=bool)}
+    monkeypatch.setattr(slope_rules, "variants", lambda n, s: everywhere)
+    assert {c.part: c.verdict for c in slope_rules._unchanged(few)}["detection"] == NOT_REPRODUCED
+    assert one(slope_rules._not_unique(few)).verdict == NOT_REPRODUCED

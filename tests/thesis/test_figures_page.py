@@ -1,0 +1,127 @@
+"""Pages and tables of figures as text: nothing from outside, the same every time, units in every header."""
+
+import base64
+import csv
+import hashlib
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+
+from aqualog.thesis.catalogue import WITHOUT
+from aqualog.thesis.claims import DIFFERENCE, Check
+from aqualog.thesis.draw import panel_figure, rounded
+from aqualog.thesis.export import figure_csv, figures_document
+from aqualog.thesis.page import panel_ids, render_figures
+from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
+from aqualog.thesis.run import make
+from tests.thesis.made import all_made, made
+
+
+@pytest.fixture(scope="module")
+def page():
+    return render_figures(all_made(), title="all")
+
+
+def island(page):
+    return json.loads(re.search(r'<script type="application/json" id="figure-data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_page_has_each_plot_and_each_claim_once_in_the_table(page):
+    ids = [i for f in all_made() for i in panel_ids(f)]
+    assert list(island(page)) == ids
+    assert len(ids) == len(set(ids))
+    for i in ids:
+        assert page.count(f'id="{i}"') == 1
+    table = re.search(r'<table id="claims">.*?</table>', page, re.DOTALL)[0]
+    assert re.findall(r'<td class="claim">(.*?)</td>', table) == [c.name for f in all_made() for c in f.checks]
+    for f in all_made():
+        assert f'<section id="{f.stem}"' in page
+
+
+def test_scripts_are_those_of_the_policy_and_plotly_is_there_once(page):
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert len(scripts) == 2
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="(.*?)"', page)[1].replace("&#39;", "'")
+    for s in scripts:
+        digest = base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in policy
+    assert policy.count("'sha256-") == 2
+    assert policy.startswith("default-src 'none'")
+    assert page.count("plotly.js v") == 1
+    # apart from plotly.js itself
+    rest = page.replace(scripts[0], "")
+    assert not re.search(r"https?://|src=|@import|url\(", rest)
+
+
+def test_page_is_the_same_every_time():
+    assert render_figures([made("3.3")], title="x") == render_figures([make("3.3")], title="x")
+
+
+def test_single_page_has_no_table_of_all_claims():
+    page = render_figures([made("3.1")], title="x")
+    assert 'id="claims"' not in page
+    assert "C81" in page
+    assert "reproduced" in page
+
+
+def hostile():
+    bad = "</script><img src=x onerror=alert(1)>"
+    line = Line(bad, np.array([0.0, 1.0]), np.array([1.0, np.nan]))
+    return Figure(
+        "3.1", bad, bad, (Panel(bad, Axis(bad), Axis("y"), (line,)),), (Check("C1", bad, bad, DIFFERENCE, bad, bad, unit=bad, reason=bad),),
+        (Table(bad, (bad, "a"), ((bad, "1"),)),),
+    )  # fmt: skip
+
+
+def test_names_cannot_leave_their_place():
+    page = render_figures([hostile(), hostile()], title="</title><b>")
+    assert "<img" not in page
+    assert "<b>" not in re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+    assert island(page)["figure_3_01_a"]["data"][0]["y"] == [1.0, None]
+
+
+@pytest.mark.parametrize("number", WITHOUT)
+def test_table_has_units_and_the_numbers_that_are_drawn(number):
+    figure = made(number)
+    rows = list(csv.reader(io.StringIO(figure_csv(figure))))
+    header = rows[0]
+    assert all(re.search(r"\[(-|%|s|N|mm|bar|km/h|1e-3 s|m/s|m/s\^2|\(m/s\^2\)\^2)\]$", name) for name in header), (
+        header
+    )
+    assert {len(r) for r in rows} == {len(header)}
+    columns = list(zip(*rows[1:], strict=True))
+    for i, panel in enumerate(figure.panels):
+        letter = f"({'abcdef'[i]}) " if len(figure.panels) > 1 else ""
+        axis = panel.y
+        for line in panel.lines:
+            at = header.index(f"{letter}{line.name}: {axis.title}")
+            column = columns[at]
+            values = [float(v) if v else None for v in column[: line.y.size]]
+            assert values == rounded(line.y)
+            assert not any(column[line.y.size :])
+            of_x = f"{letter}{line.name}: {panel.x.title}" if panel.z else f"{letter}{panel.x.title}"
+            x = columns[max(i for i in range(at) if header[i] == of_x)]
+            assert [float(v) for v in x[: line.x.size]] == rounded(line.x)
+
+
+def test_first_column_of_runs_is_time():
+    assert figure_csv(made("3.6")).split(",")[0] == "(a) t [s]"
+
+
+def test_document_is_json():
+    text = json.dumps(figures_document(all_made(), ["a.html"]), allow_nan=False)
+    back = json.loads(text)
+    assert [f["figure"] for f in back["figures"]] == list(WITHOUT)
+    assert back["files"] == ["a.html"]
+
+
+def test_colours_are_left_to_the_page_and_solid_panels_are_solid():
+    for f in all_made():
+        for p in f.panels:
+            figure = panel_figure(p)
+            assert figure["layout"]["font"]["color"] == "@ink"
+            kinds = {t["type"] for t in figure["data"]}
+            assert kinds <= ({"scatter3d", "surface"} if p.z else {"scatter"})
