@@ -92,7 +92,7 @@ class Figures(Result):
 
         from aqualog.report.text import table
 
-        has_values = any(c.ci95 is not None for _, c in self.checks)
+        has_values = any(c.ci95 is not None for _, c in self.findings)
         rows = [
             (
                 c.name,
@@ -101,7 +101,7 @@ class Figures(Result):
                 *((_value(c),) if has_values else ()),
                 shorten(c.found, width, placeholder=" ..."),
             )
-            for f, c in self.checks
+            for f, c in self.findings
         ]
         head = ("claim", "figure", "verdict", *(("value, 95 %",) if has_values else ()), "found")
         return table(head, rows, most=_WHOLE) + "\n" if rows else ""

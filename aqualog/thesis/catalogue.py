@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -90,15 +90,23 @@ def needs_of(number: str) -> str:
 def figure_of(
     number: str,
     panels: Sequence[Panel],
-    checks: Sequence[Check] = (),
+    checks: Iterable[Check | None] = (),
     tables: Sequence[Table] = (),
     *,
     runs: RunsUsed | None = None,
     **words: object,
 ) -> Figure:
-    """A figure with its title and caption; `words` fill the caption."""
+    """A figure with its title and caption; `words` fill the caption. A check that the runs do not allow is None."""
     row = rows()[number]
-    return Figure(number, row.title, row.caption.format(**words), tuple(panels), tuple(checks), tuple(tables), runs)
+    return Figure(
+        number,
+        row.title,
+        row.caption.format(**words),
+        tuple(panels),
+        tuple(c for c in checks if c is not None),
+        tuple(tables),
+        runs,
+    )
 
 
 def chosen(asked: Sequence[str]) -> tuple[str, ...]:

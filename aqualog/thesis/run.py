@@ -109,7 +109,7 @@ def make_all(data: CampaignData, *, jobs: int, report: Callable[[int, int], None
             record(task, _made(task))
     for task, maker in makers().items():
         if maker.spreads:
-            record(task, maker.make(Plan(maker.seeds, jobs)))
+            record(task, maker.checks(Plan(maker.seeds, jobs)))
     figures = {n: r for n in NUMBERS if isinstance(r := found[n], Figure)}
     missing = {n: r for n in NUMBERS if isinstance(r := found[n], str)}
     lost = [f"{task}: {r}" for task in makers() if isinstance(r := found[task], str)]
@@ -143,8 +143,7 @@ def conclude(made: Made) -> tuple[Conclusion, ...]:
 def _made(task: str) -> Figure | Checks | str:
     if task in NUMBERS:
         return _figure(task)
-    maker = makers()[task]
-    return maker.make(Plan(maker.seeds))
+    return makers()[task].checks()
 
 
 def _figure(number: str, evidence: Evidence | None = None) -> Figure | str:

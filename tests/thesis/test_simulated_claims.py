@@ -20,7 +20,7 @@ ELSE = {
 # about as much as runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17): which side
 # they fall on is the business of the seeds
 AT_THE_EDGE = {"C3", "C14", "C17", "C21", "C23", "C50"}
-MAKERS = {m.claims[0]: m.make for module in (spins, resistance, slip_slope) for m in module.CHECKS}
+MAKERS = {m.claims[0]: m.checks for module in (spins, resistance, slip_slope) for m in module.CHECKS}
 
 
 @pytest.mark.parametrize("claim", [c for c in MAKERS if c not in AT_THE_EDGE])

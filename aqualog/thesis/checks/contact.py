@@ -8,7 +8,7 @@ from aqualog.core.records import FloatArray
 from aqualog.model.tyre import F_Z_ANCHOR, TYRES
 from aqualog.physics.contact import contact_share, friction_ratio, remaining_share, slip_stiffness_ratio
 from aqualog.physics.tyre_brush import brush_force, brush_stiffness
-from aqualog.thesis.claims import Checks, judge, limit, limits
+from aqualog.thesis.claims import Check, Checks, judge, limit, limits
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap
 
 __all__ = ["CHECKS"]
@@ -32,7 +32,7 @@ def _edges(plan: Plan, n: int = 2000) -> tuple[FloatArray, FloatArray]:
     return a, a * rng.uniform(-1.0, 1.0, n)
 
 
-def _friction(plan: Plan) -> Checks:
+def _friction(plan: Plan) -> Check:
     a, b = _edges(plan)
     mu, F_z = 0.8, 4000.0
     x, w = _gauss(-a, b)
@@ -51,10 +51,10 @@ def _friction(plan: Plan) -> Checks:
         f"largest deviation {worst:.1e} of mu F_z over {a.size} random contacts (package, print, integral of the "
         f"parabola from -a to b), {limit:.1e} against the brush; ends {ends[0]:g} and {ends[1]:g}"
     )
-    return (judge("C7.theory", outcome, whole=whole, value=max(worst, limit)),)
+    return judge("C7.theory", outcome, whole=whole, value=max(worst, limit))
 
 
-def _stiffness(plan: Plan) -> Checks:
+def _stiffness(plan: Plan) -> Check:
     a, b = _edges(plan)
     c_px = np.random.default_rng(plan.seeds[0] + 1).uniform(5e6, 20e6, a.size)
     x, w = _gauss(-a, b)
@@ -75,10 +75,10 @@ def _stiffness(plan: Plan) -> Checks:
         f"largest deviation {worst:.1e} of C_0 over {a.size} random contacts (package, print, integral over the "
         f"bristles), {slope:.1e} against the slope of the brush"
     )
-    return (judge("C8.theory", outcome, whole=worst < _EXACT and slope < 1e-5, value=max(worst, slope)),)
+    return judge("C8.theory", outcome, whole=worst < _EXACT and slope < 1e-5, value=max(worst, slope))
 
 
-def _pure_tyre_parameter(plan: Plan) -> Checks:
+def _pure_tyre_parameter(plan: Plan) -> Check:
     rng = np.random.default_rng(plan.seeds[0])
     n = 2000
     C, F_z, mus = rng.uniform(4e4, 4e5, n), rng.uniform(1e3, 8e3, n), rng.uniform(0.05, 1.2, (2, n))
@@ -95,10 +95,10 @@ def _pure_tyre_parameter(plan: Plan) -> Checks:
         f"largest relative difference {between:.1e} over {n} pairs of frictions between 0.05 and 1.2 ({off:.1e} "
         "against the stiffness itself)"
     )
-    return (judge("C2.theory", outcome, whole=between < 1e-5 and off < 1e-5, value=between),)
+    return judge("C2.theory", outcome, whole=between < 1e-5 and off < 1e-5, value=between)
 
 
-def _early(_: Plan) -> Checks:
+def _early(_: Plan) -> Check:
     L = np.linspace(0.001, 0.999, 999)
     one = np.ones(1)
     big, tiny = np.array([1e7]), np.array([_TINY_SLIP])
@@ -112,7 +112,7 @@ def _early(_: Plan) -> Checks:
         f"least lead {lead:.1e} over {L.size} contact lengths, exponent {power:.4f}; at 90 % of the contact the "
         f"slope has lost {100 * (1 - C[k]):.0f} %, the friction {100 * (1 - mu[k]):.1f} %"
     )
-    return (judge("C11.theory", outcome, whole=whole, value=lead),)
+    return judge("C11.theory", outcome, whole=whole, value=lead)
 
 
 def _v_full(h: float, p: float) -> float:
@@ -183,7 +183,7 @@ def _estimates(rng: np.random.Generator, utilisation: float, mu_max: float, runs
     return np.asarray(grid[np.argmin(left, axis=0)])
 
 
-def _utilisation(plan: Plan) -> Checks:
+def _utilisation(plan: Plan) -> Check:
     rng = np.random.default_rng(plan.seeds[0])
     runs = min(max(len(plan.seeds), 20), 200)
     spread = np.empty((2, _UTILISATION.size))
@@ -208,9 +208,7 @@ def _utilisation(plan: Plan) -> Checks:
         + f" % slippery ({runs} runs each; brush of slope {_SLOPE:g}, slip noise {_NOISE:g} rms, {_POINTS} points, "
         "slope and slip offset unknown)"
     )
-    return (
-        judge("C1.theory", outcome, whole=whole, part=low > dry, value=float(spread[0, k]), ci95=(min(ci), max(ci))),
-    )
+    return judge("C1.theory", outcome, whole=whole, part=low > dry, value=float(spread[0, k]), ci95=(min(ci), max(ci)))
 
 
 CHECKS = (

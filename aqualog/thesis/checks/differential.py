@@ -128,7 +128,7 @@ def _output_equation(plan: Plan) -> Checks:
     return (_identity("C88.theory_jacobian", worst, most=1e-9), _identity("C88.theory_forms", forms))
 
 
-def _one_driven_axle(_: Plan) -> Checks:
+def _one_driven_axle(_: Plan) -> Check:
     """Half-car with one driven axle: the true slope, whatever ratio is assumed; each side by itself."""
     worst_slip, errors = 0.0, []
     for nu, front in ((0.0, True), (1.0, False)):
@@ -161,10 +161,10 @@ def _one_driven_axle(_: Plan) -> Checks:
         f"slip within {worst_slip:.1e}; slope off by {100 * min(errors):.1f} to {100 * max(errors):.1f} % over "
         f"{len(errors)} cases; sides {100 * sides[0]:+.1f} and {100 * sides[1]:+.1f} %"
     )
-    return (judge("C87.theory", outcome, whole=whole, part=worst < 0.15, value=worst, ci95=(min(errors), max(errors))),)
+    return judge("C87.theory", outcome, whole=whole, part=worst < 0.15, value=worst, ci95=(min(errors), max(errors)))
 
 
-def _half_car(_: Plan) -> Checks:
+def _half_car(_: Plan) -> Check:
     """C98: the half-car keeps its balances, and has the slopes that the thesis names."""
     worst_force = worst_energy = worst_load = 0.0
     slopes: list[tuple[float, float]] = []
@@ -201,15 +201,13 @@ def _half_car(_: Plan) -> Checks:
         f"forces {worst_force:.1e} N, loads {worst_load:.1e} N, energy {worst_energy:.1e}; slopes "
         f"{high.min():.1f} to {high.max():.1f} and {low.min():.1f} to {low.max():.1f} ({len(slopes)} runs)"
     )
-    return (
-        judge(
-            "C98.half_car",
-            outcome,
-            whole=balanced and bias < 0.15,
-            part=balanced,
-            value=bias,
-            ci95=(float(low.min()), float(low.max())),
-        ),
+    return judge(
+        "C98.half_car",
+        outcome,
+        whole=balanced and bias < 0.15,
+        part=balanced,
+        value=bias,
+        ci95=(float(low.min()), float(low.max())),
     )
 
 

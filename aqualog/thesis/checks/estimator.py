@@ -9,7 +9,7 @@ from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.evaluate.intervals import wilson
 from aqualog.physics.tyre_brush import brush_force
-from aqualog.thesis.claims import Checks, judge
+from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.half_car import (
     DT,
     HIGH_SLOPE,
@@ -27,7 +27,7 @@ from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, ratio_of_count
 __all__ = ["CHECKS"]
 
 
-def _linear_tyre(plan: Plan) -> Checks:
+def _linear_tyre(plan: Plan) -> Check:
     """Error of the line of 3.14 on the brush, and the purpose of its offset."""
     mu = np.linspace(-0.2, 0.2, 401)
     s = np.linspace(-0.03, 0.03, 20001)
@@ -50,19 +50,17 @@ def _linear_tyre(plan: Plan) -> Checks:
         f"at most {left:.1e} of slip left; slope within {100 * spread[True]:.1f} % with the offset, "
         f"{100 * spread[False]:.0f} % without ({len(plan.seeds)} runs of 200 points)"
     )
-    return (
-        judge(
-            "C83.half_car",
-            outcome,
-            whole=whole,
-            part=fits,
-            value=spread[True],
-            ci95=bootstrap(errors[True], lambda e: 0.5 * float(np.subtract(*np.quantile(e, [0.84, 0.16])))),
-        ),
+    return judge(
+        "C83.half_car",
+        outcome,
+        whole=whole,
+        part=fits,
+        value=spread[True],
+        ci95=bootstrap(errors[True], lambda e: 0.5 * float(np.subtract(*np.quantile(e, [0.84, 0.16])))),
     )
 
 
-def _common_drop(plan: Plan) -> Checks:
+def _common_drop(plan: Plan) -> Check:
     """C85: purpose of a slow ratio, shown with a ratio as fast as the slope."""
     found: dict[str, list[tuple[float, float, float]]] = {"slow": [], "fast": []}
     # as free as the slope: neither slowed by its process noise nor held where the data do not determine it
@@ -89,19 +87,17 @@ def _common_drop(plan: Plan) -> Checks:
         f"found within 4 s in {share(soon, n)}, slope right in {share(right['slow'], n)} ({right['fast']} with "
         f"the fast ratio); ratio off by {moved['slow']:.3f} (slow) and {moved['fast']:.3f} (fast)"
     )
-    return (
-        judge(
-            "C85.half_car",
-            outcome,
-            whole=whole,
-            part=soon >= 0.95 * n and right["slow"] >= 0.95 * n,
-            value=soon / n,
-            ci95=wilson(soon, n),
-        ),
+    return judge(
+        "C85.half_car",
+        outcome,
+        whole=whole,
+        part=soon >= 0.95 * n and right["slow"] >= 0.95 * n,
+        value=soon / n,
+        ci95=wilson(soon, n),
     )
 
 
-def _change_detection(plan: Plan) -> Checks:
+def _change_detection(plan: Plan) -> Check:
     """C89: identity of the sums, and purpose of the detection, shown without it."""
     rng = np.random.default_rng(plan.seeds[0])
     nu = rng.normal(0.0, 2e-3, 3000) + np.where(np.arange(3000) > 1500, 3e-3, -2e-3)
@@ -129,22 +125,19 @@ def _change_detection(plan: Plan) -> Checks:
         f"largest deviation {worst:.1e} over 6000 samples; settled after {t['with']:.1f} s with, "
         f"{t['without']:.1f} s without (median of {len(seeds)} runs, {d.t[-1]:.0f} s at most)"
     )
-    return (
-        judge(
-            "C89.half_car",
-            outcome,
-            whole=False,
-            part=right,
-            value=t["with"] / t["without"],
-            ci95=bootstrap(
-                np.array([settled["with"], settled["without"]]).T,
-                lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1])),
-            ),
+    return judge(
+        "C89.half_car",
+        outcome,
+        whole=False,
+        part=right,
+        value=t["with"] / t["without"],
+        ci95=bootstrap(
+            np.array([settled["with"], settled["without"]]).T, lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1]))
         ),
     )
 
 
-def _activation(plan: Plan) -> Checks:
+def _activation(plan: Plan) -> Check:
     """C91: purpose of the gates, shown without them: a spinning wheel, hard traction, braking, standing still."""
     seeds = plan.first(60)
     wrong = {"with": 0, "without": 0}
@@ -181,19 +174,17 @@ def _activation(plan: Plan) -> Checks:
         f"60 s in which nothing changed; rms error of the slope {100 * rms['with']:.1f} and "
         f"{100 * rms['without']:.0f} % (medians)"
     )
-    return (
-        judge(
-            "C91.half_car",
-            outcome,
-            whole=whole,
-            part=wrong["with"] < wrong["without"] and rms["with"] < rms["without"],
-            value=wrong["with"] / max(wrong["without"], 1),
-            ci95=ratio_of_counts(wrong["with"], wrong["without"]),
-        ),
+    return judge(
+        "C91.half_car",
+        outcome,
+        whole=whole,
+        part=wrong["with"] < wrong["without"] and rms["with"] < rms["without"],
+        value=wrong["with"] / max(wrong["without"], 1),
+        ci95=ratio_of_counts(wrong["with"], wrong["without"]),
     )
 
 
-def _slow_and_sudden(plan: Plan) -> Checks:
+def _slow_and_sudden(plan: Plan) -> Check:
     """C115: radii and slope ratio that drift slowly raise nothing; a sudden drop does."""
     seeds = plan.first(40)
     n, minutes = 60_000, 10.0
@@ -226,15 +217,13 @@ def _slow_and_sudden(plan: Plan) -> Checks:
         f"drift alone: alarms in {share(alarms['drift'], m)}, slope off by at most {100 * max(worst):.0f} %; "
         f"drop found in {share(alarms['sudden'], m)}, after {np.median(delays):.1f} s (median)"
     )
-    return (
-        judge(
-            "C115.half_car",
-            outcome,
-            whole=whole,
-            part=alarms["drift"] <= 0.05 * m and alarms["sudden"] >= 0.8 * m,
-            value=alarms["sudden"] / m,
-            ci95=wilson(alarms["sudden"], m),
-        ),
+    return judge(
+        "C115.half_car",
+        outcome,
+        whole=whole,
+        part=alarms["drift"] <= 0.05 * m and alarms["sudden"] >= 0.8 * m,
+        value=alarms["sudden"] / m,
+        ci95=wilson(alarms["sudden"], m),
     )
 
 

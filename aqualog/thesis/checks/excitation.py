@@ -80,7 +80,7 @@ def _waveforms(plan: Plan) -> Checks:
     )
 
 
-def _sums(plan: Plan) -> Checks:
+def _sums(plan: Plan) -> Check:
     rng = np.random.default_rng(plan.seeds[0])
     F, E, nus = rng.uniform(-5e3, 5e3, _N), rng.uniform(-2e3, 2e3, _N), rng.uniform(0.0, 1.0, 200)
     worst = front = 0.0
@@ -93,10 +93,10 @@ def _sums(plan: Plan) -> Checks:
         front = max(front, float(np.abs((F_f - F_r) - (F_0 - R_0) - 2.0 * e).max()))
     whole = max(worst, front) < 1e-8
     outcome = f"{worst:.1e} N and {front:.1e} N over {_N} random forces, excitations and splits"
-    return (judge("C97.half_car_forces", outcome, whole=whole, value=worst),)
+    return judge("C97.half_car_forces", outcome, whole=whole, value=worst)
 
 
-def _negative_forces(_: Plan) -> Checks:
+def _negative_forces(_: Plan) -> Check:
     """C116: constant speed needs little force; excitation with positive forces alone and with negative ones."""
     rows = {}
     for kind, amplitude in (("relative", 1.0), ("mu", 0.05)):
@@ -117,22 +117,20 @@ def _negative_forces(_: Plan) -> Checks:
         f"the dry samples used; positive only (least {positive[1]:.0f} N) {text(positive[0])}, "
         f"{100 * positive[2]:.0f} % used"
     )
-    return (
-        judge(
-            "C116.half_car",
-            outcome,
-            whole=whole,
-            part=bool(found and not positive[0] <= negative[0]),
-            value=negative[0] if found else None,
-        ),
+    return judge(
+        "C116.half_car",
+        outcome,
+        whole=whole,
+        part=bool(found and not positive[0] <= negative[0]),
+        value=negative[0] if found else None,
     )
 
 
-def _vehicle_tests(_: Plan) -> Checks:
+def _vehicle_tests(_: Plan) -> Check:
     outcome = (
         "no such drive is at hand; what the method finds in simulated drives with series sensors is C112, C113, C115"
     )
-    return (judge("C117.half_car", outcome, verdict=NEEDS_DATA),)
+    return judge("C117.half_car", outcome, verdict=NEEDS_DATA)
 
 
 CHECKS = (

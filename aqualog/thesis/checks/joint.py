@@ -148,7 +148,7 @@ def _alike(records: Sequence[Mapping[str, RunRecord]]) -> float:
     return float(np.mean(list(_likeness(rows_of(records)).values())))
 
 
-def c70(plan: Plan, pool: Pool = SCORING_POOL, count: int = OF_KIND) -> Checks:
+def c70(plan: Plan, pool: Pool = SCORING_POOL, count: int = OF_KIND) -> Check:
     """Metrics of the detectors that use differences of speed, with coarse velocities."""
     records = spread_over(variants_of, drives(count, plan.seeds[0], pool), plan, "drives")
     rows = rows_of(records)
@@ -162,16 +162,14 @@ def c70(plan: Plan, pool: Pool = SCORING_POOL, count: int = OF_KIND) -> Checks:
         f"{sum(like.values())} of {len(like)} combinations alike over {count} drives with aquaplaning and {count} "
         f"others. As measured: {base}. Not alike: {'; '.join(other) or 'none'}"
     )
-    return (
-        judge(
-            "C70.drives",
-            outcome,
-            whole=all(like.values()),
-            part=part,
-            value=share,
-            ci95=ci,
-            source=f"drawn situations of the {pool.name} pool, sensors of a series car",
-        ),
+    return judge(
+        "C70.drives",
+        outcome,
+        whole=all(like.values()),
+        part=part,
+        value=share,
+        ci95=ci,
+        fields={"pool": pool.name},
     )
 
 
@@ -242,7 +240,7 @@ def _track(detector: str, wheel: str | None, statistic: float) -> Track:
     return Track(detector, wheel, None, "-", np.array([statistic]), 1.0, np.zeros(1, dtype=np.bool_))
 
 
-def _sum(plan: Plan) -> Checks:
+def _sum(plan: Plan) -> Check:
     """C71: the sum of 2.11 by hand."""
     rng = np.random.default_rng(plan.seeds[0])
     p = JointCusumParams(with_slope=False)
@@ -274,7 +272,7 @@ def _sum(plan: Plan) -> Checks:
         worst = max(worst, abs(ours - by_hand))
     exact = worst < 1e-12
     outcome = f"{worst:.1e} over {n} random states; the printed variance term would fall to {least:.2f} in them"
-    return (judge("C71.theory", outcome, part=exact, value=worst),)
+    return judge("C71.theory", outcome, part=exact, value=worst)
 
 
 CHECKS = (

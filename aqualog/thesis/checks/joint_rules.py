@@ -13,7 +13,7 @@ from aqualog.evaluate.intervals import wilson
 from aqualog.evaluate.match import LIMITS_S, hits
 from aqualog.evaluate.truth import CONTACT_FULL, spans_of
 from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
-from aqualog.thesis.claims import Checks, judge
+from aqualog.thesis.claims import Check, Checks, judge
 from aqualog.thesis.evidence.drives import NUISANCE, WATER, Score, Taken, bits_of, detected, drives, score, variants
 from aqualog.thesis.evidence.seeds import Maker, Plan, ratio_of_counts, share
 
@@ -33,7 +33,7 @@ def _score(plan: Plan, variant: str, effect: str, others: Sequence[str] = NUISAN
     return score(water, other, effect)
 
 
-def _gate(plan: Plan) -> Checks:
+def _gate(plan: Plan) -> Check:
     """C64: joint detector 1 with the gate of the resistance and without it."""
     gated, ungated = (_score(plan, v, "full") for v in ("joint_criteria", "ungated"))
     partial = [_score(plan, v, "partial") for v in ("joint_criteria", "ungated")]
@@ -51,38 +51,34 @@ def _gate(plan: Plan) -> Checks:
         f"full aquaplaning with the gate {gated.in_words()}; without {ungated.in_words()}; partial "
         f"{partial[0].found} and {partial[1].found} of {partial[1].episodes}; breaches of the rule: {breaches}"
     )
-    return (
-        judge(
-            "C64.drives",
-            outcome,
-            whole=whole,
-            part=gated.false < ungated.false and breaches == 0,
-            value=gated.false / max(ungated.false, 1),
-            ci95=ratio_of_counts(gated.false, ungated.false),
-        ),
+    return judge(
+        "C64.drives",
+        outcome,
+        whole=whole,
+        part=gated.false < ungated.false and breaches == 0,
+        value=gated.false / max(ungated.false, 1),
+        ci95=ratio_of_counts(gated.false, ungated.false),
     )
 
 
-def _spin_down(plan: Plan) -> Checks:
+def _spin_down(plan: Plan) -> Check:
     """C65: spin-downs under a braking force, counted and not."""
     full = {v: _score(plan, v, "full", _BRAKED) for v in ("criterion_1", "spin_down")}
     with_, without = full["criterion_1"], full["spin_down"]
     kept = with_.recall >= without.recall - 0.05
     whole = kept and without.false > 0 and with_.false <= 0.1 * without.false
     outcome = f"criterion 1: {with_.in_words()}; under braking forces too: {without.in_words()}"
-    return (
-        judge(
-            "C65.drives",
-            outcome,
-            whole=whole,
-            part=kept and with_.false <= 0.5 * without.false,
-            value=with_.false / max(without.false, 1),
-            ci95=ratio_of_counts(with_.false, without.false),
-        ),
+    return judge(
+        "C65.drives",
+        outcome,
+        whole=whole,
+        part=kept and with_.false <= 0.5 * without.false,
+        value=with_.false / max(without.false, 1),
+        ci95=ratio_of_counts(with_.false, without.false),
     )
 
 
-def _minor(plan: Plan) -> Checks:
+def _minor(plan: Plan) -> Check:
     """C66: the conditions of criterion 2 left out one by one."""
     cases = {
         "the difference": ("minor_no_difference", _SHAKEN),
@@ -99,10 +95,10 @@ def _minor(plan: Plan) -> Checks:
     together = _score(plan, "minor_no_difference_no_sign", "partial", _SHAKEN).false
     whole = min(factors) >= 2.0
     outcome = f"false alarms with all conditions and without {'; '.join(words)}; without difference and sign {together}"
-    return (judge("C66.drives", outcome, whole=whole, part=sum(x >= 2.0 for x in factors) >= 2, value=min(factors)),)
+    return judge("C66.drives", outcome, whole=whole, part=sum(x >= 2.0 for x in factors) >= 2, value=min(factors))
 
 
-def _full_or_partial(plan: Plan) -> Checks:
+def _full_or_partial(plan: Plan) -> Check:
     """C67: severity of spin-ups against the true contact of the wheel."""
     right: dict[bool, list[bool]] = {True: [], False: []}
     for d in drives(WATER, plan, _PER_WATER):
@@ -119,7 +115,7 @@ def _full_or_partial(plan: Plan) -> Checks:
         f"full called full {share(sum(right[True]), n[True])}, partial called partial "
         f"{share(sum(right[False]), n[False])} of the spin-ups on water"
     )
-    return (judge("C67.drives", outcome, whole=whole, part=balanced >= 0.6, value=balanced),)
+    return judge("C67.drives", outcome, whole=whole, part=balanced >= 0.6, value=balanced)
 
 
 def _slope(plan: Plan) -> Checks:
@@ -160,7 +156,7 @@ def _slope(plan: Plan) -> Checks:
     )
 
 
-def _resistance(plan: Plan) -> Checks:
+def _resistance(plan: Plan) -> Check:
     """C69: contribution of the resistance to criteria 1 to 4."""
     found = added = episodes = 0
     for d in drives(WATER, plan, _PER_WATER):
@@ -176,15 +172,13 @@ def _resistance(plan: Plan) -> Checks:
         added += sum(a.found and not b.found for a, b in zip(own, others, strict=True))
     whole = episodes > 10 and found >= 0.5 * episodes and added > 0
     outcome = f"{share(found, episodes)} found within 2 s, {added} of them by none of the others in that time"
-    return (
-        judge(
-            "C69.drives",
-            outcome,
-            whole=whole,
-            part=found >= 0.5 * episodes > 0,
-            value=found / max(episodes, 1),
-            ci95=wilson(found, episodes),
-        ),
+    return judge(
+        "C69.drives",
+        outcome,
+        whole=whole,
+        part=found >= 0.5 * episodes > 0,
+        value=found / max(episodes, 1),
+        ci95=wilson(found, episodes),
     )
 
 
@@ -198,7 +192,7 @@ def _found(d: Taken, bits: BoolArray) -> tuple[int, int]:
     return sum(h.found for h in found), len(spans)
 
 
-def _drivetrains(plan: Plan) -> Checks:
+def _drivetrains(plan: Plan) -> Check:
     """C6: every drivetrain works, with a vehicle file that states it."""
     by_drivetrain: dict[str, list[Taken]] = {"rwd": [], "fwd": [], "awd": []}
     for d in drives(WATER, plan, _PER_WATER):
@@ -221,8 +215,8 @@ def _drivetrains(plan: Plan) -> Checks:
         + f"; minor spin-downs find {right} of {episodes} partial episodes with the right and {wrong} with the "
         "wrong axle"
     )
-    return (
-        judge("C6.drives", outcome, whole=served and matters, part=served, value=min(s.recall for s in full.values())),
+    return judge(
+        "C6.drives", outcome, whole=served and matters, part=served, value=min(s.recall for s in full.values())
     )
 
 

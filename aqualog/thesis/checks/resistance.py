@@ -72,7 +72,7 @@ def seeds_of(table: Table, p: Pass) -> int:
     return len(table[p].figures)
 
 
-def _c12(table: Table) -> Checks:
+def _c12(table: Table) -> Check:
     depths = (VERY_WORN, CONFIGURATIONS["very worn 0.6 mm"], CONFIGURATIONS["very worn 2.0 mm"])
     lever = {p.h: cells_of(table, at_speeds(p), "lever") for p in depths}
     by_h = [lever[h].mean(axis=1) for h in sorted(lever)]
@@ -99,10 +99,10 @@ def _c12(table: Table) -> Checks:
         + ", ".join(f"{k} {x:.3f}" for k, x in span.items())
         + " m/s^2"
     )
-    return (judge("C12.passes", outcome, whole=grows and mainly, part=grows, value=shift, ci95=ci),)
+    return judge("C12.passes", outcome, whole=grows and mainly, part=grows, value=shift, ci95=ci)
 
 
-def _c37(table: Table) -> Checks:
+def _c37(table: Table) -> Check:
     c = table[VERY_WORN]
     wet, dry, rise = (c.of(k) for k in ("delta_a", "delta_a_dry", "rise_s"))
     step, ci = estimate(lambda r: float((wet - dry)[r].mean()), wet.size)
@@ -111,10 +111,10 @@ def _c37(table: Table) -> Checks:
         f"{dry.mean():+.3f} before, {wet.mean():.3f} m/s² on the lane: {told(step, ci, 3)} more; half of it after "
         f"{np.median(rise):.2f} s (at most {rise.max():.2f} s)"
     )
-    return (judge("C37.passes", outcome, whole=whole, part=bool((wet > dry).all()), value=step, ci95=ci),)
+    return judge("C37.passes", outcome, whole=whole, part=bool((wet > dry).all()), value=step, ci95=ci)
 
 
-def _c38(table: Table) -> Checks:
+def _c38(table: Table) -> Check:
     cells = {h: table[replace(VERY_WORN, h=h)].of("delta_a") for h in DEPTHS}
     level = {h: mean(x) for h, x in cells.items()}
     thin = [level[h] for h in DEPTHS[:-1]]
@@ -130,7 +130,7 @@ def _c38(table: Table) -> Checks:
         + ", ".join(f"{1e3 * h:.1f} mm: {x}" for h, x in g.items())
         + " 1e-3 m/s^2 per km/h"
     )
-    return (judge("C38.passes", outcome, whole=deep and flat, part=deep, value=value, ci95=ci),)
+    return judge("C38.passes", outcome, whole=deep and flat, part=deep, value=value, ci95=ci)
 
 
 def scaled(statistic: Statistic) -> Statistic:
@@ -138,17 +138,15 @@ def scaled(statistic: Statistic) -> Statistic:
     return lambda rows: 1e3 * statistic(rows)
 
 
-def _c39(table: Table) -> Checks:
+def _c39(table: Table) -> Check:
     found = {
         name: estimate(scaled(gradient_of(table, p)), seeds_of(table, p)) for name, p in CONFIGURATIONS.items()
     }  # fmt: skip
     rising = [x > 0.0 for x, _ in found.values()]
     least = min(found.values())
     outcome = "1e-3 m/s^2 per km/h: " + ", ".join(f"{name} {told(*x)}" for name, x in found.items())
-    return (
-        judge(
-            "C39.passes", outcome, whole=all(rising), part=bool(np.mean(rising) >= 0.8), value=least[0], ci95=least[1]
-        ),
+    return judge(
+        "C39.passes", outcome, whole=all(rising), part=bool(np.mean(rising) >= 0.8), value=least[0], ci95=least[1]
     )
 
 
@@ -217,7 +215,7 @@ def _compared(claim: str, other: Pass, depths: Sequence[float], table: Table) ->
     return judge(f"{claim}.passes", outcome, whole=all(lower) and ci[1] < 1.0, part=ci[1] < 1.0, value=value, ci95=ci)
 
 
-def _c42(table: Table) -> Checks:
+def _c42(table: Table) -> Check:
     names = ("very worn", "new summer", "new winter")
     n = seeds_of(table, VERY_WORN)
     gradient = {k: gradient_of(table, CONFIGURATIONS[k]) for k in names}
@@ -237,10 +235,10 @@ def _c42(table: Table) -> Checks:
         "; ".join(f"{k}: {level[k]:.3f} m/s^2, {said(scaled(gradient[k]), n)} 1e-3 m/s^2 per km/h" for k in names)
         + f"; larger level over that of very worn {told(value, ci, 2)}"
     )
-    return (judge("C42.passes", outcome, whole=below(0.5), part=below(1.0), value=value, ci95=ci),)
+    return judge("C42.passes", outcome, whole=below(0.5), part=below(1.0), value=value, ci95=ci)
 
 
-def _c43(table: Table) -> Checks:
+def _c43(table: Table) -> Check:
     rows = []
     for v in SLOW:
         x = [table[replace(WORN, kmh=v, p=p)].of("delta_a") for p in PRESSURES]
@@ -252,7 +250,7 @@ def _c43(table: Table) -> Checks:
         "; ".join(f"{v} km/h: {s:.3f} against {noise:.3f}" for v, s, noise in rows)
         + f" m/s^2; in the mean {told(value, ci, 3)}"
     )
-    return (judge("C43.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci),)
+    return judge("C43.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci)
 
 
 def _range_of(values: Sequence[FloatArray]) -> float:
@@ -260,7 +258,7 @@ def _range_of(values: Sequence[FloatArray]) -> float:
     return max(means) - min(means)
 
 
-def _c45(table: Table) -> Checks:
+def _c45(table: Table) -> Check:
     base = cells_of(table, at_speeds(UNLOADED, LOAD_SPEEDS), "delta_a").mean(axis=0)
     change = {
         k: cells_of(table, at_speeds(p, LOAD_SPEEDS), "delta_a").mean(axis=0) - base for k, p in LOADED.items()
@@ -269,7 +267,7 @@ def _c45(table: Table) -> Checks:
     below = [x < 0.0 for x, _ in found.values()]
     value, ci = max(found.values())
     outcome = f"{base.mean():.3f} m/s^2; " + ", ".join(f"{k} {told(*x, 3)}" for k, x in found.items()) + " more"
-    return (judge("C45.passes", outcome, whole=all(below), part=sum(below) >= 2, value=value, ci95=ci),)
+    return judge("C45.passes", outcome, whole=all(below), part=sum(below) >= 2, value=value, ci95=ci)
 
 
 def _mean_of(values: FloatArray) -> Statistic:
@@ -289,11 +287,11 @@ CHECKS = (
     by_passes("C44", lambda: (replace(WORN, kmh=v) for v in THRESHOLD_SPEEDS), _c44),
     by_passes(
         "C40", lambda: at_depths(VERY_WORN, NEW, depths=(ONE_MM, 2.0e-3)),
-        lambda t: (_compared("C40", NEW, (ONE_MM, 2.0e-3), t),),
+        lambda t: _compared("C40", NEW, (ONE_MM, 2.0e-3), t),
     ),
     by_passes(
         "C41", lambda: at_depths(VERY_WORN, WINTER, depths=(1.3e-3, 2.0e-3)),
-        lambda t: (_compared("C41", WINTER, (1.3e-3, 2.0e-3), t),),
+        lambda t: _compared("C41", WINTER, (1.3e-3, 2.0e-3), t),
     ),
     by_passes("C42", configured, _c42),
     by_passes("C43", lambda: (q for p in PRESSURES for q in at_speeds(replace(WORN, p=p))), _c43),

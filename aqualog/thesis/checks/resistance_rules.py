@@ -19,7 +19,7 @@ from aqualog.model.situations import SCORING_POOL, draw
 from aqualog.model.term import Model, Term
 from aqualog.physics.load import G
 from aqualog.physics.resistance import nominal_acceleration
-from aqualog.thesis.claims import Checks, judge
+from aqualog.thesis.claims import Check, Checks, judge
 from aqualog.thesis.evidence.drives import WATER, Score, Taken, detected, drives, made, score, threshold_for
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, ratio_of_counts
 
@@ -38,7 +38,7 @@ def _measure(scenario: Scenario, model: Model = Model(), believed: Vehicle | Non
     return np.asarray(result.features["delta_a_x"].to_numpy()[_SETTLED:])
 
 
-def _sign(plan: Plan) -> Checks:
+def _sign(plan: Plan) -> Check:
     """C34: a known extra torque against the wheels, and one with them."""
     wanted, found = [], []
     rng = np.random.default_rng(plan.seeds[0])
@@ -57,19 +57,17 @@ def _sign(plan: Plan) -> Checks:
         f"slope {gain:.4f}, offset {offset:+.4f} m/s², largest deviation {left:.4f} m/s² over {len(found)} "
         f"pairs of drives ({min(wanted):+.2f} to {max(wanted):.2f} m/s²)"
     )
-    return (
-        judge(
-            "C34.drives",
-            outcome,
-            whole=whole,
-            part=gain > 0.0,
-            value=float(gain),
-            ci95=bootstrap(np.column_stack([wanted, found]), lambda x: float(np.polyfit(x[:, 0], x[:, 1], 1)[0])),
-        ),
+    return judge(
+        "C34.drives",
+        outcome,
+        whole=whole,
+        part=gain > 0.0,
+        value=float(gain),
+        ci95=bootstrap(np.column_stack([wanted, found]), lambda x: float(np.polyfit(x[:, 0], x[:, 1], 1)[0])),
     )
 
 
-def _balance(plan: Plan) -> Checks:
+def _balance(plan: Plan) -> Check:
     """C35: formula by hand, and its remainder on dry drives with all parameters known."""
     rng = np.random.default_rng(plan.seeds[0])
     n = 2000
@@ -101,7 +99,7 @@ def _balance(plan: Plan) -> Checks:
         f"{len(rms)} drives with grades of up to 8 %; without the wheels' inertia, as printed, "
         f"{100 * np.mean(spin):.1f} % of the acceleration would show"
     )
-    return (judge("C35.drives", outcome, whole=False, part=right, value=float(np.mean(rms)), ci95=bootstrap(rms)),)
+    return judge("C35.drives", outcome, whole=False, part=right, value=float(np.mean(rms)), ci95=bootstrap(rms))
 
 
 def _trusted(d: Taken) -> FloatArray:
@@ -117,7 +115,7 @@ def _trusted(d: Taken) -> FloatArray:
     return np.where(np.isnan(track.statistic), np.nan, x)
 
 
-def _not_directly(plan: Plan) -> Checks:
+def _not_directly(plan: Plan) -> Check:
     """C46: false alarms of a direct threshold and of the sum at the same recall of partial aquaplaning."""
     water = [(d, _trusted(d)) for d in drives(WATER, plan, _PER_WATER)]
     other = [(d, _trusted(d)) for d in drives(_NOISY, plan, _PER_OTHER)]
@@ -149,15 +147,13 @@ def _not_directly(plan: Plan) -> Checks:
         f"sum, beyond {limit_sum:.2f} m/s: {g.in_words()}; direct, beyond {limit:.2f} m/s²: {plain.in_words()}; "
         f"direct at 0.2 m/s²: {at_thesis.false} false alarms"
     )
-    return (
-        judge(
-            "C46.drives",
-            outcome,
-            whole=whole,
-            part=g.false < plain.false,
-            value=g.false / max(plain.false, 1),
-            ci95=ratio_of_counts(g.false, plain.false),
-        ),
+    return judge(
+        "C46.drives",
+        outcome,
+        whole=whole,
+        part=g.false < plain.false,
+        value=g.false / max(plain.false, 1),
+        ci95=ratio_of_counts(g.false, plain.false),
     )
 
 

@@ -58,7 +58,7 @@ def _gradient(values: FloatArray, speeds: Sequence[float]) -> Statistic:
     return lambda rows: float(np.polyfit(speeds, np.nanmean(values[:, rows], axis=1), 1)[0])
 
 
-def _c48(table: Table) -> Checks:
+def _c48(table: Table) -> Check:
     wet, dry = table[VERY_WORN].of("slope_rr"), mean(table[DRY_VERY_WORN].of("slope_rr"))
     value, ci = estimate(lambda r: mean(wet[r]) / dry, wet.size)
     away = _full_speed(VERY_WORN) - VERY_WORN.kmh
@@ -67,20 +67,16 @@ def _c48(table: Table) -> Checks:
         f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
         "higher"
     )
-    return (
-        judge(
-            "C48.passes",
-            outcome,
-            whole=ci[1] < 0.8 and is_near,
-            part=value < 1.0,
-            value=value,
-            ci95=ci,
-            fields={
-                "away": ""
-                if is_near
-                else " The even contact of this tyre ends later than the thesis reports of its own."
-            },
-        ),
+    return judge(
+        "C48.passes",
+        outcome,
+        whole=ci[1] < 0.8 and is_near,
+        part=value < 1.0,
+        value=value,
+        ci95=ci,
+        fields={
+            "away": "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
+        },
     )
 
 
@@ -96,7 +92,7 @@ def regressed(moments: FloatArray) -> float:
     return float((n * mu2 - mu * mu) / (n * mu_s - mu * s))
 
 
-def _c49(table: Table) -> Checks:
+def _c49(table: Table) -> Check:
     moments = cells_of(table, [*at_speeds(WORN), *RAMPS], "moments")
 
     def errors(rows: Rows) -> tuple[float, float, FloatArray]:
@@ -118,10 +114,10 @@ def _c49(table: Table) -> Checks:
         f"{told(100 * without, (100 * ci_without[0], 100 * ci_without[1]))} % without; "
         + ", ".join(f"{v:.0f} km/h: {100 * e:+.1f} %" for v, e in zip(at, binned, strict=True))
     )
-    return (judge("C49.passes", outcome, whole=whole, part=part, value=value, ci95=ci),)
+    return judge("C49.passes", outcome, whole=whole, part=part, value=value, ci95=ci)
 
 
-def _c50(table: Table) -> Checks:
+def _c50(table: Table) -> Check:
     rows, spans = [], []
     for v in SLOW:
         cells = {h: table[replace(WORN, kmh=v, h=h)] for h in DEPTHS}
@@ -141,10 +137,10 @@ def _c50(table: Table) -> Checks:
         "; ".join(f"{v} km/h: {s:.1f} against {noise:.1f} (slope {m:.1f}, {k} depths)" for v, k, s, noise, m in rows)
         + f"; largest share of the slope {told(value, ci, 2)}"
     )
-    return (judge("C50.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci),)
+    return judge("C50.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci)
 
 
-def _c51(table: Table) -> Checks:
+def _c51(table: Table) -> Check:
     found = {}
     for name in FALLING:
         for w in ("rl", "rr"):
@@ -153,10 +149,10 @@ def _c51(table: Table) -> Checks:
     falling = [x < 0.0 for x, _ in found.values()]
     value, ci = max(found.values())
     outcome = "per km/h: " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items())
-    return (judge("C51.passes", outcome, whole=all(falling), part=bool(np.mean(falling) >= 0.8), value=value, ci95=ci),)
+    return judge("C51.passes", outcome, whole=all(falling), part=bool(np.mean(falling) >= 0.8), value=value, ci95=ci)
 
 
-def _c52(table: Table) -> Checks:
+def _c52(table: Table) -> Check:
     left, right = (slopes_of(table, WORN, SLOW, w) for w in ("rl", "rr"))
     uneven = [float(np.mean([scatter(x) / mean(x) for x in side])) for side in (left, right)]
     higher = float(np.nanmean(left)) > float(np.nanmean(right))
@@ -165,15 +161,13 @@ def _c52(table: Table) -> Checks:
     outcome = (
         f"left over right {told(value, ci, 3)}; scatter {uneven[0]:.3f} left, {uneven[1]:.3f} right, ratio {ratio}"
     )
-    return (
-        judge(
-            "C52.passes",
-            outcome,
-            whole=higher and uneven[0] > uneven[1],
-            part=higher or uneven[0] > uneven[1],
-            value=value,
-            ci95=ci,
-        ),
+    return judge(
+        "C52.passes",
+        outcome,
+        whole=higher and uneven[0] > uneven[1],
+        part=higher or uneven[0] > uneven[1],
+        value=value,
+        ci95=ci,
     )
 
 
@@ -194,7 +188,7 @@ def _levels(values: FloatArray) -> list[float]:
     return [mean(x) for x in values]
 
 
-def _c53(table: Table) -> Checks:
+def _c53(table: Table) -> Check:
     values = {
         n: slopes_of(table, replace(WORN, p=p), FEW) for n, p in (("low", LOW), ("medium", MEDIUM), ("high", HIGH))
     }
@@ -214,19 +208,17 @@ def _c53(table: Table) -> Checks:
         + f" at {', '.join(map(str, FEW))} km/h; decrease at high over low {told(value, ci, 2)}; gap {gap[0]:.1f} "
         f"to {gap[1]:.1f}"
     )
-    return (
-        judge(
-            "C53.passes",
-            outcome,
-            whole=smaller and flatter and gap[1] < gap[0],
-            part=smaller and flatter,
-            value=value,
-            ci95=ci,
-        ),
+    return judge(
+        "C53.passes",
+        outcome,
+        whole=smaller and flatter and gap[1] < gap[0],
+        part=smaller and flatter,
+        value=value,
+        ci95=ci,
     )
 
 
-def _c54(table: Table) -> Checks:
+def _c54(table: Table) -> Check:
     winter = {h: slopes_of(table, Pass(90, tyre="new_winter", h=h, wiggles=True), WINTER_SPEEDS) for h in WINTER_DEPTHS}
     rows = {h: (mean(x[0]) - mean(x[-1]), max(scatter(y) for y in x), mean(x[0])) for h, x in winter.items()}
     worn = _levels(slopes_of(table, WORN, (70, 102)))
@@ -241,10 +233,10 @@ def _c54(table: Table) -> Checks:
         "; ".join(f"{1e3 * h:.1f} mm: {d:+.2f} of {m:.1f} (scatter {s:.2f})" for h, (d, s, m) in rows.items())
         + f", largest loss {told(100 * value, (100 * ci[0], 100 * ci[1]))} %; worn {worn[0]:.1f} to {worn[1]:.1f}"
     )
-    return (judge("C54.passes", outcome, whole=still and falls, part=nearly and falls, value=value, ci95=ci),)
+    return judge("C54.passes", outcome, whole=still and falls, part=nearly and falls, value=value, ci95=ci)
 
 
-def _c55(table: Table) -> Checks:
+def _c55(table: Table) -> Check:
     base = slopes_of(table, replace(UNLOADED, wiggles=True), FEW)
     cases = {k: slopes_of(table, replace(p, wiggles=True), FEW) for k, p in LOADED.items()}
     change = {k: np.nanmean(x, axis=0) - np.nanmean(base, axis=0) for k, x in cases.items()}
@@ -256,16 +248,14 @@ def _c55(table: Table) -> Checks:
     outcome = f"{np.nanmean(base):.1f}; " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items()) + " more"
     more = "" if all(above) else " Not each of them raises the slope."
     more += "" if is_slight else f" The largest is {share:.0%} of the slope, which is more than slight."
-    return (
-        judge(
-            "C55.passes",
-            outcome,
-            whole=all(above) and is_slight,
-            part=sum(above) >= 2,
-            value=value,
-            ci95=ci,
-            fields={"more": more},
-        ),
+    return judge(
+        "C55.passes",
+        outcome,
+        whole=all(above) and is_slight,
+        part=sum(above) >= 2,
+        value=value,
+        ci95=ci,
+        fields={"more": more},
     )
 
 

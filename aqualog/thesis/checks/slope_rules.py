@@ -19,7 +19,7 @@ from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
-from aqualog.thesis.claims import NEEDS_DATA, Checks, judge
+from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge
 from aqualog.thesis.evidence.drives import drives, made, variants
 from aqualog.thesis.evidence.passes import HIGH, LOW, Pass, figures_of
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, share
@@ -49,7 +49,7 @@ def _drops(result: DriveResult, after: float = 0.0) -> bool:
     return any(e.detector == "slip_slope_drop" and e.start_s >= after for e in result.events)
 
 
-def _history(plan: Plan) -> Checks:
+def _history(plan: Plan) -> Check:
     """C56: reference from the vehicle file against the largest slope of the configuration's history."""
     false: dict[str, int] = {"file": 0, "max": 0, "robust": 0}
     missed = dict(false)
@@ -74,15 +74,13 @@ def _history(plan: Plan) -> Checks:
         f"{false['robust']} (upper quartile of its means, the default) of {n} drives; snow missed "
         f"{missed['file']}, {missed['max']}, {missed['robust']} of {n}"
     )
-    return (
-        judge(
-            "C56.drives",
-            outcome,
-            whole=whole,
-            part=wrong["max"] < wrong["file"],
-            value=wrong["max"] / (2 * n),
-            ci95=wilson(wrong["max"], 2 * n),
-        ),
+    return judge(
+        "C56.drives",
+        outcome,
+        whole=whole,
+        part=wrong["max"] < wrong["file"],
+        value=wrong["max"] / (2 * n),
+        ci95=wilson(wrong["max"], 2 * n),
     )
 
 
@@ -100,7 +98,7 @@ def _learn(gain: float, seed: int) -> History:
 _YIELDING = ("snow_entry", "snow", "deep_snow", "gravel")
 
 
-def _not_unique(plan: Plan) -> Checks:
+def _not_unique(plan: Plan) -> Check:
     """C57: roads that yield lower the slope; results of the drop alone and of the joint detector."""
     rows = {}
     for name in _YIELDING:
@@ -113,15 +111,13 @@ def _not_unique(plan: Plan) -> Checks:
         + ", ".join(f"{k.replace('_', ' ')} {r[1]} and {r[2]} of {r[0]}" for k, r in rows.items())
         + ")"
     )
-    return (
-        judge(
-            "C57.drives",
-            outcome,
-            whole=whole,
-            part=joint <= 0.2 * drops and drops > 0,
-            value=drops / n,
-            ci95=wilson(drops, n),
-        ),
+    return judge(
+        "C57.drives",
+        outcome,
+        whole=whole,
+        part=joint <= 0.2 * drops and drops > 0,
+        value=drops / n,
+        ci95=wilson(drops, n),
     )
 
 
@@ -153,7 +149,7 @@ def _unchanged(plan: Plan) -> Checks:
     )
 
 
-def _pressure_and_tread(plan: Plan) -> Checks:
+def _pressure_and_tread(plan: Plan) -> Check:
     """C118: share of the slope that is lost between 70 and 102 km/h."""
     seeds = plan.first(8)
 
@@ -177,8 +173,8 @@ def _pressure_and_tread(plan: Plan) -> Checks:
         f"winter {100 * np.mean(winter):+.1f} % ({100 * min(winter):+.1f} to {100 * max(winter):+.1f} %, "
         f"{len(winter)} runs)"
     )
-    return (
-        judge("C118.drives", outcome, whole=whole, part=less or none, value=ratio, ci95=(min(interval), max(interval))),
+    return judge(
+        "C118.drives", outcome, whole=whole, part=less or none, value=ratio, ci95=(min(interval), max(interval))
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.evaluate.intervals import wilson
 from aqualog.evaluate.truth import CONTACT_FULL
-from aqualog.thesis.claims import Checks, judge, limit
+from aqualog.thesis.claims import Check, Checks, judge, limit
 from aqualog.thesis.evidence.passes import HIGH, SPIN_EDGES, SPIN_UP, Pass
 from aqualog.thesis.evidence.seeds import (
     Rows,
@@ -38,7 +38,7 @@ NO_FORCE, OVERLOAD_S, SPUN = (
 )  # [-], [s], [-]
 
 
-def _c3(table: Table) -> Checks:
+def _c3(table: Table) -> Check:
     plain, wiggling = [Pass(v) for v in GRID], [Pass(v, wiggles=True) for v in GRID]
     dry = mean(table[DRY].of("slope_rr"))
     slope = cells_of(table, wiggling, "slope_rr")
@@ -58,10 +58,8 @@ def _c3(table: Table) -> Checks:
     outcome = (
         "; ".join(f"{k} {said(f, n)}" for k, f in at.items()) + f" km/h; first dip after both by {told(lead, ci)} km/h"
     )
-    return (
-        judge(
-            "C3.passes", outcome, whole=whole, part=max(early, v["first dip"]) < v["full"] < np.inf, value=lead, ci95=ci
-        ),
+    return judge(
+        "C3.passes", outcome, whole=whole, part=max(early, v["first dip"]) < v["full"] < np.inf, value=lead, ci95=ci
     )
 
 
@@ -93,22 +91,20 @@ def _c4(table: Table) -> Checks:
     )
 
 
-def _c5(table: Table) -> Checks:
+def _c5(table: Table) -> Check:
     times = table[FLOODED].of("gone_still_s")
     stops, middle = int((times < 1.0).sum()), float(np.median(times))
     outcome = (
         f"{middle:.3f} s ({times.min():.3f} to {times.max():.3f}), {stops} of {times.size} within 1 s "
         "(150 km/h, even contact)"
     )
-    return (
-        judge(
-            "C5.passes",
-            outcome,
-            whole=stops == times.size,
-            part=2 * stops >= times.size,
-            value=middle if np.isfinite(middle) else None,
-            ci95=(float(times.min()), float(times.max())),
-        ),
+    return judge(
+        "C5.passes",
+        outcome,
+        whole=stops == times.size,
+        part=2 * stops >= times.size,
+        value=middle if np.isfinite(middle) else None,
+        ci95=(float(times.min()), float(times.max())),
     )
 
 
@@ -125,7 +121,7 @@ CURVE_A = tuple(Pass(v, a=0.5) for v in (78, 86, 94, 102))
 CONSTANT_KMH, AIC_SURE = limit("constant_kmh", "C13.passes"), limit("aic_sure", "C18.passes")
 
 
-def _c13(table: Table) -> Checks:
+def _c13(table: Table) -> Check:
     change = np.max(cells_of(table, [Pass(v) for v in SHOWN], "speed_change"))
     s = cells_of(table, [Pass(v) for v in SHOWN], "low_slip")
     low = -s / (1.0 - s)  # over the car's speed: a wheel that stands is 1 below it
@@ -137,27 +133,25 @@ def _c13(table: Table) -> Checks:
         f"speed within {change:.2f} km/h; slip {', '.join(f'{100 * x:.1f}' for x in level)} % below the car; from "
         f"89 to 106 km/h {told(100 * value, (100 * ci[0], 100 * ci[1]))} points more"
     )
-    return (
-        judge(
-            "C13.passes",
-            outcome,
-            whole=constant and grows,
-            part=grows,
-            value=value,
-            ci95=ci,
-            fields={"change": "" if constant else " The driver model lets the speed fall by that much on the lane."},
-        ),
+    return judge(
+        "C13.passes",
+        outcome,
+        whole=constant and grows,
+        part=grows,
+        value=value,
+        ci95=ci,
+        fields={"change": "" if constant else " The driver model lets the speed fall by that much on the lane."},
     )
 
 
-def _c14(table: Table) -> Checks:
+def _c14(table: Table) -> Check:
     dips = table[Pass(89)].of("dips")
     k, n = int((dips > 0).sum()), dips.size
     outcome = f"{dips.mean():.2f} per pass, in {k} of {n} passes"
-    return (judge("C14.passes", outcome, whole=k > 0, value=k / n, ci95=wilson(k, n)),)
+    return judge("C14.passes", outcome, whole=k > 0, value=k / n, ci95=wilson(k, n))
 
 
-def _c15(table: Table) -> Checks:
+def _c15(table: Table) -> Check:
     cells = [table[Pass(v)] for v in (89, 98, 106)]
     count = [c.of("dips") for c in cells]
     depth = [mean(c.of("depth")) for c in cells]
@@ -170,10 +164,10 @@ def _c15(table: Table) -> Checks:
         f"{a:.2f}, {b:.2f}, {c:.2f} dips per pass, {told(more, ci)} more at 106 than at 89; depth {depth[1]:.3f}, "
         f"{depth[2]:.3f}; heading {yaw:.1f} deg; stops {stops:.0%}"
     )
-    return (judge("C15.passes", outcome, whole=whole, part=a < b < c, value=more, ci95=ci),)
+    return judge("C15.passes", outcome, whole=whole, part=a < b < c, value=more, ci95=ci)
 
 
-def _c16(table: Table) -> Checks:
+def _c16(table: Table) -> Check:
     c = table[Pass(118)]
     stop, up, down = (c.of(k) for k in ("stop_s", "rear_spin_s", "rear_stop_s"))
     n = stop.size
@@ -186,10 +180,10 @@ def _c16(table: Table) -> Checks:
         f"front right {full:.0%} (the anchor, fitted on other seeds); rear up at once {k} of {n}, up at all "
         f"{ever:.0%}, down first {float((down < up).mean()):.0%}"
     )
-    return (judge("C16.passes", outcome, whole=whole, part=part, value=k / n, ci95=wilson(k, n)),)
+    return judge("C16.passes", outcome, whole=whole, part=part, value=k / n, ci95=wilson(k, n))
 
 
-def _c17(table: Table) -> Checks:
+def _c17(table: Table) -> Check:
     cells = [Pass(v) for v in FINE]
     minor = first_speed(FINE, cells_of(table, cells, "dips") > 0)
     stop = cells_of(table, cells, "stop_s") < SOON
@@ -198,15 +192,13 @@ def _c17(table: Table) -> Checks:
     value, ci = estimate(lambda r: full(r) - minor(r), n)
     there = np.isfinite(value)
     outcome = f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h"
-    return (
-        judge(
-            "C17.passes",
-            outcome,
-            whole=bool(there and ci[0] >= 15.0 and ci[1] <= 25.0),
-            part=bool(there and 10.0 <= value <= 30.0),
-            value=value if there else None,
-            ci95=ci if np.all(np.isfinite(ci)) else None,
-        ),
+    return judge(
+        "C17.passes",
+        outcome,
+        whole=bool(there and ci[0] >= 15.0 and ci[1] <= 25.0),
+        part=bool(there and 10.0 <= value <= 30.0),
+        value=value if there else None,
+        ci95=ci if np.all(np.isfinite(ci)) else None,
     )
 
 
@@ -236,7 +228,7 @@ def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
     return float(v.size * np.log(float(rest @ rest) / best[0])), best[1], best[2]
 
 
-def _c18(table: Table) -> Checks:
+def _c18(table: Table) -> Check:
     passes = [*CURVE, *CURVE_A]
     v, y = cells_of(table, passes, "mean_kmh"), -cells_of(table, passes, "low_slip")
     # the slip over the wheel's speed has no bound where the wheel stops: such passes would decide alone
@@ -253,14 +245,14 @@ def _c18(table: Table) -> Checks:
     gain, ci = estimate(part(0), n)
     whole = gain > AIC_SURE and ci[0] > 0.0
     outcome = f"better by {told(gain, ci)} over {int(rolling.sum())} of {v.size} passes, v0 = {said(part(2), n)} km/h"
-    return (judge("C18.passes", outcome, whole=whole, part=gain > 0.0, value=gain, ci95=ci),)
+    return judge("C18.passes", outcome, whole=whole, part=gain > 0.0, value=gain, ci95=ci)
 
 
-def _c19(table: Table) -> Checks:
+def _c19(table: Table) -> Check:
     dips = cells_of(table, list(_c19_needs()), "dips")
     k, n = int((dips > 0).sum()), dips.size
     outcome = f"{int(dips.sum())} dips in {n} passes"
-    return (judge("C19.passes", outcome, whole=k == 0, part=k < 0.05 * n, value=k / n, ci95=wilson(k, n)),)
+    return judge("C19.passes", outcome, whole=k == 0, part=k < 0.05 * n, value=k / n, ci95=wilson(k, n))
 
 
 def _c19_needs() -> Iterator[Pass]:
@@ -292,7 +284,7 @@ def rank_correlation(x: FloatArray, y: FloatArray) -> float:
     return float(np.corrcoef(np.argsort(np.argsort(x)), np.argsort(np.argsort(y)))[0, 1])
 
 
-def _c20(table: Table) -> Checks:
+def _c20(table: Table) -> Check:
     spun = {T: cells_of(table, [Pass(v, kick=T) for v in KICK_SPEEDS], "rear_spin") > SPUN for T in KICKS}
     at = {T: first_speed(KICK_SPEEDS, x) for T, x in spun.items()}
     n = spun[KICKS[0]].shape[1]
@@ -302,19 +294,17 @@ def _c20(table: Table) -> Checks:
     outcome = (
         ", ".join(f"{T:.0f} N m: {said(f, n)}" for T, f in at.items()) + f" km/h; {told(fall, ci)} km/h sooner in all"
     )
-    return (
-        judge(
-            "C20.passes",
-            outcome,
-            whole=whole,
-            part=bool(v[-1] < v[0]),
-            value=fall if np.isfinite(fall) else None,
-            ci95=ci if np.isfinite(ci).all() else None,
-        ),
+    return judge(
+        "C20.passes",
+        outcome,
+        whole=whole,
+        part=bool(v[-1] < v[0]),
+        value=fall if np.isfinite(fall) else None,
+        ci95=ci if np.isfinite(ci).all() else None,
     )
 
 
-def _c21(table: Table) -> Checks:
+def _c21(table: Table) -> Check:
     spun = cells_of(table, PUSHED, "rear_spin") > SPUN
     onset = np.where(spun, cells_of(table, PUSHED, "rear_spin_v"), np.nan)
     n = spun.shape[1]
@@ -331,19 +321,12 @@ def _c21(table: Table) -> Checks:
         f"{int(spun.sum())} of {spun.size} passes spin up; speeds spread over {told(value, ci)} km/h; {mixed} of "
         f"{share.size} cases are mixed"
     )
-    return (
-        judge(
-            "C21.passes",
-            outcome,
-            whole=whole,
-            part=bool(value >= SPREAD_KMH or mixed >= IRREGULAR),
-            value=value,
-            ci95=ci,
-        ),
+    return judge(
+        "C21.passes", outcome, whole=whole, part=bool(value >= SPREAD_KMH or mixed >= IRREGULAR), value=value, ci95=ci
     )
 
 
-def _c22(table: Table) -> Checks:
+def _c22(table: Table) -> Check:
     spins = cells_of(table, PUSHED, "spins")
     n = spins.shape[1]
     ranks: dict[str, tuple[float, tuple[float, float]]] = {}
@@ -360,15 +343,13 @@ def _c22(table: Table) -> Checks:
     whole = all(r < 0.0 for r, _ in ranks.values())
     there = bool(np.isfinite(value))
     outcome = "; ".join(text)
-    return (
-        judge(
-            "C22.passes",
-            outcome,
-            whole=whole,
-            part=any(r < 0.0 for r, _ in ranks.values()),
-            value=value if there else None,
-            ci95=ci if there else None,
-        ),
+    return judge(
+        "C22.passes",
+        outcome,
+        whole=whole,
+        part=any(r < 0.0 for r, _ in ranks.values()),
+        value=value if there else None,
+        ci95=ci if there else None,
     )
 
 
@@ -387,7 +368,7 @@ def _difference(spins: FloatArray) -> Statistic:
     return statistic
 
 
-def _c23(table: Table) -> Checks:
+def _c23(table: Table) -> Check:
     uneven, even = (_difference(cells_of(table, p, "spins")) for p in (UNEVEN, EVEN))
     n = len(table[EVEN[0]].figures)
     a, ci = estimate(uneven, n)
@@ -395,15 +376,13 @@ def _c23(table: Table) -> Checks:
     apart = bool(np.isfinite(a) and (ci[0] > 0.0 or ci[1] < 0.0))
     whole = apart and bool(np.isfinite(b) and abs(a) > 3.0 * abs(b))
     outcome = f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s², 102 to 126 km/h)"
-    return (
-        judge(
-            "C23.passes",
-            outcome,
-            whole=whole,
-            part=apart,
-            value=a if np.isfinite(a) else None,
-            ci95=ci if np.isfinite(a) else None,
-        ),
+    return judge(
+        "C23.passes",
+        outcome,
+        whole=whole,
+        part=apart,
+        value=a if np.isfinite(a) else None,
+        ci95=ci if np.isfinite(a) else None,
     )
 
 

@@ -14,7 +14,7 @@ from aqualog.detect import cusum, ewvar, minor_spin_down, spin
 from aqualog.evaluate.intervals import wilson
 from aqualog.features.stream import FeatureStream
 from aqualog.model.situations import SCORING_POOL, draw
-from aqualog.thesis.claims import Checks, judge
+from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.drives import WATER, Score, Taken, detected, drives, made, score, threshold_for
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, ratio_of_counts, share, spread_over
 
@@ -25,7 +25,7 @@ _PER_WATER, _PER_OTHER = 6, 3  # seeds of each situation
 _SHAKEN = ("rough_asphalt", "gravel", "kerbs_and_holes", "gear_shifts", "dry_cruise", "damp", "motorway")
 
 
-def _acceleration_difference(plan: Plan) -> Checks:
+def _acceleration_difference(plan: Plan) -> Check:
     """C24: against straight lines of wheel speed and velocity, whose derivatives are known without a computer."""
     rng = np.random.default_rng(plan.seeds[0])
     car = Vehicle(name="test", given=frozenset({"mass"}))
@@ -44,7 +44,7 @@ def _acceleration_difference(plan: Plan) -> Checks:
         for w, rate in zip(WHEELS, rates, strict=True):
             worst = max(worst, float(abs(f[f"a_w_delta_{w}"][380] - rate)))
     outcome = f"largest deviation {worst:.3f} m/s² over {4 * cases} wheels"
-    return (judge("C24.drives", outcome, whole=worst < 0.3, part=worst < 1.0, value=worst),)
+    return judge("C24.drives", outcome, whole=worst < 0.3, part=worst < 1.0, value=worst)
 
 
 def _starts(bits: BoolArray) -> list[int]:
@@ -52,7 +52,7 @@ def _starts(bits: BoolArray) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.diff(np.concatenate([[False], bits]).astype(np.int8)) > 0)]
 
 
-def _sign_of_speed(plan: Plan) -> Checks:
+def _sign_of_speed(plan: Plan) -> Check:
     """C25: detections by the sums with and without the sign of the speed difference, against the true slip."""
     right, wrong = {"with": 0, "without": 0}, {"with": 0, "without": 0}
     water = drives(WATER, plan, _PER_WATER)
@@ -76,15 +76,13 @@ def _sign_of_speed(plan: Plan) -> Checks:
         f"with the sign {share(wrong['with'], n['with'])}, without {share(wrong['without'], n['without'])} of "
         f"the detections, in {len(water)} drives on water"
     )
-    return (
-        judge(
-            "C25.drives",
-            outcome,
-            whole=whole,
-            part=shares["with"] < shares["without"],
-            value=shares["with"],
-            ci95=wilson(wrong["with"], n["with"]),
-        ),
+    return judge(
+        "C25.drives",
+        outcome,
+        whole=whole,
+        part=shares["with"] < shares["without"],
+        value=shares["with"],
+        ci95=wilson(wrong["with"], n["with"]),
     )
 
 
@@ -105,7 +103,7 @@ def _sums(d: Taken) -> dict[str, FloatArray]:
     return {"direct": direct, "summed": summed}
 
 
-def _summed_up(plan: Plan) -> Checks:
+def _summed_up(plan: Plan) -> Check:
     """C26: false alarms of both at the recall that the sum has at its threshold."""
     water = [(d, _sums(d)) for d in drives(WATER, plan, _PER_WATER)]
     other = [(d, _sums(d)) for d in drives(_SHAKEN, plan, _PER_OTHER)]
@@ -124,20 +122,18 @@ def _summed_up(plan: Plan) -> Checks:
     outcome = (
         f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}; direct, beyond {limit:.1f} m/s²: {direct.in_words()}"
     )
-    return (
-        judge(
-            "C26.drives",
-            outcome,
-            whole=whole,
-            part=by_sum.false < direct.false,
-            value=by_sum.false / max(direct.false, 1),
-            ci95=ratio_of_counts(by_sum.false, direct.false),
-            fields={"threshold": threshold},
-        ),
+    return judge(
+        "C26.drives",
+        outcome,
+        whole=whole,
+        part=by_sum.false < direct.false,
+        value=by_sum.false / max(direct.false, 1),
+        ci95=ratio_of_counts(by_sum.false, direct.false),
+        fields={"threshold": threshold},
     )
 
 
-def _moving_variance(plan: Plan) -> Checks:
+def _moving_variance(plan: Plan) -> Check:
     """C30: the recursion against the weighted variance written out, and white noise against its factor."""
     rng = np.random.default_rng(plan.seeds[0])
     worst = factor = 0.0
@@ -154,10 +150,10 @@ def _moving_variance(plan: Plan) -> Checks:
         factor = max(factor, abs(float(var[1000:].mean()) / 4.0 / ((1.0 - beta) * 2.0 / (2.0 - alpha)) - 1.0))
     whole = worst < 1e-11 and factor < 0.01
     outcome = f"{worst:.1e} over 40 series of 400; {100 * factor:.2f} % over three pairs of weights and 1e6 samples"
-    return (judge("C30.drives", outcome, whole=whole, value=worst),)
+    return judge("C30.drives", outcome, whole=whole, value=worst)
 
 
-def _variance_difference(plan: Plan) -> Checks:
+def _variance_difference(plan: Plan) -> Check:
     """C31: comparison with two separate variances, a disturbance of both axles, and a rough road."""
     rng = np.random.default_rng(plan.seeds[0])
     p = minor_spin_down.MinorParams.make(_DT)._replace(var_min=np.inf)
@@ -188,10 +184,8 @@ def _variance_difference(plan: Plan) -> Checks:
         f"{worst:.1e} over 20 pairs of series, {common:g} for the same signal; on broken asphalt "
         f"{100 * left:.0f} % left ({100 * min(ratios):.0f} to {100 * max(ratios):.0f} % over {len(ratios)} sides)"
     )
-    return (
-        judge(
-            "C31.drives", outcome, whole=exact and left < 0.5, part=exact, value=left, ci95=bootstrap(np.abs(ratios))
-        ),
+    return judge(
+        "C31.drives", outcome, whole=exact and left < 0.5, part=exact, value=left, ci95=bootstrap(np.abs(ratios))
     )
 
 
@@ -251,7 +245,7 @@ def _spun_when_kicked(item: tuple[str, int]) -> tuple[bool, bool, bool]:
     return spun, bool(_spun(d, limited=False).any()), bool(_spun(d, limited=True).any())
 
 
-def _traction_limit(plan: Plan) -> Checks:
+def _traction_limit(plan: Plan) -> Check:
     """C27: spin-ups on snow and ice with and without the limit, and the cost of the limit on water."""
     rows: dict[str, tuple[int, int, int]] = {}
     for name in _SLIPPERY:
@@ -278,15 +272,13 @@ def _traction_limit(plan: Plan) -> Checks:
         f"drives with a report, without and with the limit: {words}; on water {n_water[1]} to {n_water[2]} of "
         f"{n_water[0]} wheels that spun"
     )
-    return (
-        judge(
-            "C27.drives",
-            outcome,
-            whole=whole,
-            part=seen and kept and less,
-            value=caught / max(n, 1),
-            ci95=wilson(caught, n),
-        ),
+    return judge(
+        "C27.drives",
+        outcome,
+        whole=whole,
+        part=seen and kept and less,
+        value=caught / max(n, 1),
+        ci95=wilson(caught, n),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -151,7 +152,7 @@ def share(all_runs: Sequence[SceneRun], holds: Callable[[SceneRun], bool]) -> fl
     return float(np.mean([holds(r) for r in all_runs]))
 
 
-def words_of(all_runs: Sequence[SceneRun]) -> dict[str, object]:
+def words_of(all_runs: Sequence[SceneRun]) -> dict[str, Any]:
     """What the caption of a figure names: entry, and which seeds are drawn and judged."""
     seed, last = all_runs[0].seed, all_runs[-1].seed
     drawn = (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.evaluate.intervals import wilson
-from aqualog.thesis.claims import Checks
+from aqualog.thesis.claims import Check, Checks
 from aqualog.thesis.evidence.passes import Pass, PassFigures, figures_of
 from aqualog.workers import Crashed, work_on
 
@@ -59,9 +59,14 @@ class Maker:
     """Makes the checks of some claims from its `seeds`; `spreads` its work over processes itself."""
 
     claims: tuple[str, ...]
-    make: Callable[[Plan], Checks]
+    make: Callable[[Plan], Check | Checks]
     seeds: Sequence[int] = RULE_SEEDS
     spreads: bool = False
+
+    def checks(self, plan: Plan | None = None) -> Checks:
+        """Its checks, of a plan or of its own seeds."""
+        made = self.make(plan or Plan(self.seeds))
+        return (made,) if isinstance(made, Check) else made
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,7 @@ def _one(item: tuple[Pass, int]) -> PassFigures:
     return figures_of(*item)
 
 
-def by_passes(claim: str, needs: Callable[[], Iterable[Pass]], judge: Callable[[Table], Checks]) -> Maker:
+def by_passes(claim: str, needs: Callable[[], Iterable[Pass]], judge: Callable[[Table], Check | Checks]) -> Maker:
     """A maker of checks that are judged from passes."""
     return Maker((claim,), lambda plan: judge(table_of(needs(), plan)), PASS_SEEDS, spreads=True)
 

@@ -79,12 +79,12 @@ def measured(number: str, evidence: Evidence) -> Resistance:
     return Resistance(selected, pools)
 
 
-def rising(found: Resistance) -> list[Check]:
+def rising(found: Resistance) -> Check | None:
     """C39: the measure rises with speed, at every level."""
     slopes = {x.name: trend(found.pools[x.name]) for x in found.levels}
     told = {n: e for n, e in slopes.items() if e.ci is not None}
     if not told:
-        return []
+        return None
     least = min(told.values(), key=lambda e: e.low)
     up = [n for n, e in told.items() if e.is_above]
     whole = len(up) == len(told)
@@ -93,17 +93,15 @@ def rising(found: Resistance) -> list[Check]:
         f"above 0 at {len(up)} of {len(told)} levels; gradients {min(e.value for e in told.values()):.3f} to "
         f"{max(e.value for e in told.values()):.3f} {PER_TEN}; the least certain one"
     )
-    return [
-        judge(
-            "C39.figure",
-            outcome,
-            whole=whole,
-            part=2 * len(up) >= len(told) and not any(e.is_below for e in told.values()),
-            value=least.value,
-            ci95=least.ci,
-            fields={"flat": flat},
-        )
-    ]
+    return judge(
+        "C39.figure",
+        outcome,
+        whole=whole,
+        part=2 * len(up) >= len(told) and not any(e.is_below for e in told.values()),
+        value=least.value,
+        ci95=least.ci,
+        fields={"flat": flat},
+    )
 
 
 def over_speed(number: str, evidence: Evidence) -> Figure:
@@ -119,8 +117,9 @@ def over_speed(number: str, evidence: Evidence) -> Figure:
     lines = [means_line(x.name, means[x.name], style[x.name], shift=shift[x.name]) for x in found.levels]
     panel = Panel("Resistance measure over speed", V_KMH, _MEASURE, (*lines, _threshold(lines)))
     tables = (means_table(f"Resistance measure [{UNIT}]", means, 3),)
+    checks = [judged(found) for judged in (*_OF_FIGURE[number], rising)]
     used, fixed = found.selected.used(), found.selected.fixed
-    return figure_of(number, (panel,), (*_OF_FIGURE[number](found), *rising(found)), tables, runs=used, fixed=fixed)
+    return figure_of(number, (panel,), checks, tables, runs=used, fixed=fixed)
 
 
 def _threshold(lines: Sequence[Line]) -> Line:
@@ -132,47 +131,46 @@ def _threshold(lines: Sequence[Line]) -> Line:
 _MUCH = limit("much", "C42.figure")  # of the worn tyre's resistance that is left, for "(much) lower"
 
 
-def tread_claims(found: Resistance, claim: str) -> Sequence[Check]:
-    """The figure's own claim, and C42, over all waters in which both tyres ran."""
-    rows: list[tuple[str, str, str, Effect, Effect, float]] = []
+def _treads(found: Resistance) -> list[tuple[str, str, Effect, Effect, float]]:
+    """Water, both tyres, new less worn in level and gradient, and level over the worn tyre's, where both ran."""
+    rows = []
     for words, worn, new in pairs(found.levels, found.selected.wish):
         effect, both = found.difference(worn, new), common(found.pools[worn.name], found.pools[new.name])
         if effect is not None and both is not None:
             old, deep = (float(np.mean(p.columns["y"])) for p in both)
-            rows.append((words, worn.name, new.name, *effect, deep / old if old > 0.0 else float("nan")))
+            names = f"{new.name.split(',')[0]} less {worn.name.split(',')[0]}"
+            rows.append((words or "all", names, *effect, deep / old if old > 0.0 else float("nan")))
+    return rows
+
+
+def treads_differ(claim: str, found: Resistance) -> Check | None:
+    """C40 and C41: the less worn tyre's level is the lower, in all waters in which both ran."""
+    rows = _treads(found)
     if not rows:
-        return ()
-    low = [r for r in rows if r[3].is_below]
-    both_low = [r for r in rows if r[3].is_below and r[4].is_below]
-    much = [r for r in rows if r[5] <= _MUCH]
-    worst = max(rows, key=lambda r: r[3].high)
-    steep = max(rows, key=lambda r: r[4].high)
-    names = f"{rows[0][2].split(',')[0]} less {rows[0][1].split(',')[0]}"
-    told = "; ".join(f"{w or 'all'}: level {a.words()} {UNIT}" for w, _, _, a, _, _ in rows)
-    gradients = "; ".join(
-        f"{w or 'all'}: gradient {b.words()} {PER_TEN}, level {100 * share:.0f} % of the worn tyre's"
-        for w, _, _, _, b, share in rows
+        return None
+    low = [r for r in rows if r[2].is_below]
+    worst = max((r[2] for r in rows), key=lambda e: e.high)
+    outcome = f"{rows[0][1]}: " + "; ".join(f"{w}: level {a.words()} {UNIT}" for w, _, a, _, _ in rows)
+    whole = len(low) == len(rows)
+    return judge(f"{claim}.figure", outcome, whole=whole, part=bool(low), value=worst.value, ci95=worst.ci)
+
+
+def _c42(found: Resistance) -> Check | None:
+    rows = _treads(found)
+    if not rows:
+        return None
+    low = [r for r in rows if r[2].is_below]
+    both_low = [r for r in low if r[3].is_below]
+    much = [r for r in rows if r[4] <= _MUCH]
+    steep = max((r[3] for r in rows), key=lambda e: e.high)
+    outcome = f"{rows[0][1]}: " + "; ".join(
+        f"{w}: gradient {b.words()} {PER_TEN}, level {100 * share:.0f} % of the worn tyre's"
+        for w, _, _, b, share in rows
     )
-    whole = len(both_low) == len(rows) and len(much) == len(rows)
-    return (
-        judge(
-            f"{claim}.figure",
-            f"{names}: {told}",
-            whole=len(low) == len(rows),
-            part=bool(low),
-            value=worst[3].value,
-            ci95=worst[3].ci,
-        ),
-        judge(
-            "C42.figure",
-            f"{names}: {gradients}",
-            whole=whole,
-            part=len(low) == len(rows),
-            value=steep[4].value,
-            ci95=steep[4].ci,
-            fields={"lower": len(both_low), "all": len(rows), "at_most": len(much)},
-        ),
-    )
+    whole = len(both_low) == len(much) == len(rows)
+    fields = {"lower": len(both_low), "all": len(rows), "at_most": len(much)}
+    part = len(low) == len(rows)
+    return judge("C42.figure", outcome, whole=whole, part=part, value=steep.value, ci95=steep.ci, fields=fields)
 
 
 _SPEED = 100 * KMH  # [m/s] of the pass that is drawn (K: the thesis gives none)
@@ -180,18 +178,16 @@ _THRESHOLD = limit("threshold", "C37.figure")  # [m/s^2] thesis 2.2
 _SHOWN = (-1.0, 2.0)  # [m/s^2]
 
 
-def _c37(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Check]:
+def _c37(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     pool = pool_of(evidence, runs, resistance_of())
     if pool is None:
-        return []
+        return None
     v = pool.columns["v_x"]
     level = lines_through(pool, [np.ones(v.size), (v - v.mean()) / TEN])[0]
     if level.ci is None:
-        return []
+        return None
     outcome = f"{level.words(3)} {UNIT} at {v.mean() / KMH:.0f} km/h"
-    return [
-        judge("C37.figure", outcome, whole=level.is_above, part=level.value > 0.0, value=level.value, ci95=level.ci)
-    ]
+    return judge("C37.figure", outcome, whole=level.is_above, part=level.value > 0.0, value=level.value, ci95=level.ci)
 
 
 def figure_2_10(number: str, evidence: Evidence) -> Figure:
@@ -221,7 +217,7 @@ def figure_2_10(number: str, evidence: Evidence) -> Figure:
     axis = Axis("resistance measure", UNIT, limits=_SHOWN)
     shown_as = {i.index: "counted" if i in constant else "not at constant speed" for i in selected.runs}
     return figure_of(
-        number, (Panel("Resistance measure", TIME, axis, (*lines, water_of(r, *_SHOWN))),), _c37(evidence, constant),
+        number, (Panel("Resistance measure", TIME, axis, (*lines, water_of(r, *_SHOWN))),), [_c37(evidence, constant)],
         runs=selected.used(shown_as | {shown.index: "drawn, and counted"}), fixed=selected.fixed, run=shown.name,
         kmh=evidence.of(shown).v / KMH, passes=len(constant),
     )  # fmt: skip
@@ -232,7 +228,7 @@ _SHALLOW, _DEEP = 1.35, limit("deep", "C38.figure")  # [mm] up to, and from
 _LEVEL, _GRADIENT = limit("level", "C38.figure"), limit("gradient", "C38.figure")
 
 
-def _c38(found: Resistance) -> Sequence[Check]:
+def _c38(found: Resistance) -> Check | None:
     known = sorted(
         ((d, x.name, x) for x in found.levels if (d := depth_mm(x, found.selected.wish)) is not None and d > 0.0),
         key=lambda m: m[:2],
@@ -240,11 +236,11 @@ def _c38(found: Resistance) -> Sequence[Check]:
     shallow: list[Level] = [x for d, _, x in known if d <= _SHALLOW]
     deep: list[Level] = [x for d, _, x in known if d >= _DEEP]
     if not shallow or not deep:
-        return ()
+        return None
     rise = found.difference(shallow[-1], deep[-1])
     flat = found.difference(shallow[0], shallow[-1]) if len(shallow) > 1 else None
     if rise is None or (len(shallow) > 1 and flat is None):
-        return ()
+        return None
     is_risen = rise[0].is_above and rise[1].is_above
     is_flat = flat is None or (flat[0].is_none(_LEVEL) and flat[1].is_none(_GRADIENT))
     words = (
@@ -255,16 +251,14 @@ def _c38(found: Resistance) -> Sequence[Check]:
             f"{shallow[0].name} to {shallow[-1].name}: level {flat[0].words()} {UNIT}, gradient {flat[1].words()} "
             f"{PER_TEN}; {words}"
         )
-    return (
-        judge(
-            "C38.figure",
-            words,
-            whole=is_flat and is_risen,
-            part=is_flat or is_risen,
-            value=rise[0].value,
-            ci95=rise[0].ci,
-            fields={"why": _reason(flat, rise)},
-        ),
+    return judge(
+        "C38.figure",
+        words,
+        whole=is_flat and is_risen,
+        part=is_flat or is_risen,
+        value=rise[0].value,
+        ci95=rise[0].ci,
+        fields={"why": _reason(flat, rise)},
     )
 
 
@@ -282,45 +276,41 @@ def _reason(flat: tuple[Effect, Effect] | None, rise: tuple[Effect, Effect]) -> 
     return (", ".join(words) + ".").capitalize()
 
 
-def _c43(found: Resistance) -> Sequence[Check]:
+def _c43(found: Resistance) -> Check | None:
     low, high = found.levels[0], found.levels[-1]
     effect = found.difference(low, high) if low is not high else None
     if effect is None:
-        return ()
+        return None
     level = effect[0]
     whole = level.is_within(_HALF)
     outcome = f"{high.name} less {low.name}: level {level.words()} {UNIT}"
-    return (
-        judge(
-            "C43.figure", outcome, whole=whole, part=level.low <= 0.0 <= level.high, value=level.value, ci95=level.ci
-        ),
+    return judge(
+        "C43.figure", outcome, whole=whole, part=level.low <= 0.0 <= level.high, value=level.value, ci95=level.ci
     )
 
 
-def _c45(found: Resistance) -> Sequence[Check]:
+def _c45(found: Resistance) -> Check | None:
     names, rows = marks(found.levels, found.selected.wish)
     if not names:
-        return ()
+        return None
     effects = dict(zip(names, additive([found.pools[x.name] for x in found.levels], rows), strict=True))
     down = [n for n, e in effects.items() if e.is_below]
     whole = len(down) == len(effects)
     first = effects[names[0]]
     outcome = "; ".join(f"{n}: {e.words()} {UNIT}" for n, e in effects.items())
-    return (
-        judge(
-            "C45.figure",
-            outcome,
-            whole=whole,
-            part=bool(down),
-            value=first.value,
-            ci95=first.ci,
-            fields={"first": names[0], "others": ", ".join(n for n in effects if n not in down)},
-        ),
+    return judge(
+        "C45.figure",
+        outcome,
+        whole=whole,
+        part=bool(down),
+        value=first.value,
+        ci95=first.ci,
+        fields={"first": names[0], "others": ", ".join(n for n in effects if n not in down)},
     )
 
 
-_OF_FIGURE: Mapping[str, Callable[[Resistance], Sequence[Check]]] = {
-    "2.11": _c38, "2.12": partial(tread_claims, claim="C40"), "2.13": partial(tread_claims, claim="C41"), "2.14": _c43,
-    "2.15": _c45,
+_OF_FIGURE: Mapping[str, tuple[Callable[[Resistance], Check | None], ...]] = {
+    "2.11": (_c38,), "2.12": (partial(treads_differ, "C40"), _c42), "2.13": (partial(treads_differ, "C41"), _c42),
+    "2.14": (_c43,), "2.15": (_c45,),
 }  # fmt: skip
 FIGURES = {"2.10": figure_2_10, **dict.fromkeys(_OF_FIGURE, over_speed)}

@@ -129,9 +129,10 @@ def over_speed(number: str, evidence: Evidence) -> Figure:
         else f"delay of v_x of {d.vehicle} left open ({d.reason})"
         for d in found.table.delays
     )  # fmt: skip
+    checks = [judged(found) for judged in _OF_FIGURE[number]]
     delays = f"{late[0].upper()}{late[1:]}." if late else ""
     used, fixed = found.selected.used(), found.selected.fixed
-    return figure_of(number, panels, _OF_FIGURE[number](found), (_table(found),), runs=used, fixed=fixed, delays=delays)
+    return figure_of(number, panels, checks, (_table(found),), runs=used, fixed=fixed, delays=delays)
 
 
 def _limited(lines: Sequence[Line]) -> Axis:
@@ -162,11 +163,11 @@ _MOST = 1200  # points of a cloud
 _MU = Axis("traction coefficient")
 
 
-def _c48(rows: Sequence[SlopeRow]) -> list[Check]:
+def _c48(rows: Sequence[SlopeRow]) -> Check | None:
     ratios = {r.wheel: r.over_dry for r in rows if math.isfinite(r.contact_ratio)}
     told = {w: (x, ci) for w, (x, ci) in ratios.items() if all(map(math.isfinite, ci))}
     if not told:
-        return []
+        return None
     low = [w for w, (_, ci) in told.items() if ci[1] < 1.0]
     value, ci = max(told.values(), key=lambda found: found[1][1])
     whole = len(low) == len(told)
@@ -174,17 +175,15 @@ def _c48(rows: Sequence[SlopeRow]) -> list[Check]:
         "; ".join(f"{w} {x:.2f} [{c[0]:.2f}, {c[1]:.2f}]" for w, (x, c) in told.items())
         + f" at {rows[0].low_kmh:.0f} to {rows[0].high_kmh:.0f} km/h"
     )
-    return [
-        judge(
-            "C48.figure",
-            outcome,
-            whole=whole,
-            part=bool(low),
-            value=value,
-            ci95=(ci[0], ci[1]),
-            fields={"level": ", ".join(w for w in told if w not in low)},
-        )
-    ]
+    return judge(
+        "C48.figure",
+        outcome,
+        whole=whole,
+        part=bool(low),
+        value=value,
+        ci95=(ci[0], ci[1]),
+        fields={"level": ", ".join(w for w in told if w not in low)},
+    )
 
 
 def _cloud(evidence: Evidence, found: Slopes, row: SlopeRow, *, is_wet: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -265,7 +264,7 @@ def figure_2_16(number: str, evidence: Evidence) -> Figure:
         ),
     )  # fmt: skip
     return figure_of(
-        number, panels, _c48(at), (table,), runs=found.selected.used(), fixed=found.selected.fixed, low=best[0],
+        number, panels, [_c48(at)], (table,), runs=found.selected.used(), fixed=found.selected.fixed, low=best[0],
         high=best[1], kmh=v / KMH, rest=rest,
     )  # fmt: skip
 
@@ -276,35 +275,35 @@ _TOLD, _LEAST_RUNS = limit("told", "C49.figure"), limit("least_runs", "C49.figur
 _SLIGHT_RATIO = limit("slight", "C52.figure")  # times: "slightly higher"
 
 
-def _c49(found: Slopes) -> list[Check]:
+def _c49(found: Slopes) -> Check | None:
     rows = [r for x in found.levels for r in found.of(x) if r.runs >= _LEAST_RUNS]
     if not rows:
-        return []
+        return None
     told = len(usable(rows)) / len(rows)
-    return [judge("C49.figure", f"in {len(usable(rows))} of {len(rows)} bins", whole=told >= _TOLD, value=100 * told)]
+    return judge("C49.figure", f"in {len(usable(rows))} of {len(rows)} bins", whole=told >= _TOLD, value=100 * told)
 
 
-def _c50(found: Slopes) -> list[Check]:
+def _c50(found: Slopes) -> Check | None:
     levels = [x for x in found.levels if usable(found.of(x))]
     effects = {
         w: e for w in found.wheels
         if len(levels) > 1 and (e := ratio(found.of(levels[0], w), found.of(levels[-1], w))) is not None
     }  # fmt: skip
     if not effects:
-        return []
+        return None
     ratios = {w: e[0] for w, e in effects.items()}
     none = [w for w, e in ratios.items() if e.low <= 1.0 <= e.high or (e.low >= 1 - _SAME and e.high <= 1 + _SAME)]
     worst = min(ratios.values(), key=lambda e: e.value)
     outcome = f"{levels[-1].name} over {levels[0].name}: " + "; ".join(f"{w} {e.words(2)}" for w, e in ratios.items())
-    return [
-        judge("C50.figure", outcome, whole=len(none) == len(ratios), part=bool(none), value=worst.value, ci95=worst.ci)
-    ]
+    return judge(
+        "C50.figure", outcome, whole=len(none) == len(ratios), part=bool(none), value=worst.value, ci95=worst.ci
+    )
 
 
-def _c51(found: Slopes) -> list[Check]:
+def _c51(found: Slopes) -> Check | None:
     falls = {f"{x.name} {w}": e for x in found.levels for w in found.wheels if (e := fall(found.of(x, w))) is not None}
     if not falls:
-        return []
+        return None
     down = [n for n, e in falls.items() if e.is_below]
     least = max(falls.values(), key=lambda e: e.high)
     whole = len(down) == len(falls)
@@ -312,23 +311,21 @@ def _c51(found: Slopes) -> list[Check]:
         f"below 0 in {len(down)} of {len(falls)} curves; changes {min(e.value for e in falls.values()):.0f} to "
         f"{max(e.value for e in falls.values()):.0f} % per 10 km/h; the least certain one"
     )
-    return [
-        judge(
-            "C51.figure",
-            outcome,
-            whole=whole,
-            part=2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values()),
-            value=least.value,
-            ci95=least.ci,
-            fields={"level": ", ".join(n for n in falls if n not in down)},
-        )
-    ]
+    return judge(
+        "C51.figure",
+        outcome,
+        whole=whole,
+        part=2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values()),
+        value=least.value,
+        ci95=least.ci,
+        fields={"level": ", ".join(n for n in falls if n not in down)},
+    )
 
 
-def _c52(found: Slopes) -> list[Check]:
+def _c52(found: Slopes) -> Check | None:
     left, right = (next((w for w in found.wheels if w[1] == side), None) for side in "lr")
     if left is None or right is None:
-        return []
+        return None
     both = [
         (a, b) for x in found.levels for a, b in [(found.of(x, left), found.of(x, right))] if usable(a) and usable(b)
     ]
@@ -336,7 +333,7 @@ def _c52(found: Slopes) -> list[Check]:
     rough = [(uneven(a), uneven(b)) for a, b in both]
     rough = [(a, b) for a, b in rough if a == a and b == b]
     if not effects:
-        return []
+        return None
     higher = [e for e in effects if e.low > 1.0]
     most = [e for e in effects if e.value > 1.0]
     rougher = sum(a > b for a, b in rough)
@@ -348,39 +345,33 @@ def _c52(found: Slopes) -> list[Check]:
         + "; ".join(e.words(2) for e in effects)
         + f"; left less uniform in {rougher} of {len(rough)}"
     )
-    return [
-        judge(
-            "C52.figure",
-            outcome,
-            whole=is_higher and is_rougher,
-            part=is_higher or is_rougher,
-            value=mean.value,
-            ci95=mean.ci,
-            reason=""
-            if is_higher and is_rougher
-            else f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
-            + ("." if is_rougher else "; the right wheels, on more water, scatter as much."),
-        )
-    ]
-
-
-def _claims(found: Slopes) -> Sequence[Check]:
-    return [*_c49(found), *_c50(found), *_c51(found), *_c52(found)]
+    return judge(
+        "C52.figure",
+        outcome,
+        whole=is_higher and is_rougher,
+        part=is_higher or is_rougher,
+        value=mean.value,
+        ci95=mean.ci,
+        reason=""
+        if is_higher and is_rougher
+        else f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
+        + ("." if is_rougher else "; the right wheels, on more water, scatter as much."),
+    )
 
 
 _SLOW_KMH = limit("slow_kmh", "C53.figure")  # "low velocities", far below aquaplaning
 _ALIKE = limit("same", "C53.figure")  # of the slope: less is alike
 
 
-def _c53(found: Slopes) -> Sequence[Check]:
+def _c53(found: Slopes) -> Check | None:
     levels = found.levels
     if len(levels) < 2:
-        return ()
+        return None
     low, high = found.of(levels[0]), found.of(levels[-1])
     slow, over_all = ratio(low, high, up_to_kmh=_SLOW_KMH), ratio(low, high)
     near = ratio(low, found.of(levels[1])) if len(levels) > 2 else None
     if slow is None or over_all is None:
-        return ()
+        return None
     is_less, is_flatter = slow[0].high < 1.0, over_all[1].is_above
     # an interval that holds 1 may be wide: alike is what lies near 1 as a whole
     alike = near is None or (near[0].low >= 1.0 - _ALIKE and near[0].high <= 1.0 + _ALIKE)
@@ -395,23 +386,21 @@ def _c53(found: Slopes) -> Sequence[Check]:
         "less "
         f"by {over_all[1].words(1)} %{middle}"
     )
-    return (
-        judge(
-            "C53.figure",
-            outcome,
-            whole=whole,
-            part=is_less or is_flatter,
-            value=slow[0].value,
-            ci95=slow[0].ci,
-            fields={"lacking": ", ".join(lacking)},
-        ),
+    return judge(
+        "C53.figure",
+        outcome,
+        whole=whole,
+        part=is_less or is_flatter,
+        value=slow[0].value,
+        ci95=slow[0].ci,
+        fields={"lacking": ", ".join(lacking)},
     )
 
 
 _NONE = limit("none", "C54.figure")  # [% per 10 km/h] a fall that does not count: a tenth over the speeds driven
 
 
-def _c54(found: Slopes) -> Sequence[Check]:
+def _c54(found: Slopes) -> Check | None:
     rows = []
     for words, worn, new in pairs(found.levels, found.selected.wish):
         for wheel in found.wheels:
@@ -419,23 +408,21 @@ def _c54(found: Slopes) -> Sequence[Check]:
             if old is not None and deep is not None:
                 rows.append((f"{words} {wheel}".strip(), old, deep))
     if not rows:
-        return ()
+        return None
     level = [r for r in rows if r[2].is_none(_NONE) or r[2].is_above]
     falling = [r for r in rows if r[1].is_below]
     less = [r for r in rows if r[2].value > r[1].value / 3.0]
     worst = min((r[2] for r in rows), key=lambda e: e.low)
     whole = len(level) == len(rows) and len(falling) == len(rows)
     outcome = "; ".join(f"{n}: worn {a.words(1)}, less worn {b.words(1)} %" for n, a, b in rows)
-    return (
-        judge(
-            "C54.figure",
-            outcome,
-            whole=whole,
-            part=len(less) == len(rows),
-            value=worst.value,
-            ci95=worst.ci,
-            fields={"still": len(level), "all": len(rows), "falling": len(falling)},
-        ),
+    return judge(
+        "C54.figure",
+        outcome,
+        whole=whole,
+        part=len(less) == len(rows),
+        value=worst.value,
+        ci95=worst.ci,
+        fields={"still": len(level), "all": len(rows), "falling": len(falling)},
     )
 
 
@@ -459,34 +446,32 @@ def _effects_of_load_and_pressure(found: Slopes) -> dict[str, Effect]:
     }  # fmt: skip
 
 
-def _c55(found: Slopes) -> Sequence[Check]:
+def _c55(found: Slopes) -> Check | None:
     effects = _effects_of_load_and_pressure(found)
     if not effects:
-        return ()
+        return None
     up = [n for n, e in effects.items() if e.is_above]
     slight = all(abs(e.value) < _SLIGHT_PERCENT for e in effects.values())
     name, first = next(iter(effects.items()))
     whole = len(up) == len(effects) and slight
     outcome = "; ".join(f"{n}: {e.words(1)} %" for n, e in effects.items())
-    return (
-        judge(
-            "C55.figure",
-            outcome,
-            whole=whole,
-            part=bool(up),
-            value=first.value,
-            ci95=first.ci,
-            reason=""
-            if whole
-            else "Not higher by " + ", ".join(n for n in effects if n not in up) + "."
-            if len(up) < len(effects)
-            else "More than slightly.",
-            fields={"name": name},
-        ),
+    return judge(
+        "C55.figure",
+        outcome,
+        whole=whole,
+        part=bool(up),
+        value=first.value,
+        ci95=first.ci,
+        reason=""
+        if whole
+        else "Not higher by " + ", ".join(n for n in effects if n not in up) + "."
+        if len(up) < len(effects)
+        else "More than slightly.",
+        fields={"name": name},
     )
 
 
-_OF_FIGURE: Mapping[str, Callable[[Slopes], Sequence[Check]]] = {
-    "2.17": _claims, "2.18": _c53, "2.19": _c54, "2.20": _c55
+_OF_FIGURE: Mapping[str, tuple[Callable[[Slopes], Check | None], ...]] = {
+    "2.17": (_c49, _c50, _c51, _c52), "2.18": (_c53,), "2.19": (_c54,), "2.20": (_c55,)
 }  # fmt: skip
 FIGURES = {"2.16": figure_2_16, **dict.fromkeys(_OF_FIGURE, over_speed)}

@@ -36,25 +36,23 @@ _BEFORE, _BEFORE_TOL = 20.0, 5.0  # [km/h]
 _LEAST = 3  # passes
 
 
-def _shares(found: Sequence[Pass], kmh: float, holds: Callable[[Pass], bool], claim: str, word: str) -> list[Check]:
+def _shares(found: Sequence[Pass], kmh: float, holds: Callable[[Pass], bool], claim: str, word: str) -> Check | None:
     near = [p for p in found if abs(p.v_mean - kmh * KMH) <= _NEAR]
     if len(near) < _LEAST:
-        return []
+        return None
     hit = sum(holds(p) for p in near)
     low, high = wilson(hit, len(near))
     share = hit / len(near)
     outcome = f"{hit} of {len(near)} passes at {kmh:g} ± {_NEAR / KMH:g} km/h {word}"
-    return [
-        judge(
-            f"{claim}.figure",
-            outcome,
-            whole=share >= 0.5 and low > 0.0,
-            part=hit > 0,
-            value=share,
-            ci95=(low, high),
-            fields={"full": _full(found)},
-        )
-    ]
+    return judge(
+        f"{claim}.figure",
+        outcome,
+        whole=share >= 0.5 and low > 0.0,
+        part=hit > 0,
+        value=share,
+        ci95=(low, high),
+        fields={"full": _full(found)},
+    )
 
 
 def _full(found: Sequence[Pass]) -> str:
@@ -62,14 +60,14 @@ def _full(found: Sequence[Pass]) -> str:
     return f"{v / KMH:.0f} km/h" if np.isfinite(v) else "no speed that was driven"
 
 
-def at_89(found: Sequence[Pass]) -> list[Check]:
+def at_89(found: Sequence[Pass]) -> Check | None:
     """C14: minor spin-downs at 89 km/h."""
     return _shares(
         found, 89.0, has_minor, "C14", "with minor spin-downs of a free wheel",
     )  # fmt: skip
 
 
-def at_118(evidence: Evidence, found: Sequence[Pass]) -> list[Check]:
+def at_118(evidence: Evidence, found: Sequence[Pass]) -> Check | None:
     """C16: full spin-down at once at 118 km/h, and the rear spins up."""
 
     def at_once(p: Pass) -> bool:
@@ -87,50 +85,48 @@ def at_118(evidence: Evidence, found: Sequence[Pass]) -> list[Check]:
     )  # fmt: skip
 
 
-def rising_number(found: Sequence[Pass]) -> list[Check]:
+def rising_number(found: Sequence[Pass]) -> Check | None:
     """C15: number and depth of the minor spin-downs rise with speed, up to full aquaplaning."""
     calm = [p for p in found if not has_full(p)]
     v_first = min((p.v_mean for p in calm if has_minor(p)), default=np.nan)
     part = [p for p in calm if p.v_mean >= v_first - TEN]
     if not np.isfinite(v_first) or len(part) < _LEAST:
-        return []
+        return None
     v = np.array([p.v_mean for p in part]) / TEN
     columns = [np.ones(v.size), v - v.mean()]
     number = over_passes(columns, np.array([sum(p.minor.values()) / p.seconds for p in part]))
     deepest = np.array([-min(x for x in p.deepest.values()) for p in part])
     depth = over_passes(columns, 100.0 * deepest)
     if number is None or depth is None:
-        return []
+        return None
     both = [number[1].is_above, depth[1].is_above]
     outcome = (
         f"per 10 km/h {number[1].words(2)} more spin-downs a second, {depth[1].words(1)} % deeper slip "
         f"({len(part)} "
         "passes)"
     )
-    return [
-        judge(
-            "C15.figure",
-            outcome,
-            whole=all(both),
-            part=any(both),
-            value=number[1].value,
-            ci95=number[1].ci,
-            reason=""
-            if all(both)
-            else "Several short dips merge into one longer spin-down."
-            if both[1]
-            else "The passes are few, or cover little speed.",
-        )
-    ]
+    return judge(
+        "C15.figure",
+        outcome,
+        whole=all(both),
+        part=any(both),
+        value=number[1].value,
+        ci95=number[1].ci,
+        reason=""
+        if all(both)
+        else "Several short dips merge into one longer spin-down."
+        if both[1]
+        else "The passes are few, or cover little speed.",
+    )
 
 
-def before_full(found: Sequence[Pass]) -> list[Check]:
+def before_full(found: Sequence[Pass]) -> Check | None:
     """C17: minor spin-downs from 20 km/h below full aquaplaning on."""
     if len(found) < _LEAST:
-        return []
+        return None
     (first, firsts), (full, fulls) = half_speeds(found, [begins, has_full])
     if not (np.isfinite(first) and np.isfinite(full)):
-        return []
+        return None
     away = (full - first) / KMH
     low, high = (float(x) / KMH for x in np.nanquantile(fulls - firsts, (0.025, 0.975)))
     lo, hi = _BEFORE - _BEFORE_TOL, _BEFORE + _BEFORE_TOL
@@ -138,20 +134,18 @@ def before_full(found: Sequence[Pass]) -> list[Check]:
     outcome = (
         f"full at {full / KMH:.0f} km/h, minor from {first / KMH:.0f} km/h on: {away:.0f} km/h ({len(found)} passes)"
     )
-    return [
-        judge(
-            "C17.figure",
-            outcome,
-            whole=whole,
-            part=low <= hi and high >= lo,
-            value=away,
-            ci95=(low, high),
-            fields={"lo": lo, "hi": hi},
-        )
-    ]
+    return judge(
+        "C17.figure",
+        outcome,
+        whole=whole,
+        part=low <= hi and high >= lo,
+        value=away,
+        ci95=(low, high),
+        fields={"lo": lo, "hi": hi},
+    )
 
 
-def exponential(found: Sequence[Pass]) -> list[Check]:
+def exponential(found: Sequence[Pass]) -> Check | None:
     """C18: the deepest slip grows with speed like an exponential."""
     part = [p for p in found if not has_full(p)]
     deepest = np.array([-min(p.deepest.values()) for p in part])
@@ -160,7 +154,7 @@ def exponential(found: Sequence[Pass]) -> list[Check]:
     v, deepest = v[good], deepest[good]
     grown = over_passes([np.ones(v.size), v - v.mean()], np.log(deepest)) if v.size > _LEAST else None
     if grown is None:
-        return []
+        return None
     rate = grown[1].mapped(lambda x: 100.0 * math.expm1(x))
     curve, line = _rms_exponential(v, deepest), _rms_line(v, deepest)
     whole = rate.is_above and curve < line
@@ -168,21 +162,19 @@ def exponential(found: Sequence[Pass]) -> list[Check]:
         f"{rate.words(0)} % deeper per 10 km/h; rms about the exponential {100 * curve:.2f} %, about the line "
         f"{100 * line:.2f} % of slip ({v.size} passes)"
     )
-    return [
-        judge(
-            "C18.figure",
-            outcome,
-            whole=whole,
-            part=rate.is_above,
-            value=rate.value,
-            ci95=rate.ci,
-            reason=""
-            if whole
-            else "The slip rises, but not faster than a straight line."
-            if rate.is_above
-            else "No rise exceeds the scatter.",
-        )
-    ]
+    return judge(
+        "C18.figure",
+        outcome,
+        whole=whole,
+        part=rate.is_above,
+        value=rate.value,
+        ci95=rate.ci,
+        reason=""
+        if whole
+        else "The slip rises, but not faster than a straight line."
+        if rate.is_above
+        else "No rise exceeds the scatter.",
+    )
 
 
 def _rms_line(v: FloatArray, y: FloatArray) -> float:
@@ -208,25 +200,23 @@ def _where(found: Sequence[Pass]) -> str:
     return f"They are in {', '.join(depths)} ({there} passes), at {', '.join(wheels)}."
 
 
-def new_tread(found: Sequence[Pass], words: str) -> list[Check]:
+def new_tread(found: Sequence[Pass], words: str) -> Check | None:
     """C19: no minor spin-downs on new winter tyres."""
     if len(found) < _LEAST:
-        return []
+        return None
     hit = sum(begins(p) for p in found)
     low, high = wilson(hit, len(found))
     top = max(p.v_mean for p in found) / KMH
     outcome = f"{hit} of {len(found)} passes of {words}, up to {top:.0f} km/h"
-    return [
-        judge(
-            "C19.figure",
-            outcome,
-            whole=hit == 0,
-            part=hit <= 0.05 * len(found),
-            value=hit / len(found),
-            ci95=(low, high),
-            fields={"where": _where(found)},
-        )
-    ]
+    return judge(
+        "C19.figure",
+        outcome,
+        whole=hit == 0,
+        part=hit <= 0.05 * len(found),
+        value=hit / len(found),
+        ci95=(low, high),
+        fields={"where": _where(found)},
+    )
 
 
 _BELOW = (29.0, 20.0, 12.0, 0.0)  # [km/h] below full aquaplaning: the thesis' 89, 98, 106 and 118 km/h
@@ -249,13 +239,12 @@ def figure_2_03(number: str, evidence: Evidence) -> Figure:
     shown = spread_over(constant, evidence, [top - b * KMH for b in _BELOW])
     what = "the speed at which half of the passes have a full spin-down" if np.isfinite(v_full) else "the fastest pass"
     words = {r.index: "drawn, and counted" for r in shown}
-    claims = [*rising_number(found), *before_full(found)]
-    if selected.is_thesis:
-        claims = [*at_89(found), *claims, *at_118(evidence, found)]
+    at_speeds = (at_89(found), at_118(evidence, found)) if selected.is_thesis else (None, None)
+    checks = (at_speeds[0], rising_number(found), at_speeds[1], before_full(found))
     return figure_of(
         number,
         tuple(speed_panels(evidence, shown)),
-        tuple(sorted(claims, key=lambda c: c.claim)),
+        checks,
         runs=selected.used({r.index: words.get(r.index, "counted") for r in selected.runs}),
         fixed=selected.fixed,
         top=top / KMH,
@@ -263,7 +252,7 @@ def figure_2_03(number: str, evidence: Evidence) -> Figure:
     )
 
 
-def _deep(evidence: Evidence, selected: Selected) -> list[Check]:
+def _deep(evidence: Evidence, selected: Selected) -> Check | None:
     """C19 over the passes of winter tyres that are less worn than the tyres shown."""
     shown = wear_rank(value_of(selected.runs[0], "tyre"))
     runs = [
@@ -272,7 +261,7 @@ def _deep(evidence: Evidence, selected: Selected) -> list[Check]:
         and (rank := wear_rank(tyre)) is not None and rank > shown
     ]  # fmt: skip
     if not runs:
-        return []
+        return None
     return new_tread(passes_of(evidence, runs), label("tyre", value_of(runs[0], "tyre")))
 
 
@@ -293,7 +282,7 @@ def figure_2_04(number: str, evidence: Evidence) -> Figure:
     return figure_of(
         number,
         (Panel("Slip of the free wheels", V_KMH, Axis("slip", "%"), tuple(lines)),),
-        (*before_full(found), *exponential(found), *_deep(evidence, selected)),
+        (before_full(found), exponential(found), _deep(evidence, selected)),
         runs=selected.used(),
         fixed=selected.fixed,
     )

@@ -69,13 +69,13 @@ def spins(evidence: Evidence, info: RunInfo) -> bool:
     return any(int(np.count_nonzero(wet & is_spinning(samples, w))) >= _LEAST_STEPS for w in info.vehicle.driven)
 
 
-def far_below(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Check]:
+def far_below(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     """C20: spin-ups far below full aquaplaning, by the torque."""
     facts = [evidence.of(r) for r in runs]
     v = np.array([f.v for f in facts])
     hit = np.array([float(spins(evidence, r)) for r in runs])
     if len(runs) < _LEAST or not hit.any():
-        return []
+        return None
     full = full_speed(passes_of(evidence, runs))
     known = bool(np.isfinite(full))
     away = ((full if known else float(v.max())) - float(v[hit > 0].min())) / KMH
@@ -104,22 +104,20 @@ def far_below(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Check]:
         f"{hit.size} "
         "passes spin up"
     )
-    return [
-        judge(
-            "C20.figure",
-            outcome,
-            whole=is_far and is_driven,
-            part=is_far or is_driven,
-            value=None if by_torque is None else by_torque.value,
-            ci95=None if by_torque is None else by_torque.ci,
-            unit="per 0.01" if by_torque is not None else "",
-            reason=""
-            if is_far and is_driven
-            else "The influence of the torque does not exceed the scatter."
-            if is_far
-            else "Spin-ups begin close to full aquaplaning.",
-        )
-    ]
+    return judge(
+        "C20.figure",
+        outcome,
+        whole=is_far and is_driven,
+        part=is_far or is_driven,
+        value=None if by_torque is None else by_torque.value,
+        ci95=None if by_torque is None else by_torque.ci,
+        unit="per 0.01" if by_torque is not None else "",
+        reason=""
+        if is_far and is_driven
+        else "The influence of the torque does not exceed the scatter."
+        if is_far
+        else "Spin-ups begin close to full aquaplaning.",
+    )
 
 
 def _demand(evidence: Evidence, info: RunInfo) -> float:
@@ -130,18 +128,18 @@ def _demand(evidence: Evidence, info: RunInfo) -> float:
     return float(np.nanmean(mu)) if np.isfinite(mu).any() else float("nan")
 
 
-def irregular(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Check]:
+def irregular(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     """C21: passes with and without a spin-up mix over the speeds."""
     hit = np.array([spins(evidence, r) for r in runs])
     v = np.array([evidence.of(r).v for r in runs]) / KMH
     if len(runs) < _LEAST or not hit.any():
-        return []
+        return None
     mixed = float(v[~hit].max() - v[hit].min()) if not hit.all() else float("-inf")
     whole = mixed >= _IRREGULAR
     outcome = f"with a spin-up from {v[hit].min():.0f} km/h on, without one up to " + (
         f"{v[~hit].max():.0f} km/h" if not hit.all() else "no speed: all passes spin up"
     )
-    return [judge("C21.figure", outcome, whole=whole, part=mixed > 0.0, value=mixed if np.isfinite(mixed) else None)]
+    return judge("C21.figure", outcome, whole=whole, part=mixed > 0.0, value=mixed if np.isfinite(mixed) else None)
 
 
 def spin_up_pool(evidence: Evidence, runs: Sequence[RunInfo], wheel: str) -> Pool | None:
@@ -153,26 +151,24 @@ def spin_up_pool(evidence: Evidence, runs: Sequence[RunInfo], wheel: str) -> Poo
     return pool_of(evidence, runs, columns)
 
 
-def falling_traction(pools: dict[str, Pool]) -> list[Check]:
+def falling_traction(pools: dict[str, Pool]) -> Check | None:
     """C22: the traction coefficient in spin-ups falls with speed."""
     effects = {w: e for w, p in pools.items() if (e := trend(p)).ci is not None}
     if not effects:
-        return []
+        return None
     down = [w for w, e in effects.items() if e.is_below]
     worst = max(effects.values(), key=lambda e: e.high)
     whole = len(down) == len(effects)
     outcome = "per 10 km/h: " + "; ".join(f"{w} {e.words(4)}" for w, e in effects.items())
-    return [
-        judge(
-            "C22.figure",
-            outcome,
-            whole=whole,
-            part=bool(down),
-            value=worst.value,
-            ci95=worst.ci,
-            fields={"why": _unsure(effects, pools)},
-        )
-    ]
+    return judge(
+        "C22.figure",
+        outcome,
+        whole=whole,
+        part=bool(down),
+        value=worst.value,
+        ci95=worst.ci,
+        fields={"why": _unsure(effects, pools)},
+    )
 
 
 def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
@@ -184,29 +180,27 @@ def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
     return f"The spin-ups are too few or cover too small a range of speed ({'; '.join(words)})."
 
 
-def sides_differ(pools: dict[str, Pool]) -> list[Check]:
+def sides_differ(pools: dict[str, Pool]) -> Check | None:
     """C23: left and right differ, because there is less water on the left."""
     left, right = (next((p for w, p in pools.items() if w[1] == side), None) for side in "lr")
     found = difference(right, left) if left is not None and right is not None else None
     if found is None:
-        return []
+        return None
     level = found[0]
     outcome = f"left less right {level.words(4)}"
-    return [
-        judge(
-            "C23.figure",
-            outcome,
-            whole=level.is_above,
-            part=level.value > 0.0,
-            value=level.value,
-            ci95=level.ci,
-            reason=""
-            if level.is_above
-            else "The two sides do not differ significantly."
-            if level.low <= 0.0 <= level.high
-            else "The right wheel carries more.",
-        )
-    ]
+    return judge(
+        "C23.figure",
+        outcome,
+        whole=level.is_above,
+        part=level.value > 0.0,
+        value=level.value,
+        ci95=level.ci,
+        reason=""
+        if level.is_above
+        else "The two sides do not differ significantly."
+        if level.low <= 0.0 <= level.high
+        else "The right wheel carries more.",
+    )
 
 
 _PANELS = 4
@@ -226,7 +220,7 @@ def figure_2_05(number: str, evidence: Evidence) -> Figure:
     return figure_of(
         number,
         tuple(speed_panels(evidence, shown)),
-        (*far_below(evidence, selected.runs), *irregular(evidence, selected.runs)),
+        (far_below(evidence, selected.runs), irregular(evidence, selected.runs)),
         runs=selected.used({r.index: "drawn, and counted" if r.index in drawn else "counted" for r in selected.runs}),
         fixed=selected.fixed,
         slowest=min(v) / KMH,
@@ -250,7 +244,7 @@ def figure_2_06(number: str, evidence: Evidence) -> Figure:
     return figure_of(
         number,
         (Panel("Slip of the driven wheels", V_KMH, Axis("slip", "%"), tuple(lines)),),
-        (*far_below(evidence, selected.runs), *irregular(evidence, selected.runs)),
+        (far_below(evidence, selected.runs), irregular(evidence, selected.runs)),
         runs=selected.used({r.index: "with spin-up" if r in spun else "without spin-up" for r in selected.runs}),
         fixed=selected.fixed,
         spun=len(spun),
@@ -302,7 +296,7 @@ def figure_2_07(number: str, evidence: Evidence) -> Figure:
             Panel("Traction coefficient in spin-ups, from the torque", V_KMH, _MU, tuple(lines)),
             *([Panel("Less the water's share of the torque (lower bound)", V_KMH, _MU, low)] if low else []),
         ),
-        (*falling_traction(pools), *sides_differ(pools)),
+        (falling_traction(pools), sides_differ(pools)),
         (means_table("Traction coefficient [-]", {WHEEL_WORDS[w]: m for w, m in means.items()}, 4),),
         runs=selected.used({r.index: "with spin-up" if r in spun else "without spin-up" for r in selected.runs}),
         fixed=selected.fixed,

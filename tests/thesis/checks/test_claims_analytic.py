@@ -7,11 +7,11 @@ import pytest
 
 from aqualog.thesis.checks import contact, differential, estimator, excitation, joint, resistance_rules, wheels
 from aqualog.thesis.claims import DIFFERENCE, NEEDS_DATA, NOT_REPRODUCED, REPRODUCED, combined
-from aqualog.thesis.evidence.seeds import Plan
+from aqualog.thesis.evidence.seeds import Maker, Plan
 
 PLAN = Plan(range(1, 100))
 MODULES = (contact, differential, estimator, excitation)
-MAKERS = {m.claims: m.make for module in MODULES for m in module.CHECKS}
+MAKERS = {m.claims: m.checks for module in MODULES for m in module.CHECKS}
 ELSE = {
     # contact lengths are the simulator's, offset's sign, clamp, reason of the half-car, phase; perception
     "C9": DIFFERENCE, "C10": DIFFERENCE, "C86": DIFFERENCE, "C89": DIFFERENCE, "C98": DIFFERENCE, "C103": DIFFERENCE,
@@ -28,8 +28,12 @@ def test_claims(ids):
         assert combined(c.verdict for c in of) == ELSE.get(claim, REPRODUCED), "; ".join(c.found for c in of)
 
 
+def verdicts_of(make, claim, plan=PLAN):
+    return {c.verdict for c in Maker((claim,), make).checks(plan) if c.claim == claim}
+
+
 def verdict_of(make, claim, plan=PLAN):
-    return combined(c.verdict for c in make(plan) if c.claim == claim)
+    return combined(verdicts_of(make, claim, plan))
 
 
 def broken(function, factor=1.001):
@@ -79,9 +83,9 @@ def test_a_wrong_equation_is_found(monkeypatch, module, name, make, claim):
         factor = 3.0 if claim == "C10" else 1.001
         changed = broken(function, factor)
     few = Plan(range(1, 4))
-    assert NOT_REPRODUCED not in {c.verdict for c in make(few) if c.claim == claim}
+    assert NOT_REPRODUCED not in verdicts_of(make, claim, few)
     monkeypatch.setattr(module, name, changed)
-    assert NOT_REPRODUCED in {c.verdict for c in make(few) if c.claim == claim}
+    assert NOT_REPRODUCED in verdicts_of(make, claim, few)
 
 
 def test_waveforms_that_lag_are_found(monkeypatch):

@@ -20,11 +20,6 @@ def few(monkeypatch):
     return FEW
 
 
-def one(checks):
-    (check,) = checks
-    return check
-
-
 def test_detectors_see_no_truth():
     d = taken("puddle", 1)
     assert not [c for c in d.signals.frame.columns if c.startswith("true_")]
@@ -83,7 +78,7 @@ def test_variants_hold_the_detectors_own_bits():
 def test_sign_of_the_speed_difference(monkeypatch):
     monkeypatch.setattr(wheels, "_PER_WATER", 4)
     more = Plan(range(1, 5))
-    found = one(wheels._sign_of_speed(more))
+    found = wheels._sign_of_speed(more)
     assert found.verdict in (REPRODUCED, DIFFERENCE)
     assert found.value < 0.1
     # a detector that is its bare sum is no better than the bare sum
@@ -91,39 +86,39 @@ def test_sign_of_the_speed_difference(monkeypatch):
 
     bare = lambda p, s, a, dv, v, ok: (*cusum.scan(p.cusum, cusum.initial_state(), p.sign * a)[:2], s)  # noqa: E731
     monkeypatch.setattr(spin, "scan", bare)
-    assert one(wheels._sign_of_speed(more)).verdict == NOT_REPRODUCED
+    assert wheels._sign_of_speed(more).verdict == NOT_REPRODUCED
 
 
 def test_the_gate(few, monkeypatch):
-    found = one(joint_rules._gate(few))
+    found = joint_rules._gate(few)
     assert found.verdict == REPRODUCED
     assert found.value < 0.5
     without = joint_rules.variants
     monkeypatch.setattr(
         joint_rules, "variants", lambda n, s: {**without(n, s), "joint_criteria": without(n, s)["ungated"]}
     )
-    assert one(joint_rules._gate(few)).verdict == NOT_REPRODUCED
+    assert joint_rules._gate(few).verdict == NOT_REPRODUCED
 
 
 def test_braking_forces(few, monkeypatch):
-    assert one(joint_rules._spin_down(few)).verdict in (REPRODUCED, DIFFERENCE)
+    assert joint_rules._spin_down(few).verdict in (REPRODUCED, DIFFERENCE)
     without = joint_rules.variants
     monkeypatch.setattr(
         joint_rules, "variants", lambda n, s: {**without(n, s), "criterion_1": without(n, s)["spin_down"]}
     )
-    assert one(joint_rules._spin_down(few)).verdict == NOT_REPRODUCED
+    assert joint_rules._spin_down(few).verdict == NOT_REPRODUCED
 
 
 def test_resistance_is_its_own_indicator(few):
-    assert one(joint_rules._resistance(few)).verdict in (REPRODUCED, DIFFERENCE)
+    assert joint_rules._resistance(few).verdict in (REPRODUCED, DIFFERENCE)
 
 
 def test_sign_and_balance_of_the_resistance(monkeypatch):
-    assert one(resistance_rules._sign(Plan(range(1, 7)))).verdict == REPRODUCED
-    assert one(resistance_rules._balance(FEW)).verdict == DIFFERENCE
+    assert resistance_rules._sign(Plan(range(1, 7))).verdict == REPRODUCED
+    assert resistance_rules._balance(FEW).verdict == DIFFERENCE
     measure = resistance_rules._measure
     monkeypatch.setattr(resistance_rules, "_measure", lambda *a: -measure(*a))
-    assert one(resistance_rules._sign(Plan(range(1, 7)))).verdict == NOT_REPRODUCED
+    assert resistance_rules._sign(Plan(range(1, 7))).verdict == NOT_REPRODUCED
 
 
 def test_mass_and_rolling_resistance_matter_most():
@@ -136,7 +131,7 @@ def test_mass_and_rolling_resistance_matter_most():
 
 
 def test_high_pressure_and_winter_tyres():
-    assert one(slope_rules._pressure_and_tread(FEW)).verdict == REPRODUCED
+    assert slope_rules._pressure_and_tread(FEW).verdict == REPRODUCED
 
 
 def test_slopes_of_other_roads(monkeypatch):
@@ -146,4 +141,4 @@ def test_slopes_of_other_roads(monkeypatch):
     everywhere = {"slope": np.ones(1, dtype=bool), "joint_criteria": np.ones(1, dtype=bool)}
     monkeypatch.setattr(slope_rules, "variants", lambda n, s: everywhere)
     assert {c.part: c.verdict for c in slope_rules._unchanged(few)}["detection"] == NOT_REPRODUCED
-    assert one(slope_rules._not_unique(few)).verdict == NOT_REPRODUCED
+    assert slope_rules._not_unique(few).verdict == NOT_REPRODUCED

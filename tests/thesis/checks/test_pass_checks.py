@@ -25,7 +25,7 @@ from aqualog.thesis.evidence.passes import (
 )
 from aqualog.thesis.evidence.seeds import Cell, Plan, estimate, first_speed, mean, scatter, spread_over, table_of, told
 
-MAKERS = {m.claims[0]: m.make for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS}
+MAKERS = {m.claims[0]: m.checks for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS}
 SEEDS = (1, 2, 3, 4)
 
 # --- passes -----------------------------------------------------------------------------------------------------------
