@@ -33,7 +33,7 @@ from aqualog.io.whole import write_text, write_whole
 
 __all__ = ["Kept", "Key", "SignalCache", "cache_folder", "cache_limit"]
 
-_BEHIND = ("core", "io", "align")
+_BEHIND = ("core", "guard", "io", "align")
 _LIBRARIES = ("asammdf", "cantools", "mcap", "mcap-protobuf-support", "rosbags", "numpy", "polars")
 _ENTRY = re.compile(r"[0-9a-f]{8}-[0-9a-f]{32}-[0-9a-f]{8}\.parquet")
 _ORPHAN = re.compile(r"\.[0-9a-z-]{1,40}-\w{8}\.(parquet|json)\.tmp")  # as `write_whole` names them

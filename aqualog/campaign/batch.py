@@ -25,8 +25,9 @@ from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
 from aqualog.evaluate.labels import Label
-from aqualog.io.limits import VARIABLES, limits_from, size_of
-from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn, work_on
+from aqualog.guard.limits import VARIABLES, limits_from, size_of
+from aqualog.guard.pool import WorkOn, work_on
+from aqualog.guard.worker import NO_LIMITS, Crashed, Limits
 
 __all__ = [
     "BatchOutcome", "Compared", "Configured", "Fault", "Job", "compared", "measure_one", "name_of",

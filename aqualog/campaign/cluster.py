@@ -11,13 +11,13 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any, NamedTuple
 
-from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.io.limits import limits_from
-from aqualog.workers import NO_LIMITS, Crashed, Limits, WorkOn
+from aqualog.guard.limits import limits_from
+from aqualog.guard.pool import WorkOn, kept_worker
+from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
 
-__all__ = ["on_cluster"]
+__all__ = ["bounds_here", "on_cluster"]
 
 _MOST_IN_TASK = 32
 _TASKS_PER_THREAD = 4  # of the whole work, so that the last ones end together
@@ -33,7 +33,7 @@ _LOOK_S = 0.02
 def on_cluster(
     address: str, *, limits: Limits = NO_LIMITS, tell: Callable[[str], None] = lambda _: None
 ) -> Iterator[WorkOn]:
-    """Workers behind a scheduler in place of `aqualog.workers.work_on`.
+    """Workers behind a scheduler in place of `aqualog.guard.pool.work_on`.
 
     Parameters
     ----------
@@ -279,8 +279,29 @@ def _part(
     except ConfigError as error:
         lack = ConfigError(f"has {error.where}, which {error.what}", expected=error.expected)
         return Unfit(str(worker.address), lack)
-    with hand(here, worker.local_directory) as do:
+    with kept_worker(here, worker.local_directory) as do:
         return [do(work, *t) for t in tasks]
+
+
+def bounds_here(asked: Bounds, memory: int | None) -> Bounds:
+    """The requested limits, else those of this worker's environment; never more memory than dask gives the worker.
+
+    Parameters
+    ----------
+    asked : Bounds
+        Of the command; None is not set.
+    memory : int or None
+        dask's limit of the worker, which it keeps for the worker's own process only. [byte]
+
+    Raises
+    ------
+    ConfigError
+        If a variable of the environment is not a number.
+    """
+    given = {name: value for name, value in asked.reading._asdict().items() if value is not None}
+    reading = limits_from(os.environ)._replace(**given)
+    most = [m for m in (reading.memory_here(), memory) if m]
+    return Bounds(asked.item, reading._replace(memory=min(most, default=0)))
 
 
 def _unfit(address: str, worker: str, lack: ConfigError) -> ConfigError:

@@ -15,6 +15,7 @@ __all__ = ["Contents", "Seen", "change_since", "code_stamp", "result_key"]
 _BEHIND = (
     "core",
     "physics",
+    "guard",
     "io",
     "align",
     "features",

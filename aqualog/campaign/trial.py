@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 from aqualog.campaign.batch import CRASHED, Configured, Fault, Job, measure_one, run_batch
 from aqualog.campaign.store import Store
 from aqualog.core.compiled import kept_code
-from aqualog.workers import Crashed, work_on
+from aqualog.guard.pool import work_on
+from aqualog.guard.worker import Crashed
 
 __all__ = ["Trial", "Tried", "peak_memory", "tried"]
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aqualog.cli.apart import is_command
 from aqualog.cli.console import Console, told_if_interrupted
 from aqualog.core.errors import ConfigError, ExitCode
+from aqualog.guard.command import is_command
 
 if TYPE_CHECKING:
     from aqualog.face.campaign import Campaign, CampaignRuns

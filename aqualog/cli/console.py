@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import typer
 
-from aqualog.cli.apart import apart
 from aqualog.core.errors import AqualogError, ConfigError, ExitCode
 from aqualog.face.listener import Listener
+from aqualog.guard.command import supervised
 
 if TYPE_CHECKING:
     from aqualog.face.result import Result
@@ -182,11 +182,11 @@ def told_if_interrupted(text: str) -> Iterator[None]:
 def guarded(*, debug: bool) -> Iterator[None]:
     """One line and the contract's exit code for every error and interrupt; a traceback only with `--debug`.
 
-    Of the installed command all that is within is done `apart`.
+    Of the installed command all that is within is `supervised`.
     """
     data = _StandardOutput(sys.stdout)
     try:
-        with apart(debug=debug), redirect_stdout(cast("TextIO", data)):
+        with supervised(debug=debug), redirect_stdout(cast("TextIO", data)):
             yield
             # what stdout cannot take must come to light here, not when the interpreter ends
             data.flush()
@@ -231,8 +231,8 @@ def guarded(*, debug: bool) -> Iterator[None]:
 
 
 def _memory_told() -> str:
-    from aqualog.io.in_hand import memory_bound
-    from aqualog.io.limits import VARIABLES
+    from aqualog.guard.limits import VARIABLES
+    from aqualog.guard.system import memory_bound
 
     most = memory_bound()
     if not most:

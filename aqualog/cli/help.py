@@ -41,10 +41,10 @@ def help_pages(
       aqualog help cusum
       aqualog help reference/campaign
     """
-    from aqualog.cli.apart import here
     from aqualog.cli.console import guarded
+    from aqualog.guard.command import unsupervised
 
-    here()
+    unsupervised()
     with guarded(debug=debug):
         _show(_text([t for t in topic or () if t.strip()]))
 

@@ -12,10 +12,10 @@ import time
 import typer
 
 from aqualog import __version__
-from aqualog.cli.apart import ask
 from aqualog.cli.commands import Commands
 from aqualog.cli.start import interrupted
-from aqualog.cli.streams import ready
+from aqualog.guard.command import begin_command
+from aqualog.guard.streams import open_streams
 
 __all__ = ["app", "run"]
 
@@ -49,7 +49,7 @@ def run() -> None:
 
     A request to end is an interrupt as Ctrl-C is: it leaves by the usual way, so that no half-written file stays.
     """
-    ready()
+    open_streams()
     # a process of one command: modules are no garbage to look for again and again, least of all at its end
     gc.set_threshold(10_000)
     atexit.register(gc.freeze)
@@ -64,7 +64,7 @@ def run() -> None:
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, _raise)
         sys.unraisablehook = _lost
-    ask()
+    begin_command()
     try:
         app()
     except KeyboardInterrupt:  # before it was known which command it is

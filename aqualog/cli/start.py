@@ -6,14 +6,14 @@ import os
 import sys
 from typing import NoReturn
 
-from aqualog.cli.streams import ready
+from aqualog.guard.streams import open_streams
 
 __all__ = ["interrupted", "run"]
 
 
 def run() -> None:
     """Entry point of the installed command."""
-    ready()
+    open_streams()
     try:
         from aqualog.cli.main import run as begin
     except KeyboardInterrupt:

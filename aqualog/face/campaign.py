@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from aqualog.face.plan import BatchPlan
     from aqualog.face.propose import Proposal
     from aqualog.face.simulate import SimulatedCampaign
-    from aqualog.workers import Limits, WorkOn
+    from aqualog.guard.pool import WorkOn
+    from aqualog.guard.worker import Limits
 
 __all__ = ["Campaign", "CampaignRuns", "is_campaign"]
 
@@ -328,7 +329,7 @@ class Campaign:
             If the store cannot be written, or another batch writes there.
         """
         from aqualog.campaign.shard import part_of, shard_of
-        from aqualog.workers import Limits
+        from aqualog.guard.worker import Limits
 
         began = time.monotonic()
         if jobs is not None:
@@ -593,7 +594,7 @@ def _results(
 ) -> tuple[CampaignData, BatchOutcome]:
     """Bring the store up to date and load it; with `shard` the campaign is that shard's already."""
     from aqualog.core.user_folders import has_kept_code
-    from aqualog.workers import most_processes
+    from aqualog.guard.pool import most_processes
 
     if jobs is not None and jobs > most_processes():
         hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")

@@ -13,7 +13,7 @@ from aqualog.detect.long import detect_long
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import Settings
 from aqualog.face.paths import write_whole
-from aqualog.io.in_hand import unfinished
+from aqualog.guard.reading import unfinished
 
 __all__ = ["detect_in_windows"]
 

@@ -10,9 +10,9 @@ from typing import Any, Self, cast
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults
+from aqualog.guard.reading import reading
 from aqualog.io.base import Part, Reader, ReadOptions, part_of
 from aqualog.io.csv_format import format_of
-from aqualog.io.in_hand import reading
 from aqualog.io.sniff import sniff
 from aqualog.io.sound import read_sound
 

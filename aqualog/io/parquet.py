@@ -15,11 +15,11 @@ import polars as pl
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
+from aqualog.guard.system import bytes_text, free_memory
 from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import is_clock, is_stamp
-from aqualog.io.memory import bytes_text, free_memory
 from aqualog.io.parquet_groups import SoundRows, reason_of
 from aqualog.io.table_names import split_unit, unique_names
 from aqualog.io.table_time import (

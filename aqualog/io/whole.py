@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
-from aqualog.io.in_hand import unfinished
+from aqualog.guard.reading import unfinished
 
 __all__ = ["only_here", "write_text", "write_whole"]
 

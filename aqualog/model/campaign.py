@@ -12,12 +12,13 @@ import numpy as np
 
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.core.vehicle import Vehicle, vehicle_toml
+from aqualog.guard.pool import work_on
+from aqualog.guard.worker import Crashed
 from aqualog.io.whole import write_text, write_whole
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import PROGRAMMES, WEAR, Run
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
-from aqualog.workers import Crashed, work_on
 
 __all__ = ["CampaignOutcome", "simulate_campaign"]
 

@@ -10,12 +10,13 @@ from importlib import import_module
 
 from aqualog.campaign.samples import CampaignData
 from aqualog.core.errors import AqualogError, ConfigError
+from aqualog.guard.pool import work_on
+from aqualog.guard.worker import Crashed
 from aqualog.thesis.catalogue import NUMBERS, OF_CAMPAIGN, needs_campaign, rows
 from aqualog.thesis.claims import Check, Checks, Conclusion, claims, combined, number_of
 from aqualog.thesis.evidence.campaign import Evidence
 from aqualog.thesis.evidence.seeds import Maker, Plan
 from aqualog.thesis.record import Figure
-from aqualog.workers import Crashed, work_on
 
 __all__ = ["Made", "conclude", "make", "make_all"]
 

@@ -42,7 +42,7 @@ def in_batch(logs: Path, store: Path, **options: Any) -> int:
 
 def steady(logs: Path, store: Path, jobs: int) -> float:
     """Wall time of a log [s] once all processes have had theirs: from the first fifth on."""
-    from aqualog.workers import Limits
+    from aqualog.guard.worker import Limits
 
     stamps: list[tuple[float, int]] = []
 

@@ -1,7 +1,6 @@
 """The batch: what is new and nothing else, bad logs told, kills survived, a store that opens by itself."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -25,8 +24,8 @@ from aqualog.campaign.store import Store
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError, LogError
+from aqualog.guard.worker import Crashed
 from aqualog.model.programme import SEDAN
-from aqualog.workers import Crashed, work_on
 
 
 @pytest.fixture(scope="module")
@@ -224,40 +223,6 @@ def test_an_unforeseen_fault_of_one_log_leaves_the_others(own, monkeypatch):
     outcome = run_batch(configure(own), Store(own.parent / "s"))
     assert outcome.made == 2
     assert "ZeroDivisionError" in next(iter(outcome.failed.values()))
-
-
-def dies(i, folder):
-    (folder / f"{i}-{os.getpid()}").touch()
-    if i in (3, 11):
-        os._exit(9)
-    time.sleep(0.05)
-    return i
-
-
-def test_a_process_that_dies_is_one_item_tried_twice_and_leaves_what_is_beside_it(tmp_path):
-    found = {}
-    work_on({i: (i, tmp_path) for i in range(14)}, dies, jobs=2, record=found.__setitem__)
-    assert sorted(found) == list(range(14))
-    assert {i for i, r in found.items() if isinstance(r, Crashed)} == {3, 11}
-    tries = [p.name.split("-") for p in tmp_path.iterdir()]
-    assert sorted(int(i) for i, _ in tries) == sorted([*range(14), 3, 11])
-    assert len({process for _, process in tries}) <= 2 + 2 + 2
-
-
-def cannot_be_sent(i):
-    if i == 1:
-        return lambda: i
-    if i == 2:
-        raise ZeroDivisionError("of the item")
-    return i
-
-
-def test_what_an_item_raises_or_cannot_send_is_raised_here():
-    for i, error in ((1, TypeError), (2, ZeroDivisionError)):
-        found = {}
-        with pytest.raises(error):
-            work_on({0: (0,), i: (i,)}, cannot_be_sent, jobs=1, record=found.__setitem__)
-        assert found == {0: 0}
 
 
 def test_crash_is_told_and_tried_again(own, monkeypatch):

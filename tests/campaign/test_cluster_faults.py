@@ -22,14 +22,13 @@ from typer.testing import CliRunner
 
 import aqualog
 from aqualog.campaign import cluster as asking
-from aqualog.campaign import cluster_hand, cluster_worker
-from aqualog.campaign.cluster import on_cluster
-from aqualog.campaign.cluster_hand import Bounds, bounds_here, hand
+from aqualog.campaign import cluster_worker
+from aqualog.campaign.cluster import bounds_here, on_cluster
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.cli.main import app
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.io.limits import ReadLimits
-from aqualog.workers import NO_LIMITS, Crashed, Limits
+from aqualog.guard.limits import ReadLimits
+from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
 
 
 @contextmanager
@@ -113,18 +112,6 @@ def test_what_a_worker_may_take(monkeypatch):
     monkeypatch.setenv("AQUALOG_LIMIT_CPU_S", "soon")
     with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_CPU_S: is 'soon'; expected"):
         bounds_here(asked, None)
-
-
-def test_a_process_that_is_idle_ends(monkeypatch):
-    monkeypatch.setattr(cluster_hand, "_IDLE_S", 0.3)
-    with hand(Bounds(NO_LIMITS, ReadLimits())) as do:
-        worker = do(os.getpid)
-        assert do(os.getpid) == worker
-    for _ in range(100):
-        if not Path(f"/proc/{worker}").exists():
-            break
-        time.sleep(0.1)
-    assert not Path(f"/proc/{worker}").exists()
 
 
 def test_no_workers_is_said_after_a_while(campaign, tmp_path, monkeypatch):

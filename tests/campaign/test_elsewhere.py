@@ -16,7 +16,7 @@ from aqualog.campaign.shard import Shard, part_of, shard_of
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError
-from aqualog.workers import Crashed, Limits, work_on
+from aqualog.guard.worker import Crashed
 
 
 def run(*args):
@@ -116,48 +116,6 @@ def test_no_scheduler_is_a_clear_error(whole, tmp_path):
 @pytest.mark.parametrize("more", [["--cluster", "tcp://h:1", "--jobs", "2"], ["--cluster", " "]])
 def test_options_that_do_not_go_together(whole, tmp_path, more):
     assert run("batch", whole[0], "-o", tmp_path / "s", *more).exit_code == 2
-
-
-def sleep(seconds):
-    time.sleep(seconds)
-    return seconds
-
-
-def hang():
-    # in C, with the interpreter's lock held: no exception can end it
-    import re
-
-    re.match(r"(a+)+$", "a" * 40 + "b")
-
-
-def want(megabytes):
-    try:
-        return len(bytearray(megabytes * 1_000_000))
-    except MemoryError:
-        return "no memory"
-
-
-def test_what_takes_too_long_is_ended_and_the_others_are_not():
-    tasks = {"a": (0.0,), "b": (60.0,), "c": (0.1,), "d": (0.2,)}
-    found = {}
-    work_on(tasks, sleep, jobs=2, record=found.__setitem__, limits=Limits(seconds=1.0))
-    assert {n: r for n, r in found.items() if n != "b"} == {"a": 0.0, "c": 0.1, "d": 0.2}
-    assert isinstance(found["b"], Crashed)
-    assert found["b"].seconds >= 1.0
-
-
-def test_what_never_comes_back_to_python_is_ended():
-    found = {}
-    began = time.monotonic()
-    work_on({"a": ()}, hang, jobs=1, record=found.__setitem__, limits=Limits(seconds=1.0))
-    assert isinstance(found["a"], Crashed)
-    assert time.monotonic() - began < 30.0
-
-
-def test_too_much_memory_is_an_error_of_one_item():
-    found = {}
-    work_on({"a": (100,), "b": (3000,)}, want, jobs=2, record=found.__setitem__, limits=Limits(memory_mb=1500))
-    assert found == {"a": 100_000_000, "b": "no memory"}
 
 
 def test_a_log_that_takes_too_long_is_told_and_tried_again(whole, tmp_path, monkeypatch):

@@ -26,7 +26,6 @@ from aqualog.campaign.place import address_of, place_of
 from aqualog.campaign.place_local import Folder
 from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store
-from aqualog.cli import apart
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError, LogError
 
@@ -245,7 +244,7 @@ def test_memory_is_of_one_process(plain):
 
 
 def test_memory_that_ends_with_the_command_is_refused(plain, monkeypatch):
-    monkeypatch.setattr(apart, "_is_command", True)
+    monkeypatch.setattr("aqualog.guard.command._is_command", True)
     for command in (("batch", "-o"), ("bin-slipslope", "--store"), ("plan", "--store")):
         result = run(command[0], plain[0], command[1], "Memory://bucket/gone")
         assert (result.exit_code, result.stderr.count("\n")) == (2, 1)

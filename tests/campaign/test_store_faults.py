@@ -23,7 +23,7 @@ from aqualog.campaign.store import MARK, Store
 from aqualog.cli.main import app
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
-from aqualog.workers import most_processes
+from aqualog.guard.pool import most_processes
 
 
 @pytest.fixture(scope="module")

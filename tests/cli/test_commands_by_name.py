@@ -40,9 +40,7 @@ def test_listing_imports_no_command():
         "except SystemExit:\n    print('LOADED', *(m for m in sys.modules if m.startswith('aqualog.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split("LOADED")[1].split()) == {
-        f"aqualog.cli.{m}" for m in ("main", "commands", "apart", "start", "streams")
-    }
+    assert set(done.stdout.split("LOADED")[1].split()) == {f"aqualog.cli.{m}" for m in ("main", "commands", "start")}
 
 
 def test_modules_are_not_looked_through_for_garbage_at_the_end():

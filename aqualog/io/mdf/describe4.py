@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from aqualog.core.errors import LogError
+from aqualog.guard.system import bytes_text
 from aqualog.io.mdf.chains4 import HEAD, Block, BlockWalk
 from aqualog.io.mdf.records import Conversion, ConversionKind
 from aqualog.io.mdf.walk import BlockError
-from aqualog.io.memory import bytes_text
 
 __all__ = ["DescriptionWalk"]
 

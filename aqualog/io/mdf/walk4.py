@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aqualog.core.errors import LogError
+from aqualog.guard.system import bytes_text
 from aqualog.io.mdf.chains4 import HEAD, Block, Chain
 from aqualog.io.mdf.describe4 import DescriptionWalk
 from aqualog.io.mdf.records import Channel, Conversion, Field, Group
 from aqualog.io.mdf.walk import BlockError, Survey, plain_text, short
-from aqualog.io.memory import bytes_text
 
 __all__ = ["LARGEST_BLOCK", "survey4"]
 

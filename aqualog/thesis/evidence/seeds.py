@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.evaluate.intervals import wilson
+from aqualog.guard.pool import work_on
+from aqualog.guard.worker import Crashed
 from aqualog.thesis.claims import Check, Checks
 from aqualog.thesis.evidence.passes import Pass, PassFigures, figures_of
-from aqualog.workers import Crashed, work_on
 
 __all__ = [
     "PASS_SEEDS", "Maker", "Plan", "Rows", "Statistic", "Table", "bootstrap", "by_passes", "cells_of", "estimate",

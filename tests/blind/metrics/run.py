@@ -11,7 +11,8 @@ from blind.metrics.rows import Row
 from blind.metrics.store import Store
 
 from aqualog.face.progress import lasting
-from aqualog.workers import Crashed, work_on
+from aqualog.guard.pool import work_on
+from aqualog.guard.worker import Crashed
 
 __all__ = ["run"]
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from aqualog.core.errors import ConfigError
+from aqualog.guard.system import machine_memory
 
-__all__ = ["LEAST_MB", "VARIABLES", "ReadLimits", "limits_from", "machine_memory", "size_of"]
+__all__ = ["LEAST_MB", "VARIABLES", "ReadLimits", "limits_from", "size_of"]
 
 VARIABLES = {
     "wall": "AQUALOG_LIMIT_S",
@@ -99,37 +99,3 @@ def size_of(path: Path) -> int:
         return path.stat().st_size
     except OSError:
         return 0
-
-
-def machine_memory() -> int:
-    """Return the memory of this machine, or of the control group of this process [bytes]; 0 if unknown."""
-    try:
-        installed = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):
-        return 0
-    return min([installed, *_group_limits(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))])
-
-
-def _group_limits(groups: Path, root: Path) -> list[int]:
-    """Limits of the process's group and of those above it, in both versions of control groups."""
-    try:
-        lines = groups.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return []
-    found = []
-    for line in lines:
-        _, controllers, path = line.split(":", 2) if line.count(":") >= 2 else ("", "-", "")
-        if controllers == "":
-            base, name = root, "memory.max"
-        elif "memory" in controllers.split(","):
-            base, name = root / "memory", "memory.limit_in_bytes"
-        else:
-            continue
-        folder = base / path.lstrip("/")
-        for place in (folder, *folder.parents):
-            if place == base or place.is_relative_to(base):
-                try:
-                    found.append(int((place / name).read_text(encoding="ascii")))
-                except (OSError, ValueError):  # "max", or a folder that a container does not show
-                    continue
-    return [n for n in found if n > 0]

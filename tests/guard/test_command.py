@@ -11,21 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from aqualog.cli.aside import Lines
-from aqualog.cli.board import Board
-from aqualog.core.errors import AqualogError, ConfigError, LogError
-from aqualog.io import in_hand
-from aqualog.io.in_hand import InHand, reading, unfinished, watched_by
-from aqualog.io.limits import ReadLimits, _group_limits, limits_from, machine_memory
-from aqualog.workers import Crashed, Limits, work_on
-
 pytestmark = pytest.mark.skipif(not hasattr(signal, "sigtimedwait"), reason="commands work in one process here")
 
 HOSTILE = '''
 import collections, ctypes, itertools, os, sys, tempfile, time
 from pathlib import Path
 import aqualog.io.open_log as opening
-from aqualog.io.in_hand import unfinished
+from aqualog.guard.reading import unfinished
 csv = opening._READERS["csv"]
 
 def write(path):
@@ -140,23 +132,6 @@ def test_a_library_that_says_much_does_not_wait_for_the_one_that_watches(folder,
     assert sum(len(line) for line in told) == len(text.rstrip()) * 600 * 80
 
 
-def test_lines_of_panics_are_known_as_they_come():
-    lines = Lines()
-    text = [
-        b"one",
-        b"",
-        b"",
-        b"two",
-        b"",
-        b"thread 'a' panicked at b.rs:1:2:",
-        b"what",
-        b"  left: 1",
-        b"three",
-        b" four",
-    ]
-    assert [kept for line in text for kept in lines.kept([line])] == [b"one", b"", b"", b"two", b"three", b" four"]
-
-
 LINES = {
     "crash": "reading it ended the process (SIGSEGV: a fault of a library that reads it)",
     "leave": "reading it ended the process (exit code 0: a reading library gave up)",
@@ -262,124 +237,3 @@ def test_switched_off_a_command_works_in_the_process_that_was_called(folder, mon
     process = started(folder, "crash.csv")
     assert int(process.stderr.readline().split()[1]) == process.pid
     assert ended(process)[0] == -signal.SIGSEGV
-
-
-# --- in a batch -------------------------------------------------------------------------------------------------------
-
-
-def read_badly(path, kind):
-    acts = {"hang": lambda: time.sleep(60), "write": write_on}
-    try:
-        with reading(Path(path)):
-            acts.get(kind, int)()
-    except AqualogError as error:
-        return error.line()
-    return kind
-
-
-def write_on(path="endless"):
-    with open(path, "wb") as file:  # noqa: PTH123
-        while True:
-            file.write(bytes(1_000_000))
-
-
-def test_workers_of_a_batch_have_the_same_limits(tmp_path, monkeypatch):
-    """`--limit-s` is not given: a step of reading has its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("AQUALOG_LIMIT_S", "3")
-    monkeypatch.setenv("AQUALOG_LIMIT_FILE_MB", "5")
-    found = {}
-    work_on({k: ("a", k) for k in ("hang", "write", "y")}, read_badly, jobs=1, record=found.__setitem__)
-    assert found["y"] == "y"
-    assert isinstance(found["hang"], Crashed)
-    assert found["hang"].seconds >= 3.0
-    assert found["write"] == f"a: {LINES['write']}"
-
-
-def test_the_limit_of_an_item_stands_in_for_that_of_reading(tmp_path, monkeypatch):
-    monkeypatch.setenv("AQUALOG_LIMIT_S", "0.1")
-    found = {}
-    work_on({"a": (str(tmp_path),)}, slow_read, jobs=1, record=found.__setitem__, limits=Limits(seconds=30.0))
-    assert found == {"a": "read"}
-
-
-def slow_read(path):
-    with reading(Path(path)):
-        time.sleep(0.5)
-    return "read"
-
-
-# --- the parts --------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def told(monkeypatch):
-    """What a watcher of this process is told; nobody watches afterwards."""
-    monkeypatch.setattr(in_hand, "_watch", None)
-    monkeypatch.setattr(in_hand, "_held", InHand())
-    return []
-
-
-def test_what_is_in_hand_is_told(told, tmp_path):
-    log = tmp_path / "a.csv"
-    log.write_bytes(bytes(2_000_000))
-    with reading(log), unfinished(log):
-        pass
-    watched_by(told.append, ReadLimits(), {str(tmp_path / "b.csv"): "crashed"})
-    with unfinished(tmp_path / "x"), reading(log):
-        pass
-    with pytest.raises(LogError, match=r"b\.csv: crashed"), reading(tmp_path / "b.csv"):
-        pass
-    held = list(told)
-    told.clear()
-    with pytest.raises(AqualogError, match=r"a\.csv: its reader failed \(IndexError: x\)"), reading(log):
-        raise IndexError("x")
-    assert told[-1].log == ""
-    temporary = (str(tmp_path / "x"),)
-    assert held == [
-        InHand(temporary=temporary), InHand(str(log), 310.0, 2_000_000, 1, temporary),
-        InHand(step=2, temporary=temporary), InHand(step=2),
-    ]  # fmt: skip
-
-
-def test_the_board_tells_what_was_written_last_and_believes_no_nonsense():
-    board = Board()
-    assert board.read() == InHand()
-    held = InHand("/a b/ü\udcff.csv", 12.5, 3, 7, ("/tmp/x",))
-    board.tell(held)
-    assert board.read() == held
-    board._page[1:5] = b"\xff" * 4
-    assert board.read() == held
-    board.tell(held._replace(temporary=("x" * 5000,) * 20))
-    assert board.read() == held._replace(temporary=())
-    assert not board.is_finished
-    board.finish()
-    board.tell(held)
-    assert board.is_finished
-
-
-def test_limits_are_named_by_variables():
-    limits = limits_from({"AQUALOG_LIMIT_S": "5", "AQUALOG_LIMIT_MB": "0", "AQUALOG_LIMIT_FILE_MB": "1.5"})
-    assert limits == ReadLimits(wall_s=5.0, memory=0, file=1_500_000)
-    assert (limits.wall_for(10**9), limits.memory_here(), limits.file_for(10**9)) == (5.0, 0, 1_500_000)
-    # 100 h of MF4, 4.6 GB, are read in 4 min and 0.7 GB
-    assert ReadLimits().wall_for(4_600_000_000) > 3600.0
-    assert ReadLimits().memory_here() >= min(2_000_000_000, machine_memory())
-    for text in ("x", "-1", "nan", "inf", "1e10"):
-        with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_CPU_S: is .* expected a number of seconds"):
-            limits_from({"AQUALOG_LIMIT_CPU_S": text})
-    assert limits_from({"AQUALOG_LIMIT_FILE_MB": "1e-300"}).file == 1  # not 0, which is none
-    with pytest.raises(ConfigError, match=r"AQUALOG_LIMIT_MB: is '200'; expected 300 or more, or 0 for no limit"):
-        limits_from({"AQUALOG_LIMIT_MB": "200"})
-
-
-def test_memory_of_a_control_group(tmp_path):
-    (tmp_path / "a" / "b").mkdir(parents=True)
-    (tmp_path / "memory" / "c").mkdir(parents=True)
-    (tmp_path / "a" / "memory.max").write_text("5000\n")
-    (tmp_path / "a" / "b" / "memory.max").write_text("max\n")
-    (tmp_path / "memory" / "c" / "memory.limit_in_bytes").write_text("7000\n")
-    groups = tmp_path / "groups"
-    groups.write_text("3:cpu,memory:/c\n1:name=x:/\n0::/a/b\nnonsense\n")
-    assert sorted(_group_limits(groups, tmp_path)) == [5000, 7000]
-    assert _group_limits(tmp_path / "none", tmp_path) == []

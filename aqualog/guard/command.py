@@ -1,9 +1,9 @@
 """A command in a process of its own, watched by the one that was called.
 
 Logs are read by native libraries. One that crashes, never comes back, or takes memory without end ends the process
-that works, not the one that watches: it says which log it was and starts the work again, which then finds that this
-log cannot be read and goes on as it does with any such log. The process is forked when a command begins to work, before
-anything heavy is imported, so that `--help` costs nothing and a command a few milliseconds.
+that works, not the one that watches. That one names the log and starts the work again, which then finds that this log
+cannot be read and goes on as it does with any such log. The process is forked when a command begins to work, before
+anything heavy is imported: `--help` costs nothing and a command a few milliseconds.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 if TYPE_CHECKING:
-    from aqualog.cli.aside import Aside
-    from aqualog.cli.board import Board
-    from aqualog.io.in_hand import InHand
-    from aqualog.io.limits import ReadLimits
+    from aqualog.guard.limits import ReadLimits
+    from aqualog.guard.page import StatePage
+    from aqualog.guard.reading import ReadingState
+    from aqualog.guard.streams import ForeignStderr
 
-__all__ = ["apart", "ask", "here", "is_command"]
+__all__ = ["begin_command", "is_command", "supervised", "unsupervised"]
 
 _TICK_S = 0.25
-_SOON_S = 0.005  # a library that says much waits until there is room for it
+_SOON_S = 0.005  # a library that writes much waits until there is room for it
 _GRACE_S = 1.2  # after an interrupt, for a reader to come back to Python
 _MOST_REFUSED = 20  # each costs another beginning
 _SWITCH = "AQUALOG_LIMITS"
@@ -36,20 +36,19 @@ _TWICE_S = 0.5  # signals within are one request: a shell and a terminal may bot
 _DEAD_S = 5.0  # a process that a dead disk holds cannot be killed, and is not waited for
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 
-_asked = False
-_is_command = False
+_is_command = _is_awaited = False
 
 
-def ask() -> None:
-    """Let the command that this process was started for work apart."""
-    global _asked, _is_command
-    _asked = _is_command = True
+def begin_command() -> None:
+    """This process was started for one command, whose work is `supervised`."""
+    global _is_command, _is_awaited
+    _is_command = _is_awaited = True
 
 
-def here() -> None:
+def unsupervised() -> None:
     """Let the command work in this process: it reads no log."""
-    global _asked
-    _asked = False
+    global _is_awaited
+    _is_awaited = False
 
 
 def is_command() -> bool:
@@ -58,28 +57,28 @@ def is_command() -> bool:
 
 
 @contextmanager
-def apart(*, debug: bool) -> Iterator[None]:
+def supervised(*, debug: bool) -> Iterator[None]:
     """Work within the block in a process of its own; the process that was called never leaves it.
 
-    Without `ask`, where the system has no means, or with AQUALOG_LIMITS=off, the work is done here.
+    Without `begin_command`, where the system has no means, or with AQUALOG_LIMITS=off, the work is done here.
 
     Raises
     ------
     ConfigError
-        If a limit is no number.
+        If a limit is not a number.
     """
-    global _asked
-    asked, _asked = _asked, False
-    if not asked or os.environ.get(_SWITCH, "").strip().lower() == "off" or not _is_possible():
+    global _is_awaited
+    is_awaited, _is_awaited = _is_awaited, False
+    if not is_awaited or os.environ.get(_SWITCH, "").strip().lower() == "off" or not _is_possible():
         yield
         return
-    from aqualog.io.limits import limits_from
+    from aqualog.guard.limits import limits_from
 
-    board = _worker(limits_from(os.environ), debug=debug)
+    page = _in_worker(limits_from(os.environ), debug=debug)
     try:
         yield
     finally:
-        board.finish()
+        page.finish()
 
 
 def _is_possible() -> bool:
@@ -89,22 +88,21 @@ def _is_possible() -> bool:
 
 
 class _End(NamedTuple):
-    """How a worker has ended: exit code, or minus the signal; what it had in hand; seconds if it was too slow."""
+    """How a worker has ended: exit code, or minus the signal; what it was reading; seconds if it was too slow."""
 
     code: int
-    held: InHand
+    state: ReadingState
     seconds: float = 0.0
     is_interrupted: bool = False
 
 
-def _worker(limits: ReadLimits, *, debug: bool) -> Board:
+def _in_worker(limits: ReadLimits, *, debug: bool) -> StatePage:
     """Returns in the worker only."""
-    from aqualog.cli.aside import Aside
-    from aqualog.cli.board import Board
-    from aqualog.cli.scratch import Scratch
+    from aqualog.guard.page import StatePage
+    from aqualog.guard.scratch import Scratch, use_folder
+    from aqualog.guard.streams import ForeignStderr
 
-    board = Board()
-    scratch = Scratch()
+    page, scratch = StatePage(), Scratch()
     refused: dict[str, str] = {}
     waited = {getattr(signal, n) for n in _ENDING}
     waited = {s for s in waited if signal.getsignal(s) is not signal.SIG_IGN} | {signal.SIGCHLD}
@@ -112,54 +110,54 @@ def _worker(limits: ReadLimits, *, debug: bool) -> Board:
     while True:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
-        board.clear()
-        scratch.make()
-        aside = None if debug else Aside()
+        page.clear()
+        use_folder(scratch.make())
+        foreign = None if debug else ForeignStderr()
         me = os.getpid()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, waited)
         worker = os.fork()
         if worker == 0:
-            _begin(me, limits, board, refused, aside)
+            _begin(me, limits, page, refused, foreign)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            return board
-        if aside is not None:
-            aside.watch()
-        end = _watch(worker, board, waited, aside)
-        if aside is not None:
-            aside.end()
+            return page
+        if foreign is not None:
+            foreign.watch()
+        end = _watch(worker, page, waited, foreign)
+        if foreign is not None:
+            foreign.end()
         scratch.remove()
-        _clear_away(end.held)
+        _clear_away(end.state)
         if end.is_interrupted:
-            has_told = end.code == _INTERRUPTED or board.is_finished
-            _leave(_INTERRUPTED, "" if has_told else "interrupted")
-        if board.is_finished or not end.held.log:
-            _leave(*_last_word(end, is_finished=board.is_finished))
+            has_said_so = end.code == _INTERRUPTED or page.is_finished
+            _leave(_INTERRUPTED, "" if has_said_so else "interrupted")
+        if page.is_finished or not end.state.log:
+            _leave(*_last_word(end, is_finished=page.is_finished))
         why = _why(end, limits)
-        path = os.path.abspath(end.held.log)  # noqa: PTH100 - links are not followed
+        path = os.path.abspath(end.state.log)  # noqa: PTH100 - links are not followed
         if path in refused or len(refused) == _MOST_REFUSED:
-            _leave(_FAILED, f"error: {end.held.log}: {why}, as {len(refused)} logs before; no more are tried")
+            _leave(_FAILED, f"error: {end.state.log}: {why}, as {len(refused)} logs before; no more are tried")
         refused[path] = why
 
 
-def _begin(parent: int, limits: ReadLimits, board: Board, refused: dict[str, str], aside: Aside | None) -> None:
-    """Set the worker up; without `aside` everything that libraries write passes at once."""
-    import resource
-
-    from aqualog.io.in_hand import bound_memory, watched_by
+def _begin(
+    parent: int, limits: ReadLimits, page: StatePage, refused: dict[str, str], foreign: ForeignStderr | None
+) -> None:
+    """Set the worker up; without `foreign` everything that libraries write passes at once."""
+    from aqualog.guard.reading import watch_reading
+    from aqualog.guard.system import bound_memory, forbid_core
 
     _die_with(parent)
-    _, hard = resource.getrlimit(resource.RLIMIT_CORE)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, hard))  # as large as the memory, and with the log in it
+    forbid_core()
     if most := limits.memory_here():
         bound_memory(most)
-    if aside is None:
+    if foreign is None:
         import faulthandler
 
         faulthandler.enable()
     else:
         os.environ["RUST_BACKTRACE"] = "0"
-        aside.begin()
-    watched_by(board.tell, limits, refused)
+        foreign.begin()
+    watch_reading(page.write, limits, refused)
 
 
 def _die_with(parent: int) -> None:
@@ -174,7 +172,7 @@ def _die_with(parent: int) -> None:
         os._exit(_FAILED)
 
 
-def _watch(worker: int, board: Board, waited: set[signal.Signals], aside: Aside | None) -> _End:
+def _watch(worker: int, page: StatePage, waited: set[signal.Signals], foreign: ForeignStderr | None) -> _End:
     """Wait for the worker, pass signals on, end one that hangs."""
     interrupts, asked = 0, -math.inf
     step, spent, too_long = -1, 0.0, 0.0
@@ -182,37 +180,37 @@ def _watch(worker: int, board: Board, waited: set[signal.Signals], aside: Aside 
     then = time.monotonic()
     heard = -math.inf
     while True:
-        told = signal.sigtimedwait(waited, _SOON_S if then - heard < _TICK_S else _TICK_S)
+        came = signal.sigtimedwait(waited, _SOON_S if then - heard < _TICK_S else _TICK_S)
         now = time.monotonic()
         # a tick that lasted long was a machine asleep, or a job that was stopped
         tick, then = min(now - then, 4.0 * _TICK_S), now
         done, status, _ = os.wait4(worker, os.WNOHANG)
-        if aside is not None and aside.pass_on():
+        if foreign is not None and foreign.pass_on():
             heard = now
-        held = board.read()
+        state = page.read()
         if done or now - killed > _DEAD_S:
             code = os.waitstatus_to_exitcode(status) if done else -signal.SIGKILL
-            is_whole = board.is_finished and code >= 0
-            return _End(code, held, too_long, code == _INTERRUPTED or bool(interrupts and not is_whole))
-        if told is not None and told.si_signo != signal.SIGCHLD:
+            is_whole = page.is_finished and code >= 0
+            return _End(code, state, too_long, code == _INTERRUPTED or bool(interrupts and not is_whole))
+        if came is not None and came.si_signo != signal.SIGCHLD:
             if now - asked > _TWICE_S:
                 interrupts, asked = interrupts + 1, now
-            if told.si_code <= 0:  # sent by a process; a terminal's reaches the worker by itself
-                os.kill(worker, told.si_signo)
-        spent = spent + tick if held.step == step else 0.0
-        step = held.step
-        if held.log and 0.0 < held.seconds < spent:
-            too_long = held.seconds
+            if came.si_code <= 0:  # sent by a process; a terminal's reaches the worker by itself
+                os.kill(worker, came.si_signo)
+        spent = spent + tick if state.step == step else 0.0
+        step = state.step
+        if state.log and 0.0 < state.seconds < spent:
+            too_long = state.seconds
         # a batch finishes the logs that it has in work; a library that does not come back is not waited for
-        is_deaf = interrupts > 0 and now - asked > _GRACE_S and (bool(held.log) or interrupts > 1)
-        if (is_deaf or too_long) and killed == math.inf and not board.is_finished:
+        is_deaf = interrupts > 0 and now - asked > _GRACE_S and (bool(state.log) or interrupts > 1)
+        if (is_deaf or too_long) and killed == math.inf and not page.is_finished:
             killed = now
             os.kill(worker, signal.SIGKILL)
 
 
 def _why(end: _End, limits: ReadLimits) -> str:
     """Why a log cannot be read, in one line."""
-    size = end.held.size
+    size = end.state.size
     if end.seconds:
         return f"reading it took longer than {end.seconds:g} s. Try: a higher AQUALOG_LIMIT_S"
     if end.code == -signal.SIGXCPU:
@@ -236,7 +234,7 @@ def _how(code: int, limits: ReadLimits) -> str:
 
 
 def _last_word(end: _End, *, is_finished: bool) -> tuple[int, str]:
-    """Exit code, and what is to be said of a worker that no log has ended."""
+    """Exit code and message for a worker that no log has ended."""
     if is_finished and end.code >= 0:
         return end.code, ""
     how = f"exit code {end.code}" if end.code >= 0 else signal.Signals(-end.code).name
@@ -255,11 +253,11 @@ def _leave(code: int, text: str) -> NoReturn:
     os._exit(code)
 
 
-def _clear_away(held: InHand) -> None:
+def _clear_away(state: ReadingState) -> None:
     """Remove what the worker has not finished."""
     import shutil
 
-    for name in held.temporary:
+    for name in state.temporary:
         path = Path(name)
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
