@@ -21,8 +21,7 @@ from aqualog.doctor.records import Examination, FileState, Finding
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.content import changed_files, state_of
-from aqualog.io.open_log import open_log
-from aqualog.io.sound import read_sound
+from aqualog.io.open_log import open_log, read_readable
 
 __all__ = ["examine"]
 
@@ -107,7 +106,7 @@ def _file(
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
-            channels, lost = read_sound(reader, list(reader.channels()))
+            channels, lost = read_readable(reader, list(reader.channels()))
             kind, faults = reader.format, reader.faults
     except AqualogError as error:
         # the line names the file itself

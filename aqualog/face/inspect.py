@@ -201,7 +201,7 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
     one, hear = drive_of(drive), listener(progress)
     with one.reading(), DriveLog(one.paths, read_options(one.signal_map, one.dbc)) as log:
         hear("reading")
-        channels, lost = log.read_sound()
+        channels, lost = log.read_readable()
         formats, faults = log.formats, log.faults
         hear("looking at the channels")
         origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)

@@ -6,15 +6,13 @@ import codecs
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 import polars as pl
 
 from aqualog.core.errors import LogError
-from aqualog.core.records import BoolArray, Channel, ChannelInfo, FileFaults, FloatArray
-from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.core.records import BoolArray, Channel, ChannelInfo, FloatArray
+from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import STYLES, numbers, plain
 from aqualog.io.csv_dialect import Column, find_layout
@@ -41,7 +39,7 @@ _HABIT = 0.1
 _TAIL = 1 << 16  # [bytes]
 
 
-class CsvReader:
+class CsvReader(OpenFile):
     """Reader of one CSV file.
 
     A blank cell is no sample of its channel; a cell that stands for a bad sample, or that cannot be understood, is NaN.
@@ -51,8 +49,7 @@ class CsvReader:
     format = "csv"
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self._path = path
-        self._faults = FaultLog()
+        super().__init__(path)
         self._rows: Rows | None = None
         self._stamps: Stamps | None = None
         self._counted: set[int] = set()
@@ -121,7 +118,7 @@ class CsvReader:
         numeric = self._layout.columns[self._time.index].kind == "number"
         if isinstance(self._data, TextFile) and numeric:
             return [part_of(asked, self._pieces(asked, self._data))]
-        return [part_of(asked, (self.read(asked) for _ in range(1)))]
+        return [one_piece(asked, self.read)]
 
     def _plain(self, asked: Sequence[ChannelInfo]) -> frozenset[int]:
         """Columns that the library reads as numbers as they stand: three times faster than by their text."""
@@ -274,27 +271,11 @@ class CsvReader:
                 share = f'{100 * column.text_share:.0f} % of its cells are text such as "{column.example[:40]}"'
                 self._note(f'column "{column.name}" is left out: {share}')
 
-    def _note(self, text: str) -> None:
-        self._faults.notes.append(f"{self._path.name}: {text}")
-
-    @property
-    def faults(self) -> FileFaults:
-        """What was lost so far; complete after `read`."""
-        return self._faults.freeze()
-
     def close(self) -> None:
         """Release the text."""
         if isinstance(self._data, TextFile):
             self._data.close()
         self._data, self._rows = b"", None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _field(column: Column) -> TableField:

@@ -17,7 +17,7 @@ from itertools import islice
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from google.protobuf.message import Message as ProtobufMessage
@@ -31,7 +31,7 @@ from rosbags.typesys.store import Typestore
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, Drift, FileFaults, FloatArray, TimeArray
-from aqualog.io.base import FaultLog, Part, part_of
+from aqualog.io.base import FaultLog, OpenFile, Part, part_of
 from aqualog.io.batches import Batch, rows_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.fixed_layout import Layout, ros_layout
@@ -678,7 +678,7 @@ def _taker(sink: _Sink, streams: Sequence[Stream]) -> Callable[[Batch], None]:
     return take
 
 
-class MessageReader:
+class MessageReader(OpenFile):
     """Reader of one log made of message sources, read one after the other.
 
     Parameters
@@ -694,9 +694,8 @@ class MessageReader:
     format = "messages"
 
     def __init__(self, path: Path, sources: Sequence[Source], faults: FaultLog) -> None:
-        self.path = path
+        super().__init__(path, faults)
         self._sources = tuple(sources)
-        self._log = faults
         self._lost: dict[tuple[str, int, int], int] = {}
         self._streams: list[tuple[int, Stream]] | None = None
 
@@ -719,7 +718,7 @@ class MessageReader:
         # A topic that carries one number is named by the topic: `/omega_fl` with the field `data`.
         name = topic.rstrip("/").rpartition("/")[2] if sole and leaf.path[-1] in ("data", "value") else leaf.name
         path = f"{topic}.{leaf.text}"
-        return ChannelInfo(path, name, leaf.unit, count, self.path.name, (topic, leaf.text), leaf.comment)
+        return ChannelInfo(path, name, leaf.unit, count, self._path.name, (topic, leaf.text), leaf.comment)
 
     def _known_streams(self) -> list[tuple[int, Stream]]:
         if self._streams is None:
@@ -793,37 +792,26 @@ class MessageReader:
     def _finish(self, sinks: Mapping[str, _Sink]) -> None:
         for topic, sink in sinks.items():
             self._lost[topic, -1, -1] = sink.undecoded
-            self._log.notes += sink.notes()
+            self._faults.notes += sink.notes()
         # the topics of one recorder share its clock: the one that drifts most speaks for the file
         found = [d for sink in sinks.values() if (d := sink.drift()) is not None]
         if found:
             worst = max(found, key=lambda d: abs(d.ppm))
-            self._log.drifts = [worst]
-            self._log.notes.append(f"{self.path.name}: {drift_note(worst)}")
+            self._faults.drifts = [worst]
+            self._faults.notes.append(f"{self._path.name}: {drift_note(worst)}")
 
     def _guard(self) -> _Guard:
-        return _Guard(self.path)
+        return _Guard(self._path)
 
     @property
     def faults(self) -> FileFaults:
         """What was lost so far; complete after `read`."""
-        notes = [*self._log.notes, *(note for source in self._sources for note in source.notes())]
-        truncated = self._log.truncated or any(source.truncated for source in self._sources)
+        notes = [*self._faults.notes, *(note for source in self._sources for note in source.notes())]
+        truncated = self._faults.truncated or any(source.truncated for source in self._sources)
         unassigned = sum(source.unassigned for source in self._sources)
-        lost = self._log.lost_samples + sum(self._lost.values()) + unassigned
+        lost = self._faults.lost_samples + sum(self._lost.values()) + unassigned
         unfinalised = any(source.unfinalised for source in self._sources)
-        return FaultLog(truncated, lost, notes, unfinalised, self._log.drifts).freeze()
-
-    def close(self) -> None:
-        """Release the file. Sources open theirs only while they read."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+        return FaultLog(truncated, lost, notes, unfinalised, self._faults.drifts).freeze()
 
 
 def _sinks(infos: Iterable[ChannelInfo]) -> dict[str, _Sink]:

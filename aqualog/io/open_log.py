@@ -2,57 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Self
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults
 from aqualog.guard.reading import reading
-from aqualog.io.base import Part, Reader, ReadOptions, part_of
+from aqualog.io.base import Part, Reader, ReadOptions
 from aqualog.io.csv_format import format_of
 from aqualog.io.sniff import sniff
-from aqualog.io.sound import read_sound
 
-__all__ = ["DriveLog", "open_log"]
+__all__ = ["DriveLog", "open_log", "read_readable"]
 
-
-def _mdf(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.mdf.reader import MdfReader
-
-    return MdfReader(path, options)
-
-
-def _mcap(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.mcap import McapReader
-
-    return McapReader(path, options)
-
-
-def _ros(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.ros import RosReader
-
-    return RosReader(path, options)
-
-
-def _csv(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.csv import CsvReader
-
-    return CsvReader(path, options)
-
-
-def _parquet(path: Path, options: ReadOptions) -> Reader:
-    from aqualog.io.parquet import ParquetReader
-
-    return ParquetReader(path, options)
+_NAMED = 3  # channels of a lost group that are named
 
 
 # Each reader's libraries are imported when a file of its format is opened, not before.
-_READERS: dict[str, Callable[[Path, ReadOptions], Reader]] = {
-    "mdf": _mdf, "mcap": _mcap, "ros": _ros, "csv": _csv, "parquet": _parquet,
-}  # fmt: skip
+_READERS = {
+    "mdf": ("aqualog.io.mdf.reader", "MdfReader"),
+    "mcap": ("aqualog.io.mcap", "McapReader"),
+    "ros": ("aqualog.io.ros", "RosReader"),
+    "csv": ("aqualog.io.csv", "CsvReader"),
+    "parquet": ("aqualog.io.parquet", "ParquetReader"),
+}
 
 
 def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
@@ -64,48 +40,31 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
         If the file is missing, unknown or damaged beyond reading.
     """
     options = options or ReadOptions()
-    is_told = bool(format_of(options.csv, path.name).encoding)
+    has_encoding = bool(format_of(options.csv, path.name).encoding)
     with reading(path):
-        reader = _READERS[sniff(path, any_text=is_told)](path, options)
-    return (_WatchedInPieces if hasattr(reader, "parts") else _Watched)(path, reader)
+        module, name = _READERS[sniff(path, any_text=has_encoding)]
+        reader: Reader = getattr(import_module(module), name)(path, options)
+    return _Watched(path, reader)
 
 
 class _Watched:
     """A reader each of whose steps is a step of `reading`."""
 
-    def __init__(self, path: Path, reader: Any) -> None:
+    def __init__(self, path: Path, reader: Reader) -> None:
         self._path, self._reader = path, reader
-        self.format: str = reader.format
+        self.format = reader.format
 
     def channels(self) -> Sequence[ChannelInfo]:
         with reading(self._path):
-            return cast("Sequence[ChannelInfo]", self._reader.channels())
+            return self._reader.channels()
 
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         with reading(self._path):
-            return cast("list[Channel]", self._reader.read(wanted))
+            return self._reader.read(wanted)
 
-    @property
-    def faults(self) -> FileFaults:
-        return cast("FileFaults", self._reader.faults)
-
-    def close(self) -> None:
-        self._reader.close()
-
-    def __enter__(self) -> Self:
-        self._reader.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._reader.__exit__(kind, error, trace)
-
-
-class _WatchedInPieces(_Watched):
-    def parts(self, wanted: Sequence[ChannelInfo]) -> list[Part]:
+    def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
         with reading(self._path):
-            parts: list[Part] = self._reader.parts(wanted)
+            parts = self._reader.parts(wanted)
         return [p._replace(pieces=self._each(p.pieces)) for p in parts]
 
     def _each(self, pieces: Iterator[Sequence[Channel]]) -> Iterator[Sequence[Channel]]:
@@ -120,9 +79,20 @@ class _WatchedInPieces(_Watched):
             if isinstance(pieces, Generator):
                 pieces.close()
 
+    @property
+    def faults(self) -> FileFaults:
+        return self._reader.faults
 
-def _whole(reader: Reader, wanted: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
-    yield reader.read(wanted)
+    def close(self) -> None:
+        self._reader.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class DriveLog:
@@ -165,7 +135,7 @@ class DriveLog:
                 result |= {(c.info.file, c.info.path): c for c in reader.read(own)}
         return result
 
-    def read_sound(self) -> tuple[list[Channel], list[tuple[str, str]]]:
+    def read_readable(self) -> tuple[list[Channel], list[tuple[str, str]]]:
         """All channels that can be decoded, and (file, what) of each group of records that cannot.
 
         Raises
@@ -176,20 +146,18 @@ class DriveLog:
         channels: list[Channel] = []
         lost: list[tuple[str, str]] = []
         for path, reader in zip(self.paths, self._readers, strict=True):
-            own, told = read_sound(reader, list(reader.channels()))
+            own, sentences = read_readable(reader, list(reader.channels()))
             channels += own
-            lost += [(path.name, what) for what in told]
+            lost += [(path.name, what) for what in sentences]
         return channels, lost
 
     def parts(self, wanted: Iterable[ChannelInfo]) -> list[Part]:
-        """The same piece by piece, for logs that are longer than memory; a reader that cannot gives one piece."""
+        """The same piece by piece, for logs that are longer than memory."""
         asked = list({(w.file, w.path): w for w in wanted}.values())
         out: list[Part] = []
         for path, reader in zip(self.paths, self._readers, strict=True):
             own = [w for w in asked if w.file == path.name]
-            if own:
-                piecewise = getattr(reader, "parts", None)
-                out += piecewise(own) if piecewise is not None else [part_of(own, _whole(reader, own))]
+            out += reader.parts(own) if own else []
         return out
 
     def close(self) -> None:
@@ -203,3 +171,48 @@ class DriveLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def read_readable(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[Channel], list[str]]:
+    """Decode channels of one file; of an MDF, group by group, with a note on each group that cannot be decoded.
+
+    Returns
+    -------
+    list of Channel
+        In the order of `wanted`, without those that are lost.
+    list of str
+        A sentence for each group that is lost.
+
+    Raises
+    ------
+    LogError
+        If nothing of it can be decoded.
+    """
+    groups = _groups(reader, wanted)
+    if len(groups) < 2:
+        return reader.read(wanted), []
+    found: dict[str, Channel] = {}
+    errors: list[LogError] = []
+    lost: list[str] = []
+    for infos in groups:
+        try:
+            found |= {c.info.path: c for c in reader.read(infos)}
+        except LogError as error:
+            errors.append(error)
+            lost.append(_sentence(infos, error))
+    if errors and not found:
+        raise errors[0]
+    return [found[w.path] for w in wanted if w.path in found], lost
+
+
+def _groups(reader: Reader, wanted: Sequence[ChannelInfo]) -> list[list[ChannelInfo]]:
+    """Channels that stand in the same records; only in MDF a file is more than one such group."""
+    if reader.format != "mdf":
+        return [list(wanted)]
+    return [[w for w in wanted if (w.file, w.path) in part.channels] for part in reader.parts(wanted)]
+
+
+def _sentence(infos: Sequence[ChannelInfo], error: LogError) -> str:
+    names = ", ".join(i.path for i in infos[:_NAMED])
+    more = f" and {len(infos) - _NAMED} more" if len(infos) > _NAMED else ""
+    return f"{names}{more}: {error.what}"

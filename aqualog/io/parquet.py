@@ -7,17 +7,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import polars as pl
 
 from aqualog.core.errors import LogError
-from aqualog.core.records import Channel, ChannelInfo, FileFaults, FloatArray, TimeArray
+from aqualog.core.records import Channel, ChannelInfo, FloatArray, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
 from aqualog.io.arrow_schema import field_metadata
-from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
 from aqualog.io.csv_cells import is_clock, is_stamp
 from aqualog.io.parquet_groups import SoundRows, reason_of
@@ -71,7 +70,7 @@ class _Lost:
             self.rows += bad.size
 
 
-class ParquetReader:
+class ParquetReader(OpenFile):
     """Reader of one Parquet file.
 
     A null is no sample of its channel; a NaN is a bad sample. Units stand in the metadata of the file (as aqualog
@@ -81,8 +80,7 @@ class ParquetReader:
     format = "parquet"
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self._path = path
-        self._faults = FaultLog()
+        super().__init__(path)
         self._stamps: Stamps | None = None
         self._unit: str | None = None
         schema, metadata = self._wrapped(lambda: _head(path))
@@ -136,7 +134,7 @@ class ParquetReader:
         """Return the same piece by piece; in one if the time is text, which needs the whole to find the month."""
         asked = list(wanted)
         if self._columns[self._time.index].dtype == pl.String:
-            return [part_of(asked, (self.read(asked) for _ in range(1)))]
+            return [one_piece(asked, self.read)]
         return [part_of(asked, self._pieces(asked))]
 
     def _pieces(self, asked: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
@@ -268,25 +266,6 @@ class ParquetReader:
             reason = reason_of(error)
             hint = "check whether it was written to its end: the index stands there"
             raise LogError(f"cannot be read as Parquet ({reason})", where=str(self._path), hint=hint) from error
-
-    def _note(self, text: str) -> None:
-        self._faults.notes.append(f"{self._path.name}: {text}")
-
-    @property
-    def faults(self) -> FileFaults:
-        """What was lost so far; complete after `read`."""
-        return self._faults.freeze()
-
-    def close(self) -> None:
-        """Nothing is held open."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _about(metadata: dict[str, str]) -> dict[str, Any]:

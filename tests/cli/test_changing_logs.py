@@ -69,7 +69,7 @@ def run(*args):
 )
 def test_it_is_a_note_and_a_loss(log, monkeypatch, args, act):
     assert run(*args).exit_code == 0
-    changing(monkeypatch, log, act, "read_sound" if args[0] == "inspect" else "read")
+    changing(monkeypatch, log, act, "read_readable" if args[0] == "inspect" else "read")
     result = run(*args, "--force")
     assert result.exit_code == 3, result.stderr
     assert (result.stderr + result.stdout).count(TOLD) >= 1
@@ -94,7 +94,7 @@ def test_an_error_says_that_it_may_be_of_the_change(log, monkeypatch):
         os.truncate(path, 100)
         raise ValueError("odd block")
 
-    changing(monkeypatch, log, cut, "read_sound")
+    changing(monkeypatch, log, cut, "read_readable")
     result = run("inspect", log)
     assert (result.exit_code, result.stderr.count("\n")) == (1, 1)
     assert "drive.mf4: changed while it was read (odd block). Try: again, when it stays as it is" in result.stderr

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, ChannelInfo, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.base import FaultLog
+from aqualog.io.base import OpenFile
 from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf.conversion import converted, physical
 from aqualog.io.mdf.records import Group
@@ -38,7 +38,7 @@ _PER_SAMPLE = 24  # [bytes] of a sample while a channel is read as a whole: raw,
 _LATEST_S = 9.0e9  # int64 nanoseconds end in the year 2262
 
 
-class GroupReader:
+class GroupReader(OpenFile):
     """One open file and what was lost of it.
 
     Parameters
@@ -48,8 +48,7 @@ class GroupReader:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._faults = FaultLog()
+        super().__init__(path)
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._survey = Survey()
         self._damaged: frozenset[int] = frozenset()  # packed blocks, by address

@@ -7,15 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
-from aqualog.core.records import BoolArray, Channel, ChannelInfo, FileFaults, TimeArray
-from aqualog.io.base import FaultLog, Part, ReadOptions, part_of
+from aqualog.core.records import BoolArray, Channel, ChannelInfo, TimeArray
+from aqualog.io.base import FaultLog, Part, ReadOptions, one_piece, part_of
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, selected
 from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf import frames as can
@@ -116,7 +115,7 @@ class MdfReader(GroupReader):
                 by_group[info.key.group].append(info)
         out = [part_of(infos, self._pieces(group, infos)) for group, infos in by_group.items()]
         signals = [w for w in wanted if isinstance(w.key, _Signal)]
-        return [*out, part_of(signals, (self.read(signals) for _ in range(1)))] if signals else out
+        return [*out, one_piece(signals, self.read)] if signals else out
 
     def _pieces(self, group: int, infos: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
         n = n_bad = 0
@@ -138,19 +137,6 @@ class MdfReader(GroupReader):
             n, n_bad = n + len(t), n_bad + len(t) - len(t_ns)
             yield [Channel(i, t_ns, _where(usable, columns[i.key.index]), self._absolute) for i in infos]
         self._count_records(group, n, n_bad)
-
-    @property
-    def faults(self) -> FileFaults:
-        """What was lost so far."""
-        return self._faults.freeze()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # --- opening ---
 
