@@ -24,8 +24,8 @@ _NAMED = 3  # channels of a lost group that are named
 # Each reader's libraries are imported when a file of its format is opened, not before.
 _READERS = {
     "mdf": ("aqualog.io.mdf.reader", "MdfReader"),
-    "mcap": ("aqualog.io.mcap", "McapReader"),
-    "ros": ("aqualog.io.ros", "RosReader"),
+    "mcap": ("aqualog.io.messages.mcap", "McapReader"),
+    "ros": ("aqualog.io.messages.ros", "RosReader"),
     "csv": ("aqualog.io.csv", "CsvReader"),
     "parquet": ("aqualog.io.parquet", "ParquetReader"),
 }

@@ -15,8 +15,10 @@ from aqualog.detect import plausibility
 from aqualog.detect.long import detect_long
 from aqualog.detect.picture import Picture
 from aqualog.detect.stream import detect_drive
-from aqualog.io import batches, csv_rows, messages, parquet, text_file
+from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.mdf import reader as mdf
+from aqualog.io.messages import batches
+from aqualog.io.messages import reader as messages
 from aqualog.report.drive.document import document
 
 LOGS = Path(__file__).parents[2] / "sample_logs"

@@ -11,10 +11,12 @@ import numpy as np
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, FileFaults
-from aqualog.io import batches, csv_rows, messages, parquet, text_file
+from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import columns as mdf_columns
 from aqualog.io.mdf import reader as mdf
+from aqualog.io.messages import batches
+from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
 
 T0_NS = 1_700_000_000 * 10**9

@@ -10,9 +10,9 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from aqualog.io.batches import rows_of
 from aqualog.io.mdf.columns import unpacked_blocks
 from aqualog.io.mdf.records import Group, Stored
+from aqualog.io.messages.batches import rows_of
 
 __all__ = ["Kind", "sorted_groups"]
 

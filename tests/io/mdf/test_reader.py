@@ -27,7 +27,7 @@ from aqualog.io.mdf.frames import _variable
 from aqualog.io.mdf.reader import MdfReader
 from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
 
-REAL = Path(__file__).parents[2].parent / "shared" / "real_logs"
+REAL = Path(__file__).parents[3].parent / "shared" / "real_logs"
 START = 1_700_000_000_123_456_789
 T = np.arange(200) * 0.01
 NO_DBC = ReadOptions()
@@ -564,7 +564,7 @@ class TestRealDrives:
             expected = mdf.get("CAN_DataFrame.DataBytes", group=0).samples
         with MdfReader(path, ReadOptions(dbc=(REAL / "canedge" / "canmod-gps.dbc",))) as reader:
             group = reader._frames[0]
-            data = reader._frame_rows(group, np.unique(group.codes))[2]
+            _, (_, data, _) = reader._frame_rows(group, np.unique(group.codes))
         np.testing.assert_array_equal(data, expected)
 
     def test_cut_in_the_payloads(self, tmp_path: Path):

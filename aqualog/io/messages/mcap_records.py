@@ -1,24 +1,24 @@
-"""Walk the records of an MCAP file's data section; behind a damaged one, seek the next chunk.
+"""The records of an MCAP file, and those within a chunk.
 
 A wrong length leads anywhere. It shows if it leads beyond the file, over the place where the summary knows a chunk, or
-to bytes that are no record. Reading then resumes at the next chunk of the summary. Without a summary it resumes at the
-next place whose lengths agree with each other as those of a chunk do.
+to bytes that are no record. Without a summary reading resumes at the next place whose lengths agree with each other as
+those of a chunk do.
 """
 
 from __future__ import annotations
 
 import struct
-from bisect import bisect_left
-from collections.abc import Iterator, Sequence
-from typing import BinaryIO
+from array import array
+from typing import NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
 
-from aqualog.io.batches import rows_of
+from aqualog.io.messages.batches import Batch, rows_of
+from aqualog.io.messages.walk import RecordWalk
 from aqualog.io.unpack import LONGEST
 
-__all__ = ["HEAD", "MAGIC", "Records"]
+__all__ = ["HEAD", "MAGIC", "McapWalk", "Scan", "scanned"]
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
@@ -48,59 +48,23 @@ _CHUNK = np.dtype({
 })  # fmt: skip
 
 
-class Records:
-    """One pass over the data section.
+_STAMPED = 22  # bytes before the content of a message: channel, sequence, log time, publish time
+_PRIVATE = 0x80  # from there on opcodes are private and skipped
+_STRETCH = 1 << 16  # records
+_RECORD = np.dtype({
+    "names": ["length", "channel", "log_time"],
+    "formats": ["<u8", "<u2", "<u8"],
+    "offsets": [1, HEAD.size, HEAD.size + 6],
+    "itemsize": HEAD.size + _STAMPED,
+})  # fmt: skip
 
-    Parameters
-    ----------
-    file : BinaryIO
-    size : int
-        Of the file. [byte]
-    chunks : sequence of int
-        Where the summary knows chunks; empty without a sound one.
-    """
 
-    def __init__(self, file: BinaryIO, size: int, chunks: Sequence[int] = ()) -> None:
-        self.gaps: list[tuple[int, int]] = []
-        """Where no record could be read: from, to. [byte]"""
-        self._file, self._size = file, size
-        self._chunks = sorted(chunks)
-        self._doubted = False
+class McapWalk(RecordWalk[int]):
+    """One pass over the data section; the head of a record is its opcode."""
 
-    def doubt(self) -> None:
-        """The record just given is not what it says, so its length may be wrong, too."""
-        self._doubted = True
+    has_end_record = True
 
-    def __iter__(self) -> Iterator[tuple[int, int, bytes]]:
-        """Offset, opcode and body (empty where nobody reads it) up to the end of the data."""
-        offset = trusted = len(MAGIC)
-        while True:
-            end = self._end(offset)
-            if end is None:
-                found = self._known(offset + 1) if self._chunks else self._sought(trusted)
-                back = found is not None and found < offset  # a length has led over it
-                self.gaps.append((trusted if back else offset, self._size if found is None else found))
-                if found is None:
-                    return
-                offset = found
-                trusted = offset + 1
-                continue
-            opcode, length = self._head(offset)
-            self._doubted = False
-            yield offset, opcode, self._file.read(length) if opcode in _WITH_BODY else b""
-            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                return
-            trusted = offset + 1 if self._doubted else end
-            offset = end
-
-    def _head(self, offset: int) -> tuple[int, int]:
-        """Opcode and length; zeros if there is no room for them."""
-        self._file.seek(offset)
-        head = self._file.read(HEAD.size)
-        return HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
-
-    def _end(self, offset: int) -> int | None:
-        """Where the record ends; None if it cannot be one."""
+    def _record_at(self, offset: int) -> tuple[int, int, int] | None:
         opcode, length = self._head(offset)
         end = offset + HEAD.size + length
         if opcode == 0 or end > self._size:
@@ -114,7 +78,19 @@ class Records:
         if opcode == Opcode.ATTACHMENT and not self._is_attachment(offset + HEAD.size, length):
             return None
         known = self._known(offset + 1)
-        return None if known is not None and end > known else end
+        return None if known is not None and end > known else (opcode, offset + HEAD.size, end)
+
+    def _head(self, offset: int) -> tuple[int, int]:
+        """Opcode and length; zeros if there is no room for them."""
+        self._file.seek(offset)
+        head = self._file.read(HEAD.size)
+        return HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
+
+    def _has_body(self, head: int) -> bool:
+        return head in _WITH_BODY
+
+    def _is_last(self, head: int) -> bool:
+        return head in (Opcode.DATA_END, Opcode.FOOTER)
 
     def _is_attachment(self, start: int, length: int) -> bool:
         """Whether the sizes of its parts fill it: nothing else of it is read."""
@@ -130,11 +106,6 @@ class Records:
             if left < 0:
                 return False
         return left == 0
-
-    def _known(self, offset: int) -> int | None:
-        """The first chunk of the summary from a place on."""
-        at = bisect_left(self._chunks, offset)
-        return self._chunks[at] if at < len(self._chunks) else None
 
     def _sought(self, offset: int) -> int | None:
         """The first place from `offset` on that looks like a chunk."""
@@ -161,3 +132,45 @@ def _chunks_in(block: bytes, room: int) -> np.ndarray[tuple[int], np.dtype[np.in
     for size, name in _NAMES.items():
         agrees |= (heads["name"] == size) & (length == heads[name].astype(np.float64) + (_FIXED + size))
     return at[agrees & (length <= room - at - HEAD.size)]
+
+
+class Scan(NamedTuple):
+    """What a chunk holds: its messages, and opcode and body of each schema and channel."""
+
+    messages: Batch
+    records: tuple[tuple[int, bytes], ...]
+
+
+def scanned(data: bytes) -> Scan | None:
+    """Records of a chunk, none of them copied; None if anything about them is unusual."""
+    found = array("q")  # a list would hold ten times the chunk where its records are empty
+    position, size = 0, len(data)
+    add, length_at = found.append, struct.Struct("<Q").unpack_from
+    try:
+        while position < size:
+            # zeros are records without an end to it: no further than the first stretch of them
+            for _ in range(_STRETCH):
+                add(position)
+                position += HEAD.size + length_at(data, position + 1)[0]
+                if position >= size:
+                    break
+            if not data[found[-1]]:
+                return None
+    except struct.error:
+        return None
+    if position != size:
+        return None
+    at = np.array(found, dtype=np.int64)
+    ends = np.append(at[1:], size)
+    opcodes = np.frombuffer(data, np.uint8)[at]
+    of_messages = opcodes == Opcode.MESSAGE
+    others = np.flatnonzero(~of_messages & (opcodes < _PRIVATE)).tolist()
+    if any(opcodes[i] not in (Opcode.SCHEMA, Opcode.CHANNEL) for i in others):
+        return None
+    at_message, ends_message = at[of_messages], ends[of_messages]
+    starts = at_message + HEAD.size + _STAMPED
+    if (starts > ends_message).any():
+        return None
+    heads = rows_of(data, at_message, _RECORD.itemsize).view(_RECORD) if starts.size else np.zeros(0, _RECORD)
+    batch = Batch(heads["channel"].astype(np.int64), heads["log_time"], starts, ends_message, data)
+    return Scan(batch, tuple((int(opcodes[i]), data[found[i] + HEAD.size : int(ends[i])]) for i in others))

@@ -1,41 +1,87 @@
 """Read ROS 1 bags record by record: one that was never closed or indexed is read up to its end.
 
-A damaged chunk or a wrong length costs that chunk only. A bag has no checksums but those of bz2 and lz4: an altered
-value in a plain chunk cannot be detected.
+A bag has no checksums but those of bz2 and lz4: an altered value in a plain chunk cannot be detected.
+
+Format: http://wiki.ros.org/Bags/Format/2.0 [rosbag2010]
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 from aqualog.core.errors import LogError
-from aqualog.io.bag_records import (
-    BAG,
-    CHUNK,
-    CHUNK_INFO,
-    CONNECTION,
-    INDEX,
-    MESSAGE,
-    BagRecords,
-    Head,
-    head_fields,
-    kind_of,
-    number,
-)
-from aqualog.io.batches import Batch, Message, batched, damage_notes, gap_note
-from aqualog.io.messages import SAMPLES, Stream, UndecodableError, codec_for, make_stream
-from aqualog.io.unpack import Allowance, DamagedError, unpack
+from aqualog.io.messages.batches import Message, batched, first_of_each
+from aqualog.io.messages.codecs import UndecodableError, codec_for
+from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
+from aqualog.io.messages.walk import ChunkSource, RecordWalk
+from aqualog.io.unpack import LONGEST, Allowance, DamagedError, unpack
 
-__all__ = ["BagSource"]
+__all__ = ["CHUNK", "INDEX", "MAGIC", "BagSource", "BagWalk", "kind_of"]
+
+MAGIC = b"#ROSBAG V2.0\n"
+MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = range(2, 8)
+"""Kinds of records."""
+
+Head = Mapping[bytes, bytes]
 
 _U32 = struct.Struct("<I")
+_LONGEST_HEAD = 1 << 16  # [byte]
+_CHUNK_MARK = b"\x04\0\0\0op=" + bytes([CHUNK])
+_BEFORE_MARK = 80  # bytes: how far before that field the head of a chunk may begin
+_BLOCK = 1 << 20
 _PAIR = struct.Struct("<II")
 
 
-class BagSource:
+class BagWalk(RecordWalk[Head]):
+    """One pass over a bag from a place on."""
+
+    def _has_body(self, head: Head) -> bool:
+        return kind_of(head) != INDEX
+
+    def _record_at(self, offset: int) -> tuple[Head, int, int] | None:
+        self._file.seek(offset)
+        raw = self._file.read(4)
+        if len(raw) < 4 or (size := _U32.unpack(raw)[0]) > min(self._size - offset, _LONGEST_HEAD):
+            return None
+        head = head_fields(self._file.read(size))
+        raw = self._file.read(4)
+        if head is None or not MESSAGE <= kind_of(head) <= CONNECTION or len(raw) < 4:
+            return None
+        start = offset + size + 8
+        end = start + int(_U32.unpack(raw)[0])
+        known = self._known(offset + 1)
+        is_long = kind_of(head) != INDEX and end - start > LONGEST
+        return None if is_long or end > (self._size if known is None else known) else (head, start, end)
+
+    def _sought(self, offset: int) -> int | None:
+        """The first place from `offset` on that looks like a chunk."""
+        while offset < self._size:
+            self._file.seek(offset)
+            block = self._file.read(_BLOCK)
+            mark = block.find(_CHUNK_MARK)
+            while mark >= 0:
+                found = self._head_before(offset + mark, offset)
+                if found is not None:
+                    return found
+                mark = block.find(_CHUNK_MARK, mark + 1)
+            if len(block) < _BLOCK:
+                return None
+            offset += len(block) - _BEFORE_MARK - len(_CHUNK_MARK)
+        return None
+
+    def _head_before(self, mark: int, least: int) -> int | None:
+        """Where the chunk begins whose kind stands at `mark`."""
+        for start in range(mark - 4, max(least, mark - _BEFORE_MARK) - 1, -1):
+            found = self._record_at(start)
+            if found is not None and kind_of(found[0]) == CHUNK and {b"size", b"compression"} <= found[0].keys():
+                return start
+        return None
+
+
+class BagSource(ChunkSource[Head]):
     """One ROS 1 bag as a source of messages. Where it has a sound index, `streams` takes the counts from it.
 
     Raises
@@ -44,20 +90,11 @@ class BagSource:
         If it is encrypted.
     """
 
+    stream_name = "connection"
+
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.truncated = False
-        self.unassigned = 0
-        self.unfinalised = False
-        self._notes: list[str] = []
-        self._damaged: dict[int, str] = {}
-        self._lost: dict[int, int] = {}
-        self._size = path.stat().st_size
+        super().__init__(path)
         self._connections: dict[int, tuple[str, str, bytes]] = {}
-        self._counts: dict[int, int] = {}
-        self._chunks: tuple[int, ...] = ()  # by the index
-        self._indexed = False
-        self._allowance = Allowance()
 
     def streams(self) -> Sequence[Stream]:
         """All connections with messages that can be decoded."""
@@ -78,7 +115,7 @@ class BagSource:
 
     def _index(self, file: BinaryIO) -> dict[int, frozenset[int]] | None:
         """Return the chunks and the connections in them by the index at the end; None without a whole index."""
-        _, head, _ = next(iter(BagRecords(file, self._size)), (0, {}, b""))
+        _, head, _ = next(iter(BagWalk(file, self._size, len(MAGIC))), (0, {}, b""))
         start = number(head, b"index_pos", 8)
         if head.get(b"encryptor"):
             raise LogError("is encrypted", where=str(self.path), expected="a plain bag", hint="rosbag decrypt")
@@ -86,7 +123,7 @@ class BagSource:
             return None
         chunks: dict[int, frozenset[int]] = {}
         counts: dict[int, int] = {}
-        records = BagRecords(file, self._size, start)
+        records = BagWalk(file, self._size, start)
         is_pure = True
         for _, record, data in records:
             is_pure &= kind_of(record) in (CONNECTION, CHUNK_INFO)
@@ -108,7 +145,7 @@ class BagSource:
         return chunks
 
     def _is_chunk(self, file: BinaryIO, at: int) -> bool:
-        offset, head, _ = next(iter(BagRecords(file, self._size, at)), (-1, {}, b""))
+        offset, head, _ = next(iter(BagWalk(file, self._size, at)), (-1, {}, b""))
         return offset == at and kind_of(head) == CHUNK
 
     def _sample(self, file: BinaryIO, chunks: dict[int, frozenset[int]]) -> dict[int, list[bytes]]:
@@ -119,93 +156,51 @@ class BagSource:
         for position in sorted(chunks):
             if missing.isdisjoint(chunks[position]):
                 continue
-            offset, head, data = next(iter(BagRecords(file, self._size, position, self._chunks)), (0, {}, b""))
+            offset, head, data = next(iter(BagWalk(file, self._size, position, self._chunks)), (0, {}, b""))
             if offset != position or kind_of(head) != CHUNK:
                 continue
-            for connection, _, message in self._chunk(offset, head, data):
-                if connection in missing:
-                    _keep(samples, connection, message)
+            for batch in batched(self._chunk(offset, head, data, frozenset(missing))):
+                first_of_each(samples, batch, SAMPLES)
             missing.difference_update(samples)
         return samples
 
-    def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
-        """Count all messages and keep the first ones of each connection: for a bag without a sound index."""
-        samples: dict[int, list[bytes]] = {}
-        for connection, _, data in self._walk(file):
-            self._counts[connection] = self._counts.get(connection, 0) + 1
-            _keep(samples, connection, data)
-        self.unassigned = sum(n for i, n in self._counts.items() if i not in self._connections)
-        if self.unassigned:
-            what = f"{self.unassigned} messages are left out, their connection records are lost"
-            self._notes.append(f"{self.path.name}: {what}")
-        return samples
+    def _is_described(self, stream_id: int) -> bool:
+        return stream_id in self._connections
 
-    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
-        """These connections' messages with their times of reception, in file order."""
-        return batched(self._messages(ids))
+    def _records(self, file: BinaryIO) -> BagWalk:
+        return BagWalk(file, self._size, len(MAGIC), self._chunks)
 
-    def _messages(self, ids: frozenset[int]) -> Iterator[Message]:
-        self._lost = {}
-        seen = dict.fromkeys(ids, 0)
-        with self.path.open("rb") as file:
-            for message in self._walk(file):
-                if message[0] in ids:
-                    seen[message[0]] += 1
-                    yield message
-        if self._indexed:
-            self._lost = {i: max(0, self._counts.get(i, 0) - n) for i, n in seen.items()}
+    def _kind(self, head: Head) -> Literal["chunk", "index", "other"]:
+        kind = kind_of(head)
+        return "chunk" if kind == CHUNK else "index" if kind == INDEX else "other"
 
-    def lost(self, stream_id: int) -> int:
-        """Messages of a connection that the last pass could not get at."""
-        return self._lost.get(stream_id, 0)
-
-    def notes(self) -> Sequence[str]:
-        """What was left out so far."""
-        return [*self._notes, *damage_notes(self.path.name, self._damaged)]
-
-    def _walk(self, file: BinaryIO) -> Iterator[Message]:
-        in_damaged = is_uncounted = False
-        self._allowance = Allowance()
-        records = BagRecords(file, self._size, chunks=self._chunks)
-        for offset, head, data in records:
-            kind = kind_of(head)
-            if kind == CHUNK:
-                self.truncated |= is_uncounted
-                messages = self._chunk(offset, head, data)
-                in_damaged = offset in self._damaged
-                is_uncounted = in_damaged and not self._indexed
-                if in_damaged:
-                    records.doubt()
-                yield from messages
-            elif kind == MESSAGE and (message := _message(head, data)) is not None:
+    def _outside(
+        self, offset: int, head: Head, body: bytes, ids: frozenset[int] | None, file: BinaryIO
+    ) -> Iterator[Message]:
+        kind = kind_of(head)
+        if kind == MESSAGE and (message := _message(head, body)) is not None:
+            if ids is None or message[0] in ids:
                 yield message
-            elif kind == INDEX and in_damaged:
-                connection, count = number(head, b"conn"), number(head, b"count")
-                if connection is not None:
-                    self._lost[connection] = self._lost.get(connection, 0) + (count or 0)
-                    is_uncounted = False
-            elif kind == CONNECTION:
-                self._note_connection(head, data)
-            elif kind == BAG and not 0 < (number(head, b"index_pos", 8) or 0) < self._size:
-                self.truncated = True
-                self._notes.append(f"{self.path.name}: the bag was never closed or is cut off; it has no index")
-        self.truncated |= is_uncounted
-        for gap in records.gaps:
-            self._note_gap(*gap)
+        elif kind == CONNECTION:
+            self._note_connection(head, body)
+        elif kind == BAG and not 0 < (number(head, b"index_pos", 8) or 0) < self._size:
+            self.truncated = True
+            self._notes.append(f"{self.path.name}: the bag was never closed or is cut off; it has no index")
 
-    def _note_gap(self, start: int, end: int) -> None:
-        # with counts of all messages what a gap costs is known
-        self.truncated |= not self._indexed
-        self._notes.append(gap_note(self.path.name, start, end, self._size))
+    def _count_lost(self, head: Head, body: bytes) -> bool:
+        connection, count = number(head, b"conn"), number(head, b"count")
+        if connection is not None:
+            self._lost[connection] = self._lost.get(connection, 0) + (count or 0)
+        return connection is not None
 
-    def _chunk(self, offset: int, head: Head, data: bytes) -> list[Message]:
-        """Messages of one chunk; none if it is damaged."""
+    def _chunk(self, offset: int, head: Head, body: bytes, ids: frozenset[int] | None) -> Sequence[Message]:
         try:
             size = _U32.unpack(head[b"size"])[0]
-            return list(self._split(unpack(data, head[b"compression"].decode(), size, self._allowance)))
+            found = list(self._split(unpack(body, head[b"compression"].decode(), size, self._allowance)))
         except (DamagedError, KeyError, struct.error, UnicodeDecodeError) as error:
             self._damaged[offset] = str(error)
             return []
+        return [m for m in found if ids is None or m[0] in ids]
 
     def _split(self, data: bytes) -> Iterator[Message]:
         position, size = 0, len(data)
@@ -246,7 +241,26 @@ def _message(head: Head, data: bytes) -> Message | None:
     return connection, seconds * 1_000_000_000 + nanoseconds, data
 
 
-def _keep(samples: dict[int, list[bytes]], connection: int, data: bytes) -> None:
-    kept = samples.setdefault(connection, [])
-    if len(kept) < SAMPLES:
-        kept.append(data)
+def head_fields(data: bytes) -> dict[bytes, bytes] | None:
+    """Fields of a record's head, `<size>name=value`; None if they do not fill it."""
+    fields: dict[bytes, bytes] = {}
+    position, size = 0, len(data)
+    while position + 4 <= size:
+        start = position + 4
+        position = start + _U32.unpack_from(data, position)[0]
+        name, sign, value = data[start:position].partition(b"=")
+        if position > size or not sign:
+            return None
+        fields[name] = value
+    return fields if position == size else None
+
+
+def kind_of(head: Head) -> int:
+    """What a record is."""
+    return int.from_bytes(head.get(b"op", b"")[:2], "little")
+
+
+def number(head: Head, name: bytes, size: int = 4) -> int | None:
+    """A field that is a whole number of so many bytes; None if it is not."""
+    value = head.get(name, b"")
+    return int.from_bytes(value, "little") if len(value) == size else None

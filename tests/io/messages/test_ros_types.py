@@ -4,8 +4,8 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from aqualog.io.messages import UndecodableError, codec_for
-from aqualog.io.ros_types import RefusedError, checked
+from aqualog.io.messages.codecs import UndecodableError, codec_for
+from aqualog.io.messages.ros_types import RefusedError, checked
 
 RULER = "=" * 80 + "\n"
 FLOAT = (Nodetype.BASE, ("float64", 0))

@@ -18,9 +18,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel
-from aqualog.io.bag_records import CHUNK, INDEX, BagRecords, kind_of
 from aqualog.io.base import ReadOptions
-from aqualog.io.ros import RosReader
+from aqualog.io.messages.bag import CHUNK, INDEX, MAGIC, BagWalk, kind_of
+from aqualog.io.messages.ros import RosReader
 
 T0 = 1_700_000_000 * 10**9
 STEP = 10**7
@@ -134,7 +134,7 @@ def bag_record(head: dict[bytes, bytes], data: bytes) -> bytes:
 
 def chunk_starts(path: Path) -> list[int]:
     with path.open("rb") as file:
-        records = BagRecords(file, path.stat().st_size)
+        records = BagWalk(file, path.stat().st_size, len(MAGIC))
         return [offset for offset, head, _ in records if kind_of(head) == CHUNK]
 
 
@@ -162,7 +162,7 @@ def test_an_index_whose_chunks_have_moved_is_not_believed(tmp_path, where):
     raw = path.read_bytes()
     index_pos = struct.unpack_from("<Q", raw, raw.index(b"index_pos=") + 10)[0]
     with path.open("rb") as file:
-        last = max(o for o, head, _ in BagRecords(file, len(raw)) if kind_of(head) == INDEX and o < index_pos)
+        last = max(o for o, head, _ in BagWalk(file, len(raw), len(MAGIC)) if kind_of(head) == INDEX and o < index_pos)
     size = index_pos - last
     foreign = bag_record(
         {b"op": b"\x04", b"pad": bytes(size - len(bag_record({b"op": b"\x04", b"pad": b""}, b"")))}, b""

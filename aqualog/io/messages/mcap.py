@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -26,10 +26,12 @@ from mcap.summary import Summary
 
 from aqualog.core.errors import LogError
 from aqualog.io.base import FaultLog, ReadOptions
-from aqualog.io.batches import Batch, Message, batched, damage_notes, gap_note
-from aqualog.io.mcap_records import HEAD, MAGIC, Records
-from aqualog.io.mcap_scan import scanned
-from aqualog.io.messages import SAMPLES, MessageReader, Stream, UndecodableError, codec_for, make_stream
+from aqualog.io.messages.batches import Batch, Message, batched, first_of_each
+from aqualog.io.messages.codecs import UndecodableError, codec_for
+from aqualog.io.messages.mcap_records import HEAD, MAGIC, McapWalk, scanned
+from aqualog.io.messages.reader import MessageReader
+from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
+from aqualog.io.messages.walk import ChunkSource
 from aqualog.io.unpack import LONGEST, Allowance, DamagedError, unpack
 
 __all__ = ["McapReader", "McapSource"]
@@ -49,7 +51,7 @@ class McapReader(MessageReader):
         super().__init__(path, [McapSource(path)], FaultLog())
 
 
-class McapSource:
+class McapSource(ChunkSource[int]):
     """One MCAP file as a source of messages.
 
     Raises
@@ -59,22 +61,11 @@ class McapSource:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.truncated = False
-        self._notes: list[str] = []
-        self._damaged: dict[int, str] = {}
-        self._lost: dict[int, int] = {}
+        _check_magic(path)
+        super().__init__(path)
         self._schemas: dict[int, SchemaRecord] = {}
         self._channels: dict[int, ChannelRecord] = {}
-        self._counts: dict[int, int] = {}
-        self._chunks: tuple[int, ...] = ()  # by the summary
-        self._indexed = False
         self._unproven = False  # something without a checksum of its own has been read
-        self.unassigned = 0  # messages that belong to no stream
-        self.unfinalised = False
-        self._allowance = Allowance()
-        _check_magic(path)
-        self._size = path.stat().st_size
 
     def streams(self) -> Sequence[Stream]:
         """All connections with messages that can be decoded, in the order of their ids."""
@@ -121,79 +112,36 @@ class McapSource:
             file.seek(chunk.chunk_start_offset)
             opcode, length = HEAD.unpack(file.read(HEAD.size))
             if opcode == Opcode.CHUNK and length <= min(self._size, LONGEST):
-                for batch in batched(self._chunk(chunk.chunk_start_offset, file.read(length), here)):
-                    _keep(samples, batch)
+                for batch in batched(self._chunk(chunk.chunk_start_offset, opcode, file.read(length), here)):
+                    first_of_each(samples, batch, SAMPLES)
             missing = {i for i in missing if len(samples.get(i, ())) < min(SAMPLES, self._counts[i])}
         return samples
 
-    def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
-        """Count all messages and keep the first ones of each channel: for a file without a sound index."""
-        samples: dict[int, list[bytes]] = {}
-        for batch in batched(self._walk(file, None)):
-            _count(self._counts, batch)
-            _keep(samples, batch)
-        self.unassigned = sum(n for i, n in self._counts.items() if i not in self._channels)
-        if self.unassigned:
-            what = f"{self.unassigned} messages are left out, their channel records are lost"
-            self._notes.append(f"{self.path.name}: {what}")
-        return samples
+    def _is_described(self, stream_id: int) -> bool:
+        return stream_id in self._channels
 
-    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
-        """These channels' messages, in file order."""
-        self._lost = {}
-        seen = dict.fromkeys(ids, 0)
-        with self.path.open("rb") as file:
-            for batch in batched(self._walk(file, ids)):
-                _count(seen, batch)
-                yield batch
-        if self._indexed:
-            self._lost = {i: max(0, self._counts.get(i, 0) - n) for i, n in seen.items()}
+    def _records(self, file: BinaryIO) -> McapWalk:
+        self._unproven = False
+        return McapWalk(file, self._size, len(MAGIC), self._chunks)
 
-    def lost(self, stream_id: int) -> int:
-        """Messages of a channel that the last pass could not get at."""
-        return self._lost.get(stream_id, 0)
+    def _kind(self, head: int) -> Literal["chunk", "index", "other"]:
+        return "chunk" if head == Opcode.CHUNK else "index" if head == Opcode.MESSAGE_INDEX else "other"
 
-    def notes(self) -> Sequence[str]:
-        """What was left out so far."""
-        return [*self._notes, *damage_notes(self.path.name, self._damaged)]
+    def _outside(
+        self, offset: int, head: int, body: bytes, ids: frozenset[int] | None, file: BinaryIO
+    ) -> Iterator[Message]:
+        if head == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
+            self._unproven = True
+            channel_id, _, log_time, _ = _MESSAGE.unpack_from(body)
+            if ids is None or channel_id in ids:
+                yield channel_id, log_time, body[_MESSAGE.size :]
+        elif head in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._unproven |= not self._indexed
+            self._note_record(head, body)
+        elif head == Opcode.DATA_END and self._unproven:
+            self._check_data(file, offset, body)
 
-    def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Batch | Message]:
-        """All messages of the data section; `None` asks for all channels and keeps their records."""
-        in_damaged = is_uncounted = False
-        self._allowance, self._unproven = Allowance(), False
-        records = Records(file, self._size, self._chunks)
-        for offset, opcode, body in records:
-            if opcode == Opcode.CHUNK:
-                self.truncated |= is_uncounted
-                yield from (pieces := self._chunk(offset, body, ids))
-                in_damaged = not pieces and offset in self._damaged
-                is_uncounted = in_damaged and not self._indexed
-                if in_damaged:
-                    records.doubt()
-            elif opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
-                self._unproven = True
-                channel_id, _, log_time, _ = _MESSAGE.unpack_from(body)
-                if ids is None or channel_id in ids:
-                    yield channel_id, log_time, body[_MESSAGE.size :]
-            elif opcode == Opcode.MESSAGE_INDEX and in_damaged:
-                self._count_lost(body)
-                is_uncounted = False
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._unproven |= not self._indexed
-                self._note_record(opcode, body)
-            elif opcode == Opcode.DATA_END and self._unproven:
-                self._check_data(file, offset, body)
-        self.truncated |= is_uncounted
-        for gap in records.gaps:
-            self._note_gap(*gap)
-
-    def _note_gap(self, start: int, end: int) -> None:
-        # with counts of all messages what a gap costs is known
-        self.truncated |= not self._indexed
-        self._notes.append(gap_note(self.path.name, start, end, self._size))
-
-    def _chunk(self, offset: int, body: bytes, ids: frozenset[int] | None) -> Sequence[Batch | Message]:
-        """Messages of one chunk; none if it is damaged, for then no byte of it can be trusted."""
+    def _chunk(self, offset: int, head: int, body: bytes, ids: frozenset[int] | None) -> Sequence[Batch | Message]:
         try:
             data, is_proven = _unpacked(body, self._allowance)
             self._unproven |= not is_proven
@@ -223,11 +171,11 @@ class McapSource:
         except Exception as error:  # the record parser raises whatever the bytes lead it to
             self._notes.append(f"{self.path.name}: a schema or channel record is damaged ({error})")
 
-    def _count_lost(self, body: bytes) -> None:
-        """Add what the index behind a damaged chunk says was in it; 16 bytes per message."""
+    def _count_lost(self, head: int, body: bytes) -> bool:
         if len(body) >= 6:
             channel_id, size = struct.unpack_from("<HI", body)
-            self._lost[channel_id] = self._lost.get(channel_id, 0) + min(size, len(body)) // 16
+            self._lost[channel_id] = self._lost.get(channel_id, 0) + min(size, len(body)) // 16  # bytes a message
+        return True
 
     def _check_data(self, file: BinaryIO, end: int, body: bytes) -> None:
         """What stands outside of chunks has no other checksum than the one over the whole data section."""
@@ -246,20 +194,6 @@ def _check_magic(path: Path) -> None:
     if magic != MAGIC:
         what = "is empty" if not magic else "is no MCAP file"
         raise LogError(what, where=str(path), expected="a file that begins with \\x89MCAP0", hint="record it again")
-
-
-def _count(counts: dict[int, int], batch: Batch) -> None:
-    for channel_id, n in zip(*(found.tolist() for found in np.unique(batch.ids, return_counts=True)), strict=True):
-        counts[channel_id] = counts.get(channel_id, 0) + n
-
-
-def _keep(samples: dict[int, list[bytes]], batch: Batch) -> None:
-    """Add to the first messages of each channel what is missing of them."""
-    for channel_id in np.unique(batch.ids).tolist():
-        kept = samples.setdefault(channel_id, [])
-        if len(kept) < SAMPLES:
-            first = batch.only(np.flatnonzero(batch.ids == channel_id)[: SAMPLES - len(kept)])
-            kept += [data for _, _, data in first.messages()]
 
 
 def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, bytes], None]) -> Iterator[Message]:

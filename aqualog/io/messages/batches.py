@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Batch", "Message", "batched", "damage_notes", "gap_note", "rows_of"]
+__all__ = ["Batch", "Message", "batched", "counted", "first_of_each", "rows_of"]
 
 Message = tuple[int, int, bytes]
 """Stream id, log time [ns] and bytes."""
@@ -90,20 +90,16 @@ def rows_of(data: bytes, starts: Indices, size: int) -> NDArray[np.void]:
     return np.ndarray((len(data) - size + 1,), np.dtype((np.void, size)), data, strides=(1,))[starts]
 
 
-def damage_notes(name: str, damaged: Mapping[int, str]) -> list[str]:
-    """Return notes on damaged chunks, given the reason by offset in the file `name`; empty without damage."""
-    if not damaged:
-        return []
-    offset, reason = min(damaged.items())
-    many = f"{len(damaged)} damaged chunk{'s are' if len(damaged) > 1 else ' is'} left out"
-    return [f"{name}: {many} (first at byte {offset}: {reason})"]
+def counted(counts: dict[int, int], batch: Batch) -> None:
+    """Add the messages of each stream to their number."""
+    for stream_id, n in zip(*(found.tolist() for found in np.unique(batch.ids, return_counts=True)), strict=True):
+        counts[stream_id] = counts.get(stream_id, 0) + n
 
 
-def gap_note(name: str, start: int, end: int, size: int) -> str:
-    """What a stretch of bytes without a sound record means for what is read."""
-    if end < size:
-        return (
-            f"{name}: no sound record from byte {start} to {end}: damaged there; what stands before and behind is read"
-        )
-    what = f"no sound record from byte {start} of {size} on: cut off, damaged there or never closed"
-    return f"{name}: {what}; what stands before is read"
+def first_of_each(samples: dict[int, list[bytes]], batch: Batch, most: int) -> None:
+    """Add to the first messages of each stream what is missing of them."""
+    for stream_id in np.unique(batch.ids).tolist():
+        kept = samples.setdefault(stream_id, [])
+        if len(kept) < most:
+            first = batch.only(np.flatnonzero(batch.ids == stream_id)[: most - len(kept)])
+            kept += [data for _, _, data in first.messages()]

@@ -17,9 +17,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from aqualog.io import batches, mcap, messages
 from aqualog.io.base import ReadOptions
-from aqualog.io.mcap_scan import scanned
+from aqualog.io.messages import batches, codecs, mcap, streams
+from aqualog.io.messages.mcap_records import scanned
 from aqualog.io.open_log import open_log
 
 T0 = 1_700_000_000 * 10**9
@@ -45,7 +45,7 @@ def outcome(path: Path) -> tuple:
 def compared(path: Path, batch: int = 1 << 19) -> list[bool]:
     """Read both ways and compare; which batches of a topic were cut."""
     cuts: list[bool] = []
-    cut = messages._Cutter.cut
+    cut = streams._Cutter.cut
 
     def counted(self, rows):
         found = cut(self, rows)
@@ -54,9 +54,9 @@ def compared(path: Path, batch: int = 1 << 19) -> list[bool]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batches, "_ENOUGH", batch)
-        patch.setattr(messages._Cutter, "cut", counted)
+        patch.setattr(streams._Cutter, "cut", counted)
         fast = outcome(path)
-        patch.setattr(messages._Cutter, "cut", lambda *_: None)
+        patch.setattr(streams._Cutter, "cut", lambda *_: None)
         patch.setattr(mcap, "scanned", lambda _: None)
         plain = outcome(path)
     assert fast[0].keys() == plain[0].keys()
@@ -324,7 +324,7 @@ def test_a_topic_on_two_connections_keeps_the_order_of_the_file(tmp_path):
 
 def test_a_layout_that_is_wrong_is_not_believed(tmp_path, monkeypatch):
     path = write_mcap(tmp_path / "a.mcap", wheel_types(2), {"/wheels": ("car/msg/Wheels", wheels(200))})
-    right = messages.ros_layout
+    right = codecs.ros_layout
 
     def wrong(*args, **kwargs):
         layout = right(*args, **kwargs)
@@ -332,7 +332,7 @@ def test_a_layout_that_is_wrong_is_not_believed(tmp_path, monkeypatch):
         layout.runs["omega",] = type(field)(field.at + 8, field.dtype), count
         return layout
 
-    monkeypatch.setattr(messages, "ros_layout", wrong)
+    monkeypatch.setattr(codecs, "ros_layout", wrong)
     assert not any(compared(path))
 
 
@@ -376,7 +376,7 @@ def test_recordings_in_sqlite_and_of_ros_1(tmp_path):
 
 
 def test_the_sample_drive():
-    cuts = compared(Path(__file__).resolve().parents[2] / "sample_logs" / "lane_drive.mcap")
+    cuts = compared(Path(__file__).resolve().parents[3] / "sample_logs" / "lane_drive.mcap")
     assert cuts
     assert all(cuts)
 

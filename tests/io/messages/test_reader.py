@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from aqualog.io import batches, messages
 from aqualog.io.base import ReadOptions
+from aqualog.io.messages import batches
+from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
 
-LANE = Path(__file__).parents[2] / "sample_logs" / "lane_drive.mcap"
+LANE = Path(__file__).parents[3] / "sample_logs" / "lane_drive.mcap"
 SCHEMA = b"std_msgs/Header header\nfloat64 x\nfloat32[3] y\n" + b"=" * 80 + (
     b"\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + b"=" * 80
     + b"\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
