@@ -17,10 +17,10 @@ def generated() -> dict[Path, str]:
     from aqualog.book import reference
     from aqualog.book.documents import DOCUMENTS
     from aqualog.book.documents.fields import schema
-    from aqualog.book.reference import commands_page
+    from aqualog.book.reference.commands import commands_page
     from aqualog.cli.commands import loaded
 
-    found = {DOCS / "reference" / "commands.md": commands_page.text(loaded())}
+    found = {DOCS / "reference" / "commands.md": commands_page(loaded())}
     found |= {DOCS / "reference" / f"{n}.md": reference.page(n) for n in reference.PAGES if n != "commands"}
     for name, document in DOCUMENTS.items():
         text = json.dumps(schema(document), indent=1, ensure_ascii=False) + "\n"

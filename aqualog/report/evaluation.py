@@ -66,13 +66,14 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Repo
     """
     records, tuning = evaluation.records, evaluation.tuning
     scores, situations = score_all(records), situation_scores(records)
-    plots = evaluation_figures(evaluation)
+    plots, answers = evaluation_figures(evaluation), verdicts(records)
     tuned = tuning_sentences(tuning, score_all(tuning.before), scores) if tuning else []
     sections = [
         Section("", [
             Para(f"{len(records)} drives, {sum(r.duration_s for r in records) / 3600.0:.3g} h", where="text"),
-            Headline(headline(evaluation), verdicts(records)), Lines(verdicts(records), where="text"),
-        ], "verdict", look="verdict open"),
+            Lines(answers or [headline(evaluation)]),
+        ], where="text"),
+        Section("", [Headline(headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
         Section("Not evaluated", [Lines(list(evaluation.failed.items()), most=1000)], "failed", look="problems",
                 where="page"),
         Section("All drives", [Table(_SCORES, _score_rows(scores), "detectors"), Para(_LEGEND, where="text")]),

@@ -9,7 +9,9 @@ import pytest
 import aqualog
 from aqualog.book.__main__ import generated
 from aqualog.book.markdown import table, units
-from aqualog.book.reference import PAGES, effects_page, map_page, thresholds_page, vehicle_page
+from aqualog.book.reference import PAGES
+from aqualog.book.reference.model import EFFECTS_EXAMPLE, vehicle_example
+from aqualog.book.reference.settings import MAP_EXAMPLE, THRESHOLDS_EXAMPLE
 from aqualog.book.topics import DOCS
 from aqualog.campaign.records import GROUP_NAMES
 from aqualog.cli.commands import loaded
@@ -116,7 +118,7 @@ def test_every_number_of_the_tuning_has_a_meaning():
 
 
 def test_the_vehicle_example_loads_with_every_key(tmp_path):
-    (tmp_path / "car.toml").write_text(vehicle_page.example())
+    (tmp_path / "car.toml").write_text(vehicle_example())
     car = load_vehicle(tmp_path / "car.toml")
     assert set(KEYS) <= car.given
     assert set(car.spread) == set(SPREAD)
@@ -124,17 +126,17 @@ def test_the_vehicle_example_loads_with_every_key(tmp_path):
 
 
 def test_the_map_example_loads_with_every_key(tmp_path):
-    (tmp_path / "map.toml").write_text(map_page.EXAMPLE)
+    (tmp_path / "map.toml").write_text(MAP_EXAMPLE)
     assert len(load_signal_map(tmp_path / "map.toml").entries) == 4
-    used = tomllib.loads(map_page.EXAMPLE)
+    used = tomllib.loads(MAP_EXAMPLE)
     flat = str(used)
     assert all(f"'{k.name.removeprefix('SIGNAL.')}'" in flat for k in MAP_KEYS)
 
 
 def test_the_other_examples_load(tmp_path):
-    (tmp_path / "m.toml").write_text(effects_page.EXAMPLE)
+    (tmp_path / "m.toml").write_text(EFFECTS_EXAMPLE)
     assert len(load_model(tmp_path / "m.toml").terms) == 2
-    (tmp_path / "t.toml").write_text(thresholds_page.EXAMPLE)
+    (tmp_path / "t.toml").write_text(THRESHOLDS_EXAMPLE)
     load_thresholds(tmp_path / "t.toml")
     assert load_settings(tmp_path / "t.toml").joint_cusum.with_slope is False
 

@@ -6,13 +6,15 @@ from importlib import import_module
 
 __all__ = ["PAGES", "page"]
 
-PAGES = (
-    "commands", "signals", "map", "vehicle", "campaign", "scenario", "thresholds", "effects", "documents", "exit_codes",
-    "environment", "python",
-)  # fmt: skip
+PAGES = {
+    "commands": "commands", "signals": "signals", "map": "settings", "vehicle": "model", "campaign": "settings",
+    "scenario": "settings", "thresholds": "settings", "effects": "model", "documents": "documents",
+    "exit_codes": "machine", "environment": "machine", "python": "python",
+}  # fmt: skip
+"""Name of a page -> module that makes it."""
 
 
 def page(name: str) -> str:
     """The Markdown of one page of the reference."""
-    text: str = import_module(f"aqualog.book.reference.{name}_page").text()
+    text: str = getattr(import_module(f"aqualog.book.reference.{PAGES[name]}"), f"{name}_page")()
     return text

@@ -9,7 +9,7 @@ from aqualog.book.documents.fields import Document, Field, paths
 from aqualog.book.documents.tables import TABLES, Table
 from aqualog.book.markdown import code, page, table
 
-__all__ = ["text"]
+__all__ = ["documents_page"]
 
 _SUMMARY = "Every field of the JSON documents that commands print, and every column of the tables that aqualog writes."
 _HOW = """
@@ -29,7 +29,7 @@ Tables are Parquet files, which polars, pandas and DuckDB open as they are, or C
 """
 
 
-def text() -> str:
+def documents_page() -> str:
     """The page."""
     listed = [(f"[`{d.heading}`](#{_anchor(d.heading)})", d.summary) for d in DOCUMENTS.values()]
     listed += [(f"[`{t.name}`](#{_anchor(t.name)})", t.summary) for t in TABLES]

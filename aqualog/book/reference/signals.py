@@ -10,7 +10,7 @@ from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS, Symbol
 from aqualog.core.units import spellings
 from aqualog.model.simulate import TRUTH_SYMBOLS
 
-__all__ = ["text"]
+__all__ = ["signals_page"]
 
 _SUMMARY = "Names, units and ranges of all signals, and the spellings of units that aqualog understands."
 _HOW = """
@@ -35,7 +35,7 @@ A mapped channel without a unit counts as SI, and a note says so.
 """
 
 
-def text() -> str:
+def signals_page() -> str:
     """The page."""
     return page(
         "Signals",

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from aqualog.book.markdown import code, fence, page, table
-from aqualog.book.reference.exit_codes_page import MEANINGS
+from aqualog.book.reference.machine import MEANINGS
 
-__all__ = ["text"]
+__all__ = ["commands_page"]
 
 _SUMMARY = "Every command with its options and examples."
 _HOW = """
@@ -20,7 +20,7 @@ whole or not there. No file is overwritten without `--force`, and a file that th
 _PARAGRAPH = "\b"
 
 
-def text(commands: Mapping[str, Any]) -> str:
+def commands_page(commands: Mapping[str, Any]) -> str:
     """The page; `commands` as the command line has them, by name."""
     listed = [(f"[`{n}`](#{_anchor(n)})", _first(c.help)) for n, c in commands.items()]
     codes = "; ".join(f"{int(c)} {meaning}" for c, (meaning, _) in MEANINGS.items())

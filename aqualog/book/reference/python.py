@@ -16,7 +16,7 @@ from aqualog.book.markdown import code, fence, page, table
 from aqualog.face import thesis
 from aqualog.face.result import Result
 
-__all__ = ["text"]
+__all__ = ["python_page"]
 
 _SUMMARY = "The names that `import aqualog` offers, with their signatures."
 _HOW = """
@@ -35,7 +35,7 @@ _SECTION = re.compile(r"^(Parameters|Returns|Raises|Yields|Examples|Notes)\n-{3,
 _ITEM = re.compile(r"^(\S.*?)(?: : (.*))?$\n((?:^(?:    .*)?$\n?)*)", re.M)
 
 
-def text() -> str:
+def python_page() -> str:
     """The page."""
     names = sorted(n for n in aqualog.__all__ if not n.startswith("__"))
     shown = [(n, getattr(aqualog, n)) for n in names]

@@ -1,12 +1,48 @@
-"""Variables of the environment."""
+"""Pages of what a script and a machine need: exit codes, variables of the environment."""
 
 from __future__ import annotations
 
 from aqualog.book.markdown import code, page, table
+from aqualog.core.errors import AqualogError, ConfigError, ExitCode, FitError, LogError, SignalError
 
-__all__ = ["VARIABLES", "text"]
+__all__ = ["MEANINGS", "VARIABLES", "environment_page", "exit_codes_page"]
 
-_SUMMARY = "The variables of the environment that aqualog reads."
+_EXIT_CODES = "The exit code says to a script how a command ended."
+_EXIT_CODES_HOW = """
+One line on stderr says what went wrong, where, what was expected and what to try. A traceback appears only with
+`--debug`.
+"""
+MEANINGS = {
+    ExitCode.DONE: ("done", "the result is complete; all six verdicts of `diagnose` are results"),
+    ExitCode.FAILED: ("failed", "a log cannot be read, the disk is full, or aqualog has a fault"),
+    ExitCode.USAGE: ("usage or configuration", "an option, a name or a settings file is wrong, or a file would be "
+                     "overwritten; nothing was done"),
+    ExitCode.PARTIAL: ("done, but not with all data", "the result is there; data of a log was lost, or some logs could "
+                       "not be read"),
+    ExitCode.NOTHING_USABLE: ("nothing usable", "signals are missing, or the data do not carry the estimate"),
+    ExitCode.GATE_TRIPPED: ("a gate has tripped", "`--fail-on-event` found an event; it wins over 3"),
+    ExitCode.INTERRUPTED: ("interrupted", "Ctrl-C or a request to end; files that were finished are whole"),
+}  # fmt: skip
+_ERRORS = (ConfigError, LogError, SignalError, FitError)
+
+
+def exit_codes_page() -> str:
+    """The page."""
+    rows = [(code(str(int(c))), *MEANINGS[c]) for c in ExitCode]
+    errors = [(code(e.__name__), code(str(int(e.exit_code))), (e.__doc__ or "").split("\n\n")[0]) for e in _ERRORS]
+    return page(
+        "Exit codes",
+        _EXIT_CODES,
+        _EXIT_CODES_HOW,
+        table(("code", "meaning", "when"), rows),
+        "## Errors in Python",
+        "From Python the same faults are exceptions. "
+        f"All derive from `{AqualogError.__name__}` in `{AqualogError.__module__}`.",
+        table(("exception", "exit code", "meaning"), errors),
+    )
+
+
+_ENVIRONMENT = "The variables of the environment that aqualog reads."
 _LIMITS = """
 A command reads logs in a process of its own. Limits keep a damaged log from taking time, memory or disk without end.
 The command then names the log, starts again without it and goes on. The defaults are far above honest work, and 0 lifts
@@ -48,11 +84,11 @@ package read it: `AWS_ENDPOINT_URL`, `AWS_ACCESS_KEY_ID` and their like. On a cl
 """
 
 
-def text() -> str:
+def environment_page() -> str:
     """The page."""
     parts: list[str] = []
     for title, variables in VARIABLES.items():
         rows = [(code(n), meaning, default) for n, (meaning, default) in variables.items()]
         about = _LIMITS if title.startswith("Limits") else ""
         parts += [f"## {title}", about, table(("variable", "meaning", "default"), rows)]
-    return page("Environment variables", _SUMMARY, *parts, "## Remote stores", _REMOTE)
+    return page("Environment variables", _ENVIRONMENT, *parts, "## Remote stores", _REMOTE)
