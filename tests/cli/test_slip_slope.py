@@ -52,11 +52,11 @@ def written(folder):
 def test_table_tells_slopes_and_stability(written):
     result, _ = written
     assert result.returncode == 0, result.stderr
-    row = next(line.split() for line in result.stdout.splitlines() if line.startswith("rl "))
+    row = next(line.split() for line in result.stdout.splitlines() if line.startswith("RL "))
     assert float(row[1]) == pytest.approx(C, rel=0.03)
     assert float(row[2]) <= C <= float(row[4])
     assert "traction from the wheel torques" in result.stdout
-    assert "rl: stable: " in result.stdout
+    assert "RL: stable: " in result.stdout
     assert "left out: " in result.stdout
 
 
@@ -136,7 +136,7 @@ def test_delay_of_the_velocity_is_told(folder):
     out = folder / "late_out"
     result = run(folder / "late.csv", "--vehicle", folder / "awd.toml", "-o", out)
     assert result.returncode == 0, result.stderr
-    assert "fl: v_x is late by +0.1" in result.stdout
+    assert "FL: v_x is late by +0.1" in result.stdout
     place = json.loads((out / "slip_slope.json").read_text())["slip_slope"][0]
     assert place["delay_s"] == pytest.approx(0.1, abs=0.005)
     assert place["delay_ci95"][0] < 0.1 < place["delay_ci95"][1]
