@@ -11,7 +11,7 @@ from aqualog import __version__
 from aqualog.campaign.key import code_stamp
 from aqualog.campaign.store import Store
 from aqualog.core.errors import AqualogError
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import Configured, Job

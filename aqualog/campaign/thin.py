@@ -11,13 +11,12 @@ import polars as pl
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.negative_force import HOLD
+from aqualog.detect.braking import HOLD, BrakeWatch
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.direct import SMOOTHING
 from aqualog.detect.slip_slope.direct_inputs import (
     LIMITS,
     accelerometer_traction,
-    braking_of_wheels,
     reference_of,
     smoothed,
     torque_traction,
@@ -128,7 +127,7 @@ class Thinning:
         smooth = {k: smoothed(x, width) for k, x in f.items() if k.startswith("v_line_")}
         mu, self.traction = _traction(f | smooth, columns, vehicle, dt, width)
         slip, self.against, a_over_v = _slips(f | smooth, columns, vehicle, dt, width)
-        braking = braking_of_wheels(f, columns, vehicle, dt)
+        braking = BrakeWatch(vehicle, dt).push(f, columns)
         reason = activation.inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"],
             a_w_delta=np.zeros(n), is_braking=np.any(list(braking.values()), axis=0), limits=LIMITS,

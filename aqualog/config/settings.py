@@ -9,8 +9,8 @@ from typing import Any
 from aqualog.config.file_key import FileKey
 from aqualog.config.thresholds import load_thresholds
 from aqualog.config.toml_file import TableFaults, load_toml
-from aqualog.detect.joint_cusum import TERMS, JointCusumParams
-from aqualog.detect.stream import Settings
+from aqualog.detect.joint_cusum import TERMS
+from aqualog.detect.settings import JointCusumParams, Settings
 
 __all__ = ["JOINT_KEYS", "joint_text", "load_settings"]
 

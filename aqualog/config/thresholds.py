@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from aqualog.config.toml_file import TableFaults, load_toml
 from aqualog.core.errors import ConfigError
-from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS, Thresholds
+from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS
+from aqualog.detect.thresholds import Thresholds
 
 __all__ = ["load_thresholds", "thresholds_text"]
 
@@ -37,12 +37,8 @@ def load_thresholds(path: Path) -> tuple[Thresholds, dict[str, float]]:
     for name in document:
         if name not in _TABLES:
             faults.unknown(name, _TABLES)
-    own = _numbers(document, "thresholds", [f.name for f in fields(Thresholds)], faults)
-    rivals: dict[str, float] = {}
-    if "rivals" in document:
-        from aqualog.rivals.catalogue import RIVALS
-
-        rivals = _numbers(document, "rivals", list(RIVALS), faults)
+    own = _numbers(document, "thresholds", list(DETECTORS), faults)
+    rivals = _numbers(document, "rivals", list(RIVALS), faults)
     for name, value in own.items():
         try:
             Thresholds(**{name: value})
@@ -50,7 +46,7 @@ def load_thresholds(path: Path) -> tuple[Thresholds, dict[str, float]]:
             with faults.inside("thresholds"):
                 faults.add(name, error.line())
     faults.raise_if_any()
-    return Thresholds(**{f.name: own.get(f.name, getattr(DEFAULT, f.name)) for f in fields(Thresholds)}), rivals
+    return Thresholds(**own), rivals
 
 
 def thresholds_text(
@@ -59,17 +55,15 @@ def thresholds_text(
     """Return the TOML text of thresholds, with their units and meanings; reading it again gives the same values."""
     lines = [f"# {''.join(c if c.isprintable() else ' ' for c in text)}" for text in comments]
     lines.append("[thresholds]")
-    for f in fields(thresholds):
-        unit = "" if UNITS[f.name] == "-" else f" [{UNITS[f.name]}]"
-        lines.append(f"{f.name} = {float(getattr(thresholds, f.name))!r}  # {MEANINGS[f.name]}{unit}")
+    lines += [_line(name, value, BY_NAME[name].meaning) for name, value in thresholds.items()]
     if rivals:
-        from aqualog.rivals.catalogue import RIVALS
-
-        lines += ["", "[rivals]"]
-        for name, value in rivals.items():
-            unit = "" if RIVALS[name].unit == "-" else f" [{RIVALS[name].unit}]"
-            lines.append(f"{name} = {float(value)!r}  # {RIVALS[name].title}{unit}")
+        lines += ["", "[rivals]", *(_line(name, value, RIVALS[name].title) for name, value in rivals.items())]
     return "\n".join(lines) + "\n"
+
+
+def _line(name: str, value: float, words: str) -> str:
+    unit = BY_NAME[name].unit
+    return f"{name} = {float(value)!r}  # {words}" + ("" if unit == "-" else f" [{unit}]")
 
 
 def _numbers(document: Mapping[str, Any], table: str, known: list[str], faults: TableFaults) -> dict[str, float]:

@@ -3,40 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Track
+from aqualog.detect import cusum
+from aqualog.detect.braking import hold_on
+from aqualog.detect.detector import Detector, Found, Output, Scene, Setup
+from aqualog.detect.joint_criteria import (
+    FULL,
+    GATE,
+    HOLD,
+    JOINT_CRITERIA,
+    MAY_BE_WATER,
+    joint_needs,
+    joint_severity,
+    without_start,
+)
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.resistance import MEASURE, RESISTANCE
+from aqualog.detect.settings import JointCusumParams
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
+from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
 
-__all__ = ["TERMS", "JointCusumParams", "terms"]
+__all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 
-TERMS = ("spin_up", "spin_down", "resistance", "minor_spin_down", "slip_slope_drop")
-
-
-@dataclass(frozen=True, slots=True)
-class JointCusumParams:
-    """Scales of the terms; each reaches 1 at its scale and no more.
-
-    `third` is the third term of (2.11): `resistance`, as the text has it, or `variance`, a CUSUM of the variance
-    difference, as its printed index says (E6). `with_slope` adds the lost share of the slip slope, an option in the
-    thesis. `gated`: the sum warns only while the resistance gate is open. A wheel that is braked or spun on ice, or a
-    bus that loses messages, fills several terms at once, and the thesis calls resistance necessary.
-    """
-
-    g_up: float = 1.5  # [m/s]
-    g_down: float = 1.5  # [m/s]
-    g_resistance: float = 0.3  # [m/s]
-    var_low: float = 0.5  # [(m/s^2)^2] what tooth noise and rough asphalt leave of the difference
-    var_high: float = 4.0
-    g_variance: float = 1.0  # [(m/s^2)^2 s]
-    loss_low: float = 0.25  # [-] what load, grip and noise of the estimate cost on dry road
-    loss_high: float = 0.75
-    third: Literal["resistance", "variance"] = "resistance"
-    with_slope: bool = True
-    gated: bool = True
-    weights: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0)
+TERMS = tuple(d.name for d in (SPIN_UP, SPIN_DOWN, RESISTANCE, MINOR_SPIN_DOWN, SLIP_SLOPE_DROP))
+ALONE = 0.7  # of a wheel's variance that the other axle must not have: gravel shakes both (C33)
+LEAST_TERM = 0.1  # [-] a term below that has decided nothing
 
 
 def terms(
@@ -63,22 +58,93 @@ def terms(
     Thesis: Eq. (2.11). Departures (E6): the third term is g_RR / g_RR,max by default; the variance term is clamped at
     both ends, since as printed it is negative below its lower bound; sides and wheels enter by their largest value.
     """
-    span = {
-        "spin_up": (0.0, p.g_up),
-        "spin_down": (0.0, p.g_down),
-        "resistance": (0.0, p.g_resistance),
-        "minor_spin_down": (p.var_low, p.var_high),
-        "slip_slope_drop": (p.loss_low, p.loss_high),
-    }
+    ends = (
+        (0.0, p.g_up), (0.0, p.g_down), (0.0, p.g_resistance), (p.var_low, p.var_high), (p.loss_low, p.loss_high),
+    )  # fmt: skip
+    span = dict(zip(TERMS, ends, strict=True))
     out = {name: np.zeros(n) for name in TERMS}
     for track, counts in tracks:
-        if track.detector not in out or (track.detector == "slip_slope_drop" and not p.with_slope):
+        if track.detector not in out or (track.detector == SLIP_SLOPE_DROP.name and not p.with_slope):
             continue
-        if track.detector == "resistance" and p.third == "variance":
+        if track.detector == RESISTANCE.name and p.third == "variance":
             continue
         low, high = span[track.detector]
         scaled = np.clip((np.nan_to_num(track.statistic) - low) / (high - low), 0.0, 1.0)
         out[track.detector] = np.maximum(out[track.detector], np.where(counts, scaled, 0.0))
     if p.third == "variance":
-        out["resistance"] = np.clip(np.nan_to_num(g_variance) / p.g_variance, 0.0, 1.0)
+        out[RESISTANCE.name] = np.clip(np.nan_to_num(g_variance) / p.g_variance, 0.0, 1.0)
     return {name: weight * out[name] for name, weight in zip(TERMS, p.weights, strict=True)}
+
+
+class JointCusumWatch:
+    """Joint detector 2: the sum of scaled statistics. Features: `joint_term_spin_up` ..."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._p = p = setup.settings.joint_cusum
+        self._variance = cusum.CusumParams(p.var_low, 1.0, p.g_variance, setup.dt)
+        self._variances: dict[str, cusum.CusumState] = {}
+        self._hold = 0
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: one track, the sum. [-]"""
+        f, x = scene.f, scene.shared[MEASURE]
+        slope = scene.shared[MAY_BE_WATER]
+        counting = [(t, _counts(t, scene) & (slope | (t.detector != SLIP_SLOPE_DROP.name))) for t in scene.tracks]
+        parts = terms(self._p, counting, self._variance_sum(scene), scene.size)
+        total = np.sum(list(parts.values()), axis=0)
+        known = ~np.isnan(x)
+        above = known & (total > self._setup.threshold)
+        if self._p.gated:
+            above &= scene.shared[GATE]
+        active, self._hold = hold_on(above, self._hold, seconds=HOLD, dt=self._setup.dt)
+        evidence: dict[str, Any] = {
+            "v_x": ("first", f["v_x_hat"]),
+            "delta_a_x_max": ("max", scene.unbraked_resistance),
+            **{f"term_{name}": ("max", part) for name, part in parts.items()},
+            **{f"at_start_{name}": ("first", part) for name, part in parts.items()},
+            "full": ("any", f[FULL] > 0.0),
+        }
+        track = self._setup.track(np.where(known, total, np.nan), active)
+        return Output((Found(track, evidence),), {f"joint_term_{name}": part for name, part in parts.items()})
+
+    def _variance_sum(self, scene: Scene) -> FloatArray:
+        sums = []
+        for track in scene.of(MINOR_SPIN_DOWN):
+            assert track.side is not None
+            state = self._variances.get(track.side, cusum.initial_state())
+            g, _, self._variances[track.side] = cusum.scan(self._variance, state, track.statistic)
+            sums.append(np.nan_to_num(g))
+        return np.max(sums, axis=0) if sums else np.zeros(scene.size)
+
+
+def _counts(track: Track, scene: Scene) -> BoolArray:
+    """Flag samples without a braking force on the statistic's wheel; of a variance 0.7 must belong to one axle."""
+    bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
+    if track.detector == MINOR_SPIN_DOWN.name:
+        with np.errstate(invalid="ignore"):
+            bits &= track.statistic > ALONE * scene.f.get(f"variance_{track.wheel}", track.statistic)
+    return bits
+
+
+def _explain(evidence: dict[str, Any]) -> dict[str, Any]:
+    """Add `decided_by`: the terms of the sum when it crossed the threshold, largest first."""
+    start = {name: float(evidence.get(f"at_start_{name}", 0.0)) for name in TERMS}
+    found = sorted((n for n, v in start.items() if v >= LEAST_TERM), key=lambda n: -start[n])
+    return {**without_start(evidence), "decided_by": found}
+
+
+JOINT_CUSUM = Detector(
+    name="joint_cusum",
+    title="Joint CUSUM",
+    unit="-",
+    meaning="scaled sum of all effects",
+    statistic="scaled sum of the single detectors",
+    threshold=1.15,
+    needs=joint_needs,
+    start=JointCusumWatch,
+    kind="joint",
+    reads=(*JOINT_CRITERIA.reads, JOINT_CRITERIA),
+    severity=joint_severity,
+    explain=_explain,
+)

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.compiled import compiled
+from aqualog.core.notation import SIDES
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_wheels, too_slow
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
-from aqualog.detect.thresholds import DEFAULT
+from aqualog.detect.spin import wheel_evidence
 
-__all__ = ["MinorParams", "MinorState", "initial_state", "scan"]
+__all__ = [
+    "A_Y_MINOR", "MINOR_SPIN_DOWN", "MIN_RATE", "MinorParams", "MinorState", "MinorWatch", "initial_state", "scan",
+]  # fmt: skip
+
+THRESHOLD = 1.0  # [(m/s^2)^2]
+MIN_RATE = 20.0  # [Hz] a minor spin-down lasts 50 to 300 ms; slower wheel speeds show kerbs and noise only
+A_Y_MINOR = 4.0  # [m/s^2] beyond, the inner wheels lose load enough to slow down on dry road too
 
 
 class MinorParams(NamedTuple):
@@ -32,7 +42,7 @@ class MinorParams(NamedTuple):
     dt: float  # [s]
 
     @staticmethod
-    def make(dt: float, threshold: float = DEFAULT.minor_spin_down) -> MinorParams:
+    def make(dt: float, threshold: float = THRESHOLD) -> MinorParams:
         """Return defaults: 0.5 s of memory, 1.2 (m/s²)² of the wheel, 1.0 of the difference, 8 to 1 below zero."""
         return MinorParams(
             from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt
@@ -148,3 +158,56 @@ def scan(
     delta, var, bits, last = _scan(p, state, a_w_delta, a_w_delta_other, v_w_delta, v_x, allowed)
     final: MinorState = last._replace(active=bool(last.active))
     return delta, var, bits, final
+
+
+class MinorWatch:
+    """Minor spin-downs of the watched axle, side by side.
+
+    Features: the variances of all wheels that are compared, `variance_fl` ... [(m/s²)^2].
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._axle = setup.vehicle.watched_axle
+        self._params = MinorParams.make(setup.dt, setup.threshold)
+        self._states = {s: initial_state() for s in SIDES}
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: a track per side. [(m/s²)^2]"""
+        f = scene.f
+        found: list[Found] = []
+        features: dict[str, FloatArray] = {}
+        with np.errstate(invalid="ignore"):
+            is_upright = ~(np.abs(f["a_y_slow"]) > A_Y_MINOR)
+        for side, pair in SIDES.items():
+            watched = next(w for w in pair if w[0] == self._axle)
+            other = next(w for w in pair if w[0] != self._axle)
+            if watched not in scene.wheels or other not in scene.wheels:
+                continue
+            delta, var, bits, self._states[side] = scan(
+                self._params, self._states[side], f[f"a_w_delta_{watched}"], f[f"a_w_delta_{other}"],
+                f[f"v_w_delta_{watched}"] - f["v_w_delta_common"], f["v_x_hat"],
+                ~scene.braking[watched] & is_upright,
+            )  # fmt: skip
+            features |= {f"variance_{watched}": var, f"variance_{other}": var - delta}
+            evidence = {**wheel_evidence(scene, watched, f.get(f"mu_{watched}")), "variance_max": ("max", var)}
+            found.append(Found(self._setup.track(delta, bits, wheel=watched), evidence))
+        return Output(tuple(found), features)
+
+
+def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    omega = missing_wheels(have)
+    has_side = any(not missing_wheels(have, wheels) for wheels in SIDES.values())
+    return Needs((*(() if has_side else omega), *too_slow(rate_hz, MIN_RATE)), tuple(omega))
+
+
+MINOR_SPIN_DOWN = Detector(
+    name="minor_spin_down",
+    title="Minor spin-down",
+    unit="(m/s^2)^2",
+    meaning="variance of a wheel's acceleration difference beyond that of the other axle",
+    statistic="variance of wheel acceleration, watched axle minus the other one",
+    threshold=THRESHOLD,
+    needs=_needs,
+    start=MinorWatch,
+)

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from typing import Any
+
 import numpy as np
 
+from aqualog.calibrate import online
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect import cusum
+from aqualog.detect.braking import hold_on
 from aqualog.detect.cusum import CusumParams
-from aqualog.detect.thresholds import DEFAULT
+from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_balance, too_slow
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
+from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
 
-__all__ = ["THRESHOLD", "alarm_params", "gate_params", "trusted_measure", "usable_for_offset"]
+__all__ = [
+    "LEVEL", "MEASURE", "MIN_RATE", "RESISTANCE", "ResistanceWatch", "alarm_params", "trusted_measure",
+    "usable_for_offset",
+]  # fmt: skip
 
-THRESHOLD = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
+THRESHOLD = 0.2  # [m/s]
+LEVEL = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
+MIN_RATE = 2.0  # [Hz]
+MEASURE = "trusted_measure"  # as later detectors find it
+FREEZE = 2.0  # [s] after a wheel has left the road's speed nothing is learnt as dry
 V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
 CLIP = 0.8  # [m/s^2] a gear change or a bump shows more for a moment than water ever does (C46)
 V_OFFSET = 5.0  # [m/s] from here on the dry offset is learnt; the less water shows, the better
@@ -18,18 +35,13 @@ A_OFFSET = 1.0  # [m/s^2] beyond, a wrong mass shows in the measure, and curves 
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
-def alarm_params(dt: float, threshold: float = DEFAULT.resistance) -> CusumParams:
+def alarm_params(dt: float, threshold: float = THRESHOLD) -> CusumParams:
     """Tuning of the single detector, robust: its drift is half the change that is to be found.
 
     It reports 0.2 m/s² after 2 s, 0.4 m/s² after 0.7 s (C76).
     """
     # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 0.3 m/s
-    return CusumParams(0.5 * THRESHOLD, threshold, max(1.5 * threshold, 0.3), dt)
-
-
-def gate_params(dt: float, threshold: float = DEFAULT.joint_criteria) -> CusumParams:
-    """Tuning of the joint detector's gate, sensitive: it only has to show that something holds the car back (C64)."""
-    return CusumParams(0.5 * THRESHOLD, threshold, 2.0 * threshold, dt)
+    return CusumParams(0.5 * LEVEL, threshold, max(1.5 * threshold, 0.3), dt)
 
 
 def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_braking: BoolArray) -> FloatArray:
@@ -79,3 +91,60 @@ def usable_for_offset(
     with np.errstate(invalid="ignore"):
         usable = (v_x > V_OFFSET) & (np.abs(a_kin) < A_OFFSET) & (np.abs(a_y) < A_OFFSET) & ~is_braking
     return np.where(usable, np.clip(delta_a_x, -CLIP, CLIP), np.nan)
+
+
+class ResistanceWatch:
+    """Resistance measure, its offset on dry road, and its alarm.
+
+    The trusted measure (n,) [m/s²] is shared as `MEASURE`. Where a wheel or the slip slope suggests that this is not
+    dry road, the offset is frozen.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._dt = setup.dt
+        self._params = alarm_params(setup.dt, setup.threshold)
+        self._online = online.OnlineParams.make(setup.dt) if setup.settings.learns_offset else None
+        self._offset = online.initial_state()
+        self._sum = cusum.initial_state()
+        self._frozen = 0
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: one track, the sum. [m/s]"""
+        f = scene.f
+        suspects = scene.of(*RESISTANCE.reads)
+        suspicion = np.any([np.zeros(scene.size, dtype=bool), *(t.active for t in suspects)], axis=0)
+        frozen, self._frozen = hold_on(suspicion, self._frozen, seconds=FREEZE, dt=self._dt)
+        measure, features = f["delta_a_x"], {}
+        if self._online is not None:
+            usable = usable_for_offset(measure, f["v_x_hat"], f["a_kin_slow"], f["a_y_slow"], scene.is_braking)
+            offset, self._offset = online.scan(self._online, self._offset, usable, f["v_x_hat"], frozen)
+            features["delta_a_x_offset"] = offset
+            measure = measure - offset
+        x = trusted_measure(measure, f["v_x_hat"], f["a_y_slow"], scene.is_braking)
+        g, bits, self._sum = cusum.scan(self._params, self._sum, x)
+        evidence: dict[str, Any] = {
+            "v_x": ("first", f["v_x_hat"]),
+            "v_x_min": ("min", f["v_x_hat"]),
+            "v_x_max": ("max", f["v_x_hat"]),
+            "delta_a_x_max": ("max", np.where(scene.is_braking, np.nan, measure)),
+        }
+        return Output((Found(self._setup.track(g, bits), evidence),), features, {MEASURE: x})
+
+
+def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    slow = too_slow(rate_hz, MIN_RATE, "signals at {:g} Hz or more (check the unit of the time)")
+    return Needs((*missing_balance(vehicle, have), *slow))
+
+
+RESISTANCE = Detector(
+    name="resistance",
+    title="Resistance",
+    unit="m/s",
+    meaning="sum of the resistance measure beyond 0.1 m/s²",
+    statistic="sum of the resistance measure beyond its drift",
+    threshold=THRESHOLD,
+    needs=_needs,
+    start=ResistanceWatch,
+    reads=(SPIN_DOWN, MINOR_SPIN_DOWN, SPIN_UP, SLIP_SLOPE_DROP),
+)

@@ -5,17 +5,42 @@ difference.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Collection, Mapping
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
-from aqualog.detect.thresholds import DEFAULT
+from aqualog.detect.detector import (
+    Detector,
+    Found,
+    Needs,
+    Output,
+    Scene,
+    Setup,
+    missing_torques,
+    missing_wheels,
+    too_slow,
+    traction,
+)
+from aqualog.physics.slip import slip_of_wheel_speed
 
-__all__ = ["SpinParams", "SpinState", "initial_state", "scan"]
+__all__ = [
+    "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState", "SpinWatch",
+    "initial_state", "scan", "wheel_evidence",
+]  # fmt: skip
+
+THRESHOLD = 0.6  # [m/s]
+MIN_RATE = 5.0  # [Hz] a full spin-down lasts half a second and more
+MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
+SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
+MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
 
 
 class SpinParams(NamedTuple):
@@ -35,7 +60,7 @@ class SpinParams(NamedTuple):
     t_calm: float  # [s]
 
     @staticmethod
-    def make(sign: float, dt: float, threshold: float = DEFAULT.spin_down) -> SpinParams:
+    def make(sign: float, dt: float, threshold: float = THRESHOLD) -> SpinParams:
         """Return defaults: 3 m/s² drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
         # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 1.5 m/s
         sums = CusumParams(3.0, threshold, max(5.0 * threshold, 3.0), dt)
@@ -125,3 +150,99 @@ def scan(
     g, bits, last = _scan(p, state, a_w_delta, v_w_delta, v_x, allowed)
     final: SpinState = last._replace(active=bool(last.active))
     return g, bits, final
+
+
+class SpinWatch:
+    """Spin-downs of all wheels (`sign` -1), or spin-ups of the driven ones (+1)."""
+
+    def __init__(self, setup: Setup, *, sign: float) -> None:
+        self._setup = setup
+        self._is_up = sign > 0.0
+        self._wheels = setup.vehicle.driven if self._is_up else WHEELS
+        self._params = SpinParams.make(sign, setup.dt, setup.threshold)
+        self._states = {w: initial_state() for w in self._wheels}
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: a track per wheel. [m/s]"""
+        f = scene.f
+        found = []
+        for wheel in (w for w in scene.wheels if w in self._wheels):
+            g, bits, self._states[wheel] = scan(
+                self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
+                self._allowed(scene, wheel),
+            )  # fmt: skip
+            # only a spinning driven wheel has the water's resistance booked on it
+            mu = traction(f, wheel) if self._is_up else f.get(f"mu_{wheel}")
+            found.append(Found(self._setup.track(g, bits, wheel=wheel), wheel_evidence(scene, wheel, mu)))
+        return Output(tuple(found))
+
+    def _allowed(self, scene: Scene, wheel: str) -> BoolArray:
+        mu = traction(scene.f, wheel) if self._is_up else None
+        if mu is None:
+            return np.ones(scene.size, dtype=bool)
+        with np.errstate(invalid="ignore"):
+            return mu < MU_SPIN_UP
+
+
+def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:
+    """Return evidence for an event of one wheel; `mu` its traction coefficient (n,), None if not known."""
+    f, braking = scene.f, scene.braking[wheel]
+    slip = slip_of_wheel_speed(f[f"v_w_{wheel}"], f["v_x_hat"])
+    evidence: dict[str, Any] = {
+        "v_x": ("first", f["v_x_hat"]),
+        "slip_min": ("min", slip),
+        "slip_max": ("max", slip),
+        "a_w_delta_min": ("min", f[f"a_w_delta_{wheel}"]),
+        "a_w_delta_max": ("max", f[f"a_w_delta_{wheel}"]),
+        "braking": ("any", braking),
+        "braking_at_start": ("at_start", braking),
+    }
+    return evidence if mu is None else {**evidence, "mu": ("first", mu), "mu_min": ("min", mu)}
+
+
+def _needs_down(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    omega = missing_wheels(have)
+    # a single wheel has nothing to be compared with, unless there is a reference
+    is_blind = len(omega) == len(WHEELS) or (len(omega) == len(WHEELS) - 1 and "v_x" not in have)
+    return Needs((*(omega if is_blind else ()), *too_slow(rate_hz, MIN_RATE)), tuple(omega))
+
+
+def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    omega = missing_wheels(have, vehicle.driven)
+    is_blind = len(omega) == len(vehicle.driven)
+    return Needs(
+        (*(omega if is_blind else ()), *too_slow(rate_hz, MIN_RATE)), (*omega, *missing_torques(vehicle, have))
+    )
+
+
+def _severity_down(evidence: Mapping[str, Any]) -> str:
+    return "full" if evidence.get("slip_min", 0.0) < SLIP_FULL else "partial"
+
+
+def _severity_up(evidence: Mapping[str, Any]) -> str:
+    """Apply thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is unknown."""
+    return "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial"
+
+
+SPIN_DOWN = Detector(
+    name="spin_down",
+    title="Spin-down",
+    unit="m/s",
+    meaning="speed that a wheel loses faster than a healthy one can",
+    statistic="speed a wheel lost faster than a healthy one can",
+    threshold=THRESHOLD,
+    needs=_needs_down,
+    start=partial(SpinWatch, sign=-1.0),
+    severity=_severity_down,
+)
+SPIN_UP = Detector(
+    name="spin_up",
+    title="Spin-up",
+    unit="m/s",
+    meaning="speed that a wheel gains faster than a healthy one can",
+    statistic="speed a driven wheel gained faster than the vehicle",
+    threshold=THRESHOLD,
+    needs=_needs_up,
+    start=partial(SpinWatch, sign=1.0),
+    severity=_severity_up,
+)

@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aqualog.core.records import DriveResult, Event, FloatArray, Signals, Track, Unavailable
+from aqualog.core.notation import SYMBOLS
+from aqualog.core.records import DriveResult, Event, FileFaults, FloatArray, Signals, SlopeSummary, Track, Unavailable
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import BrakeWatch
+from aqualog.detect.detector import Detector, Scene, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.force_watch import ResistanceWatch, TieRodWatch
-from aqualog.detect.joint_cusum import JointCusumParams
-from aqualog.detect.joint_watch import JointCriteriaWatch, JointCusumWatch, SlopeJudge
-from aqualog.detect.needs import check_needs
+from aqualog.detect.extremes import Extremes
 from aqualog.detect.plausibility import Plausibility
-from aqualog.detect.scene import BrakeWatch, Scene
-from aqualog.detect.slip_slope.estimator import INACTIVE
+from aqualog.detect.registry import all_of, check_needs, running_order
+from aqualog.detect.settings import Settings
+from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.remarks import remarks
-from aqualog.detect.slip_slope.watch import Memory, SlipSlopeWatch, pairs
-from aqualog.detect.thresholds import DEFAULT, Thresholds
-from aqualog.detect.wheel_watch import MinorWatch, SpinWatch
+from aqualog.detect.slip_slope.watch import DropWatch
 from aqualog.features.stream import Features, FeatureStream
 
-__all__ = ["DriveStream", "Piece", "Settings", "detect_drive", "in_order"]
+if TYPE_CHECKING:
+    from aqualog.align.windows import LongDrive
 
-PIECE = 20_000  # samples that go through at once: some hundred arrays of 160 kB, which a cache holds
+__all__ = ["ROWS", "DriveStream", "Piece", "Settings", "detect_drive", "detect_long", "in_order", "present_in"]
 
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Settings of the detectors.
-
-    `correct_yaw` as in `FeatureStream`. `learns_offset`: the offset of the resistance measure on dry road is estimated
-    and subtracted. `joint_cusum`: scales of joint detector 2, whose threshold is that of `thresholds`.
-    """
-
-    thresholds: Thresholds = DEFAULT
-    correct_yaw: bool = True
-    learns_offset: bool = True
-    joint_cusum: JointCusumParams = field(default_factory=JointCusumParams)
+ROWS = 20_000  # samples that go through at once, 3 min at 100 Hz: some hundred arrays of 160 kB, which a cache holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +53,8 @@ class DriveStream:
     settings : Settings
     memory : Memory, optional
         Prior knowledge of the dry slip slope.
+    detectors : iterable of Detector, optional
+        The thesis' own by default.
     """
 
     def __init__(
@@ -75,38 +65,26 @@ class DriveStream:
         *,
         settings: Settings | None = None,
         memory: Memory | None = None,
+        detectors: Iterable[Detector] | None = None,
     ) -> None:
         settings = settings or Settings()
-        self.vehicle = vehicle
         self.dt_ns = dt_ns
         self.dt = dt = dt_ns * 1e-9
+        self.memory = memory or Memory()
         self._features = FeatureStream(vehicle, dt, available, correct_yaw=settings.correct_yaw)
         self._available = self._features.available
-        unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns)
+        chosen = tuple(all_of("effect", "joint") if detectors is None else detectors)
+        unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns, detectors=chosen)
         self.unavailable: tuple[Unavailable, ...] = tuple(unavailable)
         self.limited: tuple[Unavailable, ...] = tuple(limited)
         off = {u.detector for u in unavailable}
-        t = settings.thresholds
         self._book = EventBook(dt_ns)
         self._brakes = BrakeWatch(vehicle, dt)
-        self._wheels: list[SpinWatch | MinorWatch] = []
-        if "spin_down" not in off:
-            self._wheels.append(SpinWatch("spin_down", vehicle, dt, t.spin_down))
-        if "minor_spin_down" not in off:
-            self._wheels.append(MinorWatch(vehicle, dt, t.minor_spin_down))
-        if "spin_up" not in off:
-            self._wheels.append(SpinWatch("spin_up", vehicle, dt, t.spin_up))
-        self.memory = memory or Memory()
-        self.slope_watches: tuple[SlipSlopeWatch, ...] = ()
-        if "slip_slope_drop" not in off:
-            self.slope_watches = tuple(
-                SlipSlopeWatch(vehicle, pair, dt, self.memory, loss=t.slip_slope_drop) for pair in pairs(vehicle)
-            )
-        self._resistance = None if "resistance" in off else ResistanceWatch(dt, t, learns=settings.learns_offset)
-        self._tie_rods = None if "tie_rod" in off else TieRodWatch(vehicle, dt, t)
-        self._judge = SlopeJudge(dt)
-        self._joint = None if "joint_criteria" in off else JointCriteriaWatch(dt)
-        self._sum = None if "joint_cusum" in off else JointCusumWatch(dt, settings.joint_cusum, t.joint_cusum)
+        self.watches = {
+            d: d.start(Setup(d, vehicle, dt, settings.thresholds.get(d.name, d.threshold), settings, self.memory))
+            for d in running_order(chosen)
+            if d.name not in off
+        }
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples, one or more.
@@ -116,73 +94,66 @@ class DriveStream:
         columns : mapping symbol -> array (n,)
             SI, NaN where missing.
         """
-        f = dict(self._features.push(columns))
+        f = self._features.push(columns)
         known = {s: columns[s] for s in self._available}
-        scene = Scene(f, self._brakes.push(f, known))
-        tracks: list[Track] = []
+        scene = Scene(f, self._brakes.push(f, known), known)
         events: list[Event] = []
-        for watch in self._wheels:
-            new_tracks, new_events = watch.push(scene, self._book)
-            tracks += new_tracks
-            events += new_events
-            if isinstance(watch, MinorWatch):
-                f |= watch.features
-        for slope in self.slope_watches:
-            track, new_events = self._slope_drop(slope, scene, f)
-            tracks.append(track)
-            events += new_events
-        if self._resistance is not None:
-            suspicion = np.any([np.zeros(scene.size, dtype=bool), *(t.active for t in tracks)], axis=0)
-            track, new_events, x, gate, features = self._resistance.push(scene, self._book, suspicion)
-            tracks.append(track)
-            events += new_events
-            f |= features
-        if self._tie_rods is not None:
-            new_tracks, new_events = self._tie_rods.push(scene, self._book)
-            tracks += new_tracks
-            events += new_events
-        single = tuple(tracks)
-        if self._joint is not None or self._sum is not None:
-            may_be_water = self._judge.push(scene, single, x)
-        if self._joint is not None:
-            track, new_events, features = self._joint.push(scene, single, x, gate, may_be_water, self._book)
-            tracks.append(track)
-            events += new_events
-            f |= features
-        if self._sum is not None:
-            track, new_events, features = self._sum.push(scene, single, x, gate, may_be_water, self._book)
-            tracks.append(track)
-            events += new_events
-            f |= features
-        return Piece(f, tuple(tracks), tuple(events))
+        for detector, watch in self.watches.items():
+            output = watch.push(scene)
+            for found in output.found:
+                events += self._book.take(found.track, found.evidence, detector.severity, detector.explain)
+            scene = scene.after(output)
+        return Piece(scene.f, scene.tracks, tuple(events))
 
     def finish(self) -> tuple[Event, ...]:
         """Return events that are open at the end of the drive."""
         return self._book.finish()
 
-    def _slope_drop(self, watch: SlipSlopeWatch, scene: Scene, f: dict[str, FloatArray]) -> tuple[Track, list[Event]]:
-        seen = watch.push(f, scene.braking, f["yaw_rate_slow"])
-        place, wheel = watch.pair.place, watch.pair.wheel
-        f[f"slip_slope_{place}"] = np.where(seen.estimate.status < INACTIVE, seen.estimate.slope, np.nan)
-        f[f"slip_slope_ref_{place}"] = seen.reference
-        track = Track("slip_slope_drop", wheel, place, "-", seen.loss, watch.drop_threshold, seen.active)
-        evidence: dict[str, Any] = {
-            "v_x": ("first", f["v_x_hat"]),
-            "slope_min": ("min", seen.estimate.slope),
-            "slope_ref": ("first", seen.reference),
-            "mu": ("first", seen.mu),
-            "slip_max": ("max", np.abs(seen.slip)),
-        }
-        return track, self._book.take(track, evidence, _partial)
-
-
-def _partial(_: Mapping[str, Any]) -> str:
-    return "partial"
+    @property
+    def slopes(self) -> tuple[SlopeSummary, ...]:
+        """Return how the slip slope was estimated so far, place by place."""
+        drops = (w for w in self.watches.values() if isinstance(w, DropWatch))
+        return tuple(w.summary() for drop in drops for w in drop.watches)
 
 
 def in_order(events: Iterable[Event]) -> tuple[Event, ...]:
     """Sort events by their beginning."""
     return tuple(sorted(events, key=lambda e: (e.start_s, e.detector, e.wheel or "", e.side or "")))
+
+
+class _Through:
+    """The one way through a drive: piece by piece through all detectors, with what is checked and gathered beside."""
+
+    def __init__(
+        self, vehicle: Vehicle, dt_ns: int, present: Sequence[str], settings: Settings | None, memory: Memory | None
+    ) -> None:
+        self._stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
+        self._plausibility = Plausibility(present, vehicle, self._stream.dt)
+        self._vehicle = vehicle
+        self._events: list[Event] = []
+
+    def push(self, columns: Mapping[str, FloatArray]) -> Piece:
+        piece = self._stream.push(columns)
+        self._plausibility.push(columns, piece.features)
+        self._events += piece.events
+        return piece
+
+    def result(self, signals: Signals, features: Mapping[str, FloatArray], tracks: tuple[Track, ...]) -> DriveResult:
+        import polars as pl
+
+        stream = self._stream
+        slopes = stream.slopes
+        return DriveResult(
+            signals=signals,
+            features=pl.DataFrame(features),
+            tracks=tracks,
+            events=in_order((*self._events, *stream.finish())),
+            unavailable=stream.unavailable,
+            limited=stream.limited,
+            vehicle_name=self._vehicle.name,
+            notes=(*self._plausibility.notes(), *remarks(slopes)),
+            slopes=slopes,
+        )
 
 
 class _Gathered:
@@ -241,31 +212,113 @@ def detect_drive(
     DriveResult
         Events in order of their beginning.
     """
+    # a column without a single value is a signal that the drive does not have
+    rows = signals.frame.height
+    present = [s for s in signals.symbols if signals.frame[s].null_count() < rows]
+    through = _Through(vehicle, signals.dt_ns, present, settings, memory)
+    columns = {s: signals.array(s) for s in (present or ["v_x"])}
+    gathered = _Gathered(rows, samples=samples)
+    for at in range(0, max(rows, 1), ROWS):
+        piece = through.push({s: x[at : at + ROWS] for s, x in columns.items()})
+        gathered.add(piece, min(ROWS, rows - at))
+    return through.result(signals, gathered.features, gathered.tracks)
+
+
+def detect_long(
+    drive: LongDrive,
+    vehicle: Vehicle,
+    *,
+    settings: Settings | None = None,
+    memory: Memory | None = None,
+    faults: Sequence[FileFaults] = (),
+    rows: int = ROWS,
+    keep: Callable[[DriveResult], None] | None = None,
+    present: Sequence[str] | None = None,
+    pictured: bool = False,
+    tell: Callable[[float], None] = lambda _: None,
+) -> DriveResult:
+    """Run all detectors over a drive that is longer than memory, a window at a time.
+
+    Parameters
+    ----------
+    drive : LongDrive
+    vehicle, settings, memory
+        As of `detect_drive`.
+    faults : sequence of FileFaults
+        Losses of the readers, as the first pass found.
+    rows : int
+        Of a window.
+    keep : callable, optional
+        Called with each window, its signals, features and tracks, in order.
+    present : sequence of str, optional
+        Result of `present_in`.
+    pictured : bool
+        With least and greatest values of stretches of the drive, for a page.
+    tell : callable
+        Called with the share of the drive that is done.
+
+    Returns
+    -------
+    DriveResult
+        Events equal those of `detect_drive`; signals, features and tracks are extremes of stretches, or empty.
+    """
     import polars as pl
 
-    # a column without a single value is a signal that the drive does not have
-    present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
-    stream = DriveStream(vehicle, signals.dt_ns, present, settings=settings, memory=memory)
-    columns = {s: signals.array(s) for s in (present or ["v_x"])}
-    plausibility = Plausibility(present, vehicle, signals.dt)
-    gathered = _Gathered(signals.frame.height, samples=samples)
-    found: list[Event] = []
-    for at in range(0, max(signals.frame.height, 1), PIECE):
-        part = {s: x[at : at + PIECE] for s, x in columns.items()}
-        piece = stream.push(part)
-        plausibility.push(part, piece.features)
-        found += piece.events
-        gathered.add(piece, min(PIECE, signals.frame.height - at))
-    events = in_order((*found, *stream.finish()))
-    slopes = tuple(w.summary() for w in stream.slope_watches)
-    return DriveResult(
-        signals=signals,
-        features=pl.DataFrame(gathered.features),
-        tracks=gathered.tracks,
-        events=events,
-        unavailable=stream.unavailable,
-        limited=stream.limited,
-        vehicle_name=vehicle.name,
-        notes=(*plausibility.notes(), *remarks(slopes)),
-        slopes=slopes,
-    )
+    present = present_in(drive, rows) if present is None else present
+    dt_ns = drive.plan.grid.dt_ns
+    through = _Through(vehicle, dt_ns, present, settings, memory)
+    missing = dict.fromkeys(drive.plan.symbols, 0)
+    bridged: set[str] = set()
+    extremes = Extremes(drive.plan.grid.rows, dt_ns)
+    tracks: tuple[Track, ...] = ()
+    for signals, gaps in drive.windows(rows):
+        piece = through.push({s: signals.array(s) for s in (present or ["v_x"])})
+        bridged |= {s for s, is_bridged in gaps.items() if is_bridged}
+        for s in signals.symbols:
+            missing[s] += signals.frame[s].null_count()
+        tracks = piece.tracks
+        if keep is not None:
+            keep(DriveResult(signals, pl.DataFrame(dict(piece.features)), tracks, (), (), (), vehicle.name))
+        if pictured:
+            extremes.push(dict(_named(signals, piece)))
+        tell(float(signals.frame["t"][-1]) / max(drive.plan.grid.rows * dt_ns * 1e-9, 1e-9))
+    whole = drive.plan.facts(missing, frozenset(bridged), faults)
+    seen: dict[tuple[str, str], FloatArray] = extremes.columns()
+    features = {name: x for (kind, name), x in seen.items() if kind == "feature"}
+    return through.result(_coarse(whole, drive, seen, extremes.dt_ns), features, tuple(_coarse_tracks(tracks, seen)))
+
+
+def present_in(drive: LongDrive, rows: int = ROWS) -> list[str]:
+    """Return symbols with a value anywhere; mostly the first window of so many rows suffices."""
+    seen: set[str] = set()
+    for signals, _ in drive.windows(rows):
+        seen |= {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
+        if len(seen) == len(drive.plan.symbols):
+            break
+    return [s for s in drive.plan.symbols if s in seen]
+
+
+def _named(signals: Signals, piece: Piece) -> Iterator[tuple[tuple[str, str], FloatArray]]:
+    """Yield all columns of a window, by kind and name; tracks by their number."""
+    yield from ((("signal", s), signals.array(s)) for s in signals.symbols)
+    yield from ((("feature", f), x) for f, x in piece.features.items())
+    yield from ((("statistic", str(i)), t.statistic) for i, t in enumerate(piece.tracks))
+    yield from ((("bit", str(i)), t.active.astype(np.float64)) for i, t in enumerate(piece.tracks))
+
+
+def _coarse(whole: Signals, drive: LongDrive, seen: Mapping[tuple[str, str], FloatArray], dt_ns: int) -> Signals:
+    import polars as pl
+
+    columns = {name: pl.Series(x).fill_nan(None) for (kind, name), x in seen.items() if kind == "signal"}
+    columns = {s: x.cast(pl.Boolean) if SYMBOLS[s].unit == "bool" else x for s, x in columns.items()}
+    n = next(iter(columns.values())).len() if columns else 0
+    empty = {s: pl.Series([], dtype=pl.Float64) for s in drive.plan.symbols}
+    frame = pl.DataFrame({"t": np.arange(n) * dt_ns * 1e-9, **(columns or empty)})
+    return replace(whole, frame=frame, dt_ns=dt_ns, full=(drive.plan.grid.rows, drive.plan.grid.dt_ns))
+
+
+def _coarse_tracks(tracks: Sequence[Track], seen: Mapping[tuple[str, str], FloatArray]) -> Iterator[Track]:
+    nothing: FloatArray = np.zeros(0)
+    for i, track in enumerate(tracks):
+        bits = np.asarray(seen.get(("bit", str(i)), nothing) > 0.0)
+        yield replace(track, statistic=seen.get(("statistic", str(i)), nothing), active=bits)

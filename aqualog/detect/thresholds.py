@@ -2,74 +2,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+import math
+from collections.abc import Iterator, Mapping
 
 from aqualog.core.errors import ConfigError
+from aqualog.detect.registry import BY_NAME, DETECTORS
 
-__all__ = ["DEFAULT", "MEANINGS", "UNITS", "Thresholds"]
+__all__ = ["DEFAULT", "Thresholds"]
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """One value per detector, in the unit of its statistic (`UNITS`); a larger one means fewer alarms.
+class Thresholds(Mapping[str, float]):
+    """One value per detector of the thesis, in its unit; a larger one means fewer alarms.
 
-    All other values of a detector follow from physics and stay (drifts, hysteresis, memories).
+    An item and an attribute of a name are the same. All other values of a detector follow from
+    physics and stay (drifts, hysteresis, memories).
+
+    Parameters
+    ----------
+    values : float, by name
+        Those left out keep the detector's default.
 
     Raises
     ------
     ConfigError
-        If a value is not positive, or `slip_slope_drop` leaves 0 ... 1.
+        If a value is not positive, or a share is not below 1.
     """
 
-    spin_down: float = 0.6
-    minor_spin_down: float = 1.0
-    spin_up: float = 0.6
-    resistance: float = 0.2
-    slip_slope_drop: float = 0.5
-    tie_rod: float = 0.4
-    joint_criteria: float = 0.03
-    joint_cusum: float = 1.15
+    __slots__ = ("_values",)
 
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            most = 1.0 if f.name == "slip_slope_drop" else float("inf")
-            if not 0.0 < value < most:
-                bounds = "between 0 and 1" if most == 1.0 else "above 0"
+    def __init__(self, **values: float) -> None:
+        unknown = [n for n in values if n not in DETECTORS]
+        if unknown:
+            raise ConfigError(f"no detector {unknown[0]!r}", expected=", ".join(DETECTORS))
+        self._values = {n: values.get(n, BY_NAME[n].threshold) for n in DETECTORS}
+        for name, value in self._values.items():
+            d = BY_NAME[name]
+            if not 0.0 < value < d.highest:
+                bounds = "above 0" if math.isinf(d.highest) else f"between 0 and {d.highest:g}"
                 raise ConfigError(
-                    f"threshold {f.name} = {value:g} {UNITS[f.name]}", expected=f"a value {bounds} ({MEANINGS[f.name]})"
-                )
+                    f"threshold {name} = {value:g} {d.unit}", expected=f"a value {bounds} ({d.meaning})"
+                )  # fmt: skip
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __getattr__(self, name: str) -> float:
+        if name.startswith("_") or name not in self._values:
+            raise AttributeError(name)
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return f"Thresholds({', '.join(f'{n}={x!r}' for n, x in self._values.items())})"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _made, (self._values,)
+
+    def with_values(self, values: Mapping[str, float]) -> Thresholds:
+        """Return the same with other values."""
+        return Thresholds(**{**self._values, **values})
 
     def scaled(self, detector: str, factor: float) -> Thresholds:
-        """Return the same with the threshold of one detector times a factor; a loss of slope stays below 1.
-
-        The loss of slope is scaled by the share that may be left: 1 - (1 - loss) / factor.
-        """
-        old = getattr(self, detector)
-        new = 1.0 - (1.0 - old) / factor if detector == "slip_slope_drop" else old * factor
-        return replace(self, **{detector: min(max(new, 1e-3), 0.999) if detector == "slip_slope_drop" else new})
+        """Return the same with the threshold of one detector times a factor; a share as `Detector.scaled`."""
+        return self.with_values({detector: BY_NAME[detector].scaled(self._values[detector], factor)})
 
 
-UNITS = {
-    "spin_down": "m/s",
-    "minor_spin_down": "(m/s^2)^2",
-    "spin_up": "m/s",
-    "resistance": "m/s",
-    "slip_slope_drop": "-",
-    "tie_rod": "s",
-    "joint_criteria": "m/s",
-    "joint_cusum": "-",
-}
+def _made(values: Mapping[str, float]) -> Thresholds:
+    return Thresholds(**values)
 
-MEANINGS = {
-    "spin_down": "speed that a wheel loses faster than a healthy one can",
-    "minor_spin_down": "variance of a wheel's acceleration difference beyond that of the other axle",
-    "spin_up": "speed that a wheel gains faster than a healthy one can",
-    "resistance": "sum of the resistance measure beyond 0.1 m/s²",
-    "slip_slope_drop": "lost share of the dry slip slope",
-    "tie_rod": "sum of the tie-rod residual over its scatter, beyond four of it",
-    "joint_criteria": "sum of the resistance measure beyond 0.1 m/s² that opens the gate",
-    "joint_cusum": "scaled sum of all effects",
-}
 
 DEFAULT = Thresholds()

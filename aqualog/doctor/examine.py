@@ -14,6 +14,7 @@ from aqualog.align.quantity import Quantity
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FileFaults
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.registry import DETECTORS
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
 from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
@@ -25,8 +26,6 @@ from aqualog.io.open_log import open_log, read_readable
 
 __all__ = ["examine"]
 
-_DETECTORS = ("spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod", "joint_criteria",
-              "joint_cusum")  # fmt: skip
 
 _STORED = {"mdf": "records", "csv": "rows or cells", "parquet": "rows or values"}  # messages elsewhere
 
@@ -89,14 +88,14 @@ def _examined(
         result = detect_drive(signals, vehicle)
     except AqualogError as error:
         whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
-        return Examination(tuple(files), (*findings, whole), (), tuple((d, ()) for d in _DETECTORS))
+        return Examination(tuple(files), (*findings, whole), (), tuple((d, ()) for d in DETECTORS))
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
     # what the drive leaves out as frozen need not be looked at
     findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]
     findings += _of_signals(findings, [*signals.quality.notes, *result.notes], frozen)
     missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
     lacking = {u.detector for u in result.unavailable}
-    return Examination(tuple(files), tuple(findings), tuple(d for d in _DETECTORS if d not in lacking), missing)
+    return Examination(tuple(files), tuple(findings), tuple(d for d in DETECTORS if d not in lacking), missing)
 
 
 def _file(

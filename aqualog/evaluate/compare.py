@@ -6,23 +6,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.roc import JOINT
 from aqualog.evaluate.score import Rate, Score, detector_names, grouped, score
-from aqualog.rivals.catalogue import RIVALS
 
-__all__ = ["COUNTERPARTS", "TARGETS", "Better", "Coverage", "better_rivals", "coverage", "situation_scores"]
-
-COUNTERPARTS = {
-    "wheel_thresholds": "spin_down",
-    "front_rear_pattern": "minor_spin_down",
-    "wheel_oscillation": "minor_spin_down",
-    "resistance_model": "resistance",
-    "slope_rls": "slip_slope_drop",
-    "slope_kalman": "slip_slope_drop",
-    "slope_friction_ekf": "slip_slope_drop",
-}
-"""The thesis' detector for the same effect as a rival."""
+__all__ = ["TARGETS", "Better", "Coverage", "better_rivals", "coverage", "situation_scores"]
 
 TARGETS = {"full": 0.99, "partial": 0.9, "per_hour": 0.01}
 """Requirements of a joint detector: recall of full and partial aquaplaning, false alarms per hour."""
@@ -90,7 +79,8 @@ def better_rivals(records: Sequence[RunRecord]) -> list[Better]:
     found: list[Better] = []
     rivals = [n for n in detector_names(records) if n in RIVALS]
     for rival in rivals:
-        for own in (COUNTERPARTS[rival], *JOINT):
+        counterpart = RIVALS[rival].counterpart
+        for own in (*((counterpart.name,) if counterpart else ()), *JOINT):
             both = [r for r in records if rival in r.detectors and own in r.detectors]
             if not both:
                 continue

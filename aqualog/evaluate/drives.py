@@ -15,7 +15,7 @@ from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.joint_cusum import JointCusumParams
+from aqualog.detect.settings import JointCusumParams
 from aqualog.evaluate.labels import Label, Labels, Span, after, until
 from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
 from aqualog.io.base import ReadOptions

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import Event, FloatArray, Track
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
+from aqualog.detect.rivals.run import run_rivals
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
 from aqualog.evaluate.labels import Labels, Span, joined, without
 from aqualog.evaluate.match import LIMITS_S, beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.records import DetectorRun, RunRecord
-from aqualog.rivals.catalogue import run_rivals
 
 __all__ = ["ODD_LABELS", "Found", "judge", "record_of", "run_detectors"]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from aqualog.detect.registry import all_of
+
 __all__ = [
     "AQUAPLANING", "EFFECTS", "SURFACES", "WATER_AFTER_S", "Label", "Labels", "Span", "after", "joined", "overlaps",
     "until", "without",
@@ -14,7 +16,7 @@ Span = tuple[float, float]
 """Start and end. [s]"""
 
 AQUAPLANING = ("full", "partial", "water")
-EFFECTS = ("spin_down", "minor_spin_down", "spin_up", "resistance", "slip_slope_drop", "tie_rod")
+EFFECTS = tuple(d.name for d in all_of("effect"))
 SURFACES = (
     "dry", "damp", "snow", "ice", "gravel", "rough", "split", "braking", "abs", "kerb", "pothole", "cornering",
     "gear_shift",

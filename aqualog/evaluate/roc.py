@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS, all_of
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
 from aqualog.evaluate.judge import record_of, run_detectors
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.score import Rate, Recall, detector_names, score
-from aqualog.rivals.catalogue import RIVALS
 
 __all__ = ["FACTORS", "JOINT", "RocPoint", "curve_points", "records_at", "threshold_at"]
 
 FACTORS = tuple(2.0 ** (k / 2.0) for k in range(-4, 5))
 """Factors on each detector's own threshold: a quarter to four, in steps of a factor of 1.41."""
 
-JOINT = ("joint_criteria", "joint_cusum")
+JOINT = tuple(d.name for d in all_of("joint"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,7 @@ def threshold_at(detector: str, factor: float, thresholds: Thresholds, rivals: M
     """Threshold of a detector or a rival, in its own unit, times a factor."""
     if detector in RIVALS:
         return factor * (rivals or {}).get(detector, RIVALS[detector].threshold)
-    return float(getattr(thresholds.scaled(detector, factor), detector))
+    return thresholds.scaled(detector, factor)[detector]
 
 
 def curve_points(
@@ -87,8 +86,7 @@ def curve_points(
 ) -> tuple[RocPoint, ...]:
     """Return points of all curves: factor -> the drives' records at it; by detector, then by factor."""
     points = []
-    known = {f.name for f in fields(Thresholds)} | set(RIVALS)
-    names = [n for n in detector_names([r for records in by_factor.values() for r in records]) if n in known]
+    names = [n for n in detector_names([r for records in by_factor.values() for r in records]) if n in BY_NAME]
     for name in names:
         for factor, records in sorted(by_factor.items()):
             s = score(records, name)

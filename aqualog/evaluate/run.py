@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive, Source
 from aqualog.evaluate.judge import judge

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from aqualog.detect.registry import RIVALS
 from aqualog.detect.thresholds import Thresholds
 from aqualog.evaluate.roc import RocPoint
-from aqualog.rivals.catalogue import RIVALS
 
 __all__ = ["LIMIT_PER_HOUR", "Choice", "applied", "choose"]
 
@@ -52,7 +52,7 @@ def applied(choices: Mapping[str, Choice], thresholds: Thresholds, rivals: Mappi
 ]:  # fmt: skip
     """Return thresholds, and those of the rivals, with the proposals in them."""
     values = {name: c.point.threshold for name, c in choices.items()}
-    own = replace(thresholds, **{n: x for n, x in values.items() if n not in RIVALS})
+    own = thresholds.with_values({n: x for n, x in values.items() if n not in RIVALS})
     return own, {**rivals, **{n: x for n, x in values.items() if n in RIVALS}}
 
 

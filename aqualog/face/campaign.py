@@ -570,7 +570,7 @@ class CampaignRuns(Result):
 
 
 def _detectors() -> Sequence[str]:
-    from aqualog.detect.needs import DETECTORS
+    from aqualog.detect.registry import DETECTORS
 
     return DETECTORS
 

@@ -390,7 +390,7 @@ def check_something_to_do(
     ------
     SignalError
     """
-    from aqualog.detect.needs import DETECTORS, check_needs
+    from aqualog.detect.registry import DETECTORS, check_needs
 
     unavailable, _ = check_needs(vehicle, symbols, rate_hz=rate_hz)
     if len(unavailable) < len(DETECTORS):

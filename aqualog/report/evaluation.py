@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from aqualog import __version__
+from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.compare import better_rivals, coverage, situation_scores
 from aqualog.evaluate.match import Cell as Counts
 from aqualog.evaluate.records import RunRecord
@@ -30,7 +31,6 @@ from aqualog.report.evaluation_words import (
 from aqualog.report.plain import fields_of, plain
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
 from aqualog.report.wording import number
-from aqualog.rivals.catalogue import RIVALS
 
 __all__ = ["evaluation_document", "evaluation_report"]
 
@@ -203,7 +203,7 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
             "seconds": plain(sum((r.duration_s for r in records), 0.0)),
             "failed": dict(evaluation.failed),
         },
-        "thresholds": fields_of(evaluation.thresholds, *evaluation.thresholds.__dataclass_fields__),
+        "thresholds": {n: plain(x) for n, x in evaluation.thresholds.items()},
         "rivals": None if evaluation.rivals is None else dict(evaluation.rivals),
         "detectors": _scores(score_all(records)),
         "by": [

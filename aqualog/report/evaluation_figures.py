@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.compare import situation_scores
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.roc import RocPoint
@@ -14,7 +15,6 @@ from aqualog.evaluate.score import Score, score_all
 from aqualog.report.axes import axis, layout
 from aqualog.report.evaluation_words import short
 from aqualog.report.wording import plot_text
-from aqualog.rivals.catalogue import RIVALS
 
 __all__ = ["alarm_matrix", "evaluation_figures", "latency_curves", "recall_matrix", "roc_curves"]
 

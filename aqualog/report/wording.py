@@ -10,6 +10,7 @@ from typing import Any
 
 from aqualog.core.records import Event
 from aqualog.core.units import displayed_unit
+from aqualog.detect.registry import all_of
 
 __all__ = [
     "CELL", "NOTE", "caption", "cut", "detector_name", "evidence_parts", "lacking", "name_digest", "number", "place",
@@ -25,16 +26,7 @@ LONGEST_TEXT = 4000  # characters in one place of a page
 # characters that a terminal or a browser acts on instead of showing: controls and marks of writing direction
 _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
-_DETECTORS = {
-    "spin_down": ("Spin-down", "speed a wheel lost faster than a healthy one can"),
-    "minor_spin_down": ("Minor spin-down", "variance of wheel acceleration, watched axle minus the other one"),
-    "spin_up": ("Spin-up", "speed a driven wheel gained faster than the vehicle"),
-    "resistance": ("Resistance", "sum of the resistance measure beyond its drift"),
-    "slip_slope_drop": ("Slip-slope drop", "share of the dry slip slope that is lost"),
-    "tie_rod": ("Tie-rod force", "sum of the tie-rod residual beyond its scatter"),
-    "joint_criteria": ("Joint criteria", "wheel criteria met while the resistance gate is open"),
-    "joint_cusum": ("Joint CUSUM", "scaled sum of the single detectors"),
-}
+_DETECTORS = {d.name: d for d in all_of("effect", "joint")}
 # stem of the key of evidence (lowest and highest value where it ends in _min and _max) -> label, factor, unit, decimals
 _EVIDENCE = {
     "v_x": ("speed", _KMH, "km/h", 0),
@@ -54,12 +46,12 @@ _CRITERIA = {1: "spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip slope"
 
 def detector_name(detector: str) -> str:
     """`minor_spin_down` -> `Minor spin-down`."""
-    return _DETECTORS[detector][0] if detector in _DETECTORS else readable(detector, LONGEST_WORD).replace("_", " ")
+    return _DETECTORS[detector].title if detector in _DETECTORS else readable(detector, LONGEST_WORD).replace("_", " ")
 
 
 def caption(detector: str) -> str:
     """Meaning of a detector's statistic in one phrase."""
-    return _DETECTORS[detector][1] if detector in _DETECTORS else "statistic"
+    return _DETECTORS[detector].statistic if detector in _DETECTORS else "statistic"
 
 
 def place(wheel: str | None, side: str | None) -> str:

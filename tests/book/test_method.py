@@ -8,16 +8,15 @@ from conftest import ROOT
 from aqualog.align import freezes, glitches
 from aqualog.calibrate import design, online
 from aqualog.campaign import full_speed, samples
-from aqualog.detect import joint, minor_spin_down, negative_force, other_surface, resistance, spin, tie_rod, wheel_watch
-from aqualog.detect.joint_cusum import JointCusumParams
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect import braking, joint_criteria, minor_spin_down, other_surface, resistance, spin, tie_rod
+from aqualog.detect.registry import DETECTORS, RIVALS
+from aqualog.detect.settings import JointCusumParams
 from aqualog.detect.slip_slope import activation, direct, drop, history, watch
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.detect.thresholds import DEFAULT
 from aqualog.diagnose.run import Options
 from aqualog.model.tyre import TYRE_KEYS, TYRES
 from aqualog.physics.resistance import nominal_acceleration
-from aqualog.rivals.catalogue import RIVALS
 
 DOCS = ROOT / "aqualog" / "docs"
 ESTIMATORS = (
@@ -75,15 +74,15 @@ def rows():
     yield "spin_down", f"| deep slip | a quarter of the speed for {s.t_deep:g} s |"
     yield "spin_down", f"| least speed | {s.v_min:g} m/s |"
     yield "spin_up", f"| threshold `spin_up` | {DEFAULT.spin_up:g} m/s |"
-    yield "spin_up", f"| traction limit | {wheel_watch.MU_SPIN_UP:g} |"
-    yield "spin_up", f"traction below {wheel_watch.MU_FULL:g} |"
+    yield "spin_up", f"| traction limit | {spin.MU_SPIN_UP:g} |"
+    yield "spin_up", f"traction below {spin.MU_FULL:g} |"
     yield "minor_spin_down", f"| threshold `minor_spin_down` | {DEFAULT.minor_spin_down:.1f} (m/s²)² |"
     yield "minor_spin_down", f"| variance of the wheel itself | {m.var_min / m.delta_min:g} times"
     yield "minor_spin_down", f"| own share | {m.share:g} |"
     yield "minor_spin_down", f"| one-sidedness | {m.one_sided:g} to 1 |"
     yield "minor_spin_down", f"noise of {m.v_noise:g} m/s"
     yield "minor_spin_down", f"| least speed | {m.v_min:g} m/s |"
-    yield "minor_spin_down", f"| lateral acceleration | below {wheel_watch.A_Y_MINOR:g} m/s² |"
+    yield "minor_spin_down", f"| lateral acceleration | below {minor_spin_down.A_Y_MINOR:g} m/s² |"
     yield "minor_spin_down", f"| after braking | {m.warm_up:g} s |"
     yield "minor_spin_down", f"| after the start | {m.warm_up + minor_spin_down.RADIUS_KNOWN:g} s |"
     yield "minor_spin_down", f"| calm | {m.quiet:g} s |"
@@ -113,8 +112,8 @@ def rows():
     yield "tie_rod", f"| least speed | {tie_rod.V_MIN:g} m/s"
     yield "tie_rod", f"| lateral acceleration | below {tie_rod.A_Y_MAX:g} m/s² |"
     yield "joint_criteria", f"| threshold `joint_criteria` | {DEFAULT.joint_criteria:g} m/s |"
-    yield "joint_criteria", f"| gate held | {joint.GATE_HOLD:g} s |"
-    yield "joint_criteria", f"| warning held | {joint.HOLD:g} s |"
+    yield "joint_criteria", f"| gate held | {joint_criteria.GATE_HOLD:g} s |"
+    yield "joint_criteria", f"| warning held | {joint_criteria.HOLD:g} s |"
     yield "joint_criteria", f"faster than 61 km/h ({w.v_min:g} m/s)"
     yield "joint_criteria", f"exceeds {w.resistance:g} m/s² ({w.still:g} m/s² while"
     yield "joint_criteria", f"found lost for {w.proof:g} s below 50 km/h since the last {w.forget:g} s"
@@ -155,8 +154,8 @@ def rows():
     yield "reading", f"repeats itself for {freezes._TORQUE[0]:g} s in which"
     yield "diagnosis", f"| `--level` | {Options().level:g} |"
     yield "diagnosis", f"| `--surrogates` | {Options().surrogates} |"
-    yield "detectors", f"| brake pressure | above {negative_force.BRAKE_PRESSURE / 1e5:g} bar |"
-    yield "detectors", f"| held after release | {negative_force.HOLD:g} s |"
+    yield "detectors", f"| brake pressure | above {braking.BRAKE_PRESSURE / 1e5:g} bar |"
+    yield "detectors", f"| held after release | {braking.HOLD:g} s |"
     for k in TYRE_KEYS.values():
         yield "simulation", f"| `{k.name}` | {k.unit} | {k.default:g} |"
     for y in TYRES.values():

@@ -27,13 +27,12 @@ from aqualog.core.errors import ExitCode
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.units import spellings
 from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS, RIVALS
 from aqualog.detect.slip_slope.tuning import MEANINGS, TUNING
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.tyre import TYRE_KEYS, TYRES
-from aqualog.rivals.catalogue import RIVALS
 
 PACKAGE = Path(aqualog.__file__).parent
 FILES = generated()

@@ -96,7 +96,7 @@ def test_every_page_is_in_a_section():
 
 def test_every_command_and_detector_has_a_page():
     from aqualog.cli.commands import COMMANDS
-    from aqualog.detect.needs import DETECTORS
+    from aqualog.detect.registry import DETECTORS
 
     pages = topics()
     assert [d for d in DETECTORS if find(f"method/{d}", pages) is None] == []

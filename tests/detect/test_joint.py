@@ -1,26 +1,32 @@
 """Joint detectors: truth table, terms of the sum, what decides, and where a lost slope counts."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from drives import CAR
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
-from aqualog.detect import joint, joint_cusum, other_surface
+from aqualog.detect import joint_criteria, joint_cusum, other_surface
+from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.joint_cusum import TERMS, JointCusumParams
-from aqualog.detect.joint_watch import JointCriteriaWatch, JointCusumWatch
-from aqualog.detect.scene import Scene
+from aqualog.detect.joint_criteria import GATE, JOINT_CRITERIA, MAY_BE_WATER
+from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
+from aqualog.detect.resistance import MEASURE
+from aqualog.detect.settings import JointCusumParams, Settings
 
 DT = 0.01
 N = 200
+NOTHING = np.zeros(N, dtype=bool)
 
 
-def scene(**f):
-    features = {"v_x_hat": np.full(N, 27.0), "delta_a_x": np.full(N, 0.3)}
-    features |= {f"v_w_{w}": np.full(N, 27.0) for w in WHEELS}
-    return Scene(features | f, {w: np.zeros(N, dtype=bool) for w in WHEELS})
+def scene(tracks=(), x=0.3, v_x=27.0, **shared):
+    features = {"v_x_hat": np.full(N, v_x), "delta_a_x": np.full(N, 0.3), "criterion_full": np.zeros(N)}
+    features |= {f"v_w_{w}": np.full(N, v_x) for w in WHEELS}
+    shared = {MEASURE: np.broadcast_to(x, (N,)).astype(float), GATE: ~NOTHING, MAY_BE_WATER: ~NOTHING} | shared
+    return Scene(features, dict.fromkeys(WHEELS, NOTHING), tracks=tuple(tracks), shared=shared)
 
 
 def track(detector, bits, wheel="fr", statistic=None):
@@ -29,13 +35,20 @@ def track(detector, bits, wheel="fr", statistic=None):
     return Track(detector, None if detector == "resistance" else wheel, "right", "-", statistic, 0.5, bits)
 
 
+def watched(detector, seen, settings=None, threshold=None):
+    """Track, event at the end of the drive (or None), and features of one piece."""
+    setup = Setup(detector, CAR, DT, threshold or detector.threshold, settings or Settings())
+    output = detector.start(setup).push(seen)
+    (found,) = output.found
+    book = EventBook(10_000_000)
+    book.take(found.track, found.evidence, detector.severity, detector.explain)
+    return found.track, next(iter(book.finish()), None), output.features
+
+
 def warned(criteria, gate, *, slope=True):
-    names = {n: d for d, n in joint.CRITERIA.items()}
-    tracks = [track(names[k], k in criteria) for k in names]
-    watch = JointCriteriaWatch(DT)
-    bits = np.full(N, gate)
-    found, _, _ = watch.push(scene(), tracks, np.full(N, 0.3), bits, np.full(N, slope), EventBook(10_000_000))
-    return bool(found.active.any())
+    tracks = [track(d, k in criteria) for d, k in joint_criteria.CRITERIA.items()]
+    seen = scene(tracks, x=0.3 if gate else 0.0, v_x=27.0 if slope else 16.0)  # at 16 m/s no film takes half the slope
+    return bool(watched(JOINT_CRITERIA, seen)[0].active.any())
 
 
 @pytest.mark.parametrize("criteria", [c for r in range(6) for c in itertools.combinations(range(1, 6), r)])
@@ -52,12 +65,9 @@ def test_a_lost_slope_that_cannot_be_waters_does_not_warn():
 
 
 def test_the_warning_names_what_decided():
-    watch, book = JointCriteriaWatch(DT), EventBook(10_000_000)
     late = np.arange(N) > 60
     tracks = [track("minor_spin_down", np.arange(N) > 20), track("spin_down", late), track("resistance", late)]
-    gate = np.arange(N) > 40
-    _, _, features = watch.push(scene(), tracks, np.full(N, 0.3), gate, np.ones(N, dtype=bool), book)
-    (event,) = book.finish()
+    _, event, features = watched(JOINT_CRITERIA, scene(tracks, x=np.where(np.arange(N) > 26, 0.3, 0.0)))
     assert event.start_s == pytest.approx(0.41)  # the gate opens
     assert event.evidence["decided_by"] == ["minor_spin_down"]
     assert event.evidence["criterion_1"]
@@ -69,15 +79,10 @@ def test_the_warning_names_what_decided():
 
 
 def test_a_criterion_that_began_under_braking_does_not_count():
-    s = scene()
-    braking = {w: np.arange(N) < 30 for w in WHEELS}
-    watch = JointCriteriaWatch(DT)
-    bits = np.arange(N) > 10
-    found, _, _ = watch.push(
-        Scene(s.f, braking), [track("spin_down", bits)], np.full(N, 0.3), np.ones(N, dtype=bool),
-        np.ones(N, dtype=bool), EventBook(10_000_000),
-    )  # fmt: skip
-    assert not found.active.any()
+    seen = scene([track("spin_down", np.arange(N) > 10)])
+    assert watched(JOINT_CRITERIA, seen)[0].active.any()
+    braking = dict.fromkeys(WHEELS, np.arange(N) < 30)
+    assert not watched(JOINT_CRITERIA, replace(seen, braking=braking))[0].active.any()
 
 
 # --- joint detector 2 -----------------------------------------------------------------------------------------------
@@ -127,27 +132,23 @@ def test_the_largest_wheel_decides_and_braked_wheels_do_not_count():
 
 
 def test_the_sum_warns_above_its_threshold_and_names_the_terms():
-    book = EventBook(10_000_000)
-    watch = JointCusumWatch(DT, JointCusumParams(), 1.2)
     ramp = np.clip((np.arange(N) - 50) * 0.01, 0.0, 1.0)
     tracks = [track("resistance", True, statistic=0.3), track("spin_down", True, statistic=1.5 * ramp)]
-    always = np.ones(N, dtype=bool)
-    found, _, features = watch.push(scene(), tracks, np.full(N, 0.3), always, always, book)
+    found, event, features = watched(JOINT_CUSUM, scene(tracks), threshold=1.2)
     first = np.flatnonzero(found.active)[0]
     assert first == 71  # 1 + 0.21 > 1.2
     assert found.statistic == pytest.approx(1.0 + ramp)
     assert features["joint_term_resistance"] == pytest.approx(1.0)
-    (event,) = book.finish()
     assert event.evidence["decided_by"] == ["resistance", "spin_down"]
     assert event.severity == "partial"  # no wheel has lost the road
 
 
 @pytest.mark.parametrize("gated", [True, False])
 def test_without_resistance_the_sum_does_not_warn_unless_asked_to(gated):
-    never, always = np.zeros(N, dtype=bool), np.ones(N, dtype=bool)
     tracks = [track("spin_up", True, statistic=1.5), track("spin_down", True, statistic=1.5)]
-    watch = JointCusumWatch(DT, JointCusumParams(gated=gated), 1.2)
-    found, _, _ = watch.push(scene(), tracks, np.zeros(N), never, always, EventBook(10_000_000))
+    settings = Settings(joint_cusum=JointCusumParams(gated=gated))
+    seen = scene(tracks, x=0.0, **{GATE: NOTHING})
+    found, _, _ = watched(JOINT_CUSUM, seen, settings, threshold=1.2)
     assert found.active.all() != gated
     assert found.statistic == pytest.approx(2.0)
 

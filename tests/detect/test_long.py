@@ -12,9 +12,8 @@ from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect import plausibility
-from aqualog.detect.long import detect_long
-from aqualog.detect.picture import Picture
-from aqualog.detect.stream import detect_drive
+from aqualog.detect.extremes import Extremes
+from aqualog.detect.stream import detect_drive, detect_long
 from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
@@ -129,7 +128,7 @@ def test_a_picture_loses_no_peak(step):
     x = rng.standard_normal(250_000)
     x[123_456], x[77] = 50.0, np.nan
     x[200_000:201_000] = np.nan
-    picture = Picture(x.size, 10_000_000)
+    picture = Extremes(x.size, 10_000_000)
     for a in range(0, x.size, step) if step > 1 else [0]:
         picture.push({"x": x[a : a + step] if step > 1 else x})
     seen = picture.columns()["x"]

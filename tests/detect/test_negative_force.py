@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aqualog.detect.negative_force import began_free, hold_on, is_braking
+from aqualog.detect.braking import began_free, hold_on, is_braking
 
 
 def bits(text):

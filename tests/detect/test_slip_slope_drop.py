@@ -262,8 +262,8 @@ SNOW = (Lane(20.0, 40.0, surface=SURFACES["snow"]),)
 def test_an_excited_all_wheel_drive_notices_snow_and_not_dry_road():
     dry, stream = drive(AWD, excitation=SINE)
     assert dry == []
-    for watch in stream.slope_watches:
-        assert watch.summary().slope == pytest.approx(31.0, rel=0.1)
+    for summary in stream.slopes:
+        assert summary.slope == pytest.approx(31.0, rel=0.1)
     events, _ = drive(AWD, excitation=SINE, lanes=SNOW)
     assert {e.side for e in events} == {"left", "right"}
     assert {e.wheel for e in events} == {None}
@@ -280,11 +280,10 @@ def test_at_the_load_share_it_is_blind_and_says_so():
     even = replace(AWD, torque_split_rear=AWD.l_f / (AWD.l_f + AWD.l_r))
     events, stream = drive(even, lanes=SNOW)
     assert events == []
-    for watch in stream.slope_watches:
-        summary = watch.summary()
+    for summary in stream.slopes:
         assert summary.seconds["blind"] > 0.95 * sum(summary.seconds.values())
         assert summary.alarms == 0
-    (note,) = remarks([w.summary() for w in stream.slope_watches])
+    (note,) = remarks(stream.slopes)
     assert "left, right" in note
     assert "both axles slip alike" in note
 
@@ -300,7 +299,7 @@ def test_one_driven_axle_notices_snow_while_it_is_driven():
 def test_history_goes_from_drive_to_drive():
     """A car that starts on snow knows from the last drive what dry road is."""
     _, stream = drive(AWD, excitation=SINE, duration_s=60.0)
-    slopes = [w.summary() for w in stream.slope_watches]
+    slopes = stream.slopes
     history = remembered(History(), "summer", slopes)
     assert set(history.periods["summer"]) == {"left", "right"}
     all_snow = (Lane(0.0, 40.0, surface=SURFACES["snow"]),)

@@ -90,10 +90,10 @@ def test_cut_inside_every_event():
 
 def test_a_drive_in_pieces_is_the_drive_in_one(monkeypatch):
     signals, _ = drive(CAR, duration_s=16.0, lanes=(lane(),), speed_kmh=((0.0, 104.0),))
-    assert signals.frame.height < stream.PIECE
+    assert signals.frame.height < stream.ROWS
     whole = detect_drive(signals, CAR)
     assert whole.events
-    monkeypatch.setattr(stream, "PIECE", 333)
+    monkeypatch.setattr(stream, "ROWS", 333)
     pieces, bare = detect_drive(signals, CAR), detect_drive(signals, CAR, samples=False)
     assert pieces.features.equals(whole.features)
     for one, other in zip(whole.tracks, pieces.tracks, strict=True):

@@ -10,7 +10,7 @@ from drives import CAR
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Quality, Signals
 from aqualog.detect import tie_rod
-from aqualog.detect.needs import check_needs
+from aqualog.detect.registry import check_needs
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import Thresholds
 from aqualog.physics.load import wheel_loads

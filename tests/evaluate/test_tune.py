@@ -211,7 +211,7 @@ def test_where_a_rival_is_better_it_is_said():
 
 def test_thresholds_file_goes_there_and_back(tmp_path):
     path = tmp_path / "t.toml"
-    thresholds = replace(DEFAULT, spin_down=0.4242, slip_slope_drop=0.61)
+    thresholds = DEFAULT.with_values({"spin_down": 0.4242, "slip_slope_drop": 0.61})
     path.write_text(thresholds_text(thresholds, {"wheel_thresholds": 1.5}, comments=["a\nb"]), encoding="utf-8")
     assert load_thresholds(path) == (thresholds, {"wheel_thresholds": 1.5})
 
@@ -233,7 +233,7 @@ def test_faults_of_a_thresholds_file_come_together(tmp_path):
 def test_thresholds_reach_the_detectors(sources):
     drive = sources[0].load()
     assert judge(drive).detectors["minor_spin_down"].full[0].found
-    deaf = judge(drive, thresholds=replace(DEFAULT, minor_spin_down=1e6)).detectors["minor_spin_down"]
+    deaf = judge(drive, thresholds=DEFAULT.with_values({"minor_spin_down": 1e6})).detectors["minor_spin_down"]
     assert not deaf.full[0].found
     rivals = judge(drive, rivals={"wheel_thresholds": 1e4}).detectors["wheel_thresholds"]
     assert not rivals.full[0].found

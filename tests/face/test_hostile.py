@@ -132,7 +132,7 @@ def test_messages_name_arguments_and_no_options():
 
 def test_modules_of_a_folder_beside_a_function():
     code = (
-        "import aqualog.detect.stream as s; import aqualog as aq; assert s.PIECE and callable(aq.detect)\n"
+        "import aqualog.detect.stream as s; import aqualog as aq; assert s.ROWS and callable(aq.detect)\n"
         "import aqualog.align.clock; assert callable(aqualog.align) and aqualog.align.clock.estimate_clock\n"
         "from aqualog.diagnose import run; assert callable(aq.diagnose) and aq.diagnose.run is run\n"
         "import importlib; importlib.reload(aq); import aqualog.doctor.records as r; assert r.Finding\n"

@@ -17,10 +17,10 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import KEYS, Vehicle, vehicle_toml
+from aqualog.detect.registry import RIVALS
 from aqualog.detect.slip_slope.history import History, Period, history_to_json, reference
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.rivals.catalogue import RIVALS
 from tests.fuzz.registry import Target, target
 from tests.fuzz.settings_files import LOG, NAMES, check_error, check_finite, drive, folder_with, loaded
 

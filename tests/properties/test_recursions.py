@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aqualog.detect import cusum, ewvar, minor_spin_down, spin
-from aqualog.detect.negative_force import hold_on
+from aqualog.detect.braking import hold_on
 from aqualog.features import velocity
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 

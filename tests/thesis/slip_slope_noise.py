@@ -102,7 +102,7 @@ def outcome(seed: int, surface: str, split: float, *, excited: bool, rate: int =
     # both sides see the same; where one is NaN it tells nothing
     slope = 0.5 * (piece.features["slip_slope_left"] + piece.features["slip_slope_right"])
     judged = blind = 0.0
-    for summary in (w.summary() for w in stream.slope_watches):
+    for summary in stream.slopes:
         judged += sum(summary.seconds[k] for k in ("estimating", "slope_frozen", "blind"))
         blind += summary.seconds["blind"]
 

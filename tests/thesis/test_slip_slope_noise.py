@@ -60,7 +60,7 @@ def hour(*, excited, split, seed, drift=DRIFT):
     stream = DriveStream(believed_car(seed, split), 10_000_000, list(columns))
     piece = stream.push(columns)
     events = [e for e in (*piece.events, *stream.finish()) if e.detector == "slip_slope_drop"]
-    return events, [w.summary() for w in stream.slope_watches], piece.features
+    return events, stream.slopes, piece.features
 
 
 @pytest.mark.parametrize(("excited", "split"), [(True, 0.6), pytest.param(False, 0.4, marks=pytest.mark.nightly)])

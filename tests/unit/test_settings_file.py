@@ -1,10 +1,13 @@
 """Thresholds files as `detect --thresholds` takes them."""
 
+import re
+
 import pytest
 
 from aqualog.config.settings import joint_text, load_settings
 from aqualog.core.errors import ConfigError
-from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS, Thresholds
+from aqualog.detect.registry import BY_NAME
+from aqualog.detect.thresholds import DEFAULT, Thresholds
 
 TEXT = """[thresholds]
 resistance = 0.3
@@ -52,10 +55,10 @@ def test_faults_are_told(tmp_path, text, told):
 
 
 def test_every_threshold_has_unit_and_meaning_and_bounds():
-    assert set(UNITS) == set(MEANINGS) == set(Thresholds.__slots__)
-    for name in Thresholds.__slots__:
-        with pytest.raises(ConfigError):
+    for name, value in DEFAULT.items():
+        assert BY_NAME[name].unit
+        with pytest.raises(ConfigError, match=re.escape(BY_NAME[name].meaning)):
             Thresholds(**{name: 0.0})
-        assert getattr(DEFAULT.scaled(name, 2.0), name) > getattr(DEFAULT, name)
+        assert DEFAULT.scaled(name, 2.0)[name] > value
     assert DEFAULT.scaled("slip_slope_drop", 2.0).slip_slope_drop == pytest.approx(0.75)
     assert 0 < DEFAULT.scaled("slip_slope_drop", 0.25).slip_slope_drop < 1

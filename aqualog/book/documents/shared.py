@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aqualog.book.documents.fields import count, flag, mapping, maybe, number, or_null, several, text
 from aqualog.core.notation import WHEELS
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 
 __all__ = ["BIN", "EVENT", "FAULTS", "FAULT_COUNTS", "LACKING", "PLACE_KEYS", "TERMS", "WHEEL"]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 from aqualog.book.markdown import code, fence, number, page, table
 from aqualog.campaign.records import GROUP_NAMES
 from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS, RunKey
@@ -11,11 +9,10 @@ from aqualog.config.labels import LABEL_KEYS
 from aqualog.config.scenario import SCENARIO_KEYS, ScenarioKey
 from aqualog.config.settings import JOINT_KEYS
 from aqualog.config.signal_map import MAP_KEYS
+from aqualog.detect.registry import RIVALS, all_of
 from aqualog.detect.slip_slope.tuning import MEANINGS as TUNING_MEANINGS
 from aqualog.detect.slip_slope.tuning import TUNING
-from aqualog.detect.thresholds import DEFAULT, MEANINGS, UNITS
 from aqualog.model.tyre import TYRE_KEYS, TYRES
-from aqualog.rivals.catalogue import RIVALS
 
 __all__ = ["MAP_EXAMPLE", "THRESHOLDS_EXAMPLE", "campaign_page", "map_page", "scenario_page", "thresholds_page"]
 
@@ -253,7 +250,7 @@ k is 1/C, beta the slope ratio of the axles, delta the slip offset.
 
 def thresholds_page() -> str:
     """The page."""
-    own = [(code(f.name), UNITS[f.name], f"{getattr(DEFAULT, f.name):g}", MEANINGS[f.name]) for f in fields(DEFAULT)]
+    own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of("effect", "joint")]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
     joint = [(code(k.name), k.kind, k.default, k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]

@@ -14,6 +14,7 @@ from aqualog.core.errors import ConfigError, FitError, SignalError
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.direct_inputs import (
     BESIDE,
@@ -21,7 +22,6 @@ from aqualog.detect.slip_slope.direct_inputs import (
     Place,
     Reference,
     accelerometer_traction,
-    braking_of_wheels,
     earlier,
     left_out,
     mean_of,
@@ -111,7 +111,7 @@ def slip_slopes(
     f = dict(FeatureStream(vehicle, signals.dt, present).push(columns))
     if way.traction == "accelerometer":
         f |= accelerometer_traction(f, columns["a_x"], vehicle)
-    braking = braking_of_wheels(f, columns, vehicle, signals.dt)
+    braking = BrakeWatch(vehicle, signals.dt).push(f, columns)
     if way.method != "differential":
         f = {n: x for n, x in f.items() if n.startswith(_READ)}  # long drives: the others are half of the memory
     smooth = {n: smoothed(x, width) if n.startswith(("v_line_", "mu_")) else x for n, x in f.items()}

@@ -11,12 +11,10 @@ import numpy as np
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.negative_force import HOLD as BRAKE_HOLD
-from aqualog.detect.negative_force import hold_on, is_braking
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.activation import Limits
 from aqualog.physics.differential import differential_slip
-from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.load import wheel_loads
 from aqualog.physics.slip import V_MIN, wheel_slip
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
 
@@ -31,7 +29,6 @@ __all__ = [
     "Place",
     "Reference",
     "accelerometer_traction",
-    "braking_of_wheels",
     "earlier",
     "left_out",
     "mean_of",
@@ -99,19 +96,6 @@ def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle
         free_wheel_mass=2.0 * vehicle.inertia(one) / vehicle.r_e(one) ** 2,
     )  # fmt: skip
     return {f"mu_{WHEELS[i]}": mu[row] for row, i in enumerate(driven)}
-
-
-def braking_of_wheels(
-    f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float
-) -> dict[str, BoolArray]:
-    """Flag where a braking force acts on each wheel."""
-    weight = 0.25 * vehicle.mass * G
-    found = {}
-    for w in WHEELS:
-        torque = columns[f"torque_{w}"] / (vehicle.r_l(w) * weight) if f"torque_{w}" in columns else None
-        bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), torque)
-        found[w], _ = hold_on(bits, 0, seconds=BRAKE_HOLD, dt=dt)
-    return found
 
 
 def smoothed(x: FloatArray, width: int) -> FloatArray:

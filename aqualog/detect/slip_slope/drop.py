@@ -10,9 +10,10 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.slip_slope.history import KEPT_PERIODS, Period, Rule
-from aqualog.detect.thresholds import DEFAULT
 
-__all__ = ["DropParams", "DropState", "completed", "initial_state", "scan"]
+__all__ = ["THRESHOLD", "DropParams", "DropState", "completed", "initial_state", "scan"]
+
+THRESHOLD = 0.5  # [-] lost share of the dry slope
 
 
 class DropParams(NamedTuple):
@@ -29,7 +30,7 @@ class DropParams(NamedTuple):
     dt: float
 
     @staticmethod
-    def make(dt: float, rule: Rule, loss: float = DEFAULT.slip_slope_drop) -> DropParams:
+    def make(dt: float, rule: Rule, loss: float = THRESHOLD) -> DropParams:
         """Return half of the reference (thesis: C68); back above 0.6 of it, so that the detection does not flicker."""
         left = 1.0 - loss
         back = min(1.2 * left, 0.5 * (1.0 + left))

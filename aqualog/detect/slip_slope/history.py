@@ -12,9 +12,10 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import Signals, SlopeSummary
+from aqualog.core.vehicle import Vehicle
 
 __all__ = [
-    "History", "Period", "Rule", "check_configuration", "drive_key", "history_from_json", "history_to_json",
+    "History", "Memory", "Period", "Rule", "check_configuration", "drive_key", "history_from_json", "history_to_json",
     "reference", "remembered",
 ]  # fmt: skip
 
@@ -65,6 +66,19 @@ class History:
                 for configuration, places in self.periods.items()
             }
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Prior knowledge of the dry slope, and the rule for the comparison."""
+
+    history: History = field(default_factory=History)
+    configuration: str = ""
+    rule: Rule = "robust"
+
+    def name(self, vehicle: Vehicle) -> str:
+        """Return the configuration under which this drive is remembered."""
+        return self.configuration or vehicle.name
 
 
 def reference(periods: Sequence[Period], *, rule: Rule = "robust") -> float:

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
 from aqualog.core.notation import AXLES, SIDES
-from aqualog.core.records import BoolArray, FloatArray, SlopeSummary
+from aqualog.core.records import BoolArray, FloatArray, SlopeSummary, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import ewvar
-from aqualog.detect.negative_force import hold_on
+from aqualog.detect.braking import hold_on
+from aqualog.detect.detector import (
+    Detector,
+    Found,
+    Needs,
+    Output,
+    Scene,
+    Setup,
+    missing_torques,
+    missing_wheels,
+    too_slow,
+)
 from aqualog.detect.slip_slope import activation, drop, estimator
+from aqualog.detect.slip_slope.drop import THRESHOLD
 from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
-from aqualog.detect.slip_slope.history import History, Rule
+from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
-from aqualog.detect.thresholds import DEFAULT
+from aqualog.detect.spin import MIN_RATE
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.physics.differential import beta_of_ratio, differential_slip, slope_ratio
 
-__all__ = ["Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
+__all__ = ["SLIP_SLOPE_DROP", "DropWatch", "Memory", "Pair", "SlipSlopeWatch", "Watched", "pairs"]
 
 VARIANCE_MAX = 3.0  # [(m/s^2)^2] "wheel acceleration variance below a threshold" (C68); teeth below 0.1, gravel 2.5-5
 TAU_VARIANCE = 0.3  # [s]
@@ -63,19 +75,6 @@ def pairs(vehicle: Vehicle, *, form: Form | None = None, per_axle: bool = False)
 
 
 @dataclass(frozen=True, slots=True)
-class Memory:
-    """Prior knowledge of the dry slope, and the rule for the comparison."""
-
-    history: History = field(default_factory=History)
-    configuration: str = ""
-    rule: Rule = "robust"
-
-    def name(self, vehicle: Vehicle) -> str:
-        """Return the configuration under which this drive is remembered."""
-        return self.configuration or vehicle.name
-
-
-@dataclass(frozen=True, slots=True)
 class Watched:
     """One piece of a drive at one pair, arrays (n,).
 
@@ -113,7 +112,7 @@ class SlipSlopeWatch:
         dt: float,
         memory: Memory | None = None,
         tuning: Tuning = TUNING,
-        loss: float = DEFAULT.slip_slope_drop,
+        loss: float = THRESHOLD,
     ) -> None:
         memory = memory or Memory()
         self.pair = pair
@@ -243,3 +242,53 @@ def _mean(f: Mapping[str, FloatArray], stem: str, wheels: tuple[str, ...]) -> Fl
     for wheel in wheels[1:]:
         total = total + f[f"{stem}_{wheel}"]
     return total / len(wheels)
+
+
+class DropWatch:
+    """A lost slip slope at the pairs of a car; features `slip_slope_left` ... and `slip_slope_ref_left` ... [-]"""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        car = setup.vehicle
+        self.watches = tuple(
+            SlipSlopeWatch(car, pair, setup.dt, setup.memory, loss=setup.threshold) for pair in pairs(car)
+        )
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: a track per pair, the lost share of the dry slope. [-]"""
+        f = scene.f
+        found: list[Found] = []
+        features: dict[str, FloatArray] = {}
+        for watch in self.watches:
+            seen = watch.push(f, scene.braking, f["yaw_rate_slow"])
+            place = watch.pair.place
+            features[f"slip_slope_{place}"] = np.where(seen.estimate.status < INACTIVE, seen.estimate.slope, np.nan)
+            features[f"slip_slope_ref_{place}"] = seen.reference
+            evidence: dict[str, Any] = {
+                "v_x": ("first", f["v_x_hat"]),
+                "slope_min": ("min", seen.estimate.slope),
+                "slope_ref": ("first", seen.reference),
+                "mu": ("first", seen.mu),
+                "slip_max": ("max", np.abs(seen.slip)),
+            }
+            name, unit = self._setup.detector.name, self._setup.detector.unit
+            track = Track(name, watch.pair.wheel, place, unit, seen.loss, watch.drop_threshold, seen.active)
+            found.append(Found(track, evidence))
+        return Output(tuple(found), features)
+
+
+def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    return Needs((*missing_wheels(have), *missing_torques(vehicle, have), *too_slow(rate_hz, MIN_RATE)))
+
+
+SLIP_SLOPE_DROP = Detector(
+    name="slip_slope_drop",
+    title="Slip-slope drop",
+    unit="-",
+    meaning="lost share of the dry slip slope",
+    statistic="share of the dry slip slope that is lost",
+    threshold=THRESHOLD,
+    needs=_needs,
+    start=DropWatch,
+    highest=1.0,
+)

@@ -10,7 +10,7 @@ from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import campaign_matrix
 from aqualog.campaign.samples import CampaignData, RunInfo
 from aqualog.core.notation import WHEELS
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 from aqualog.report.campaign.answers import RESISTANCE_LEVEL, Answer
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import group_text, key_title, value_text

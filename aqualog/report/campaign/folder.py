@@ -15,7 +15,7 @@ from pathlib import Path
 from aqualog.campaign.bins import Group
 from aqualog.campaign.samples import CampaignData
 from aqualog.core.errors import ConfigError
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 from aqualog.io.whole import write_text
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import file_name

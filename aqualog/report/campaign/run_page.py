@@ -13,7 +13,7 @@ import numpy as np
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
-from aqualog.detect.needs import DETECTORS
+from aqualog.detect.registry import DETECTORS
 from aqualog.report import offline
 from aqualog.report.campaign.labels import key_title, value_text
 from aqualog.report.campaign.runs import RunFacts

@@ -141,7 +141,7 @@ def _not_directly(plan: Plan) -> Check:
     wanted = by_sum(0.2)
     limit_sum, g = threshold_for(wanted.recall, [float(v) for v in np.geomspace(0.02, 1.0, 30)], by_sum)
     limit, plain = threshold_for(wanted.recall, [float(v) for v in np.geomspace(0.05, 0.8, 30)], direct)
-    at_thesis = direct(resistance.THRESHOLD)
+    at_thesis = direct(resistance.LEVEL)
     whole = g.episodes > 20 and plain.false > 0 and g.false <= 0.5 * plain.false
     outcome = (
         f"sum, beyond {limit_sum:.2f} m/s: {g.in_words()}; direct, beyond {limit:.2f} m/s²: {plain.in_words()}; "

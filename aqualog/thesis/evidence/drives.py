@@ -13,12 +13,11 @@ from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, DriveResult, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import minor_spin_down
-from aqualog.detect.joint import CRITERIA, GATED
-from aqualog.detect.negative_force import hold_on
-from aqualog.detect.scene import BrakeWatch
+from aqualog.detect.braking import BrakeWatch, hold_on
+from aqualog.detect.joint_criteria import CRITERIA, GATED
+from aqualog.detect.minor_spin_down import A_Y_MINOR
 from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
 from aqualog.detect.stream import Settings, detect_drive
-from aqualog.detect.wheel_watch import A_Y_MINOR
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.intervals import poisson, wilson
 from aqualog.evaluate.labels import Labels, Span, joined, without

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.detect.joint import GATE_HOLD, GATED, HOLD, SLOPE, Criteria
-from aqualog.detect.thresholds import DEFAULT, UNITS
-from aqualog.detect.wheel_watch import MU_FULL, MU_SPIN_UP
+from aqualog.detect.joint_criteria import GATE_HOLD, GATED, HOLD, SLOPE, Criteria
+from aqualog.detect.registry import BY_NAME
+from aqualog.detect.spin import MU_FULL, MU_SPIN_UP
+from aqualog.detect.thresholds import DEFAULT
 from aqualog.report.theme import INK, MUTED, THRESHOLD, WATER, WHEEL_COLOURS
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit, limits
@@ -25,15 +26,15 @@ __all__ = ["FIGURES", "panels_2_25"]
 _RESISTANCE = 5
 _BOX_COLOURS = {1: WHEEL_COLOURS["fl"], 2: WHEEL_COLOURS["fr"], 3: WHEEL_COLOURS["rl"], 4: WHEEL_COLOURS["rr"]}
 _BOX_WORDS = {
-    1: ("1 Excessive spin-down", f"CUSUM of a_wΔ > {DEFAULT.spin_down:g} {UNITS['spin_down']}, wheel slower",
+    1: ("1 Excessive spin-down", f"CUSUM of a_wΔ > {DEFAULT.spin_down:g} {BY_NAME['spin_down'].unit}, wheel slower",
         "than the car, no negative force"),
-    2: ("2 Minor spin-down", f"Δσ² > {DEFAULT.minor_spin_down:g} {UNITS['minor_spin_down']}, free wheel slower",
+    2: ("2 Minor spin-down", f"Δσ² > {DEFAULT.minor_spin_down:g} {BY_NAME['minor_spin_down'].unit}, free wheel slower",
         "than the car, no negative force"),
-    3: ("3 Spin-up", f"CUSUM of a_wΔ > {DEFAULT.spin_up:g} {UNITS['spin_up']}, wheel faster,",
+    3: ("3 Spin-up", f"CUSUM of a_wΔ > {DEFAULT.spin_up:g} {BY_NAME['spin_up'].unit}, wheel faster,",
         f"traction < {MU_SPIN_UP:g}; full below {MU_FULL:g}"),
     4: ("4 Slip-slope drop", f"slope below {1.0 - DEFAULT.slip_slope_drop:g} of the dry one, tyre driven,",
         "wheels calm, goes with speed and Δa"),
-    5: ("5 Resistance", f"CUSUM of Δa > {DEFAULT.resistance:g} {UNITS['resistance']}:", "critical water level"),
+    5: ("5 Resistance", f"CUSUM of Δa > {DEFAULT.resistance:g} {BY_NAME['resistance'].unit}:", "critical water level"),
 }  # fmt: skip
 _TALL, _STEP, _TOP = 14.0, 17.0, 84.0
 _IN, _LEFT, _RIGHT, _OR, _AND, _OUT, _END = 15.0, 19.0, 62.0, 67.0, 79.0, 90.0, 109.0  # edges of the boxes
@@ -64,7 +65,7 @@ def _diagram() -> Panel:
     boxes.append(_box("inputs", 0.0, 16.0, _IN, 82.0, MUTED))
     notes += [Note(text, 0.5 * _IN, 69.0 - 6.0 * i, size=10) for i, text in enumerate(inputs)]
     boxes.append(_box("gate", _LEFT, -3.0, _RIGHT - _LEFT, _TALL, THRESHOLD))
-    gate = f"CUSUM of Δa > {DEFAULT.joint_criteria:g} {UNITS['joint_criteria']}, stays open {GATE_HOLD:g} s"
+    gate = f"CUSUM of Δa > {DEFAULT.joint_criteria:g} {BY_NAME['joint_criteria'].unit}, stays open {GATE_HOLD:g} s"
     notes += [
         Note("<b>Resistance gate</b>", middle, 8.2), Note(gate, middle, 3.8, size=10, colour=MUTED),
         Note("necessary for 1 to 4", middle, -0.2, size=10, colour=MUTED), _arrow(0.5 * _IN, 4.0, _LEFT, 4.0),

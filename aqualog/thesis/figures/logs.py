@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.campaign.samples import RunInfo
-from aqualog.detect.joint import CRITERIA
+from aqualog.detect.joint_criteria import CRITERIA
 from aqualog.detect.slip_slope.activation import CORNERING
 from aqualog.thesis.catalogue import rows
 from aqualog.thesis.evidence.campaign import KMH, DriveRun, Evidence, free_wheels

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.physics.load import G
 
-__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "began_free", "hold_on", "is_braking"]
+__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "BrakeWatch", "began_free", "hold_on", "is_braking"]
 
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
@@ -102,3 +107,23 @@ def began_free(active: BoolArray, braking: BoolArray, state: tuple[bool, bool]) 
     """
     y, was_active, free = _began_free(*state, active, braking)
     return y, (bool(was_active), bool(free))
+
+
+class BrakeWatch:
+    """Find the wheels with a braking force, with its after-effects."""
+
+    def __init__(self, vehicle: Vehicle, dt: float) -> None:
+        self._vehicle = vehicle
+        self._dt = dt
+        self._left = dict.fromkeys(WHEELS, 0)
+
+    def push(self, f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
+        """Return bits (n,) by wheel; `columns` holds the torques that the drive has."""
+        weight = 0.25 * self._vehicle.mass * G
+        result = {}
+        for wheel in WHEELS:
+            torque = columns.get(f"torque_{wheel}")
+            share = None if torque is None else torque / (self._vehicle.r_l(wheel) * weight)
+            bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), share)
+            result[wheel], self._left[wheel] = hold_on(bits, self._left[wheel], seconds=HOLD, dt=self._dt)
+        return result

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.compiled import compiled
-from aqualog.core.notation import WHEELS, side_of
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
 from aqualog.features.smoothing import gain
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
 
-__all__ = ["THRESHOLD", "BandParams", "level_change", "run"]
+__all__ = ["THRESHOLD", "WHEEL_OSCILLATION", "BandParams", "level_change"]
 
+MIN_RATE = 80.0  # [Hz] the band reaches from 15 Hz to near half of the rate
 THRESHOLD = 20.0  # [dB]
 F_LOW, F_HIGH = 15.0, 45.0  # [Hz] band where the rate allows
 NYQUIST_SHARE = 0.9
@@ -105,7 +108,7 @@ def level_change(p: BandParams, x: FloatArray, usable: BoolArray) -> FloatArray:
     return y
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per wheel; the statistic is the level of the oscillation over its reference. [dB]
 
     The torsional mode of a tyre lies at 30 to 60 Hz (K), partly beyond what a log of 100 Hz holds: the band is 15 to
@@ -114,14 +117,27 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
     Thesis [35].
     """
-    p = BandParams.make(r.dt)
-    v_x = r.features["v_x_hat"]
+    p = BandParams.make(setup.dt)
+    v_x = r.f["v_x_hat"]
     tracks = []
     for wheel in WHEELS:
         with np.errstate(invalid="ignore", divide="ignore"):
             usable = (v_x > V_MIN) & ~r.braking[wheel]
-            x = r.features[f"v_w_delta_{wheel}"] / np.maximum(v_x, V_MIN)
+            x = r.f[f"v_w_delta_{wheel}"] / np.maximum(v_x, V_MIN)
         statistic = DB * level_change(p, x, usable)
-        bits = alarm_bits(statistic, threshold, dt=r.dt)
-        tracks.append(Track("wheel_oscillation", wheel, side_of(wheel), "dB", statistic, threshold, bits))
+        bits = alarm_bits(statistic, setup.threshold, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=wheel))
     return tuple(tracks)
+
+
+WHEEL_OSCILLATION = rival(
+    "wheel_oscillation",
+    "high-frequency oscillation of the wheel",
+    "the wheel's rotational oscillation in a high band changes with the length of its contact",
+    run,
+    reference="[35]",
+    unit="dB",
+    threshold=THRESHOLD,
+    needs=partial(needs_wheels, least=MIN_RATE),
+    counterpart=MINOR_SPIN_DOWN,
+)

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.compiled import compiled
-from aqualog.core.notation import side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
+from aqualog.detect.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
-from aqualog.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 
-__all__ = ["PATIENCE", "THRESHOLD", "RlsParams", "run", "scan"]
+__all__ = ["PATIENCE", "SLOPE_RLS", "THRESHOLD", "RlsParams", "scan"]
 
 THRESHOLD = 0.7  # [-]
 PATIENCE = 1.0  # [s] an alarm outlasts missing estimates by this
@@ -88,18 +88,31 @@ def scan(
     return result
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per driven wheel; the statistic is the loss of slope against the dry one. [-]
 
     Thesis [14], [17]: (3.14) by recursive least squares. [17] makes the maximum friction a linear function of the
     slope, which orders drives as the slope does, so that the slope itself is compared.
     """
-    p = RlsParams.make(r.dt)
+    p = RlsParams.make(setup.dt)
     tracks = []
-    for w in driven_wheels(r):
+    for w in driven_wheels(r, setup):
         slope, _ = scan(p, np.clip(w.slip, -SLIP_LINE, SLIP_LINE), w.mu, w.is_active, slope=w.expected)
-        loss = loss_of_slope(slope, reference_slope(w, slope, dt=r.dt))
+        loss = loss_of_slope(slope, reference_slope(w, slope, dt=setup.dt))
         statistic = np.where(w.is_shown, loss, np.nan)
-        bits = alarm_bits(statistic, threshold, off_share=0.8, patience_s=PATIENCE, dt=r.dt)
-        tracks.append(Track("slope_rls", w.wheel, side_of(w.wheel), "-", statistic, threshold, bits))
+        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
     return tuple(tracks)
+
+
+SLOPE_RLS = rival(
+    "slope_rls",
+    "slip slope by recursive least squares",
+    "slip on traction by least squares with forgetting; a slope far below the dry one means little friction",
+    run,
+    reference="[14], [17]",
+    unit="-",
+    threshold=THRESHOLD,
+    needs=needs_slip,
+    counterpart=SLIP_SLOPE_DROP,
+)

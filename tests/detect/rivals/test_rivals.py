@@ -11,7 +11,8 @@ from straight_drive import drive as straight
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
-from aqualog.rivals.catalogue import RIVALS, run_rivals
+from aqualog.detect.registry import RIVALS
+from aqualog.detect.rivals.run import run_rivals
 
 KNOWN = frozenset({"mass", "l_f", "l_r", "tyre.slip_slope_f", "tyre.slip_slope_r"})
 NAMES = tuple(RIVALS)
@@ -258,7 +259,8 @@ def test_catalogue_tells_itself():
         assert rival.name == name
         assert rival.threshold > 0.0
         assert rival.title
-        assert rival.idea
+        assert rival.meaning
+        assert rival.counterpart
         assert rival.reference.startswith("[")
 
 

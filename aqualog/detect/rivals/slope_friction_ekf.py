@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from aqualog.core.compiled import compiled, inlined
-from aqualog.core.notation import side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
+from aqualog.detect.rivals.slope_inputs import driven_wheels, reference_slope
+from aqualog.detect.rivals.slope_rls import PATIENCE
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.features.smoothing import gain
 from aqualog.physics.tyre_brush import brush_force, brush_slope
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
-from aqualog.rivals.slope_inputs import driven_wheels, reference_slope
-from aqualog.rivals.slope_rls import PATIENCE
 
-__all__ = ["MU_FULL", "THRESHOLD", "CurveParams", "run", "scan", "severity"]
+__all__ = ["MU_FULL", "SLOPE_FRICTION_EKF", "THRESHOLD", "CurveParams", "scan"]
 
 THRESHOLD = 0.75  # [-]
 MU_FULL = 0.1  # [-] less than wet ice: nothing but floating
@@ -149,26 +149,40 @@ def scan(
     return result
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per driven wheel; statistic: the larger loss, of slope or of maximum friction. [-]
 
     Thesis [16]: an extended Kalman filter estimates slope and friction of a nonlinear tyre model together; the tyre is
     the brush of section 3.1. A driven wheel that spins shows its friction, so such samples stay in.
     """
-    p = CurveParams.make(r.dt)
-    dry = r.vehicle.mu_max
+    p = CurveParams.make(setup.dt)
+    dry = setup.vehicle.mu_max
     tracks = []
-    for w in driven_wheels(r):
+    for w in driven_wheels(r, setup):
         slope, mu_max, offset = scan(p, w.slip, w.mu, w.is_active, slope=w.expected, mu_max=dry)
-        reference = reference_slope(w, slope, dt=r.dt)
+        reference = reference_slope(w, slope, dt=setup.dt)
         loss = 1.0 - np.minimum(slope / reference, mu_max / dry)
         with np.errstate(invalid="ignore"):
             statistic = np.where(w.is_shown | (np.abs(w.slip - offset) > SLIP_SHOWN), loss, np.nan)
-        bits = alarm_bits(statistic, threshold, off_share=0.8, patience_s=PATIENCE, dt=r.dt)
-        tracks.append(Track("slope_friction_ekf", w.wheel, side_of(w.wheel), "-", statistic, threshold, bits))
+        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
     return tuple(tracks)
 
 
-def severity(evidence: Mapping[str, Any]) -> str:
+def _severity(evidence: Mapping[str, Any]) -> str:
     """Return full where nine tenths are lost: less friction than wet ice has."""
     return "full" if evidence.get("statistic_max", 0.0) > 1.0 - MU_FULL else "partial"
+
+
+SLOPE_FRICTION_EKF = rival(
+    "slope_friction_ekf",
+    "slip slope and friction by extended Kalman filter",
+    "slope and maximum friction of a bent tyre curve, estimated together",
+    run,
+    reference="[16]",
+    unit="-",
+    threshold=THRESHOLD,
+    needs=needs_slip,
+    counterpart=SLIP_SLOPE_DROP,
+    severity=_severity,
+)

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from aqualog.core.compiled import compiled
-from aqualog.core.notation import WHEELS, side_of
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Track
-from aqualog.detect.wheel_watch import SLIP_FULL
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
+from aqualog.detect.spin import SLIP_FULL, SPIN_DOWN
 from aqualog.features.smoothing import UNSET, derivative
 from aqualog.features.stream import TAU_WHEEL
 from aqualog.physics.slip import slip_of_wheel_speed
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
 
-__all__ = ["THRESHOLD", "critical_share", "run", "severity"]
+__all__ = ["THRESHOLD", "WHEEL_THRESHOLDS", "critical_share"]
 
-THRESHOLD = 1.0  # [-] of both critical levels; rule in `catalogue`, as for all rivals
+THRESHOLD = 1.0  # [-] of both critical levels; rule in `rival`, as for all rivals
 # Without brakes nothing but water (or another slippery road) slows a wheel faster than the car (K): lifting off takes
 # 1-2 m/s^2 and less than 1 % of slip. With brakes a wheel on a dry road reaches 2-3 g and 20 % of slip before its
 # controller lets go (K).
@@ -63,7 +63,7 @@ def critical_share(deceleration: FloatArray, negative_slip: FloatArray, *, dt: f
     return np.minimum(peak, negative_slip)
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per wheel; the statistic is the share of both critical levels. [-]
 
     The deceleration is the wheel's own, not its difference to the car's: the method uses wheel speeds alone. An
@@ -71,23 +71,37 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
     Thesis [32]: critical deceleration levels and slips for spin-downs with and without braking.
     """
-    v_x = r.features["v_x_hat"]
+    v_x = r.f["v_x_hat"]
     tracks = []
     for wheel in WHEELS:
         braking = r.braking[wheel]
-        v_w = r.features[f"v_w_{wheel}"]
-        a_w, _ = derivative(v_w, UNSET, tau=TAU_WHEEL, dt=r.dt)
+        v_w = r.f[f"v_w_{wheel}"]
+        a_w, _ = derivative(v_w, UNSET, tau=TAU_WHEEL, dt=setup.dt)
         with np.errstate(invalid="ignore"):
             slip = -slip_of_wheel_speed(v_w, v_x) / np.where(braking, SLIP_BRAKING, SLIP)
             slip = np.where(v_x < V_MIN, 0.0, slip)
         deceleration = -a_w / np.where(braking, DECELERATION_BRAKING, DECELERATION)
-        statistic = critical_share(deceleration, slip, dt=r.dt)
-        bits = alarm_bits(statistic, threshold, stay=slip, dt=r.dt)
-        tracks.append(Track("wheel_thresholds", wheel, side_of(wheel), "-", statistic, threshold, bits))
+        statistic = critical_share(deceleration, slip, dt=setup.dt)
+        bits = alarm_bits(statistic, setup.threshold, stay=slip, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=wheel))
     return tuple(tracks)
 
 
-def severity(evidence: Mapping[str, Any]) -> str:
+def _severity(evidence: Mapping[str, Any]) -> str:
     """Return full where the wheel has lost a quarter of its speed without brakes; braked wheels lose it on any road."""
     lost = evidence.get("slip_min", 0.0) < SLIP_FULL
     return "full" if lost and not evidence.get("braking", False) else "partial"
+
+
+WHEEL_THRESHOLDS = rival(
+    "wheel_thresholds",
+    "thresholds on wheel deceleration and slip",
+    "a wheel that decelerates and slips beyond critical levels, higher ones under braking, spins down",
+    run,
+    reference="[32]",
+    unit="-",
+    threshold=THRESHOLD,
+    needs=needs_wheels,
+    counterpart=SPIN_DOWN,
+    severity=_severity,
+)

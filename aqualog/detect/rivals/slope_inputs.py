@@ -8,16 +8,15 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.detect.negative_force import hold_on
+from aqualog.detect.braking import hold_on
+from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.slip_slope.activation import ACTIVE, JUMPING, LIMITS, SPINNING, inactive_reason
 from aqualog.detect.slip_slope.watch import AFTER_JUMP, TAU_SMOOTH
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.load import G
-from aqualog.rivals.late_velocity import velocity_lag
-from aqualog.rivals.records import RivalInputs
 
-__all__ = ["Driven", "driven_wheels", "loss_of_slope", "reference_slope"]
+__all__ = ["Driven", "driven_wheels", "loss_of_slope", "reference_slope", "velocity_lag"]
 
 A_X_MAX_LATE = 0.5  # [m/s^2] beyond, what is left of a reference's lag (0.03 s) is a third of the slip
 # Traction below which errors of the velocity are as large as the slip: 1e-3 of free wheels, 2e-3 of a reference
@@ -25,6 +24,13 @@ SHOWN, SHOWN_LATE = 0.03, 0.06  # [-]
 SLIP_MAX = 0.3  # [-] beyond, every tyre slides
 SETTLE, OWN = 10.0, 40.0  # [s] of estimating until, and for which, the drive's own slope becomes the reference
 OWN_LOW, OWN_HIGH = 10.0, 100.0  # [-] a slope that a tyre on asphalt can have: 15-50 (K), and room for radii that err
+
+LAG_TAU = 0.3  # [s] both accelerations are smoothed alike
+LAG_TAU_SLOW = 5.0  # [s] grade and offset of the accelerometer change more slowly
+LAG_MAX = 0.5  # [s]
+# Integral of the squared jerk at which half of a lag is reported, less of it before: a receiver counts as in time at
+# first. 5 s of accelerations that change by 0.1 m/s³ have it
+LAG_KNOWN = 0.05  # [m^2/s^5]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,37 +51,37 @@ class Driven:
     is_given: bool
 
 
-def driven_wheels(r: RivalInputs) -> tuple[Driven, ...]:
+def driven_wheels(r: Scene, setup: Setup) -> tuple[Driven, ...]:
     """Return driven wheels, each against the faster free wheel; on an AWD car, the reference velocity without its lag.
 
     A driven wheel that leaves the road's speed stays in: that is the slope's fall. A free wheel in water can only be
     slow, so that the faster one gives the velocity. If that one leaves the road's speed, too, no velocity is available.
     """
-    f, car = r.features, r.vehicle
+    f, car, dt = r.f, setup.vehicle, setup.dt
     free = [w for w in WHEELS if w not in car.driven]
-    v_free, a_free = _faster(r, free) if free else (_in_time(r), np.zeros(f["v_x_hat"].size))
+    v_free, a_free = _faster(r, free) if free else (_in_time(r, dt), np.zeros(f["v_x_hat"].size))
     limits = LIMITS if free else LIMITS._replace(a_x_max=A_X_MAX_LATE)
     found = []
     for wheel in car.driven:
         slip = np.clip(differential_slip(f[f"v_line_{wheel}"], v_free), -SLIP_MAX, SLIP_MAX)
         # the torque's own rate: that of the traction holds the wheel's acceleration
         pull = r.columns[f"torque_{wheel}"] / (car.r_l(wheel) * 0.25 * car.mass * G)
-        rate, _ = derivative(pull, UNSET, tau=TAU_SMOOTH, dt=r.dt)
+        rate, _ = derivative(pull, UNSET, tau=TAU_SMOOTH, dt=dt)
         reason = inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"], a_w_delta=a_free,
             is_braking=np.any([r.braking[w] for w in (wheel, *free)], axis=0), mu_rate=np.abs(np.nan_to_num(rate)),
             limits=limits,
         )  # fmt: skip
-        unsettled, _ = hold_on((reason == JUMPING) | (reason == SPINNING), 0, seconds=AFTER_JUMP, dt=r.dt)
+        unsettled, _ = hold_on((reason == JUMPING) | (reason == SPINNING), 0, seconds=AFTER_JUMP, dt=dt)
         is_active = (reason == ACTIVE) & ~unsettled
-        mu, _ = lowpass(np.where(is_active, f[f"mu_{wheel}"], np.nan), UNSET, tau=TAU_SMOOTH, dt=r.dt)
+        mu, _ = lowpass(np.where(is_active, f[f"mu_{wheel}"], np.nan), UNSET, tau=TAU_SMOOTH, dt=dt)
         with np.errstate(invalid="ignore"):
             shown = np.abs(mu) > (SHOWN if free else SHOWN_LATE)
         key = f"slip_slope_{wheel[0]}"
         found.append(
             Driven(
                 wheel,
-                lowpass(np.where(is_active, slip, np.nan), UNSET, tau=TAU_SMOOTH, dt=r.dt)[0],
+                lowpass(np.where(is_active, slip, np.nan), UNSET, tau=TAU_SMOOTH, dt=dt)[0],
                 mu,
                 is_active,
                 shown,
@@ -86,9 +92,9 @@ def driven_wheels(r: RivalInputs) -> tuple[Driven, ...]:
     return tuple(found)
 
 
-def _faster(r: RivalInputs, free: list[str]) -> tuple[FloatArray, FloatArray]:
+def _faster(r: Scene, free: list[str]) -> tuple[FloatArray, FloatArray]:
     """Return the speed of the faster free wheel [m/s], and its acceleration difference, absolute [m/s²]."""
-    f, (one, other) = r.features, free
+    f, (one, other) = r.f, free
     with np.errstate(invalid="ignore"):
         first = ~(f[f"v_line_{other}"] > f[f"v_line_{one}"])
     v = np.where(first, f[f"v_line_{one}"], f[f"v_line_{other}"])
@@ -96,10 +102,10 @@ def _faster(r: RivalInputs, free: list[str]) -> tuple[FloatArray, FloatArray]:
     return v, np.abs(a_w)
 
 
-def _in_time(r: RivalInputs) -> FloatArray:
+def _in_time(r: Scene, dt: float) -> FloatArray:
     """Return the velocity without the lag of its reference, v(t) = v(t - lag) + lag a."""
-    lag = velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=r.dt)
-    return r.features["v_x_hat"] + lag * r.features["a_kin_slow"]
+    lag = velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=dt)
+    return r.f["v_x_hat"] + lag * r.f["a_kin_slow"]
 
 
 def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArray:
@@ -134,3 +140,35 @@ def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArra
 def loss_of_slope(slope: FloatArray, reference: FloatArray) -> FloatArray:
     """Return the share of the dry slope that is lost, 1 - C / C_ref; below 0 for a stiffer one. [-]"""
     return 1.0 - slope / reference
+
+
+def velocity_lag(v_x: FloatArray, a_x: FloatArray, *, dt: float) -> FloatArray:
+    """Return the lag of a velocity behind the accelerometer, from the drive so far.
+
+    Parameters
+    ----------
+    v_x : array (n,)
+        Reference velocity. [m/s]
+    a_x : array (n,)
+        Specific force; its own latency, some 10 ms, is left out. [m/s²]
+    dt : float
+        [s]
+
+    Returns
+    -------
+    lag : array (n,)
+        0 ... 0.5, starting at 0, never NaN. [s]
+
+    Least squares of dv_x/dt - a_x = -lag da_x/dt beyond the slow part, which holds the grade. Wheel speeds are not
+    used: a slip grows with the acceleration as a lag does, and would look like one.
+    """
+    a_v, _ = derivative(v_x, UNSET, tau=LAG_TAU, dt=dt)
+    smooth, _ = lowpass(a_x, UNSET, tau=LAG_TAU, dt=dt)
+    jerk, _ = derivative(smooth, UNSET, tau=LAG_TAU, dt=dt)
+    late = a_v - smooth
+    slow, _ = lowpass(late, UNSET, tau=LAG_TAU_SLOW, dt=dt)
+    # the difference is smoothed as the jerk is, or the jerk would be the later one
+    behind, _ = lowpass(late - slow, UNSET, tau=LAG_TAU, dt=dt)
+    along = np.cumsum(np.nan_to_num(-behind * jerk)) * dt
+    size = np.cumsum(np.where(np.isnan(behind), 0.0, np.nan_to_num(jerk * jerk))) * dt
+    return np.clip(along / (size + LAG_KNOWN), 0.0, LAG_MAX)

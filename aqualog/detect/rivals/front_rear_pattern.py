@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray, Track
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
 from aqualog.features.smoothing import fading_lowpass, gain
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
 
-__all__ = ["THRESHOLD", "at_the_rear", "dips", "run"]
+__all__ = ["FRONT_REAR_PATTERN", "THRESHOLD", "at_the_rear", "dips"]
 
+MIN_RATE = 20.0  # [Hz] the axles pass the same spot within a tenth of a second
 THRESHOLD = 9.0  # [-] times the stored reference
 TAU_REFERENCE = 20.0  # [s] memory of the reference
 STEP_MAX = 0.005  # [-] a larger deviation does not move the reference by more: it is what is looked for
@@ -101,7 +104,7 @@ def _widened(x: FloatArray, samples: int) -> FloatArray:
     return np.where(np.isnan(x), np.nan, largest)
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per side, at the front wheel; statistic: the front's dips over their reference. [-]
 
     The numerator is the rms of the front's dips (0.15 s) less those that the rear wheel repeats over the same spot; the
@@ -111,9 +114,9 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
     Thesis [33], [34].
     """
-    f = r.features
+    f = r.f
     v_x = f["v_x_hat"]
-    late = max(round(TOLERANCE / r.dt), 1)
+    late = max(round(TOLERANCE / setup.dt), 1)
     tracks = []
     for side, (front, rear) in SIDES.items():
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -121,15 +124,30 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
             share = {
                 w: np.where(usable, (f[f"v_w_delta_{w}"] - f["v_w_delta_common"]) / v_x, np.nan) for w in SIDES[side]
             }
-        there = _later(at_the_rear(dips(share[front], dt=r.dt), v_x, wheelbase=r.vehicle.wheelbase, dt=r.dt), late)
-        here = _widened(dips(share[rear], dt=r.dt), late)
+        there = _later(
+            at_the_rear(dips(share[front], dt=setup.dt), v_x, wheelbase=setup.vehicle.wheelbase, dt=setup.dt), late
+        )
+        here = _widened(dips(share[rear], dt=setup.dt), late)
         both = there + here  # a power needs both wheels
         power_f, power_r = (
-            fading_lowpass(np.where(np.isnan(both), np.nan, x * x), 0.0, tau=TAU_POWER, fade=TAU_POWER, dt=r.dt)[0]
+            fading_lowpass(np.where(np.isnan(both), np.nan, x * x), 0.0, tau=TAU_POWER, fade=TAU_POWER, dt=setup.dt)[0]
             for x in (there, here)
         )
         power_f = np.where(np.isnan(both), np.nan, power_f)
-        statistic = _over_reference(gain(TAU_REFERENCE, r.dt), FLOOR, power_f, REPEATED * power_r)
-        bits = alarm_bits(statistic, threshold, dt=r.dt)
-        tracks.append(Track("front_rear_pattern", front, side, "-", statistic, threshold, bits))
+        statistic = _over_reference(gain(TAU_REFERENCE, setup.dt), FLOOR, power_f, REPEATED * power_r)
+        bits = alarm_bits(statistic, setup.threshold, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=front))
     return tuple(tracks)
+
+
+FRONT_REAR_PATTERN = rival(
+    "front_rear_pattern",
+    "front-rear comparison over the same spot",
+    "dips of a front wheel beyond a stored reference that the rear wheel does not repeat over the same spot",
+    run,
+    reference="[33], [34]",
+    unit="-",
+    threshold=THRESHOLD,
+    needs=partial(needs_wheels, least=MIN_RATE),
+    counterpart=MINOR_SPIN_DOWN,
+)

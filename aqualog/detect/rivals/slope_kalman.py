@@ -8,19 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.compiled import compiled
-from aqualog.core.notation import side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
+from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
+from aqualog.detect.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
+from aqualog.detect.rivals.slope_rls import PATIENCE, SLIP_LINE
 from aqualog.detect.slip_slope import ekf
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
-from aqualog.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
-from aqualog.rivals.slope_rls import PATIENCE, SLIP_LINE
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 
-__all__ = ["THRESHOLD", "KalmanParams", "run", "scan"]
+__all__ = ["SLOPE_KALMAN", "THRESHOLD", "KalmanParams", "scan"]
 
 THRESHOLD = 0.65  # [-]
 
@@ -108,17 +108,30 @@ def scan(
     return result
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track per driven wheel; the statistic is the loss of slope against the dry one. [-]
 
     Thesis [15]: slope and offset by a Kalman filter whose covariance is raised when a CUSUM of its residual alarms.
     """
-    p = KalmanParams.make(r.dt)
+    p = KalmanParams.make(setup.dt)
     tracks = []
-    for w in driven_wheels(r):
+    for w in driven_wheels(r, setup):
         slope, _, _ = scan(p, np.clip(w.slip, -SLIP_LINE, SLIP_LINE), w.mu, w.is_active, slope=w.expected)
-        loss = loss_of_slope(slope, reference_slope(w, slope, dt=r.dt))
+        loss = loss_of_slope(slope, reference_slope(w, slope, dt=setup.dt))
         statistic = np.where(w.is_shown, loss, np.nan)
-        bits = alarm_bits(statistic, threshold, off_share=0.8, patience_s=PATIENCE, dt=r.dt)
-        tracks.append(Track("slope_kalman", w.wheel, side_of(w.wheel), "-", statistic, threshold, bits))
+        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
     return tuple(tracks)
+
+
+SLOPE_KALMAN = rival(
+    "slope_kalman",
+    "slip slope by Kalman filter with CUSUM",
+    "slope and offset of the slip by a linear Kalman filter that a CUSUM of its residual makes quick",
+    run,
+    reference="[15]",
+    unit="-",
+    threshold=THRESHOLD,
+    needs=needs_slip,
+    counterpart=SLIP_SLOPE_DROP,
+)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
-from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect.detector import Needs, Scene, Setup, any_wheel, missing_balance, too_slow
+from aqualog.detect.resistance import RESISTANCE
+from aqualog.detect.rivals.rival import MIN_RATE, alarm_bits, rival
 from aqualog.features.smoothing import UNSET, fading_lowpass, lowpass
 from aqualog.physics.load import G
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.records import RivalInputs
 
-__all__ = ["THRESHOLD", "run"]
+__all__ = ["RESISTANCE_MODEL", "THRESHOLD"]
 
 THRESHOLD = 0.35  # [m/s^2]
 TAU_GRADE = 1.0  # [s] a road's grade changes with its length, an accelerometer's noise does not
@@ -21,7 +24,7 @@ V_MIN = 10.0  # [m/s] below, water costs nothing that a balance can show
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
 
-def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
+def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     """Run the method: one track of the car; the statistic is the low-passed extra resistance over the mass. [m/s²]
 
     Wheel forces less nominal rolling and air resistance, less m (dv/dt + g sin(theta)). The grade is the slow part of
@@ -30,15 +33,31 @@ def run(r: RivalInputs, threshold: float) -> tuple[Track, ...]:
 
     Thesis [36].
     """
-    f = r.features
+    f = r.f
     a_x = r.columns["a_x"]
-    grade, _ = lowpass((a_x - f["a_kin"]) / G, UNSET, tau=TAU_GRADE, dt=r.dt)  # sin(theta)
+    grade, _ = lowpass((a_x - f["a_kin"]) / G, UNSET, tau=TAU_GRADE, dt=setup.dt)  # sin(theta)
     beyond = f["delta_a_x"] + a_x - (f["a_kin"] + G * grade)
-    braking = np.any([r.braking[w] for w in WHEELS], axis=0)
     with np.errstate(invalid="ignore"):
-        usable = (f["v_x_hat"] > V_MIN) & (np.abs(f["a_y_slow"]) < A_Y_MAX) & ~braking
+        usable = (f["v_x_hat"] > V_MIN) & (np.abs(f["a_y_slow"]) < A_Y_MAX) & ~any_wheel(r.braking)
     measure = np.where(usable, beyond, np.nan)
-    slow, _ = fading_lowpass(measure, 0.0, tau=TAU_MEASURE, fade=FADE, dt=r.dt)
+    slow, _ = fading_lowpass(measure, 0.0, tau=TAU_MEASURE, fade=FADE, dt=setup.dt)
     statistic = np.where(np.isnan(measure), np.nan, slow)
-    bits = alarm_bits(statistic, threshold, off_share=0.7, dt=r.dt)
-    return (Track("resistance_model", None, None, "m/s^2", statistic, threshold, bits),)
+    bits = alarm_bits(statistic, setup.threshold, off_share=0.7, dt=setup.dt)
+    return (setup.track(statistic, bits),)
+
+
+def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    return Needs((*missing_balance(vehicle, have), *too_slow(rate_hz, MIN_RATE)))
+
+
+RESISTANCE_MODEL = rival(
+    "resistance_model",
+    "resistance from a longitudinal model",
+    "what holds the car back beyond nominal rolling, air and grade is water that the tyres displace",
+    run,
+    reference="[36]",
+    unit="m/s^2",
+    threshold=THRESHOLD,
+    needs=_needs,
+    counterpart=RESISTANCE,
+)

@@ -9,14 +9,14 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["Picture"]
+__all__ = ["Extremes"]
 
 STRETCHES = 50_000
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 
-class Picture:
+class Extremes:
     """Two rows for each stretch of a drive: its least and greatest value, in the order of their times.
 
     Parameters
@@ -48,7 +48,7 @@ class Picture:
             self._rest[key] = x[whole:].copy()
 
     def columns(self) -> dict[_Key, FloatArray]:
-        """Return the picture, by the names that were given."""
+        """Return the extremes, by the names that were given."""
         return {key: np.concatenate(parts) for key, parts in self._kept.items()}  # type: ignore[misc]
 
 

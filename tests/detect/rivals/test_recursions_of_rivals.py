@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from aqualog.rivals import (
+from aqualog.detect.rivals import (
     front_rear_pattern,
     slope_friction_ekf,
     slope_kalman,
@@ -13,8 +13,8 @@ from aqualog.rivals import (
     wheel_oscillation,
     wheel_thresholds,
 )
-from aqualog.rivals.alarm import alarm_bits
-from aqualog.rivals.late_velocity import velocity_lag
+from aqualog.detect.rivals.rival import alarm_bits
+from aqualog.detect.rivals.slope_inputs import velocity_lag
 
 DT = 0.01
 
