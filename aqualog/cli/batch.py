@@ -6,41 +6,16 @@ from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import (
-    CarOfLogs,
-    Dbc,
-    Debug,
-    Force,
-    Inputs,
-    Jobs,
-    Json,
-    Progress,
-    Quiet,
-    Signals,
-    Thresholds,
-    Verbose,
-)  # fmt: skip
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["batch"]
 
 
+@command(
+    "logs:campaign store:out vehicle:of_logs signals dbc thresholds jobs limit_s limit_mb shard cluster json force"
+)
 def batch(
-    inputs: Inputs,
-    out: Annotated[
-        str | None,
-        typer.Option(
-            "-o",
-            "--out",
-            "--store",
-            help="Folder or URL (s3://...) for the results; default beside the campaign file: NAME.store.",
-            metavar="DIR",
-        ),
-    ] = None,
-    vehicle: CarOfLogs = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
-    thresholds: Thresholds = None,
-    jobs: Jobs = None,
+    run: Run,
     limit_s: Annotated[
         float | None,
         typer.Option("--limit-s", help="Longest time for one log, in seconds.", min=1.0, max=1e9, metavar="S"),
@@ -57,13 +32,7 @@ def batch(
         str | None,
         typer.Option("--cluster", help="Work on the workers of this dask scheduler.", metavar="tcp://HOST:8786"),
     ] = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Run every log of a campaign through the detectors and keep the results.
 
     Only what is new is done: a log is measured again when its content, its vehicle, the signal map, the thresholds or
@@ -81,23 +50,9 @@ def batch(
       aqualog batch campaign.toml --shard 3/8
       aqualog batch campaign.toml --cluster tcp://scheduler:8786 -o s3://bucket/store
       duckdb -c "select tyre, avg(events_joint_criteria) from 'campaign.store/runs.parquet' group by tyre"
-    """  # fmt: skip
-    from aqualog.cli.campaigns import INTERRUPTED, exit_code, open_campaign
-    from aqualog.cli.console import Console, guarded, told_if_interrupted
-
-    with guarded(debug=debug):
-        console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        campaign = open_campaign(inputs, vehicle=vehicle, signals=signals, dbc=dbc, thresholds=thresholds, store=out)
-        with console.hearing() as hear, told_if_interrupted(INTERRUPTED):
-            runs = campaign.run(
-                jobs=jobs, force=force, shard=shard, cluster=cluster, limit_s=limit_s, limit_mb=limit_mb, progress=hear
-            )
-        if not runs.data.runs and runs.shard is not None:  # a matrix may have more jobs than there are logs
-            console.note(f"shard {runs.shard.index} of {runs.shard.count} has no log")
-            return
-        console.data(runs, as_json=as_json)
-        for text in runs.notes:
-            console.note(text)
-        code = exit_code(runs)
-    if code:
-        raise typer.Exit(code)
+    """
+    campaign = run.campaign()
+    runs = run.measured(campaign, force=run.force, shard=shard, cluster=cluster, limit_s=limit_s, limit_mb=limit_mb)
+    if not runs.data.runs and runs.shard is not None:  # a matrix may have more jobs than there are logs
+        return Output(notes=[f"shard {runs.shard.index} of {runs.shard.count} has no log"])
+    return run.of_runs(runs, result=runs, notes=runs.notes)

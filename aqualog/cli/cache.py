@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import Debug, Json, Verbose
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["cache"]
 
 
+@command("clean json verbose", has_steps=False)
 def cache(
+    run: Run,
     clean: Annotated[bool, typer.Option("--clean", help="Remove what is kept.")] = False,
-    as_json: Json = False,
-    verbose: Verbose = False,
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Show or empty the folder in which aligned signals are kept.
 
     detect, diagnose, calibrate and slip-slope keep signals there with --cache, or always where AQUALOG_CACHE names a
@@ -32,10 +30,7 @@ def cache(
       aqualog cache --clean
       AQUALOG_CACHE=/data/cache aqualog diagnose drive.mf4 --vehicle car.toml
     """
-    from aqualog.cli.console import clean as cleaned
-    from aqualog.cli.console import guarded
     from aqualog.face.cache import cache
 
-    with guarded(debug=debug):
-        kept = cache(clean=clean)
-        sys.stdout.write(kept.to_json() + "\n" if as_json else cleaned(kept.text(verbose=verbose)))
+    kept = cache(clean=clean)
+    return Output(kept, text=kept.text(verbose=run.console.verbose))

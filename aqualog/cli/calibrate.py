@@ -7,37 +7,16 @@ from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import (
-    Cache,
-    CarNeeded,
-    Dbc,
-    Debug,
-    Force,
-    Json,
-    Progress,
-    Quiet,
-    Rate,
-    Signals,
-    Verbose,
-)  # fmt: skip
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["calibrate"]
 
 
+@command("logs:drives vehicle:needed signals dbc out fix page rate cache json force")
 def calibrate(
-    logs: Annotated[
-        list[str],
-        typer.Argument(
-            help="Logs of dry drives, each argument a drive of its own; a folder is one drive of several files.",
-            metavar="LOG...",
-            show_default=False,
-        ),
-    ],
-    vehicle: CarNeeded = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
+    run: Run,
     out: Annotated[
-        str | None, typer.Option("-o", "--out", help="Vehicle file with the calibrated values.", metavar="FILE")
+        Path | None, typer.Option("-o", "--out", help="Vehicle file with the calibrated values.", metavar="FILE")
     ] = None,
     fix: Annotated[
         list[str] | None,
@@ -48,17 +27,9 @@ def calibrate(
         ),
     ] = None,
     page: Annotated[
-        str | None, typer.Option("--page", help="Page with tables and residuals (HTML).", metavar="FILE")
+        Path | None, typer.Option("--page", help="Page with tables and residuals (HTML).", metavar="FILE")
     ] = None,
-    rate: Rate = None,
-    cache: Cache = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
     Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
@@ -71,64 +42,24 @@ def calibrate(
       aqualog calibrate dry*.mcap --vehicle car.toml --fix mass=1482 --json
       aqualog calibrate monday/ tuesday/ --vehicle car.toml --signals map.toml --page calibration.html
     """
-    from aqualog.cli.console import guarded
-
-    with guarded(debug=debug):
-        code = _calibrate(
-            logs, vehicle, signals, dbc or [], out, fix or [], page, rate,
-            cached=cache, as_json=as_json, force=force, quiet=quiet, verbose=verbose, progress=progress,
-        )  # fmt: skip
-    if code:
-        raise typer.Exit(code)
-
-
-def _calibrate(
-    logs: list[str],
-    vehicle_file: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    out_name: str | None,
-    fix: list[str],
-    page_name: str | None,
-    rate: float | None,
-    *,
-    cached: bool | None,
-    as_json: bool,
-    force: bool,
-    quiet: bool,
-    verbose: bool,
-    progress: str,
-) -> int:
-    from aqualog.cli.console import told_if_interrupted
-    from aqualog.cli.setup import prepare, result_file
-    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ExitCode
     from aqualog.face.calibrate import calibrate
     from aqualog.face.drives import NothingUsableError, grouped
 
-    if vehicle_file is None:
-        raise ConfigError("no --vehicle", expected="a vehicle file: which axle is driven, radii, axle distances")
-    fixed = _fixed(fix)
-    out, page = result_file(out_name, "-o"), result_file(page_name, "--page")
+    run.need_vehicle("which axle is driven, radii, axle distances")
+    fixed = _fixed(fix or [])
     targets = [p for p in (out, page) if p is not None]
-    setup = prepare(
-        logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
-    )  # fmt: skip
+    drive = run.drive(targets)
     try:
-        with setup.console.hearing() as hear, told_if_interrupted("nothing was written"):
-            result = calibrate(grouped(logs, setup.drive), setup.vehicle, fix=fixed, progress=hear)
+        with run.hearing("nothing was written") as hear:
+            result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, progress=hear)
     except NothingUsableError:  # each reason was reported
-        return int(ExitCode.NOTHING_USABLE)
+        return Output(code=int(ExitCode.NOTHING_USABLE))
     if out is not None:
         result.write_vehicle(out, force=True)
     if page is not None:
         result.write_page(page, force=True)
-    setup.console.data(result, as_json=as_json)
-    for text in result.notes:
-        setup.console.note(text)
-    for path in targets:
-        setup.console.note(f"written: {path}")
-    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
+    return Output(result, [*result.notes, *(f"written: {path}" for path in targets)])
 
 
 def _fixed(texts: list[str]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import Dbc, Debug, Force, Json, Progress, Quiet, Verbose
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["campaign_app", "init"]
 
@@ -22,23 +22,14 @@ def _campaign() -> None:
 
 
 @campaign_app.command(no_args_is_help=True)
+@command("folder out vehicle:proposed dbc json force")
 def init(
+    run: Run,
     folder: Annotated[Path, typer.Argument(help="Folder with logs, in it or below it.", metavar="FOLDER")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Campaign file to write.", metavar="FILE")] = Path(
         "campaign.toml"
     ),
-    vehicle: Annotated[
-        Path | None,
-        typer.Option("--vehicle", help="Vehicle file of all runs; without it one to fill is written.", metavar="FILE"),
-    ] = None,
-    dbc: Dbc = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Propose a campaign file for a folder of logs.
 
     Looks at every log in the folder and below it, puts together files of one drive, reads tyre, pressure, water depth,
@@ -52,17 +43,9 @@ def init(
       aqualog campaign init measurements -o wet2024/campaign.toml --vehicle car.toml
       aqualog campaign init can_logs --dbc car.dbc
     """
-    from aqualog.cli.console import Console, guarded
-    from aqualog.core.errors import ExitCode
     from aqualog.face.propose import propose
 
-    with guarded(debug=debug):
-        console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        with console.hearing() as hear:
-            found = propose(folder, out, vehicle=vehicle, dbc=dbc or (), force=force, progress=hear)
-            found.write_files()
-        for text in found.notes:
-            console.note(text)
-        console.data(found, as_json=as_json)
-        if found.has_loss:
-            raise typer.Exit(int(ExitCode.PARTIAL))
+    with run.hearing() as hear:
+        found = propose(folder, out, vehicle=run.vehicle, dbc=run.dbc, force=run.force, progress=hear)
+        found.write_files()
+    return Output(found, found.notes)

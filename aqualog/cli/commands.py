@@ -39,16 +39,16 @@ COMMANDS = {
     ),
     "doctor": Command("Report what is wrong with a log, what was lost of it, and what to do."),
     "convert": Command("Write the aligned signals of one drive as one log, in SI units and with canonical names."),
-    "align": Command(
-        "Find the clock offset (and drift) between sources from a quantity that both carry.", module="clock"
-    ),
+    "align": Command("Find the clock offset (and drift) between sources from a quantity that both carry."),
     "slip-slope": Command(
         "Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same."
     ),
     "batch": Command("Run every log of a campaign through the detectors and keep the results."),
     "plan": Command("Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),
-    "bin-slipslope": Command("Slip slope over speed for each configuration, and the speed of full aquaplaning."),
-    "bin-resistance": Command("Mean resistance measure over speed for each configuration."),
+    "bin-slipslope": Command(
+        "Slip slope over speed for each configuration, and the speed of full aquaplaning.", module="bins"
+    ),
+    "bin-resistance": Command("Mean resistance measure over speed for each configuration.", module="bins"),
     "report": Command(
         "Make the page of a campaign: quality, test matrix, slip slope and resistance over speed, detections, all runs."
     ),

@@ -89,9 +89,13 @@ class Console:
         with self.steps() as steps:
             yield Heard(self, steps)
 
-    def data(self, result: Result, *, as_json: bool) -> None:
-        """Print a result on stdout: the document, or what a reader sees."""
-        sys.stdout.write(result.to_json() + "\n" if as_json else clean(result.text()))
+    def error(self, text: str) -> None:
+        """Something that failed, while the rest goes on."""
+        sys.stderr.write(f"error: {clean(text)}\n")
+
+    def data(self, result: Result, *, as_json: bool, text: str | None = None) -> None:
+        """Print a result on stdout: the document, or what a reader sees (`text` in place of the result's own)."""
+        sys.stdout.write(result.to_json() + "\n" if as_json else clean(result.text() if text is None else text))
 
     @contextmanager
     def steps(self) -> Iterator[Steps]:

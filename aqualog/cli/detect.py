@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.options import (
-    Cache,
-    Dbc,
-    Debug,
-    Force,
-    Json,
-    Logs,
-    Progress,
-    Quiet,
-    Rate,
-    Signals,
-    Thresholds,
-    Vehicle,
-    Verbose,
-)  # fmt: skip
+from aqualog.cli.frame import Output, Run, command
 
 if TYPE_CHECKING:
     from aqualog.face.detect import Detection
@@ -29,11 +15,12 @@ if TYPE_CHECKING:
 __all__ = ["detect"]
 
 
+@command(
+    "logs vehicle signals dbc out write rate history configuration reference thresholds model fail_on_event cache json "
+    "force"
+)
 def detect(
-    logs: Logs,
-    vehicle: Vehicle = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
+    run: Run,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
@@ -46,7 +33,6 @@ def detect(
             metavar="FILE",
         ),
     ] = None,
-    rate: Rate = None,
     history: Annotated[
         Path | None,
         typer.Option(
@@ -71,26 +57,10 @@ def detect(
             metavar="RULE",
         ),
     ] = "robust",
-    thresholds: Thresholds = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            "--model",
-            help="Model file (TOML), as `aqualog diagnose` writes it: effects that the car is known to have.",
-            metavar="FILE",
-        ),
-    ] = None,
     fail_on_event: Annotated[
         bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
     ] = False,
-    cache: Cache = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Detect aquaplaning in one drive.
 
     The files named are ONE drive: a single log, or the files of several loggers. Events go to stdout as a table or as
@@ -105,41 +75,6 @@ def detect(
       aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
       aqualog detect drive.mf4 --vehicle car.toml --model model.toml
     """
-    from aqualog.cli.console import guarded
-
-    with guarded(debug=debug):
-        code = _detect(
-            logs, vehicle, signals, dbc or [], out, write, rate, history, configuration, reference, thresholds,
-            model, cached=cache, fail_on_event=fail_on_event, as_json=as_json, force=force, quiet=quiet,
-            verbose=verbose, progress=progress,
-        )  # fmt: skip
-    if code:
-        raise typer.Exit(code)
-
-
-def _detect(
-    logs: list[str],
-    vehicle_file: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    out: Path | None,
-    write: Path | None,
-    rate: float | None,
-    history_file: Path | None,
-    configuration: str,
-    reference: str,
-    thresholds_file: Path | None,
-    model_file: Path | None,
-    *,
-    cached: bool | None,
-    fail_on_event: bool,
-    as_json: bool,
-    force: bool,
-    quiet: bool,
-    verbose: bool,
-    progress: str,
-) -> int:
-    from aqualog.cli.setup import prepare
     from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.detect import DETECT_FILES, detect
     from aqualog.face.paths import refuse_existing
@@ -149,48 +84,34 @@ def _detect(
     if write is not None:
         check_suffix(write)
         targets.append(write)
-    if out is not None and history_file is not None and out.absolute() == history_file.absolute():
-        raise ConfigError("is the folder of the results", where=str(history_file), expected="a file of its own")
-    setup = prepare(
-        logs, map_file=map_file, dbc=dbc, targets=targets, force=force, quiet=quiet, verbose=verbose,
-        progress=progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
-    )  # fmt: skip
-    console = setup.console
-    given = [p for p in (thresholds_file, model_file) if p is not None]
-    if history_file is not None:
-        refuse_existing([history_file], force=True, sources=[*setup.drive.sources, *targets, *given])
-    if given:
-        refuse_existing(targets, force=force, sources=given)
-    with console.hearing() as hear:
+    if out is not None and history is not None and out.absolute() == history.absolute():
+        raise ConfigError("is the folder of the results", where=str(history), expected="a file of its own")
+    given = [p for p in (run.thresholds, run.model) if p is not None]
+    drive = run.drive(targets, others=given)
+    if history is not None:
+        refuse_existing([history], force=True, sources=[*drive.sources, *targets, *given])
+    with run.hearing() as hear:
         result = detect(
-            setup.drive, setup.vehicle, thresholds=thresholds_file, model=model_file, history=history_file,
-            configuration=configuration, reference=reference, windows=out, whole=write is not None,
-            samples=out is not None or write is not None, progress=hear,
+            drive, thresholds=run.thresholds, model=run.model, history=history, configuration=configuration,
+            reference=reference, windows=out, whole=write is not None, samples=out is not None or write is not None,
+            progress=hear,
         )  # fmt: skip
         hear("writing")
         if out is not None:
             result.save(out, force=True)
         if write is not None:
             result.write(write, force=True)
-        if history_file is not None:
-            result.remember(history_file)
-    console.data(result, as_json=as_json)
+        if history is not None:
+            result.remember(history)
     notes = [
-        *(
-            ["no --vehicle: a default RWD car is taken, and what needs its mass is not judged"]
-            if not vehicle_file
-            else []
-        ),
-        *_model_notes(result, model_file),
-        *_history_notes(result, history_file, configuration),
+        *([] if run.vehicle else ["no --vehicle: a default RWD car is taken, and what needs its mass is not judged"]),
+        *_model_notes(result, run.model),
+        *_history_notes(result, history, configuration),
         *result.notes,
         *([f"results are in {out}: {', '.join(DETECT_FILES)}"] if out is not None else []),
     ]
-    for text in notes:
-        console.note(text)
-    if fail_on_event and result.drive_result.events:
-        return int(ExitCode.GATE_TRIPPED)
-    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
+    has_tripped = fail_on_event and bool(result.drive_result.events)
+    return Output(result, notes, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)
 
 
 def _model_notes(result: Detection, path: Path | None) -> list[str]:

@@ -3,53 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aqualog.cli.options import (
-    Cache,
-    Dbc,
-    Debug,
-    Force,
-    Json,
-    Progress,
-    Quiet,
-    Rate,
-    Signals,
-    Verbose,
-)  # fmt: skip
+from aqualog.cli.frame import Output, Run, command
 
 if TYPE_CHECKING:
-    from aqualog.cli.console import Console
     from aqualog.face.diagnose import Diagnosis
 
 __all__ = ["diagnose"]
 
 
+@command(
+    "logs:diagnosed vehicle:believed model:known signals dbc holdout out page level seed surrogates bootstrap rate "
+    "cache json force"
+)
 def diagnose(
-    logs: Annotated[
-        list[str],
-        typer.Argument(
-            help="Logs, each argument a drive of its own; a folder is one drive of several files. Or a campaign file.",
-            metavar="LOG...|CAMPAIGN.toml",
-            show_default=False,
-        ),
-    ],
-    vehicle: Annotated[
-        Path | None,
-        typer.Option(
-            "--vehicle",
-            help="Vehicle file (TOML): what the simulation believes. Drives need one; a campaign names its own.",
-            metavar="FILE",
-        ),
-    ] = None,
-    model: Annotated[
-        Path | None,
-        typer.Option("--model", help="Model file (TOML): what is known already, on top of the base.", metavar="FILE"),
-    ] = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
+    run: Run,
     holdout: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,10 +30,10 @@ def diagnose(
         ),
     ] = None,
     out: Annotated[
-        str | None, typer.Option("-o", "--out", help="Extended model: a file that --model takes.", metavar="FILE")
+        Path | None, typer.Option("-o", "--out", help="Extended model: a file that --model takes.", metavar="FILE")
     ] = None,
     page: Annotated[
-        str | None, typer.Option("--page", help="Page with the pictures before and after (HTML).", metavar="FILE")
+        Path | None, typer.Option("--page", help="Page with the pictures before and after (HTML).", metavar="FILE")
     ] = None,
     level: Annotated[
         float, typer.Option("--level", help="Share of drives without effect that may be given one.", min=1e-4, max=0.5)
@@ -77,15 +48,7 @@ def diagnose(
     bootstrap: Annotated[
         bool, typer.Option("--bootstrap/--no-bootstrap", help="Without: quicker, the test by its formula alone.")
     ] = True,
-    rate: Rate = None,
-    cache: Cache = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.
 
     The vehicle file is what the simulation believes. The verdict is one of: no_effect, named, compound, cannot_tell
@@ -100,141 +63,77 @@ def diagnose(
       aqualog diagnose drive.mf4 --vehicle car.toml --no-bootstrap
       aqualog diagnose campaign.toml --page campaign.html
     """
-    from aqualog.cli.console import Console, guarded
+    from aqualog.core.errors import ConfigError
+    from aqualog.face.campaign import is_campaign
 
-    with guarded(debug=debug):
-        from aqualog.cli.setup import result_file
-        from aqualog.core.errors import ConfigError
-        from aqualog.face.campaign import is_campaign
-
-        console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        if surrogates is not None and not bootstrap:
-            raise ConfigError("--surrogates beside --no-bootstrap", expected="one of them")
-        targets = (result_file(out, "-o"), result_file(page, "--page"))
-        if is_campaign(logs):
-            strange = {
-                "--holdout": bool(holdout),
-                "--rate": rate is not None,
-                "--no-bootstrap": not bootstrap,
-                "--cache": cache is True,
-            }
-            given = [option for option, is_given in strange.items() if is_given]
-            code = _campaign(
-                logs, vehicle, model, signals, dbc or [], targets, given, seed=seed, level=level, surrogates=surrogates,
-                console=console, as_json=as_json, force=force,
-            )  # fmt: skip
-        else:
-            code = _diagnose(
-                logs, holdout or [], vehicle, model, signals, dbc or [], targets, rate, seed=seed, level=level,
-                surrogates=surrogates if bootstrap else 0, console=console, cached=cache, as_json=as_json, force=force,
-            )  # fmt: skip
-    if code:
-        raise typer.Exit(code)
+    if surrogates is not None and not bootstrap:
+        raise ConfigError("--surrogates beside --no-bootstrap", expected="one of them")
+    if not is_campaign(run.logs):
+        drawn = surrogates if bootstrap else 0
+        return _drives(run, holdout or [], out, page, {"level": level, "seed": seed, "surrogates": drawn})
+    strange = {
+        "--holdout": bool(holdout),
+        "--rate": run.rate is not None,
+        "--no-bootstrap": not bootstrap,
+        "--cache": run.cache is True,
+    }
+    given = next((option for option, is_given in strange.items() if is_given), None)
+    if given is not None:
+        raise ConfigError(f"{given} does not apply to a campaign", expected="what a campaign takes: --help")
+    return _campaign(run, out, page, {"level": level, "seed": seed, "surrogates": surrogates})
 
 
-Targets = tuple[Path | None, Path | None]  # model file, page
-
-
-def _diagnose(
-    logs: list[str],
-    holdout: list[str],
-    vehicle_file: Path | None,
-    model_file: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    targets: Targets,
-    rate: float | None,
-    *,
-    seed: int,
-    level: float,
-    surrogates: int | None,
-    console: Console,
-    cached: bool | None,
-    as_json: bool,
-    force: bool,
-) -> int:
-    from aqualog.cli.console import told_if_interrupted
-    from aqualog.cli.setup import prepare
+def _drives(run: Run, holdout: list[str], out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
     from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.face.diagnose import diagnose
     from aqualog.face.drives import NothingUsableError, grouped
-    from aqualog.face.paths import expand, list_files, refuse_existing
+    from aqualog.face.paths import expand, list_files
 
-    if vehicle_file is None:
-        raise ConfigError("no --vehicle", expected="a vehicle file: it is what the simulation believes")
-    written = [p for p in targets if p is not None]
-    setup = prepare(
-        logs, map_file=map_file, dbc=dbc, targets=written, force=force, quiet=console.quiet, verbose=console.verbose,
-        progress=console.progress, vehicle_file=vehicle_file, cached=cached, rate_hz=rate,
-    )  # fmt: skip
-    missing = next((p for p in expand(holdout) if not p.exists()), None)
+    run.need_vehicle("it is what the simulation believes")
+    unseen = expand(holdout)
+    others = [*unseen, *list_files(holdout), *([run.model] if run.model is not None else [])]
+    drive = run.drive([p for p in (out, page) if p is not None], others=others)
+    missing = next((p for p in unseen if not p.exists()), None)
     if missing is not None:
         raise ConfigError(
             "no such file or folder", where=f"--holdout {missing}", expected="a drive to measure the gain on"
         )
-    others = [*expand(holdout), *list_files(holdout), *([model_file] if model_file is not None else [])]
-    refuse_existing(written, force=True, sources=others)
     try:
-        with console.hearing() as hear, told_if_interrupted("nothing was written"):
+        with run.hearing("nothing was written") as hear:
             result = diagnose(
-                grouped(logs, setup.drive), setup.vehicle, holdout=grouped(holdout, setup.drive), model=model_file,
-                seed=seed, level=level, surrogates=surrogates, views=targets[1] is not None, progress=hear,
+                grouped(run.logs, drive), drive.vehicle, holdout=grouped(holdout, drive), model=run.model,
+                views=page is not None, progress=hear, **options,
             )  # fmt: skip
     except NothingUsableError:  # each reason was reported
-        return int(ExitCode.NOTHING_USABLE)
-    _finish(result, targets, console, as_json=as_json)
-    return int(ExitCode.PARTIAL) if result.has_loss else int(ExitCode.DONE)
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    return Output(*_written(result, out, page))
 
 
-def _campaign(
-    inputs: list[str],
-    vehicle_file: Path | None,
-    model_file: Path | None,
-    map_file: Path | None,
-    dbc: list[Path],
-    targets: Targets,
-    strange: list[str],
-    *,
-    seed: int,
-    level: float,
-    surrogates: int | None,
-    console: Console,
-    as_json: bool,
-    force: bool,
-) -> int:
+def _campaign(run: Run, out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
     """Diagnose a campaign's runs together, which show what no single drive does."""
-    from aqualog.cli.campaigns import exit_code, open_campaign, run_campaign
-    from aqualog.core.errors import ConfigError
     from aqualog.face.detect import model_of
     from aqualog.face.diagnose import diagnose
     from aqualog.face.paths import refuse_existing
 
-    if strange:
-        raise ConfigError(f"{strange[0]} does not apply to a campaign", expected="what a campaign takes: --help")
-    campaign = open_campaign(inputs, vehicle=vehicle_file, signals=map_file, dbc=dbc)
-    written = [p for p in targets if p is not None]
-    campaign.check_targets(written, force=force)
-    refuse_existing(written, force=True, sources=[model_file] if model_file is not None else [])
-    known = model_of(model_file)
-    runs = run_campaign(campaign, console)
-    if runs.outcome.done:
-        with console.hearing() as hear:
-            result = diagnose(runs, model=known, seed=seed, level=level, surrogates=surrogates, progress=hear)
-        _finish(result, targets, console, as_json=as_json)
-    return exit_code(runs)
+    campaign = run.campaign()
+    targets = [p for p in (out, page) if p is not None]
+    campaign.check_targets(targets, force=run.force)
+    refuse_existing(targets, force=True, sources=[run.model] if run.model is not None else [])
+    known = model_of(run.model)
+    runs = run.measured(campaign)
+    if not runs.outcome.done:
+        return run.of_runs(runs)
+    with run.hearing() as hear:
+        result = diagnose(runs, model=known, progress=hear, **options)
+    result, notes = _written(result, out, page)
+    return run.of_runs(runs, result=result, notes=notes)
 
 
-def _finish(result: Diagnosis, targets: Targets, console: Console, *, as_json: bool) -> None:
-    """Write the files, then stdout, then the notes."""
-    model, page = targets
+def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[Diagnosis, list[str]]:
+    """Write the files; return the result, which then names its model file, and its notes."""
     if model is not None:
         result = result.naming(model)
         result.write_model(model, force=True)
     if page is not None:
         result.write_page(page, force=True)
-    console.data(result, as_json=as_json)
-    for text in result.notes:
-        console.note(text)
-    for path in targets:
-        if path is not None:
-            console.note(f"written: {path}")
+    return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-import typer
-
-from aqualog.cli.options import Dbc, Debug, Json, Logs, Progress, Quiet, Signals, Vehicle, Verbose
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["doctor"]
 
 
-def doctor(
-    logs: Logs,
-    vehicle: Vehicle = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+@command("logs vehicle signals dbc json")
+def doctor(run: Run) -> Output:
     """Report what is wrong with a log, what was lost of it, and what to do.
 
     Every file is read to its end: damage, time stamps that jump, samples that are no numbers, codes, signals that stand
@@ -33,18 +22,9 @@ def doctor(
       aqualog doctor wheels.csv imu.csv --signals map.toml --vehicle car.toml
       aqualog doctor broken.mcap --json
     """
-    from aqualog.cli.console import guarded
-    from aqualog.cli.setup import prepare
     from aqualog.face.doctor import doctor
 
-    with guarded(debug=debug):
-        setup = prepare(
-            logs, map_file=signals, dbc=dbc or [], targets=[], force=False, quiet=quiet, verbose=verbose,
-            progress=progress, vehicle_file=vehicle,
-        )  # fmt: skip
-        with setup.console.hearing() as hear:
-            found = doctor(setup.drive, setup.vehicle, progress=hear)
-        setup.console.data(found, as_json=as_json)
-        code = int(found.exit_code)
-    if code:
-        raise typer.Exit(code)
+    drive = run.drive()
+    with run.hearing() as hear:
+        found = doctor(drive, progress=hear)
+    return Output(found, code=int(found.exit_code))

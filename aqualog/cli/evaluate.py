@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import (
-    CarOfLogs,
-    Dbc,
-    Debug,
-    Force,
-    Inputs,
-    Json,
-    Progress,
-    Quiet,
-    Signals,
-    Thresholds,
-    Verbose,
-)
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["evaluate"]
 
 
+@command("logs:campaign vehicle:of_logs signals dbc labels by rivals roc thresholds tune out json force")
 def evaluate(
-    inputs: Inputs,
-    vehicle: CarOfLogs = None,
-    signals: Signals = None,
-    dbc: Dbc = None,
+    run: Run,
     labels: Annotated[
         Path | None,
         typer.Option(
@@ -45,7 +30,6 @@ def evaluate(
     ] = "",
     rivals: Annotated[bool, typer.Option("--rivals", help="Also the methods of the prior art.")] = False,
     roc: Annotated[bool, typer.Option("--roc", help="Also at thresholds from a quarter to four times.")] = False,
-    thresholds: Thresholds = None,
     tune: Annotated[
         Path | None,
         typer.Option(
@@ -55,13 +39,7 @@ def evaluate(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Page (HTML).", metavar="FILE")] = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Compare what the detectors find with what was there: recall, latency, false alarms, confusion.
 
     What was there comes from a labels file, from the truth in a simulated log, from the signal on_water, or from the
@@ -75,44 +53,32 @@ def evaluate(
       aqualog evaluate drive.mf4 --vehicle car.toml --labels labels.csv --json
       aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
     """
-    from aqualog.cli.console import Console, clean, guarded, told_if_interrupted
     from aqualog.core.errors import ExitCode
     from aqualog.evaluate.judge import ODD_LABELS
     from aqualog.face.evaluate import evaluate, inputs_of
     from aqualog.face.paths import refuse_existing
 
-    with guarded(debug=debug):
-        console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        given = inputs_of(inputs, vehicle, map=signals, dbc=dbc or (), labels=labels)
-        own = [*given.files, *(p for p in (thresholds,) if p)]
-        refuse_existing([p for p in (tune, out) if p], force=force, sources=own)
-        with console.hearing() as hear, told_if_interrupted("nothing was written"):
-            found = evaluate(
-                inputs, vehicle, labels=labels, map=signals, dbc=dbc or (), by=by, rivals=rivals, roc=roc,
-                thresholds=thresholds, tune=tune is not None, progress=hear,
-            )  # fmt: skip
-        has_records = bool(found.evaluation.records)
-        if tune is not None and has_records and found.evaluation.tuning is not None:
-            found.write_thresholds(tune, force=True)
-        if out is not None and has_records:
-            found.write_page(out, force=True)
-        for name, reason in found.evaluation.failed.items():
-            sys.stderr.write(f"error: {clean(reason if name in reason else f'{name}: {reason}')}\n")
-        if not has_records:
-            raise typer.Exit(int(ExitCode.NOTHING_USABLE))
-        console.data(found, as_json=as_json)
-        for text in found.notes:
-            if ODD_LABELS in text:
-                console.note(text)
-            else:
-                console.detail(f"note: {text}")
-        if out is not None:
-            console.note(f"the page is {out}")
-        if tune is not None:
-            console.note(f"the thresholds are in {tune}")
-        for name, text in found.late.items():
-            sys.stderr.write(f"error: {clean(f'{name}: {text}')}\n")
-        for text in found.cut:
-            console.detail(f"note: {text}")
-        if found.has_loss:
-            raise typer.Exit(int(ExitCode.PARTIAL))
+    given = inputs_of(run.logs, run.vehicle, map=run.signals, dbc=run.dbc, labels=labels)
+    own = [*given.files, *(p for p in (run.thresholds,) if p)]
+    refuse_existing([p for p in (tune, out) if p], force=run.force, sources=own)
+    with run.hearing("nothing was written") as hear:
+        found = evaluate(
+            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals, roc=roc,
+            thresholds=run.thresholds, tune=tune is not None, progress=hear,
+        )  # fmt: skip
+    has_records = bool(found.evaluation.records)
+    if tune is not None and has_records and found.evaluation.tuning is not None:
+        found.write_thresholds(tune, force=True)
+    if out is not None and has_records:
+        found.write_page(out, force=True)
+    for name, reason in found.evaluation.failed.items():
+        run.console.error(reason if name in reason else f"{name}: {reason}")
+    if not has_records:
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    for name, reason in found.late.items():
+        run.console.error(f"{name}: {reason}")
+    odd = [n for n in found.notes if ODD_LABELS in n]
+    written = [f"the page is {out}"] if out is not None else []
+    written += [f"the thresholds are in {tune}"] if tune is not None else []
+    details = [f"note: {n}" for n in (*found.notes, *found.cut) if n not in odd]
+    return Output(found, [*odd, *written], details)

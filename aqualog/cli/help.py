@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aqualog.cli.options import Debug
+from aqualog.cli.frame import Output, Run, command
 
 if TYPE_CHECKING:
     from aqualog.book.topics import Topic
@@ -21,13 +21,14 @@ _MOST_NAME = 80
 _NAME_WIDTH = 22
 
 
+@command("topic", has_steps=False, reads_logs=False)
 def help_pages(
+    run: Run,
     topic: Annotated[
         list[str] | None,
         typer.Argument(help="A page, a command, or words to look for.", metavar="TOPIC", show_default=False),
     ] = None,
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Show the documents: topics, one page, or the pages that hold a word.
 
     Without TOPIC, the topics are listed with a line each. A TOPIC that is the name of a page shows that page, on a
@@ -41,12 +42,8 @@ def help_pages(
       aqualog help cusum
       aqualog help reference/campaign
     """
-    from aqualog.cli.console import guarded
-    from aqualog.guard.command import unsupervised
-
-    unsupervised()
-    with guarded(debug=debug):
-        _show(_text([t for t in topic or () if t.strip()]))
+    _show(_text([t for t in topic or () if t.strip()]))
+    return Output()
 
 
 def _text(asked: list[str]) -> str:

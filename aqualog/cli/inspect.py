@@ -7,26 +7,19 @@ from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import Dbc, Debug, Force, Json, Logs, Progress, Quiet, Signals, Verbose
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["inspect"]
 
 
+@command("logs signals dbc write_map json force")
 def inspect(
-    logs: Logs,
-    signals: Signals = None,
-    dbc: Dbc = None,
+    run: Run,
     write_map: Annotated[
         Path | None,
         typer.Option("--write-map", help="Write the proposed signal map to this file.", metavar="FILE"),
     ] = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix.
 
     Every channel with its rate, unit, range, gaps and faults; how an IMU is mounted; a signal map to start from. The
@@ -42,41 +35,31 @@ def inspect(
       aqualog inspect can.mf4 --dbc car.dbc --write-map map.toml
       aqualog inspect wheels.csv imu.csv gps.csv --write-map map.toml
     """
-    from aqualog.cli.console import guarded
-    from aqualog.cli.setup import prepare
     from aqualog.face.inspect import inspect
 
-    with guarded(debug=debug):
-        if any(n.lower().endswith(".toml") for n in logs):
-            code = _campaign(logs, has_log_options=bool(signals or dbc or write_map), as_json=as_json)
-        else:
-            setup = prepare(
-                logs, map_file=signals, dbc=dbc or [], targets=[write_map] if write_map else [], force=force,
-                quiet=quiet, verbose=verbose, progress=progress,
-            )  # fmt: skip
-            console = setup.console
-            with console.hearing() as hear:
-                found = inspect(setup.drive, progress=hear)
-            if write_map is not None:
-                found.write_map(write_map, force=True)
-            console.data(found, as_json=as_json)
-            if write_map is not None:
-                console.note(
-                    f"proposed map with {len(found.proposals)} signals is in {write_map}: check it before you use it"
-                )
-            code = int(found.exit_code)
-    if code:
-        raise typer.Exit(code)
+    if any(n.lower().endswith(".toml") for n in run.logs):
+        return _campaign(run, has_log_options=bool(run.signals or run.dbc or write_map))
+    drive = run.drive([write_map] if write_map else [])
+    with run.hearing() as hear:
+        found = inspect(drive, progress=hear)
+    notes = []
+    if write_map is not None:
+        found.write_map(write_map, force=True)
+        notes = [f"proposed map with {len(found.proposals)} signals is in {write_map}: check it before you use it"]
+    return Output(found, notes, code=int(found.exit_code))
 
 
-def _campaign(names: list[str], *, has_log_options: bool, as_json: bool) -> int:
-    from aqualog.cli.inspect_campaign import inspect_campaign
-    from aqualog.core.errors import ConfigError
+def _campaign(run: Run, *, has_log_options: bool) -> Output:
+    """Show the test matrix; a missing log counts as an input that failed, without any log nothing is usable."""
+    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.face.matrix import matrix
 
+    names = run.logs
     if len(names) > 1:
         raise ConfigError("a campaign file beside other inputs", where=", ".join(names)[:200], expected="it alone")
     if has_log_options:
         raise ConfigError(
             "--signals, --dbc and --write-map are for logs", where=names[0], hint="name the signal map in the file"
         )
-    return inspect_campaign(Path(names[0]), as_json=as_json)
+    found = matrix(names[0])
+    return Output(found, code=None if found.logs_there else int(ExitCode.NOTHING_USABLE))

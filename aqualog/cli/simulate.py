@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from aqualog.cli.options import (
-    Debug,
-    Force,
-    Json,
-    Progress,
-    Quiet,
-    Verbose,
-)  # fmt: skip
-
-if TYPE_CHECKING:
-    from aqualog.cli.console import Console
+from aqualog.cli.frame import Output, Run, command
 
 __all__ = ["simulate"]
 
 
+@command("what out model:simulated seed jobs:drives json force")
 def simulate(
+    run: Run,
     what: Annotated[
         list[str],
         typer.Argument(
@@ -37,22 +29,10 @@ def simulate(
             "-o", "--out", help="Log to write: .mf4, .mcap, .csv or .parquet; of a campaign: folder.", metavar="PATH"
         ),
     ],
-    model: Annotated[
-        Path | None, typer.Option("--model", help="Model file (TOML): effects on top of the base.", metavar="FILE")
-    ] = None,
     seed: Annotated[
         int | None, typer.Option("--seed", help="In place of the scenario's.", min=0, max=2**63 - 1, metavar="N")
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", help="Campaign: drives at a time.", min=1, max=1024, metavar="N")
-    ] = None,
-    as_json: Json = False,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-    debug: Debug = False,
-) -> None:
+) -> Output:
     """Simulate one drive of a scenario file, or the drives of a measuring campaign.
 
     The log carries what a car's sensors see, and the truth in signals that begin with true_, which no detector reads.
@@ -65,25 +45,15 @@ def simulate(
       aqualog simulate scenario.toml --model model.toml -o drive.mcap
       aqualog simulate campaign thesis -o thesis --jobs 2
     """
-    from aqualog.cli.console import Console, guarded
-
-    with guarded(debug=debug):
-        console = Console.make(quiet=quiet, verbose=verbose, progress=progress)
-        if what[0] == "campaign":
-            code = _campaign(
-                what[1:], out, jobs=jobs, force=force, console=console,
-                strange={"--model": model is not None, "--seed": seed is not None, "--json": as_json},
-            )  # fmt: skip
-        else:
-            code = _drive(what, out, model, seed, jobs=jobs, as_json=as_json, force=force, console=console)
-    if code:
-        raise typer.Exit(code)
+    if what[0] == "campaign":
+        strange = {"--model": run.model is not None, "--seed": seed is not None, "--json": run.json}
+        return _campaign(run, what[1:], out, strange)
+    return _drive(run, what, out, seed)
 
 
-def _campaign(
-    names: list[str], out: Path, *, jobs: int | None, force: bool, console: Console, strange: dict[str, bool]
-) -> int:
+def _campaign(run: Run, names: list[str], out: Path, strange: dict[str, bool]) -> Output:
     from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.face.simulate import simulate_campaign
 
     if len(names) != 1:
         raise ConfigError(
@@ -94,33 +64,15 @@ def _campaign(
     given = next((option for option, is_given in strange.items() if is_given), None)
     if given is not None:
         raise ConfigError(f"{given} does not apply to a campaign", expected="-o, --jobs and --force")
-    from aqualog.cli.console import told_if_interrupted
-    from aqualog.face.simulate import simulate_campaign
-
-    with console.hearing() as hear, told_if_interrupted(_INTERRUPTED):
-        result = simulate_campaign(names[0], out, jobs=jobs, force=force, progress=hear)
-    console.note(result.headline())
-    if not result.has_loss:
-        return int(ExitCode.DONE)
-    return int(ExitCode.PARTIAL if result.outcome.made or result.outcome.kept else ExitCode.FAILED)
+    with run.hearing("the drives that are done stay, the same command goes on with the rest") as hear:
+        result = simulate_campaign(names[0], out, jobs=run.jobs, force=run.force, progress=hear)
+    lost = ExitCode.PARTIAL if result.outcome.made or result.outcome.kept else ExitCode.FAILED
+    return Output(notes=[result.headline()], code=int(lost if result.has_loss else ExitCode.DONE))
 
 
-_INTERRUPTED = "the drives that are done stay, the same command goes on with the rest"
-
-
-def _drive(
-    names: list[str],
-    out: Path,
-    model_file: Path | None,
-    seed: int | None,
-    *,
-    jobs: int | None,
-    as_json: bool,
-    force: bool,
-    console: Console,
-) -> int:
+def _drive(run: Run, names: list[str], out: Path, seed: int | None) -> Output:
     from aqualog.config.scenario import vehicle_of
-    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError
     from aqualog.face.paths import refuse_existing
     from aqualog.face.simulate import simulate
     from aqualog.io.write_log import check_suffix
@@ -128,20 +80,17 @@ def _drive(
     check_suffix(out)
     if len(names) > 1:
         raise ConfigError(f"{len(names)} scenarios", where=names[1], expected="one at a time")
-    if jobs is not None:
+    if run.jobs is not None:
         raise ConfigError("--jobs does not apply to one drive", expected="aqualog simulate campaign NAME --jobs N")
     path = Path(names[0])
-    refuse_existing([out], force=force, sources=[path, *vehicle_of(path), *([model_file] if model_file else [])])
-    with console.hearing() as hear:
-        result = simulate(path, model=model_file, seed=seed, progress=hear).naming(out)
+    given = [path, *vehicle_of(path), *([run.model] if run.model else [])]
+    refuse_existing([out], force=run.force, sources=given)
+    with run.hearing() as hear:
+        result = simulate(path, model=run.model, seed=seed, progress=hear).naming(out)
         hear("writing")
         result.write(out, force=True)
-    if as_json:
-        console.data(result, as_json=True)
-    for text in result.notes:
-        console.note(text)
-    console.note(
+    where = (
         f"{len(result.channels)} signals of {result.scenario.duration_s:g} s (seed {result.made.seed}) are in {out}; "
         f"simulated {result.factor:.3g} times as fast as driven"
     )
-    return int(ExitCode.DONE)
+    return Output(result, [*result.notes, where])

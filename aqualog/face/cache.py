@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
     from aqualog.align.cache import Kept, SignalCache
 
-__all__ = ["KeptSignals", "cache"]
+__all__ = ["KeptSignals", "NoCacheFolderError", "cache", "cache_of_user"]
+
+
+class NoCacheFolderError(ConfigError):
+    """There is no folder in which signals could be kept."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,14 +115,26 @@ def cache(*, clean: bool = False) -> KeptSignals:
     ConfigError
         If there is no home folder and AQUALOG_CACHE names none.
     """
+    place = cache_of_user()
+    entries = tuple(place.kept())
+    return KeptSignals(place, entries, place.clean() if clean else None)
+
+
+def cache_of_user(tell: Callable[[str], None] = lambda _: None) -> SignalCache:
+    """Return the cache in AQUALOG_CACHE, else in the user's cache folder; `tell` hears what is not kept, and why.
+
+    Raises
+    ------
+    NoCacheFolderError
+        If there is no home folder and AQUALOG_CACHE names none.
+    """
     from aqualog.align.cache import SignalCache, cache_folder, cache_limit
 
     try:
-        place = SignalCache(cache_folder(), limit=cache_limit())
+        folder = cache_folder()
     except RuntimeError as error:
-        raise ConfigError("there is no home folder", expected="a folder in AQUALOG_CACHE") from error
-    entries = tuple(place.kept())
-    return KeptSignals(place, entries, place.clean() if clean else None)
+        raise NoCacheFolderError("there is no home folder", expected="a folder in AQUALOG_CACHE") from error
+    return SignalCache(folder, limit=cache_limit(), tell=tell)
 
 
 def _is_default() -> bool:

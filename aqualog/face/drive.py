@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from aqualog.core.errors import AqualogError, ConfigError, LogError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, names_of, number_of
+from aqualog.face.cache import cache_of_user
 from aqualog.face.paths import expand, list_files
 from aqualog.face.result import PathLike, printable
 from aqualog.io.content import Seen, changed_files, state_of
@@ -235,7 +236,7 @@ def read(
         databases,
         rate_hz,
         None if vehicle is None else vehicle_of(vehicle),
-        _cache() if cache else None,
+        cache_of_user() if cache else None,
         (*paths, *list_files(names), *databases, *own),
         state_of(list(paths)),
     )
@@ -275,23 +276,12 @@ def sources_of(drive: Drive, *others: object) -> tuple[Path, ...]:
     return (*drive.sources, *(Path(x) for x in others if isinstance(x, str | Path)))
 
 
-def with_vehicle(drive: Drive, vehicle: Vehicle) -> Drive:
-    """Return the same drive with another vehicle; signals that were read stay."""
-    return replace(drive, vehicle=vehicle)
-
-
 def _map_of(given: PathLike | SignalMap | None) -> SignalMap:
     if given is None or isinstance(given, SignalMap):
         return given or SignalMap()
     from aqualog.config.signal_map import load_signal_map
 
     return load_signal_map(file_of(given, "map", "SignalMap"))
-
-
-def _cache() -> SignalCache:
-    from aqualog.align.cache import SignalCache, cache_folder, cache_limit
-
-    return SignalCache(cache_folder(), limit=cache_limit())
 
 
 def _reading(vehicle: Vehicle) -> tuple[float, ...]:

@@ -9,8 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from aqualog.cli.bin_resistance import bin_resistance
-from aqualog.cli.bin_slipslope import bin_slipslope
+from aqualog.cli.bins import bin_resistance, bin_slipslope
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN

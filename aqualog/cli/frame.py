@@ -1,0 +1,243 @@
+"""What every command has in common: a command names its options, calls the face once, and says what it prints."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from aqualog.cli.options import SHARED
+
+if TYPE_CHECKING:
+    from aqualog.align.cache import SignalCache
+    from aqualog.cli.console import Console, Heard
+    from aqualog.face.campaign import Campaign, CampaignRuns
+    from aqualog.face.drive import Drive
+    from aqualog.face.result import Result
+
+__all__ = ["BATCH_BROKEN_OFF", "Output", "Run", "command"]
+
+BATCH_BROKEN_OFF = "the logs that are done are kept, the same command goes on with the rest"
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What a command leaves on stdout and stderr, and its exit code.
+
+    `text` stands for a reader in place of the result's own; `notes` come after it, `details` with -v after those.
+    Without `code` it is 3 where the result has a loss, else 0.
+    """
+
+    result: Result | None = None
+    notes: Sequence[str] = ()
+    details: Sequence[str] = ()
+    text: str | None = None
+    code: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a command was given: each field is the shared option of that name, `logs` as they were typed."""
+
+    console: Console
+    logs: tuple[str, ...] = ()
+    vehicle: Path | None = None
+    signals: Path | None = None
+    dbc: tuple[Path, ...] = ()
+    rate: float | None = None
+    cache: bool | None = False
+    store: str | None = None
+    thresholds: Path | None = None
+    jobs: int | None = None
+    model: Path | None = None
+    json: bool = False
+    force: bool = False
+
+    def need_vehicle(self, why: str) -> None:
+        """Refuse to work with a default car, which would make the result wrong.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.core.errors import ConfigError
+
+        if self.vehicle is None:
+            raise ConfigError("no --vehicle", expected=f"a vehicle file: {why}")
+
+    @contextmanager
+    def hearing(self, interrupted: str = "") -> Iterator[Heard]:
+        """Show what a call of the face is doing; `interrupted` says what an interrupt within leaves behind."""
+        from aqualog.cli.console import told_if_interrupted
+
+        with self.console.hearing() as hear, told_if_interrupted(interrupted):
+            yield hear
+
+    def drive(self, targets: Iterable[Path] = (), *, others: Sequence[Path] = ()) -> Drive:
+        """Return the drive of all logs, after all checks that need no log to be opened.
+
+        Neither logs, settings nor `others` may be among the files to be written, the `targets`.
+
+        Raises
+        ------
+        ConfigError, LogError
+        """
+        from aqualog.align.mapping import SignalMap
+        from aqualog.config.signal_map import load_signal_map
+        from aqualog.core.vehicle import Vehicle
+        from aqualog.face.drive import Drive
+        from aqualog.face.paths import expand, list_files, refuse_existing
+        from aqualog.io.content import state_of
+
+        paths = expand(self.logs)
+        before = state_of(paths)
+        own = (*paths, *list_files(self.logs), *self.dbc, *(p for p in (self.signals, self.vehicle) if p))
+        refuse_existing(targets, force=self.force, sources=(*own, *others))
+        return Drive(
+            tuple(paths),
+            load_signal_map(self.signals) if self.signals else SignalMap(),
+            self.dbc,
+            self.rate,
+            Vehicle.read(self.vehicle) if self.vehicle else Vehicle(),
+            self._cache(),
+            own,
+            before,
+        )
+
+    def _cache(self) -> SignalCache | None:
+        """Return the cache if signals are to be kept and there is a place for them."""
+        if not (bool(os.environ.get("AQUALOG_CACHE")) if self.cache is None else self.cache):
+            return None
+        from aqualog.face.cache import NoCacheFolderError, cache_of_user
+
+        try:
+            return cache_of_user(tell=self.console.detail)
+        except NoCacheFolderError:
+            self.console.detail("there is no home folder to keep signals in; AQUALOG_CACHE names another")
+            return None
+
+    def campaign(self, inputs: Sequence[str] = ()) -> Campaign:
+        """Read and check a campaign completely: `inputs`, or the logs as they were typed.
+
+        Raises
+        ------
+        ConfigError
+            With all faults in one message; also for a store that would end with this process.
+        """
+        from aqualog.guard.command import is_command
+        from aqualog.core.errors import ConfigError
+        from aqualog.face.campaign import Campaign
+
+        if self.store is not None and is_command():
+            from aqualog.campaign.place import is_of_process
+
+            if is_of_process(self.store):
+                raise ConfigError(
+                    "is in the memory of this command and would end with it", where=self.store,
+                    expected="a folder or a URL",
+                )  # fmt: skip
+        return Campaign(
+            inputs or self.logs, vehicle=self.vehicle, map=self.signals, dbc=self.dbc, thresholds=self.thresholds,
+            store=self.store,
+        )  # fmt: skip
+
+    def measured(self, campaign: Campaign, **options: Any) -> CampaignRuns:
+        """Measure what is new, as `aqualog batch` does; every log that gives no result is reported on stderr."""
+        with self.hearing(BATCH_BROKEN_OFF) as hear:
+            return campaign.run(jobs=self.jobs, progress=hear, **options)
+
+    def of_runs(self, runs: CampaignRuns, **output: Any) -> Output:
+        """Return the output of a command on a campaign, with the exit code for what came of its logs."""
+        from aqualog.core.errors import ExitCode
+
+        has_some, lost = bool(runs.outcome.done), ExitCode.PARTIAL if runs.has_loss else ExitCode.DONE
+        return Output(**output, code=int(lost if has_some else ExitCode.NOTHING_USABLE))
+
+    def finish(self, output: Output) -> int:
+        """Print what a command leaves, and return its exit code."""
+        from aqualog.core.errors import ExitCode
+
+        result = output.result
+        if result is not None:
+            self.console.data(result, as_json=self.json, text=output.text)
+        for text in output.notes:
+            self.console.note(text)
+        for text in output.details:
+            self.console.detail(text)
+        if output.code is not None:
+            return output.code
+        return int(ExitCode.PARTIAL if result is not None and result.has_loss else ExitCode.DONE)
+
+
+def command(
+    takes: str, *, has_steps: bool = True, reads_logs: bool = True
+) -> Callable[[Callable[..., Output]], Callable[..., None]]:
+    """Make a command of its body.
+
+    The body takes the `Run` and what it declares; a parameter without `typer.Option` is a shared option. An error
+    within becomes one line and an exit code, and its output is printed.
+
+    Parameters
+    ----------
+    takes : str
+        Names of the options in the order of the help: of `SHARED`, or parameters of the body.
+    has_steps : bool
+        Whether it takes -q, -v and --progress, too.
+    reads_logs : bool
+        Whether it works in a process of its own, which a log may end.
+    """
+
+    def made(body: Callable[..., Output]) -> Callable[..., None]:
+        own = inspect.signature(body, eval_str=True).parameters
+        names = [*takes.split(), *(("quiet", "verbose", "progress") if has_steps else ()), "debug"]
+        options = [_parameter(name, own) for name in names]
+
+        def work(**given: Any) -> None:
+            from aqualog.cli.console import guarded
+            from aqualog.guard.command import unsupervised
+
+            if not reads_logs:
+                unsupervised()
+            with guarded(debug=given["debug"]):
+                run = _run(given)
+                code = run.finish(body(run, **{n: given[n] for n in own if n != "run"}))
+            if code:
+                raise typer.Exit(code)
+
+        work.__name__, work.__doc__, work.__module__ = body.__name__, body.__doc__, body.__module__
+        work.__annotations__ = {p.name: p.annotation for p in options}
+        vars(work)["__signature__"] = inspect.Signature(options)
+        return work
+
+    return made
+
+
+def _parameter(name: str, own: Mapping[str, inspect.Parameter]) -> inspect.Parameter:
+    """Return a parameter for typer: the body's where it has a help of its own, else the shared one."""
+    short = name.partition(":")[0]
+    if name in SHARED and not (short in own and hasattr(own[short].annotation, "__metadata__")):
+        kind, default = SHARED[name]
+    else:
+        kind, default = own[name].annotation, own[name].default
+    is_needed = default is ... or default is inspect.Parameter.empty
+    return inspect.Parameter(
+        short, inspect.Parameter.KEYWORD_ONLY, annotation=kind,
+        default=inspect.Parameter.empty if is_needed else default,
+    )  # fmt: skip
+
+
+def _run(given: Mapping[str, Any]) -> Run:
+    from aqualog.cli.console import Console
+
+    console = Console.make(
+        quiet=given.get("quiet", False), verbose=given.get("verbose", False), progress=given.get("progress", "auto")
+    )
+    fields: dict[str, Any] = {n: given[n] for n in Run.__slots__ if n in given}
+    fields |= {n: tuple(fields.get(n) or ()) for n in ("logs", "dbc")}
+    return Run(console, **fields)
