@@ -130,9 +130,9 @@ class Run:
         ConfigError
             With all faults in one message; also for a store that would end with this process.
         """
-        from aqualog.guard.command import is_command
         from aqualog.core.errors import ConfigError
         from aqualog.face.campaign import Campaign
+        from aqualog.guard.command import is_command
 
         if self.store is not None and is_command():
             from aqualog.campaign.place import is_of_process
