@@ -26,8 +26,8 @@ _READERS = {
     "mdf": ("aqualog.io.mdf.reader", "MdfReader"),
     "mcap": ("aqualog.io.messages.mcap", "McapReader"),
     "ros": ("aqualog.io.messages.ros", "RosReader"),
-    "csv": ("aqualog.io.csv", "CsvReader"),
-    "parquet": ("aqualog.io.parquet", "ParquetReader"),
+    "csv": ("aqualog.io.tables.csv", "CsvReader"),
+    "parquet": ("aqualog.io.tables.parquet", "ParquetReader"),
 }
 
 

@@ -16,7 +16,7 @@ import polars as pl
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import FloatArray
-from aqualog.io.table_names import split_unit
+from aqualog.io.tables.columns import split_unit
 
 __all__ = ["METADATA_KEY", "TableColumn", "join_parquet", "write_csv", "write_parquet"]
 

@@ -89,7 +89,7 @@ def test_document_is_the_same_and_a_hit_imports_no_reader(path, tmp_path):
     hit, loaded = out.split("LOADED")
     assert plain.exit_code == 0
     assert plain.stdout == first.stdout == hit
-    assert not {"asammdf", "mcap", "rosbags", "pandas", "aqualog.io.csv"} & set(loaded.split())
+    assert not {"asammdf", "mcap", "rosbags", "pandas", "aqualog.io.tables.csv"} & set(loaded.split())
 
 
 def test_nulls_faults_and_notes_survive():

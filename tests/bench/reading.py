@@ -168,7 +168,7 @@ def csv_rows(folder: Path, scale: Scale) -> list[Row]:
 
     def ours() -> list[np.ndarray]:
         from aqualog.io.base import ReadOptions
-        from aqualog.io.csv import CsvReader
+        from aqualog.io.tables.csv import CsvReader
 
         with CsvReader(path, ReadOptions()) as reader:
             found = {c.info.name: c.values for c in reader.read(reader.channels())}

@@ -14,8 +14,7 @@ from pathlib import Path
 import lz4.frame
 import zstandard
 
-from aqualog.io.parquet_pages import read_index
-from aqualog.io.thrift import decode
+from aqualog.io.tables.parquet_pages import decode, read_index
 
 BIG, HUGE = 1 << 26, 1 << 40
 _CHUNK, _MCAP_HEAD = 6, struct.Struct("<BQ")

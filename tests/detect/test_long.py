@@ -14,10 +14,11 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.detect import plausibility
 from aqualog.detect.extremes import Extremes
 from aqualog.detect.stream import detect_drive, detect_long
-from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
+from aqualog.io.tables import csv_rows, parquet
+from aqualog.io.tables import csv_text as text_file
 from aqualog.report.drive.document import document
 
 LOGS = Path(__file__).parents[2] / "sample_logs"

@@ -11,13 +11,14 @@ import numpy as np
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, FileFaults
-from aqualog.io import csv_rows, parquet, text_file
 from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import columns as mdf_columns
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
+from aqualog.io.tables import csv_rows, parquet
+from aqualog.io.tables import csv_text as text_file
 
 T0_NS = 1_700_000_000 * 10**9
 LONGEST_LINE = 2000

@@ -7,10 +7,10 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import LogError
-from aqualog.io import parquet
-from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import ReadOptions
-from aqualog.io.parquet import ParquetReader
+from aqualog.io.tables import parquet
+from aqualog.io.tables.arrow_schema import field_metadata
+from aqualog.io.tables.parquet import ParquetReader
 from aqualog.io.write_table import TableColumn, write_parquet
 
 START = 1_772_366_400_000_000_000

@@ -5,11 +5,10 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import LogError
-from aqualog.io import parquet
 from aqualog.io.base import ReadOptions
-from aqualog.io.parquet import ParquetReader
-from aqualog.io.parquet_pages import page_fault, read_index
-from aqualog.io.thrift import MalformedError, decode
+from aqualog.io.tables import parquet
+from aqualog.io.tables.parquet import ParquetReader
+from aqualog.io.tables.parquet_pages import MalformedError, decode, page_fault, read_index
 
 ROWS, PER_GROUP = 400, 100
 T = np.arange(ROWS) * 0.01

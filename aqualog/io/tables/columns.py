@@ -1,4 +1,4 @@
-"""Find the time column of a table, its unit, and its stamps in nanoseconds."""
+"""Columns of a table: their names and units, which one is the time, and its stamps in nanoseconds."""
 
 from __future__ import annotations
 
@@ -18,8 +18,51 @@ from aqualog.io.base import ReadOptions
 
 __all__ = [
     "Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "judged_unit", "no_unit_note",
-    "text_to_ns",
+    "split_unit", "text_to_ns", "unique_names",
 ]  # fmt: skip
+
+# Loggers do write `max. SoC [%)`: either closing bracket ends the group.
+_SQUARE = re.compile(r"^(?P<name>.*?)(?P<space>\s*)\[(?P<unit>[^\[\]()]*(?:\([^()]*\)[^\[\]()]*)?)[\])]$")
+_ROUND = re.compile(r"^(?P<name>.*\S)(?P<space>\s*)[({](?P<unit>[^(){}]*)[)}]$")
+_SLASH = re.compile(r"^(?P<name>.*\S)\s+(?:/|in)\s+(?P<unit>\S+)$")
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """Name and unit of a header cell: `v_x [km/h]` -> (`v_x`, `km/h`).
+
+    A group in square brackets at the end is the unit, known or not, unless it is an index (`cell[3]`). A group in other
+    brackets or behind a slash is one only if its spelling is known: `speed (filtered)` is a name.
+    """
+    text = " ".join(header.split())
+    square = _SQUARE.match(text)
+    if square and square["name"] and not (square["unit"].isdigit() and not square["space"]):
+        return square["name"].strip(), square["unit"].strip()
+    for pattern in (_ROUND, _SLASH):
+        other = pattern.match(text)
+        if other and is_unit(other["unit"]):
+            return other["name"].strip(), other["unit"].strip()
+    return text, ""
+
+
+def unique_names(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, those that come again as `name#2`, `name#3`; a column without a name is `column_1`, counted from 1."""
+    taken = set(names)
+    numbers: dict[str, int] = {}
+    result = []
+    for position, name in enumerate(names, start=1):
+        own = name or f"column_{position}"
+        wanted = own
+        if own in numbers:  # counted on from the last one of that name: a header may repeat one thousands of times
+            number = numbers[own] + 1
+            while f"{own}#{number}" in taken:
+                number += 1
+            numbers[own] = number
+            wanted = f"{own}#{number}"
+            taken.add(wanted)
+        numbers.setdefault(wanted, 1)
+        result.append(wanted)
+    return tuple(result)
+
 
 FieldKind = Literal["number", "stamp", "date", "clock", "text"]
 

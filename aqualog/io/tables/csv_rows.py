@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray
-from aqualog.io.csv_dialect import Layout, is_comment, split_line
-from aqualog.io.text_file import TextFile
+from aqualog.io.tables.csv_dialect import Layout, is_comment, split_line
+from aqualog.io.tables.csv_text import TextFile
 
 __all__ = ["RowFaults", "Rows", "behind", "bodies", "find_rows", "rows_of"]
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from aqualog.io import csv_rows, text_file
 from aqualog.io.base import ReadOptions
-from aqualog.io.csv import CsvReader
-from aqualog.io.text_file import TextFile, open_text
+from aqualog.io.tables import csv_rows
+from aqualog.io.tables import csv_text as text_file
+from aqualog.io.tables.csv import CsvReader
+from aqualog.io.tables.csv_text import TextFile, open_text
 
 
 def lines(n=400, *, unit=" [s]", step=0.01, sep=",", start=0.0):

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from aqualog.align.mapping import SignalMap, resolve
 from aqualog.core.errors import ConfigError, LogError, SignalError
-from aqualog.io import text_file
 from aqualog.io.base import ReadOptions
-from aqualog.io.csv import CsvReader
 from aqualog.io.csv_format import CsvFormat
 from aqualog.io.open_log import open_log
-from aqualog.io.table_names import split_unit, unique_names
+from aqualog.io.tables import csv_text as text_file
+from aqualog.io.tables.columns import split_unit, unique_names
+from aqualog.io.tables.csv import CsvReader
 from aqualog.io.write_table import TableColumn, write_csv
 
 
@@ -578,7 +578,7 @@ def test_utf_16_without_a_mark_is_opened_if_it_is_said(tmp_path):
 
 
 def test_a_first_line_without_an_end_is_named(read, monkeypatch):
-    monkeypatch.setattr("aqualog.io.csv_dialect._HEAD_BYTES", 1000)
+    monkeypatch.setattr("aqualog.io.tables.csv_dialect._HEAD_BYTES", 1000)
     with pytest.raises(LogError, match="first line is longer than 1000 bytes"):
         read("t," + ",".join(f"x{k}" for k in range(1000)) + "\n" + table())
 

@@ -15,13 +15,10 @@ import polars as pl
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FloatArray, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.arrow_schema import field_metadata
 from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.csv_cells import is_clock, is_stamp
-from aqualog.io.parquet_groups import SoundRows, reason_of
-from aqualog.io.table_names import split_unit, unique_names
-from aqualog.io.table_time import (
+from aqualog.io.tables.arrow_schema import field_metadata
+from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,
     TableField,
@@ -30,7 +27,11 @@ from aqualog.io.table_time import (
     from_numbers,
     judged_unit,
     no_unit_note,
+    split_unit,
+    unique_names,
 )
+from aqualog.io.tables.csv_cells import is_clock, is_stamp
+from aqualog.io.tables.parquet_groups import SoundRows, reason_of
 from aqualog.io.write_table import METADATA_KEY
 
 __all__ = ["ParquetReader"]

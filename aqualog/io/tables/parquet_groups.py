@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
 from aqualog.io.base import FaultLog
-from aqualog.io.parquet_pages import Group, Index, is_of, page_fault, read_index
-from aqualog.io.thrift import MalformedError
+from aqualog.io.tables.parquet_pages import Group, Index, MalformedError, is_of, page_fault, read_index
 
 __all__ = ["SoundRows", "reason_of"]
 

@@ -14,12 +14,8 @@ from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, FloatArray
 from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.csv_cells import STYLES, numbers, plain
-from aqualog.io.csv_dialect import Column, find_layout
 from aqualog.io.csv_format import csv_hint, format_of
-from aqualog.io.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
-from aqualog.io.csv_text import read_text
-from aqualog.io.table_time import (
+from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,
     TableField,
@@ -30,7 +26,10 @@ from aqualog.io.table_time import (
     judged_unit,
     no_unit_note,
 )  # fmt: skip
-from aqualog.io.text_file import TextFile, open_text
+from aqualog.io.tables.csv_cells import STYLES, numbers, plain
+from aqualog.io.tables.csv_dialect import Column, find_layout
+from aqualog.io.tables.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
+from aqualog.io.tables.csv_text import TextFile, open_text, read_text
 
 __all__ = ["CsvReader"]
 

@@ -1,0 +1,1 @@
+"""Logs that are one table: CSV and Parquet."""
