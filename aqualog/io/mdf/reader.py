@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -20,12 +20,54 @@ from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf import frames as can
 from aqualog.io.mdf.conversion import refusal
 from aqualog.io.mdf.groups import Columns, GroupReader
-from aqualog.io.mdf.listing import Entry, unique
 from aqualog.io.mdf.records import Channel as MdfChannel
 from aqualog.io.mdf.records import Group
 from aqualog.io.mdf.walk import Survey, short
 
 __all__ = ["MdfReader"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A channel on its way into the list; `sources` may make its path unique."""
+
+    info: ChannelInfo
+    sources: tuple[str, ...]
+
+
+def _unique(entries: Sequence[_Entry]) -> tuple[ChannelInfo, ...]:
+    """Give every channel a path of its own: with its source in front if sources differ, else with a number behind."""
+    infos = [e.info for e in entries]
+    for level in range(max((len(e.sources) for e in entries), default=0)):
+        count = Counter(i.path for i in infos)
+        candidates = [
+            _prefixed(i, e, level) if count[i.path] > 1 else i.path for i, e in zip(infos, entries, strict=True)
+        ]
+        variants: dict[str, set[str]] = defaultdict(set)
+        for info, candidate in zip(infos, candidates, strict=True):
+            variants[info.path].add(candidate)
+        infos = [
+            replace(i, path=c) if len(variants[i.path]) > 1 else i for i, c in zip(infos, candidates, strict=True)
+        ]  # a source that all of them share says nothing
+    return tuple(_numbered(infos))
+
+
+def _prefixed(info: ChannelInfo, entry: _Entry, level: int) -> str:
+    source = entry.sources[level] if level < len(entry.sources) else ""
+    return f"{source}.{info.path}" if source and not info.path.startswith(f"{source}.") else info.path
+
+
+def _numbered(infos: Sequence[ChannelInfo]) -> Iterator[ChannelInfo]:
+    last: dict[str, int] = {}  # number by path: where the search goes on, also of thousands of the same name
+    for info in infos:
+        path, k = info.path, last.get(info.path, 1)
+        while path in last:
+            k += 1
+            path = f"{info.path}#{k}"
+        last[info.path] = k
+        last.setdefault(path, 1)
+        yield info if path == info.path else replace(info, path=path)
+
 
 _Array = NDArray[Any]
 
@@ -158,7 +200,7 @@ class MdfReader(GroupReader):
     def _describe(self, dbc: Dbc | None) -> None:
         with self._guard("cannot be read as MDF"):
             self._open()
-            self._channels = unique(self._listed(dbc))
+            self._channels = _unique(self._listed(dbc))
 
     def _find_damaged(self, error: LogError) -> None:
         """Seek packed blocks that make the file unreadable; raise the error if there is no such block."""
@@ -187,8 +229,8 @@ class MdfReader(GroupReader):
 
     # --- listing ---
 
-    def _listed(self, dbc: Dbc | None) -> list[Entry]:
-        entries: list[Entry] = []
+    def _listed(self, dbc: Dbc | None) -> list[_Entry]:
+        entries: list[_Entry] = []
         self._frames: list[can.FrameGroup] = []
         for index, group in enumerate(self._groups):
             if not group.cycles or group.is_variable:
@@ -228,7 +270,7 @@ class MdfReader(GroupReader):
                 return "its records cannot be reconstructed from its channels, their time does not go up"
         return None
 
-    def _measured(self, index: int) -> Iterator[Entry]:
+    def _measured(self, index: int) -> Iterator[_Entry]:
         group, prefix = self._groups[index], self._name(index)
         for number, channel in enumerate(group.channels):
             if not channel.is_number or channel.name.startswith(can.FRAME):
@@ -249,7 +291,7 @@ class MdfReader(GroupReader):
                 f"{prefix}.{name}", name, channel.unit, group.cycles, self._path.name, _Measured(index, number),
                 channel.comment,
             )  # fmt: skip
-            yield Entry(info, (*channel.sources, device))
+            yield _Entry(info, (*channel.sources, device))
 
     # --- records ---
 
@@ -283,7 +325,7 @@ class MdfReader(GroupReader):
             self._faults.notes.append(f"group {self._name(index)}: {what}")
         return codes
 
-    def _signals(self, dbc: Dbc) -> Iterator[Entry]:
+    def _signals(self, dbc: Dbc) -> Iterator[_Entry]:
         buses = can.buses_of(self._census)
         for code in sorted(self._census, key=lambda c: (can.bus_of(c), c)):
             message = dbc.messages.get(can.frame_key(code))
@@ -299,7 +341,7 @@ class MdfReader(GroupReader):
                     f"{prefix}{message.name}.{signal.name}", signal.name, signal.unit or "", self._census[code],
                     self._path.name, _Signal(code, message, signal.name), short(signal.comment or ""),
                 )  # fmt: skip
-                yield Entry(info, (bus,))
+                yield _Entry(info, (bus,))
 
     def _read_signals(self, wanted: Sequence[ChannelInfo]) -> dict[str, Channel]:
         by_code: dict[int, list[ChannelInfo]] = defaultdict(list)

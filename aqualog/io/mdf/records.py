@@ -49,50 +49,23 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One channel of a group.
-
-    Parameters
-    ----------
-    name, unit, comment : str
-    sources : tuple of str
-        Names of what it comes from.
-    is_master : bool
-        Whether it is the time, or whatever the samples are over.
-    is_time : bool
-        Of a master, whether it is over time.
-    is_virtual : bool
-        Whether its raw values count the records and lie nowhere.
-    is_number : bool
-        Whether its samples are numbers of at most 64 bits.
-    field : Field
-    invalidation_bit : int or None
-        Position behind the bytes of the record. [bit]
-    is_invalid : bool
-        Whether none of its samples is valid.
-    conversion : Conversion or None
-    refused : str
-        Why it cannot be read although it should; empty if it can.
-    values : tuple of Stored, or int
-        Values of variable length, or the address of the group that holds them; empty for others.
-    is_variable : bool
-        Whether it has such values.
-    """
+    """One channel of a group."""
 
     name: str
     unit: str
     comment: str
-    sources: tuple[str, ...]
-    is_master: bool
-    is_time: bool
-    is_virtual: bool
-    is_number: bool
+    sources: tuple[str, ...]  # names of what it comes from
+    is_master: bool  # the time, or whatever the samples are over
+    is_time: bool  # of a master: over time
+    is_virtual: bool  # its raw values count the records and lie nowhere
+    is_number: bool  # its samples are numbers of at most 64 bits
     field: Field
-    invalidation_bit: int | None
-    is_invalid: bool
+    invalidation_bit: int | None  # position behind the bytes of the record
+    is_invalid: bool  # none of its samples is valid
     conversion: Conversion | None
-    refused: str = ""
-    values: tuple[Stored, ...] | int = ()
-    is_variable: bool = False
+    refused: str = ""  # why it cannot be read although it should
+    values: tuple[Stored, ...] | int = ()  # of variable length, or the address of the group that holds them
+    is_variable: bool = False  # whether it has such values
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,56 +81,27 @@ class Stored:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A channel group and the data of the records that it is in.
+    """A channel group and the data of the records that it is in; sizes are bytes."""
 
-    Parameters
-    ----------
-    at, owner : int
-        Addresses of its block and of its data group.
-    name : str
-        Empty without one.
-    source : tuple of str
-        Names by which a bus can be known.
-    record_id, id_size, behind : int
-        What tells its records from others: the id, its size, and bytes behind a record. [bytes]
-    cycles : int
-        Number of records as declared, or as found where the declared number is wrong.
-    size, invalidation : int
-        Bytes of a record, and of its invalidation bits behind them. [bytes]
-    channels : tuple of Channel
-    data, invalid_data : tuple of Stored
-        The records; invalidation bits where they are stored apart from them.
-    is_bus_event, is_variable : bool
-        Whether it holds bus frames; whether it holds nothing but values of variable length.
-    master_at : int
-        Address of the group that has its time; 0: it has its own.
-    is_inferred : bool
-        Whether its records were reconstructed from its channels: valid only if their time goes up.
-    is_uncounted : bool
-        Whether the number of its records is known only when they have been sorted.
-    zeros : int
-        Of the data of such a group, how many bytes at the end are zero. [bytes]
-    """
-
-    at: int
-    owner: int
+    at: int  # address of its block
+    owner: int  # address of its data group
     name: str = ""
-    source: tuple[str, ...] = ()
+    source: tuple[str, ...] = ()  # names by which a bus can be known
     record_id: int = 0
-    id_size: int = 0
-    behind: int = 0
-    cycles: int = 0
-    size: int = 0
-    invalidation: int = 0
+    id_size: int = 0  # of the id before each record
+    behind: int = 0  # what stands behind each record
+    cycles: int = 0  # number of records as declared, or as found where that is wrong
+    size: int = 0  # of a record
+    invalidation: int = 0  # of its invalidation bits
     channels: tuple[Channel, ...] = ()
     data: tuple[Stored, ...] = ()
-    invalid_data: tuple[Stored, ...] = ()
-    is_bus_event: bool = False
-    is_variable: bool = False
-    master_at: int = 0
-    is_inferred: bool = False
-    is_uncounted: bool = False
-    zeros: int = 0
+    invalid_data: tuple[Stored, ...] = ()  # invalidation bits that are stored on their own
+    is_bus_event: bool = False  # holds bus frames
+    is_variable: bool = False  # holds nothing but values of variable length
+    master_at: int = 0  # address of the group that has its time; 0: it has its own
+    is_inferred: bool = False  # reconstructed from its channels: valid only if their time goes up
+    is_uncounted: bool = False  # the number of its records is known only when they have been sorted
+    zeros: int = 0  # at the end of the data of such a group
 
     @property
     def record(self) -> int:

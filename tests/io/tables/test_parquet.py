@@ -9,8 +9,7 @@ import pytest
 from aqualog.core.errors import LogError
 from aqualog.io.base import ReadOptions
 from aqualog.io.tables import parquet
-from aqualog.io.tables.arrow_schema import field_metadata
-from aqualog.io.tables.parquet import ParquetReader
+from aqualog.io.tables.parquet import ParquetReader, field_metadata
 from aqualog.io.write_table import TableColumn, write_parquet
 
 START = 1_772_366_400_000_000_000
