@@ -22,9 +22,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.align.mapping import SignalMap, map_text
+from aqualog.align.mapping import SignalMap, map_text, values_read
 from aqualog.core.errors import ConfigError
-from aqualog.core.notation import WHEELS
 from aqualog.core.records import Signals
 from aqualog.core.user_folders import user_cache
 from aqualog.core.vehicle import Vehicle
@@ -100,8 +99,8 @@ class SignalCache:
             files = [f"{p.name}:{contents.of(p)}" for p in (*paths, *dbc)]
         except OSError:
             return None
-        car = (*(vehicle.r_e(w) for w in WHEELS), vehicle.steering_ratio, vehicle.torque_gain)
-        text = hash_of([_stamp(), str(len(paths)), *files, map_text(signal_map), repr(car), repr(rate_hz)])
+        settings = (map_text(signal_map), repr(values_read(vehicle)), repr(rate_hz))
+        text = hash_of([_stamp(), str(len(paths)), *files, *settings])
         if contents.has_changed:
             self._keep_known(contents)
         return Key(text, (*paths, *dbc), contents.seen((*paths, *dbc)))

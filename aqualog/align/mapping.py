@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
 from aqualog.core.errors import SignalError
-from aqualog.core.notation import ACCEPTED, SYMBOLS
+from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import ChannelInfo
+from aqualog.core.vehicle import Vehicle
 from aqualog.io.csv_format import CsvFormat
 
-__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve"]
+__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve", "values_read"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +78,11 @@ def map_text(signal_map: SignalMap) -> str:
     """Return all of a map that signals depend on, for keys. Order counts: the first pattern that fits a clock holds."""
     entries, clocks = tuple(signal_map.entries.items()), tuple(signal_map.clocks.items())
     return repr((entries, clocks, signal_map.time_channel, signal_map.time_unit, tuple(signal_map.csv.items())))
+
+
+def values_read(vehicle: Vehicle) -> tuple[float, ...]:
+    """Return all of a vehicle that its signals depend on, for keys: radii [m], steering ratio, torque gain."""
+    return (*(vehicle.r_e(w) for w in WHEELS), vehicle.steering_ratio, vehicle.torque_gain)
 
 
 def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:

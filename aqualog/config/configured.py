@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.batch import Configured
 from aqualog.campaign.records import Campaign, Run
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
-from aqualog.config.settings import load_settings
+from aqualog.config.reader import tried
 from aqualog.config.signal_map import load_signal_map
+from aqualog.config.thresholds import load_settings
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 from aqualog.detect.stream import Settings
 
 __all__ = ["configure", "configure_logs", "files_of"]
-
-T = TypeVar("T")
 
 
 def configure(
@@ -40,28 +38,19 @@ def configure(
         With all faults of all files in one message.
     """
     faults: list[str] = []
-    campaign = _tried(load_campaign, path, faults)
+    campaign = tried(load_campaign, path, faults)
     return _configured(campaign, map_file, dbc, thresholds, faults)
-
-
-def _tried(read: Callable[[Path], T], file: Path, faults: list[str]) -> T | None:
-    """Return what a file says, or None with its faults noted."""
-    try:
-        return read(file)
-    except ConfigError as error:
-        faults.append(error.line())
-        return None
 
 
 def _configured(
     campaign: Campaign | None, map_file: Path | None, dbc: Sequence[Path], thresholds: Path | None, faults: list[str]
 ) -> Configured:
     runs = campaign.runs if campaign else ()
-    vehicles = {p: _tried(load_vehicle, p, faults) for p in dict.fromkeys(r.vehicle for r in runs)}
-    labels = {p: _tried(load_labels, p, faults) for p in dict.fromkeys(r.labels for r in runs if r.labels)}
+    vehicles = {p: tried(load_vehicle, p, faults) for p in dict.fromkeys(r.vehicle for r in runs)}
+    labels = {p: tried(load_labels, p, faults) for p in dict.fromkeys(r.labels for r in runs if r.labels)}
     map_path = map_file or (campaign.signals if campaign else None)
-    signal_map = _tried(load_signal_map, map_path, faults) if map_path else SignalMap()
-    settings = _tried(load_settings, thresholds, faults) if thresholds else Settings()
+    signal_map = tried(load_signal_map, map_path, faults) if map_path else SignalMap()
+    settings = tried(load_settings, thresholds, faults) if thresholds else Settings()
     faults += [f"{p}: {'is no file' if p.exists() else 'there is no such file'}" for p in dbc if not p.is_file()]
     if faults or campaign is None or signal_map is None or settings is None:
         raise ConfigError("; ".join(dict.fromkeys(faults)))

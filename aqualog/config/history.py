@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aqualog.config.toml_file import DEEPEST
+from aqualog.config.reader import DEEPEST
 from aqualog.core.errors import ConfigError
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
 from aqualog.io.whole import write_text

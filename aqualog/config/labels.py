@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import replace
 from pathlib import Path
 
-from aqualog.config.file_key import FileKey
-from aqualog.config.table_faults import LineFaults
+from aqualog.config.reader import Faults, Key, Row, read_csv
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.evaluate.labels import Label, joined
-from aqualog.io.small_file import read_small
 
 __all__ = ["LABEL_KEYS", "load_labels"]
 
 LABEL_KEYS = (
-    FileKey("", "start_s", "number", "s", "", "begin, from the log's first sample; must be given"),
-    FileKey("", "end_s", "number", "s", "", "end; what runs beyond the log is cut; must be given"),
-    FileKey("", "effect", "text", "", "", "full, partial, water, a detector's name, a surface or a situation; must be "
+    Key("", "start_s", "number", "s", "", "begin, from the log's first sample; must be given",
+        -1e7, 1e7),
+    Key("", "end_s", "number", "s", "", "end; what runs beyond the log is cut; must be given", -1e7, 1e7),
+    Key("", "effect", "text", "", "", "full, partial, water, a detector's name, a surface or a situation; must be "
             "given"),
-    FileKey("", "wheel", "text", "", "", "fl, fr, rl, rr; empty: the car"),
+    Key("", "wheel", "text", "", "", "fl, fr, rl, rr; empty: the car"),
 )  # fmt: skip
 """Columns of a labels file."""
 _COLUMNS = tuple(k.name for k in LABEL_KEYS)
-_LARGEST = 64 * 2**20  # [byte]
+_EMPTY = dict.fromkeys(_COLUMNS, "")
+_NUMBERS = {k.name: k for k in LABEL_KEYS if k.kind == "number"}
 
 
 def load_labels(path: Path) -> tuple[Label, ...]:
@@ -42,27 +40,30 @@ def load_labels(path: Path) -> tuple[Label, ...]:
     ConfigError
         With all faults of the file in one message.
     """
-    rows = read_csv(path, what="labels file")
-    faults = LineFaults(path)
+    rows = read_csv(path, "labels file")
+    faults = Faults(path)
+    first = Row({}, faults, 1)
     heading = [name.strip() for name in rows[0]] if rows else []
     _check_form(rows[0] if rows else [], path)
     for name in dict.fromkeys(n for n in heading if heading.count(n) > 1):
-        faults.add(1, f"column {name} stands twice")
+        first.add("", f"column {name} stands twice")
     for name in dict.fromkeys(heading):
         if name not in _COLUMNS:
-            faults.unknown(1, "column", name, _COLUMNS)
+            first.unknown(name, _COLUMNS, what="column")
     for name in _COLUMNS[:3]:
         if name not in heading:
-            faults.add(1, f"no column {name}; expected {','.join(_COLUMNS)}")
+            first.add("", f"no column {name}; expected {','.join(_COLUMNS)}")
     faults.raise_if_any()
     labels: list[Label] = []
     for line, row in enumerate(rows[1:], 2):
         if not any(cell.strip() for cell in row):
             continue
+        named = dict(zip(heading, (c.strip() for c in row), strict=False))
+        cells = Row({**_EMPTY, **named}, faults, line)
         if len(row) > len(heading):
-            faults.add(line, f"{len(row)} cells, the heading has {len(heading)}")
+            cells.add("", f"{len(row)} cells, the heading has {len(heading)}")
             continue
-        label = _label(dict(zip(heading, (c.strip() for c in row), strict=False)), line, faults)
+        label = _label(cells)
         if label is not None:
             labels.append(label)
     faults.raise_if_any()
@@ -76,25 +77,6 @@ _SYNONYMS = {
     "aquaplaning": "partial", "hydroplaning": "partial", "aquaplane": "partial",
     "wet": "water", "on_water": "water", "lane": "water",
 }  # fmt: skip
-
-
-def read_csv(path: Path, *, what: str) -> list[list[str]]:
-    """Read the rows of a small CSV file.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be read.
-    """
-    data = read_small(path, what=what, expected="a CSV file", largest=_LARGEST)
-    try:
-        text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")  # as a file of text is read
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{what} is not UTF-8 text", where=str(path), expected="a CSV file") from error
-    try:
-        return list(csv.reader(io.StringIO(text), strict=True))
-    except csv.Error as error:
-        raise ConfigError(f"{what} is not CSV: {error}", where=str(path)) from error
 
 
 def _check_form(first: list[str], path: Path) -> None:
@@ -120,21 +102,20 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _label(cells: dict[str, str], line: int, faults: LineFaults) -> Label | None:
-    start = faults.number(line, "start_s", cells.get("start_s", ""), low=-1e7, high=1e7, unit="s")
-    end = faults.number(line, "end_s", cells.get("end_s", ""), low=-1e7, high=1e7, unit="s")
+def _label(cells: Row) -> Label | None:
+    start, end = (cells.number(n, k) for n, k in _NUMBERS.items())
     effect, wheel = cells.get("effect", ""), cells.get("wheel", "")
     if not effect.isprintable() or not effect:
-        faults.add(line, "no effect; expected full, partial, water, a detector or a surface")
+        cells.add("", "no effect; expected full, partial, water, a detector or a surface")
     if wheel and wheel not in WHEELS:
-        faults.add(line, f'unknown wheel "{wheel[:60]}"; expected {", ".join(WHEELS)} or nothing')
+        cells.add("", f'unknown wheel "{wheel[:60]}"; expected {", ".join(WHEELS)} or nothing')
     if start is None or end is None or not effect:
         return None
     if not end > start:
-        faults.add(line, f"end_s = {end:g} is not after start_s = {start:g}")
+        cells.add("", f"end_s = {end:g} is not after start_s = {start:g}")
         return None
     if end <= 0.0:
-        faults.add(line, f"end_s = {end:g} is not after the log's first sample, from which labels count")
+        cells.add("", f"end_s = {end:g} is not after the log's first sample, from which labels count")
         return None
     return Label(max(start, 0.0), end, _SYNONYMS.get(effect.lower().replace(" ", "_"), effect), wheel or None)
 

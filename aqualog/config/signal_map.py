@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
-from aqualog.config.file_key import FileKey
-from aqualog.config.toml_file import Faults, is_number, load_toml
+from aqualog.config.reader import Key, Table, is_number, read
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.csv_format import CsvFormat, format_fault
@@ -18,30 +16,32 @@ __all__ = ["MAP_KEYS", "load_signal_map", "map_text"]
 
 _CLOCK = 'sources."FILE"'
 MAP_KEYS = (
-    FileKey("signals", "SIGNAL.channel", "text or list", "", "", "name of the channel, or names in order of "
+    Key("signals", "SIGNAL.channel", "text or list", "", "", "name of the channel, or names in order of "
             "preference; must be given; `SIGNAL = \"name\"` is short for it"),
-    FileKey("signals", "SIGNAL.unit", "text", "", "the file's", "unit of the raw values, in place of the file's"),
-    FileKey("signals", "SIGNAL.scale", "number", "", "1", "factor on the SI value; a negative one turns the sign"),
-    FileKey("signals", "SIGNAL.offset", "number", "SI", "0", "added after scaling"),
-    FileKey("signals", "SIGNAL.invalid", "list of numbers", "", "[]", "raw values that mean \"no value\""),
-    FileKey("time", "channel", "text", "", "", "the column that holds the time"),
-    FileKey("time", "unit", "text", "", "", "its unit: s, ms, us, ns, min or h"),
-    FileKey("csv", "separator", "text", "", "found", "one sign, or `tab`, `comma`, `semicolon`, `space`; in "
+    Key("signals", "SIGNAL.unit", "text", "", "the file's", "unit of the raw values, in place of the file's"),
+    Key("signals", "SIGNAL.scale", "number", "", "1", "factor on the SI value; a negative one turns the sign",
+        -1e12, 1e12),
+    Key("signals", "SIGNAL.offset", "number", "SI", "0", "added after scaling", -1e12, 1e12),
+    Key("signals", "SIGNAL.invalid", "list of numbers", "", "[]", "raw values that mean \"no value\""),
+    Key("time", "channel", "text", "", "", "the column that holds the time"),
+    Key("time", "unit", "text", "", "", "its unit: s, ms, us, ns, min or h"),
+    Key("csv", "separator", "text", "", "found", "one sign, or `tab`, `comma`, `semicolon`, `space`; in "
             "`[csv.\"PATTERN\"]` for the files of that name alone"),
-    FileKey("csv", "decimal", "text", "", "found", "`.` or `,`"),
-    FileKey("csv", "encoding", "text", "", "found", "an encoding that Python knows, `cp1252`"),
-    FileKey(_CLOCK, "offset_s", "number", "s", "0", "by how much the clock of this file is late; the name may be a "
-            "pattern"),
-    FileKey(_CLOCK, "drift_ppm", "number", "ppm", "0", "by how much it runs fast"),
-    FileKey(_CLOCK, "at_s", "number", "s", "0", "stamp of the file's own clock at which the offset holds"),
+    Key("csv", "decimal", "text", "", "found", "`.` or `,`"),
+    Key("csv", "encoding", "text", "", "found", "an encoding that Python knows, `cp1252`"),
+    Key(_CLOCK, "offset_s", "number", "s", "0", "by how much the clock of this file is late; the name may be a "
+            "pattern", -1e10, 1e10),
+    Key(_CLOCK, "drift_ppm", "number", "ppm", "0", "by how much it runs fast", -1e5, 1e5),
+    Key(_CLOCK, "at_s", "number", "s", "0", "stamp of the file's own clock at which the offset holds", -1e10, 1e10),
 )  # fmt: skip
 """Every key of a signal map."""
 
 _TABLES = ("signals", "time", "csv", "sources")
 _ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")
+_NUMBERS = {n: k for n, k in zip(_ENTRY_KEYS, MAP_KEYS, strict=False) if k.kind == "number"}
 _TIME_KEYS = tuple(k.name for k in MAP_KEYS if k.table == "time")
 _CSV_KEYS = tuple(k.name for k in MAP_KEYS if k.table == "csv")
-_CLOCK_KEYS = tuple(k.name for k in MAP_KEYS if k.table == _CLOCK)
+_CLOCK_KEYS = {k.name: k for k in MAP_KEYS if k.table == _CLOCK}
 
 
 def load_signal_map(path: Path) -> SignalMap:
@@ -52,101 +52,74 @@ def load_signal_map(path: Path) -> SignalMap:
     ConfigError
         With all faults of the file in one message.
     """
-    document, text = load_toml(path, what="signal map")
-    faults = Faults(path, text)
-    for name in document:
-        if name not in _TABLES:
-            faults.unknown(name, _TABLES)
+    file = read(path, "signal map")
+    file.check_names(*_TABLES)
+    signals, sources, time = (file.table(name) for name in ("signals", "sources", "time"))
     entries = {}
-    for symbol, table in _table(document, "signals", faults).items():
+    for symbol in signals.values:
         if symbol not in SYMBOLS and symbol not in ACCEPTED:
-            faults.unknown(symbol, [*SYMBOLS, *ACCEPTED])
+            signals.unknown(symbol, [*SYMBOLS, *ACCEPTED])
             continue
-        entry = _entry(symbol, table, faults)
+        entry = _entry(signals, symbol)
         if entry is not None:
             entries[symbol] = entry
-    clocks = {name: _clock(name, t, faults) for name, t in _table(document, "sources", faults).items()}
-    time = _table(document, "time", faults)
-    for key in time:
-        if key not in _TIME_KEYS:
-            faults.unknown(key, _TIME_KEYS)
+    clocks = {}
+    for name in sources.values:
+        values = sources.table(name).numbers(_CLOCK_KEYS)
+        clocks[name] = SourceClock(**values)
+    time.check_names(*_TIME_KEYS)
     channel = time.get("channel")
     if channel is not None and not isinstance(channel, str):
-        faults.add("channel", f"[time] channel = {str(channel)[:40]} is not a name")
+        time.add("channel", f"[time] channel = {str(channel)[:40]} is not a name")
     unit = time.get("unit")
     if unit is not None and not (isinstance(unit, str) and is_unit(unit) and parse_unit(unit).dimension == "time"):
-        faults.add("unit", f"[time] unit = {str(unit)[:40]!r} is no unit of time; use s, ms, us or ns")
-    csv = _csv(_table(document, "csv", faults), faults)
-    faults.raise_if_any()
+        time.add("unit", f"[time] unit = {str(unit)[:40]!r} is no unit of time; use s, ms, us or ns")
+    csv = _csv(file.table("csv"))
+    file.faults.raise_if_any()
     return SignalMap(entries, clocks, channel, unit, str(path), csv)
 
 
-def _table(document: dict[str, Any], name: str, faults: Faults) -> dict[str, Any]:
-    table = document.get(name, {})
-    if isinstance(table, dict):
-        return table
-    faults.add(name, f"{name} is not a table")
-    return {}
-
-
-def _csv(table: dict[str, Any], faults: Faults) -> dict[str, CsvFormat]:
+def _csv(table: Table) -> dict[str, CsvFormat]:
     """Return the format of CSV files: of those that are named or match a pattern, and of all others (`*`)."""
-    common = {k: v for k, v in table.items() if not isinstance(v, dict)}
+    common = {k: v for k, v in table.values.items() if not isinstance(v, dict)}
     found = {}
-    for name, own in (*((k, v) for k, v in table.items() if isinstance(v, dict)), ("*", common)):
-        for key, value in own.items():
+    for name in (*(k for k, v in table.values.items() if isinstance(v, dict)), "*"):
+        own = table.child("", common) if name == "*" else table.table(name)
+        place = table if name == "*" else own
+        for key, value in own.values.items():
             if key not in _CSV_KEYS:
-                faults.unknown(key, _CSV_KEYS)
+                place.unknown(key, _CSV_KEYS)
             elif fault := format_fault(key, value):
-                faults.add(key, f"[csv] {fault}")
-        if own:
-            found[name] = CsvFormat.of({k: str(v) for k, v in {**common, **own}.items()})
+                place.add(key, f"[csv] {fault}")
+        if own.values:
+            found[name] = CsvFormat.of({k: str(v) for k, v in {**common, **own.values}.items()})
     return found
 
 
-def _entry(symbol: str, table: Any, faults: Faults) -> Entry | None:
-    if isinstance(table, str):
-        table = {"channel": table}
-    if not isinstance(table, dict) or "channel" not in table:
-        faults.add(symbol, f'{symbol} names no channel; expected {symbol} = {{ channel = "..." }}')
+def _entry(signals: Table, symbol: str) -> Entry | None:
+    given = signals.get(symbol)
+    table = signals.child(symbol, {"channel": given} if isinstance(given, str) else given)
+    if not isinstance(table.values, dict) or "channel" not in table:
+        signals.add(symbol, f'{symbol} names no channel; expected {symbol} = {{ channel = "..." }}')
         return None
-    for key in table:
-        if key not in _ENTRY_KEYS:
-            faults.unknown(key, _ENTRY_KEYS)
-    channel = table["channel"]
+    numbers = table.numbers(_NUMBERS, *_ENTRY_KEYS)
+    channel = table.get("channel")
     names = tuple(channel) if isinstance(channel, list) else (channel,)
     if not names or not all(isinstance(n, str) and n for n in names):
-        faults.add(symbol, f"{symbol}: channel = {channel!r} is not a name or a list of names")
+        signals.add(symbol, f"{symbol}: channel = {channel!r} is not a name or a list of names")
         return None
     unit = table.get("unit")
     if unit is not None and not is_unit(str(unit)):
-        faults.add(symbol, f'{symbol}: unknown unit "{unit}"')
+        signals.add(symbol, f'{symbol}: unknown unit "{unit}"')
         return None
-    big = 1e12
-    scale = faults.number({"scale": table.get("scale", 1.0)}, "scale", low=-big, high=big, unit="")
-    offset = faults.number({"offset": table.get("offset", 0.0)}, "offset", low=-big, high=big, unit="")
     invalid = table.get("invalid", [])
     if not isinstance(invalid, list) or not all(is_number(i) for i in invalid):
-        faults.add(symbol, f"{symbol}: invalid = {str(invalid)[:40]} is not a list of numbers")
+        signals.add(symbol, f"{symbol}: invalid = {str(invalid)[:40]} is not a list of numbers")
         return None
-    if scale is None or offset is None:
-        return None
-    if scale == 0.0:
-        faults.add(symbol, f"{symbol}: scale = 0 would erase the signal")
-    return Entry(symbol, names, None if unit is None else str(unit), scale, offset, tuple(float(i) for i in invalid))
-
-
-def _clock(name: str, table: Any, faults: Faults) -> SourceClock:
-    if not isinstance(table, dict):
-        faults.add(name, f"sources.{name} is not a table")
-        return SourceClock()
-    for key in table:
-        if key not in _CLOCK_KEYS:
-            faults.unknown(key, _CLOCK_KEYS)
-    offset = faults.number({"offset_s": table.get("offset_s", 0.0)}, "offset_s", low=-1e10, high=1e10, unit="s")
-    drift = faults.number({"drift_ppm": table.get("drift_ppm", 0.0)}, "drift_ppm", low=-1e5, high=1e5, unit="ppm")
-    at = faults.number({"at_s": table.get("at_s", 0.0)}, "at_s", low=-1e10, high=1e10, unit="s")
-    return SourceClock(offset or 0.0, drift or 0.0, at or 0.0)
+    if numbers.get("scale") == 0.0:
+        signals.add(symbol, f"{symbol}: scale = 0 would erase the signal")
+    unit = None if unit is None else str(unit)
+    return Entry(symbol, names, unit, **numbers, invalid=tuple(float(i) for i in invalid))
 
 
 def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None) -> str:

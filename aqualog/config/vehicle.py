@@ -1,14 +1,18 @@
-"""Vehicle files."""
+"""Read vehicle files, and write them with calibrated values, each with its interval and its origin."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from aqualog.config.toml_file import TableFaults, is_real, load_toml
-from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle
+from aqualog.config.reader import Table, is_real, read
+from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, spread_lines
 
-__all__ = ["load_vehicle"]
+if TYPE_CHECKING:
+    from aqualog.calibrate.records import Calibration, Parameter
+
+__all__ = ["calibrated_toml", "load_vehicle"]
 
 MOST_POWERS = 5  # of a polynomial; calibration fits fewer
 LARGEST_TERM = 1e4  # [N], [N*m] constant and spread: as much as the whole force of a tie rod (K)
@@ -16,6 +20,7 @@ LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a ha
 TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
 _SPLIT = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
+_TABLES_AND_WORDS = ("name", "drivetrain", "spread", *POLYNOMIALS, *(k.section for k in KEYS.values() if k.section))
 
 
 def load_vehicle(path: Path) -> Vehicle:
@@ -28,94 +33,68 @@ def load_vehicle(path: Path) -> Vehicle:
     ConfigError
         With all faults of the file in one message.
     """
-    document, text = load_toml(path, what="vehicle file")
-    faults = TableFaults(path, text)
-    values: dict[str, Any] = {"name": str(document.pop("name", path.stem))}
-    if isinstance(values.get("name"), str) and not values["name"].isprintable():
-        faults.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
-    given = {"name", *(n for n in ("drivetrain",) if n in document)}
-    drivetrain = document.pop("drivetrain", "rwd")
-    if not isinstance(drivetrain, str) or drivetrain not in _SPLIT:
-        faults.add("drivetrain", f'drivetrain = {drivetrain!r} is not one of "rwd", "fwd", "awd"')
-        drivetrain = "rwd"
-    values["drivetrain"] = drivetrain
-    values["torque_split_rear"] = _SPLIT[drivetrain]
+    file = read(path, "vehicle file")
+    values: dict[str, Any] = {"name": str(file.get("name", path.stem))}
+    if not values["name"].isprintable():
+        file.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
+    given = {"name", *(n for n in ("drivetrain",) if n in file)}
+    values["drivetrain"] = file.choice("drivetrain", _SPLIT, "rwd")
+    values["torque_split_rear"] = _SPLIT[values["drivetrain"]]
     for section in POLYNOMIALS:
-        with faults.inside(section):
-            values[section] = _polynomial(document.pop(section, {}), section, faults)
-    with faults.inside("spread"):
-        values["spread"] = _spread(document.pop("spread", {}), faults)
-    for section, table in _sections(document, faults).items():
-        with faults.inside(section):
-            _numbers(table, section, faults, values, given)
-    faults.raise_if_any()
+        values[section] = _polynomial(file.table(section), section)
+    sections = list(dict.fromkeys(k.section for k in KEYS.values() if k.section))
+    spread = file.table("spread").numbers({n: _Spread(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
+    for name, value in file.values.items():
+        if isinstance(value, dict) and name not in (*sections, *POLYNOMIALS, "spread"):
+            file.unknown(name, [*sections, *POLYNOMIALS, "spread"])
+    top = {k: x for k, x in file.values.items() if not isinstance(x, dict) and k not in _TABLES_AND_WORDS}
+    _numbers(file, "", top, values, given)
+    for section in sections:
+        table = file.table(section)
+        _numbers(table, section, table.values, values, given)
+    file.faults.raise_if_any()
     # a loaded radius that is not given follows the effective one, so that a truck does not get a car's
     for axle in ("f", "r"):
         if f"wheels.r_e_{axle}" in given and f"wheels.r_l_{axle}" not in given:
             values[f"r_l_{axle}"] = 0.975 * values[f"r_e_{axle}"]
-    return Vehicle(**values, given=frozenset(given))
+    return Vehicle(**values, spread=spread, given=frozenset(given))
 
 
-def _sections(document: dict[str, Any], faults: TableFaults) -> dict[str, dict[str, Any]]:
-    sections = {s for s in (k.section for k in KEYS.values()) if s}
-    found: dict[str, dict[str, Any]] = {"": {}}
-    for name, value in document.items():
-        if name in sections and isinstance(value, dict):
-            found[name] = value
-        elif isinstance(value, dict):
-            faults.unknown(name, [*sections, *POLYNOMIALS, "spread"])
-        else:
-            found[""][name] = value
-    return found
-
-
-def _numbers(table: dict[str, Any], section: str, faults: TableFaults, values: dict[str, Any], given: set[str]) -> None:
+def _numbers(table: Table, section: str, names: Iterable[str], values: dict[str, Any], given: set[str]) -> None:
     """Read plain keys of a table into `values`, their paths into `given`."""
-    known = [k.name for k in KEYS.values() if k.section == section]
-    for name in table:
+    known = {k.name: k for k in KEYS.values() if k.section == section}
+    for name in names:
         if name in known:
-            key = KEYS[f"{section}.{name}" if section else name]
-            number = faults.number(table, name, low=key.low, high=key.high, unit=key.unit)
+            number = table.number(name, known[name])
             if number is not None:
                 values[name] = number
-                given.add(key.path)
+                given.add(known[name].path)
         elif section and (name in POLYNOMIALS or name in KEYS):
             own = f"expected [{name}], a table of its own" if name in POLYNOMIALS else "expected above all tables"
-            faults.add(name, f"{name} stands in [{section}]; {own}")
+            table.add(name, f"{name} stands in [{section}]; {own}")
         else:
-            faults.unknown(name, known)
+            table.unknown(name, known)
 
 
-def _spread(table: Any, faults: TableFaults) -> dict[str, float]:
-    """Read standard deviations from drive to drive by key, each at most as large as its key may be."""
-    result: dict[str, float] = {}
-    if not isinstance(table, dict):
-        faults.add("spread", "spread is not a table; write [spread]")
-        return result
-    for name in table:
-        if name not in SPREAD:
-            faults.unknown(name, SPREAD)
-            continue
-        number = faults.number(table, name, low=0.0, high=KEYS[name].high, unit=KEYS[name].unit)
-        if number is not None:
-            result[name] = number
-    return result
+class _Spread(NamedTuple):
+    """Bounds of a standard deviation from drive to drive: at most as large as its key may be."""
+
+    high: float
+    unit: str
+    low: float = 0.0
 
 
-def _polynomial(table: Any, section: str, faults: TableFaults) -> dict[str, tuple[float, ...]]:
+def _polynomial(table: Table, section: str) -> dict[str, tuple[float, ...]]:
     """Read `F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
     result: dict[str, tuple[float, ...]] = {}
-    if not isinstance(table, dict):
-        faults.add(section, f"{section} is not a table; write [{section}]")
-        return result
-    for name, value in table.items():
+    for name, value in table.values.items():
         if name not in COEFFICIENTS:
-            faults.unknown(name, COEFFICIENTS)
+            table.unknown(name, COEFFICIENTS)
             continue
         numbers = value if isinstance(value, list) else [value]
         wrong = _wrong(name, numbers)
         if wrong:
-            faults.add(name, f"[{section}] {name} = {str(value)[:60]} {wrong}")
+            table.add(name, f"[{section}] {name} = {str(value)[:60]} {wrong}")
         else:
             result[name] = tuple(float(n) for n in numbers)
     return result
@@ -135,3 +114,56 @@ def _wrong(name: str, numbers: list[Any]) -> str:
         if not abs(n) <= bound:
             return f"is outside -{bound:g} ... {bound:g}" + (f" in power {power}" if power > 1 else "")
     return ""
+
+
+def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
+    """Return the text of a vehicle file that `load_vehicle` reads.
+
+    Keys that neither the old file gives nor the drives identify stand as comments: no default looks like a given value.
+    Values have seven digits.
+    """
+    from aqualog.calibrate.apply import calibrated, told
+
+    new = calibrated(vehicle, calibration.parameters, calibration.transfers, calibration.spread)
+    values = told(calibration.parameters, vehicle)
+    name = new.name.replace("\\", "").replace('"', "")
+    drives = ", ".join(_plain(d.name) for d in calibration.drives)
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', f'drivetrain = "{new.drivetrain}"']
+    section = ""
+    for key in KEYS.values():
+        if key.section != section:
+            section = key.section
+            lines += ["", f"[{section}]"]
+        value = getattr(new, key.name)
+        line = f"{key.name} = {value!r}  # [{key.unit}] {key.meaning}"
+        if key.path in values:
+            line += "; " + _source(values[key.path][1])
+        elif key.path not in new.given:
+            line = f"# {line}; not identified, default"
+        lines.append(line)
+    if new.spread:
+        lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
+    for part in POLYNOMIALS:
+        table = getattr(new, part)
+        if not table:
+            continue
+        lines += ["", f"[{part}]"]
+        fit = calibration.transfers.get(part)
+        if fit is not None:
+            lines.append(f"# from {fit.seconds:.0f} s of dry driving; explains {fit.explained:.1%} of the variance")
+        lines += [f"{n} = {list(c)!r}" for n, c in table.items()]
+    if calibration.cannot_tell:
+        lines += ["", "# what the drives could not identify", *(f"# - {_plain(s)}" for s in calibration.cannot_tell)]
+    return "\n".join(lines) + "\n"
+
+
+def _source(p: Parameter) -> str:
+    if p.remark == "given":
+        return "given"
+    low, high = p.ci95
+    return f"calibrated, 95 %: {low:.5g} ... {high:.5g}" + (f" ({p.remark})" if p.remark else "")
+
+
+def _plain(text: str) -> str:
+    """One printable line."""
+    return "".join(c if c.isprintable() else "?" for c in text)

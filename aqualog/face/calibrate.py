@@ -118,7 +118,7 @@ class Calibration(Result):
 
     def files(self) -> Writers:
         """Return `calibration.json`, `calibrated.toml` and `calibration.html`."""
-        from aqualog.config.vehicle_edit import calibrated_toml
+        from aqualog.config.vehicle import calibrated_toml
         from aqualog.report.calibration import calibration_report
         from aqualog.report.page import report_page
 

@@ -376,7 +376,7 @@ def _memory(history: PathLike | None, configuration: str, reference: str) -> Mem
 def _settings(thresholds: PathLike | None) -> Settings | None:
     if thresholds is None:
         return None
-    from aqualog.config.settings import load_settings
+    from aqualog.config.thresholds import load_settings
 
     return load_settings(file_of(thresholds, "thresholds"))
 

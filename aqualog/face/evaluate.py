@@ -132,8 +132,7 @@ class Comparison(Result):
         return report_page(evaluation_report(self.evaluation, by=self.keys), title=self.name)
 
     def _thresholds(self) -> str:
-        from aqualog.config.settings import joint_text
-        from aqualog.config.thresholds import thresholds_text
+        from aqualog.config.thresholds import joint_text, thresholds_text
 
         found, about = self.evaluation, []
         if found.tuning is not None:
@@ -204,8 +203,7 @@ def evaluate(
     given = inputs_of(inputs, vehicle, map=map, dbc=dbc, labels=labels)
     keys = group_keys(split(by), given.keys)
     hear.detail(f"{len(given.sources)} drives of {given.name}")
-    from aqualog.config.settings import load_settings
-    from aqualog.config.thresholds import load_thresholds
+    from aqualog.config.thresholds import load_settings, load_thresholds
     from aqualog.detect.thresholds import DEFAULT
     from aqualog.evaluate.run import evaluate as evaluate_drives
     from aqualog.evaluate.run import tune as tune_drives

@@ -19,9 +19,8 @@ from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS
 from aqualog.config.model import load_model
 from aqualog.config.scenario import SCENARIO_KEYS
-from aqualog.config.settings import JOINT_KEYS, load_settings
 from aqualog.config.signal_map import MAP_KEYS, load_signal_map
-from aqualog.config.thresholds import load_thresholds
+from aqualog.config.thresholds import JOINT_KEYS, load_settings, load_thresholds
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ExitCode
 from aqualog.core.notation import ACCEPTED, SYMBOLS

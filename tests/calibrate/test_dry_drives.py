@@ -12,8 +12,7 @@ from aqualog.calibrate.design import prepare
 from aqualog.calibrate.lag import earlier, lag_between
 from aqualog.calibrate.offset import energy_offset
 from aqualog.calibrate.run import calibrate
-from aqualog.config.vehicle import load_vehicle
-from aqualog.config.vehicle_edit import calibrated_toml
+from aqualog.config.vehicle import calibrated_toml, load_vehicle
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle

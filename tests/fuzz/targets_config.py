@@ -10,9 +10,8 @@ import numpy as np
 from aqualog.align.load import load_signals
 from aqualog.config.history import load_history, save_history
 from aqualog.config.labels import load_labels
-from aqualog.config.settings import joint_text, load_settings
 from aqualog.config.signal_map import load_signal_map, map_text
-from aqualog.config.thresholds import load_thresholds, thresholds_text
+from aqualog.config.thresholds import joint_text, load_settings, load_thresholds, thresholds_text
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import Signals

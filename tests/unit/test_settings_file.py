@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from aqualog.config.settings import joint_text, load_settings
+from aqualog.config.thresholds import joint_text, load_settings
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import BY_NAME
 from aqualog.detect.thresholds import DEFAULT, Thresholds

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from aqualog.book.markdown import code, fence, number, page, table
 from aqualog.campaign.records import GROUP_NAMES
-from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS, RunKey
+from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS
-from aqualog.config.scenario import SCENARIO_KEYS, ScenarioKey
-from aqualog.config.settings import JOINT_KEYS
+from aqualog.config.reader import Key
+from aqualog.config.scenario import SCENARIO_KEYS
 from aqualog.config.signal_map import MAP_KEYS
+from aqualog.config.thresholds import JOINT_KEYS
 from aqualog.detect.registry import RIVALS, all_of
 from aqualog.detect.slip_slope.tuning import MEANINGS as TUNING_MEANINGS
 from aqualog.detect.slip_slope.tuning import TUNING
@@ -53,7 +54,7 @@ at_s = 0.0
 
 def map_page() -> str:
     """The page."""
-    rows = [(code(k.table), code(k.name), k.kind, k.unit, k.default, k.meaning) for k in MAP_KEYS]
+    rows = [(code(k.table), code(k.name), k.kind, k.unit, str(k.default), k.meaning) for k in MAP_KEYS]
     return page(
         "Signal map",
         _MAP,
@@ -116,7 +117,7 @@ partial too. A detector's name marks what that detector is to see. All other wor
 
 def campaign_page() -> str:
     """The page."""
-    top = [(code(k.name), k.kind, k.default, k.meaning) for k in CAMPAIGN_KEYS]
+    top = [(code(k.name), k.kind, str(k.default), k.meaning) for k in CAMPAIGN_KEYS]
     runs = [(code(k.name), k.kind, k.unit, _bounds(k), k.meaning) for k in RUN_KEYS.values()]
     runs.append(("`x_...`", "text or number", "", "", "a key of your own"))
     groups = [(code(n), ", ".join(map(code, keys))) for n, keys in GROUP_NAMES.items()]
@@ -141,7 +142,7 @@ def campaign_page() -> str:
     )
 
 
-def _bounds(key: RunKey) -> str:
+def _bounds(key: Key) -> str:
     return f"{number(key.low)} ... {number(key.high)}" if key.kind == "number" else ""
 
 
@@ -194,7 +195,7 @@ def scenario_page() -> str:
     )
 
 
-def _scenario_row(key: ScenarioKey) -> tuple[str, ...]:
+def _scenario_row(key: Key) -> tuple[str, ...]:
     default = "" if key.default is None else code(key.default) if isinstance(key.default, str) else f"{key.default:g}"
     bounds = f"{number(key.low)} ... {number(key.high)}" if number(key.low) else ""
     return code(key.path), key.unit, default, bounds, key.meaning
@@ -252,7 +253,7 @@ def thresholds_page() -> str:
     """The page."""
     own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of("effect", "joint")]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
-    joint = [(code(k.name), k.kind, k.default, k.meaning) for k in JOINT_KEYS]
+    joint = [(code(k.name), k.kind, str(k.default), k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]
     return page(
         "Thresholds file",
