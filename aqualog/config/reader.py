@@ -157,9 +157,14 @@ class Faults:
         self._found: list[str] = []
         self._untold = 0
 
+    @property
+    def is_full(self) -> bool:
+        """Return whether further faults are only counted."""
+        return len(self._found) == _MOST_TOLD
+
     def add(self, message: str, find_line: Callable[[], int | None] = lambda: None) -> None:
         """Note a fault; its line (from 1) is looked for only where it is spelt out."""
-        if len(self._found) == _MOST_TOLD:
+        if self.is_full:
             self._untold += 1
             return
         line = find_line()
@@ -216,6 +221,9 @@ class Table:
 
     def unknown(self, name: str, known: Iterable[str], *, what: str = "key", hint: str = "") -> None:
         """Note a name that does not exist, with the nearest one that does, else with the hint."""
+        if self.faults.is_full:  # the nearest name takes its time
+            self.faults.add("")
+            return
         by_lower = {n.lower(): n for n in sorted(known)}
         near = difflib.get_close_matches(name[:_LONGEST_KEY].lower(), by_lower, n=1, cutoff=0.5)
         told = f' (did you mean "{by_lower[near[0]]}"?)' if near else f" ({hint})" if hint else ""

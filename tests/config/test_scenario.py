@@ -1,4 +1,4 @@
-"""Scenario and model files: what they mean, and what is said of those that are wrong."""
+"""Scenario files: what they mean, and what is said of those that are wrong."""
 
 import json
 import math
@@ -6,19 +6,14 @@ import os
 from dataclasses import fields, replace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from aqualog.config.model import dump_model, load_model
 from aqualog.config.scenario import SAMPLE_RATES_HZ, SCENARIO_KEYS, load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
-from aqualog.model.effects import EFFECTS
 from aqualog.model.faults import SensorFault
 from aqualog.model.scenario import Kick, Lane, Scenario
 from aqualog.model.sensors import ESC, IDEAL
 from aqualog.model.surface import SURFACES
-from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRE_KEYS, TYRES
 
 # letter by letter, with its comments
@@ -56,9 +51,9 @@ def load(folder, text):
     return load_scenario(folder / "scenario.toml")
 
 
-def refused(folder, text, loader=load):
+def refused(folder, text):
     with pytest.raises(ConfigError) as error:
-        loader(folder, text)
+        load(folder, text)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -434,95 +429,6 @@ def test_excitation(folder):
     assert "both axles driven" in refused(folder, rear)
     (folder / "awd.toml").write_text(VEHICLE.replace('"rwd"', '"awd"\ntorque_split_rear = 1.0'))
     assert "torque_split_rear = 1" in refused(folder, text.format("ramp", "amplitude_mu"))
-
-
-# model files
-
-
-def load_as_model(folder, text):
-    (folder / "model.toml").write_text(text, encoding="utf-8")
-    return load_model(folder / "model.toml")
-
-
-def test_model_file(tmp_path):
-    text = """
-[[term]]
-effect = "payload_mass"
-delta_mass = 262
-
-[[term]]
-effect = "accelerometer_bias"
-where = "a_y"
-bias = -0.1
-
-[[term]]
-effect = "tyre_warmup"
-"""
-    assert load_as_model(tmp_path, text) == Model(
-        (
-            Term(EFFECTS["payload_mass"], {"delta_mass": 262.0}),
-            Term(EFFECTS["accelerometer_bias"], {"bias": -0.1}, "a_y"),
-            Term(EFFECTS["tyre_warmup"]),
-        )
-    )
-    assert load_as_model(tmp_path, "# nothing\n") == Model()
-
-
-def test_faults_of_a_model_come_together(tmp_path):
-    text = """[[term]]
-effect = "paylod_mass"
-[[term]]
-effect = "payload_mass"
-delta_mas = 3.0
-delta_mass = 1e9
-where = "fl"
-[[term]]
-delta_mass = 3.0
-[[term]]
-effect = "head_wind"
-where = "f"
-speed = "much"
-[[term]]
-effect = "road_grade"
-grade = 0.1
-[[term]]
-effect = "road_grade"
-grade = 0.01
-[[tern]]
-effect = "road_grade"
-"""
-    line = refused(tmp_path, text, load_as_model)
-    for part in (
-        "line 2: unknown effect 'paylod_mass' (did you mean \"payload_mass\"?)", 'line 5: unknown key "delta_mas"',
-        "line 6: delta_mass = 1e+09 is outside", "line 7: payload_mass cannot sit at 'fl'; expected f, r", "line 8: term names no effect",
-        "line 12: head_wind cannot sit at 'f'", "line 13: speed = much is not a number",
-        "line 18: road_grade is in the model already", 'unknown key "tern" (did you mean "term"?)',
-    ):  # fmt: skip
-        assert part in line
-
-
-@pytest.mark.parametrize(
-    "text", ["term = 3", "[term]\neffect = 'head_wind'", "term = [3]", "[[term]]\neffect = []", "="]
-)
-def test_absurd_models_are_configuration_errors(tmp_path, text):
-    refused(tmp_path, text, load_as_model)
-
-
-@st.composite
-def models(draw):
-    model = Model()
-    for name in draw(st.lists(st.sampled_from(sorted(EFFECTS)), max_size=4, unique=True)):
-        effect = EFFECTS[name]
-        chosen = [p for p in effect.parameters if draw(st.booleans())]
-        values = {p.name: draw(st.floats(p.low, p.high)) for p in chosen}
-        model = model.with_term(Term(effect, values, draw(st.sampled_from([None, *effect.places]))))
-    return model
-
-
-@settings(max_examples=60)
-@given(model=models())
-def test_written_models_read_back(tmp_path_factory, model):
-    assert load_as_model(tmp_path_factory.mktemp("model"), dump_model(model)) == model
 
 
 def test_split_profile_needs_all_wheel_drive(tmp_path):
