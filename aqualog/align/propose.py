@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.align.mapping import Entry, channel_id
+from aqualog.align.overview import ChannelOverview, overview, rotated_channels
 from aqualog.align.resample import linear
 from aqualog.align.timebase import ClockRepair
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
 
-__all__ = ["Proposal", "propose_map", "words_of"]
+__all__ = ["Look", "Proposal", "look_at", "propose_map", "words_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +60,25 @@ class _Rule:
     may_rest: bool = False  # constant in many a drive, as a brake that nobody treads on
 
 
+class _OfWheels(NamedTuple):
+    """A quantity of several wheels: words in the name, or a part of the path, and words for each position."""
+
+    quantity: str
+    words: tuple[str, ...]
+    dimensions: tuple[str, ...]
+    positions: Mapping[str, tuple[str, ...]]
+
+
 _WHEEL_WORDS = ("wheel", "whl", "rad", "radgeschw", "radgeschwindigkeit", "raddrehzahl", "wss", "ws", "omega", "wspd")
-_TIE_RODS = ("spurstange", "spurstangenkraft", "tie rod", "tierod")
+_TORQUE_WORDS = ("torque", "trq", "moment", "tq")
 _SIDES = {"fl": ("left", "links", "l", "li"), "fr": ("right", "rechts", "r", "re")}
+_OF_WHEELS = (
+    _OfWheels("omega", _WHEEL_WORDS, ("speed", "angular_speed"), _POSITIONS),
+    _OfWheels("torque", _TORQUE_WORDS, ("torque",), _POSITIONS),
+    _OfWheels("pressure", ("tire", "tyre", "tpms", "reifen"), ("pressure",), _POSITIONS),
+    _OfWheels("tie_rod", ("spurstange", "spurstangenkraft", "tie rod", "tierod"), ("force",),
+              {w: (*_POSITIONS[w], *more) for w, more in _SIDES.items()}),
+)  # fmt: skip
 _LANE_WORDS = ("nass", "nassbahn", "wet", "on water", "onwater", "lichtschranke", "light barrier")
 _LANE_FLAGS = {"flag", "state", "status", "sensor", "valid"}  # of a state these words may be the name
 _RULES = (
@@ -78,14 +96,32 @@ _RULES = (
           ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
     _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",), ("pressure", "druck"),
           may_rest=True),
-    _Rule("torque_f", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("rear", "hinten", "steer", "motor")),
-    _Rule("torque_r", ("torque", "trq", "moment", "tq"), ("torque",), ("axle",), ("front", "vorne", "steer", "motor")),
+    _Rule("torque_f", _TORQUE_WORDS, ("torque",), ("axle",), ("rear", "hinten", "steer", "motor")),
+    _Rule("torque_r", _TORQUE_WORDS, ("torque",), ("axle",), ("front", "vorne", "steer", "motor")),
     _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
     _Rule("latitude", ("latitude", "lat"), ("", "angle"), (), ("lateral", "acc"), "deg"),
     _Rule("longitude", ("longitude", "lon", "lng"), ("", "angle"), (), ("longitudinal", "acc"), "deg"),
     _Rule("altitude", ("altitude", "elevation", "height", "alt"), ("length",)),
     _Rule("ambient_temperature", ("ambient", "outside", "aussen", "outdoor"), ("temperature",)),
 )  # fmt: skip
+
+
+class Look(NamedTuple):
+    """What the channels of one drive look like: figures of each, and the signals that they may be."""
+
+    overviews: list[ChannelOverview]
+    proposals: dict[str, Proposal]
+
+
+def look_at(channels: Sequence[Channel]) -> Look:
+    """Summarise channels and propose signals; axes of accelerometers that are not the car's are passed over.
+
+    Times count from the first sample of all channels.
+    """
+    origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
+    found = [overview(c, origin_ns=origin) for c in channels]
+    rotated = rotated_channels(found)
+    return Look(found, propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated]))
 
 
 def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
@@ -107,18 +143,12 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
         exact = [c for c in usable if c.info.name == symbol]
         if len(exact) == 1:
             found[symbol] = Proposal(Entry(symbol, (_address(exact[0], usable),)), "its canonical name", 10.0)
-    for wheel in WHEELS:
-        _keep_best(found, f"omega_{wheel}", _wheel_candidates(usable, wheel, _WHEEL_WORDS, ("speed", "angular_speed")))
-        _keep_best(
-            found, f"torque_{wheel}", _wheel_candidates(usable, wheel, ("torque", "trq", "moment", "tq"), ("torque",))
-        )
-        _keep_best(
-            found,
-            f"pressure_{wheel}",
-            _wheel_candidates(usable, wheel, ("tire", "tyre", "tpms", "reifen"), ("pressure",)),
-        )
-    for wheel in ("fl", "fr"):
-        _keep_best(found, f"tie_rod_{wheel}", _wheel_candidates(usable, wheel, _TIE_RODS, ("force",), _SIDES[wheel]))
+    for several in _OF_WHEELS:
+        for wheel, positions in several.positions.items():
+            candidates = [
+                p for c in usable if (p := _wheel_candidate(several, wheel, positions, c, usable)) is not None
+            ]
+            _keep_best(found, f"{several.quantity}_{wheel}", candidates)
     _keep_best(found, "on_water", [p for c in usable if (p := _lane_candidate(c, usable)) is not None])
     speed = _speed(found, usable)
     for rule in _RULES:
@@ -200,25 +230,18 @@ def _proposal(
     return Proposal(entry, reason, score)
 
 
-def _wheel_candidates(
-    channels: _Named,
-    wheel: str,
-    words: tuple[str, ...],
-    dimensions: tuple[str, ...],
-    more_positions: tuple[str, ...] = (),
-) -> list[Proposal]:
-    result = []
-    for channel in channels:
-        name = words_of(channel.info.name)
-        joined = " ".join(name)
-        has_position = any(p in name if " " not in p else p in joined for p in (*_POSITIONS[wheel], *more_positions))
-        has_word = set(words) & set(words_of(channel.info.path)) or any(w in joined for w in words if len(w) > 4)
-        if not has_position or not has_word or set(name) & _NOT_A_VALUE or _dimension(channel) not in (*dimensions, ""):
-            continue
-        symbol = {"speed": "omega", "force": "tie_rod"}.get(dimensions[0], dimensions[0])
-        score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (_dimension(channel) == "")
-        result.append(_proposal(f"{symbol}_{wheel}", channel, channels, score))
-    return result
+def _wheel_candidate(
+    rule: _OfWheels, wheel: str, positions: tuple[str, ...], channel: Channel, channels: _Named
+) -> Proposal | None:
+    name = words_of(channel.info.name)
+    joined = " ".join(name)
+    has_position = any(p in name if " " not in p else p in joined for p in positions)
+    has_word = set(rule.words) & set(words_of(channel.info.path)) or any(w in joined for w in rule.words if len(w) > 4)
+    dimension = _dimension(channel)
+    if not has_position or not has_word or set(name) & _NOT_A_VALUE or dimension not in (*rule.dimensions, ""):
+        return None
+    score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (dimension == "")
+    return _proposal(f"{rule.quantity}_{wheel}", channel, channels, score)
 
 
 def _candidate(rule: _Rule, channel: Channel, channels: _Named) -> Proposal | None:

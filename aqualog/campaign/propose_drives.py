@@ -7,21 +7,25 @@ different kinds that share these words form one drive.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from aqualog.align.propose_map import LogFile
 from aqualog.campaign.records import GROUP_NAMES
 from aqualog.campaign.store import MARK
 from aqualog.core.errors import AqualogError
-from aqualog.core.records import ChannelInfo
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import open_log
 from aqualog.io.sniff import sniff
 
-__all__ = ["Drive", "Found", "LogFile", "drive_name", "group_drives", "is_run_table", "kinds_of", "scan", "tokens"]
+__all__ = [
+    "Drive", "Found", "broken_logs", "drive_name", "group_drives", "is_run_table", "kinds_of", "scan", "tokens",
+    "without_twins",
+]  # fmt: skip
 
 SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
 _RUN_COLUMNS = {k for keys in GROUP_NAMES.values() for k in keys} | {
@@ -30,20 +34,6 @@ _RUN_COLUMNS = {k for keys in GROUP_NAMES.values() for k in keys} | {
 _WORD = re.compile(r"[A-Za-z0-9À-ÿ.,+]+")
 ALIKE = 0.5  # share of common channels from which two files hold the same things
 APART = 0.2  # share up to which they may be loggers of one drive: a speed or a temperature is in both (K)
-
-
-@dataclass(frozen=True, slots=True)
-class LogFile:
-    """A readable log; `name` is its path below the folder, with /."""
-
-    path: Path
-    name: str
-    channels: tuple[ChannelInfo, ...]
-
-    @property
-    def signature(self) -> frozenset[tuple[str, str]]:
-        """Names and units of its channels."""
-        return frozenset((c.path, c.unit) for c in self.channels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,3 +257,58 @@ def _without_copies(
         else:
             notes.append(f"{logs[i].name} is left out: it looks like a copy of {logs[original].name}")
     return kept
+
+
+# --- files that are no drives: byte-identical copies, and logs that cannot be read
+
+
+def without_twins(logs: Sequence[LogFile]) -> tuple[tuple[LogFile, ...], tuple[str, ...]]:
+    """Logs without byte-identical copies, in their order, and a note on each that is left out.
+
+    Of twins the one with the shorter name stays, as `a - Copy.mf4` stands before `a.mf4` by its letters. Only files of
+    one size are read for their hash; folders (bags) are not compared.
+    """
+    by_size: dict[int, list[LogFile]] = {}
+    for log in logs:
+        if log.path.is_file():
+            by_size.setdefault(log.path.stat().st_size, []).append(log)
+    twin_of: dict[str, str] = {}
+    for same in by_size.values():
+        if len(same) == 1:
+            continue
+        first: dict[bytes, str] = {}
+        for log in sorted(same, key=lambda f: (len(f.name), f.name)):
+            original = first.setdefault(_digest(log.path), log.name)
+            if original != log.name:
+                twin_of[log.name] = original
+    notes = tuple(f"{f.name} is left out: byte for byte {twin_of[f.name]}" for f in logs if f.name in twin_of)
+    return tuple(f for f in logs if f.name not in twin_of), notes
+
+
+def _digest(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
+
+
+def broken_logs(folder: Path, bad: Sequence[tuple[str, str]]) -> tuple[LogFile, ...]:
+    """Of the files that could not be read those that a table of runs can hold and that look like logs.
+
+    Not so are pipes, names that a table cannot hold, and texts called .csv whose first line has one cell only.
+    """
+    found = []
+    for name, _ in bad:
+        path = folder / name
+        if ";" not in name and name == name.strip() and (path.is_dir() or (path.is_file() and not _is_text(path))):
+            found.append(LogFile(path, name, ()))
+    return tuple(found)
+
+
+def _is_text(path: Path) -> bool:
+    if path.suffix.lower() not in (".csv", ".tsv"):
+        return False
+    try:
+        with path.open("rb") as file:
+            head = file.readline(4096)
+    except OSError:
+        return False
+    return bool(head.strip()) and not any(sign in head for sign in b",;\t")

@@ -194,8 +194,8 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
     >>> aq.read("drive.mf4", map=contents.map)
     """
     from aqualog.align.load import read_options
-    from aqualog.align.overview import find_mounting, overview, rotated_channels
-    from aqualog.align.propose import propose_map
+    from aqualog.align.overview import find_mounting
+    from aqualog.align.propose import look_at
     from aqualog.io.open_log import DriveLog
 
     one, hear = drive_of(drive), listener(progress)
@@ -204,10 +204,7 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
         channels, lost = log.read_readable()
         formats, faults = log.formats, log.faults
         hear("looking at the channels")
-        origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
-        found = [overview(c, origin_ns=origin) for c in channels]
-        rotated = rotated_channels(found)
-        proposals = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
+        found, proposals = look_at(channels)
     remarks = [*lost, *((p.name, n) for p, f in zip(one.paths, faults, strict=True) for n in f.notes)]
     changes = one.changes()
     notes = [*(n if n.startswith(f"{name}: ") else f"{name}: {n}" for name, n in remarks), *find_mounting(found)]

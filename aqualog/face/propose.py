@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.campaign.propose_drives import Drive, Found, LogFile
+    from aqualog.align.propose_map import LogFile, MapProposal
+    from aqualog.campaign.propose_drives import Drive, Found
     from aqualog.campaign.propose_names import NameTable
-    from aqualog.campaign.propose_signals import MapProposal
 
 __all__ = ["Proposal", "propose"]
 
@@ -133,11 +133,19 @@ def propose(
         del targets["vehicle.toml"]
     refuse_existing([target, *targets.values()], force=force, sources=[*databases, *([car] if car else [])])
 
-    from aqualog.campaign.propose_drives import Drive, drive_name, group_drives, is_run_table, kinds_of, scan
+    from aqualog.align.propose_map import measures_wheels, propose_signals
+    from aqualog.campaign.propose_drives import (
+        Drive,
+        broken_logs,
+        drive_name,
+        group_drives,
+        is_run_table,
+        kinds_of,
+        scan,
+        without_twins,
+    )
     from aqualog.campaign.propose_files import labels_of, relative
-    from aqualog.campaign.propose_left import broken_logs, without_twins
     from aqualog.campaign.propose_names import read_names
-    from aqualog.campaign.propose_signals import measures_wheels, propose_signals
     from aqualog.io.base import ReadOptions
 
     way = relative(place, target.parent)
@@ -158,7 +166,7 @@ def propose(
     hear("grouping files into drives")
     wheels = [measures_wheels(logs[kinds.index(k)], options) if count > 1 else True for k in range(count)]
     drives, notes = group_drives(logs, kinds, lambda a, b: wheels[a] and wheels[b])
-    signals = propose_signals(drives, options, hear)
+    signals = propose_signals([d.files for d in drives], options, hear)
     broken = broken_logs(place, found.bad)
     notes = (*twins, *notes, *_broken_notes(found, broken))
     # a broken log is a run that failed: with its row every batch says so

@@ -1,8 +1,7 @@
-"""One signal map for all drives of a folder.
+"""Propose one signal map for several drives, or for one.
 
-A map is proposed for one or two drives of each set of loggers and channels, and the proposals are joined: channels that
-bear other names in other drives become a list in order of preference. Differences that one map cannot express are
-reported.
+One or two drives of each set of loggers and channels are looked at, and the proposals are joined: channels that bear
+other names in other drives become a list in order of preference. What one map cannot express is reported.
 """
 
 from __future__ import annotations
@@ -10,21 +9,38 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from aqualog.align.mapping import Entry, SignalMap, matching
-from aqualog.align.overview import overview, rotated_channels
-from aqualog.align.propose import Proposal, propose_map, words_of
-from aqualog.campaign.propose_drives import Drive, LogFile
+from aqualog.align.propose import Proposal, look_at, words_of
 from aqualog.core.errors import AqualogError
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import Channel
+from aqualog.core.records import ChannelInfo
 from aqualog.core.units import is_unit
 from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
 
-__all__ = ["MapProposal", "measures_wheels", "propose_signals"]
+__all__ = ["LogFile", "MapProposal", "measures_wheels", "propose_signals"]
 
 MOST_MISSING = 0.1  # share of drives that may lack a signal that the map names: those drives cannot be used then
+
+
+@dataclass(frozen=True, slots=True)
+class LogFile:
+    """A readable log; `name` is what messages call it, such as its path below a folder, with /."""
+
+    path: Path
+    name: str
+    channels: tuple[ChannelInfo, ...]
+
+    @property
+    def signature(self) -> frozenset[tuple[str, str]]:
+        """Names and units of its channels."""
+        return frozenset((c.path, c.unit) for c in self.channels)
+
+
+_Files = Sequence[LogFile]  # of one drive
+_Kinds = Mapping[tuple[frozenset[tuple[str, str]], ...], Sequence[_Files]]  # drives by their sets of channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,69 +74,85 @@ def measures_wheels(log: LogFile, options: ReadOptions | None = None) -> bool:
 
 
 def propose_signals(
-    drives: Sequence[Drive], options: ReadOptions | None = None, report: Callable[[str], None] = lambda _: None
+    drives: Sequence[Sequence[LogFile]],
+    options: ReadOptions | None = None,
+    report: Callable[[str], None] = lambda _: None,
+    *,
+    most_missing: float = MOST_MISSING,
 ) -> MapProposal:
-    """The map, from the data of up to two drives of each set of channels."""
-    by_kind: dict[tuple[frozenset[tuple[str, str]], ...], list[Drive]] = {}
-    for drive in drives:
-        by_kind.setdefault(tuple(f.signature for f in drive.files), []).append(drive)
-    kinds = sorted(by_kind.values(), key=lambda d: -len(d))
+    """Propose the map, from the data of up to two drives of each set of channels.
+
+    Parameters
+    ----------
+    drives : sequence of sequences of LogFile
+        The files of each drive.
+    options : ReadOptions, optional
+    report : callable
+        Called with each step.
+    most_missing : float
+        Share of the drives that may lack a signal of the map.
+    """
+    kinds: dict[tuple[frozenset[tuple[str, str]], ...], list[_Files]] = {}
+    for files in drives:
+        kinds.setdefault(tuple(f.signature for f in files), []).append(files)
     notes: list[str] = []
-    proposed: list[tuple[dict[str, Proposal], list[Drive]]] = []
-    for number, members in enumerate(kinds[:12], 1):
+    proposed: list[dict[str, Proposal]] = []
+    by_size = sorted(kinds.values(), key=lambda members: -len(members))
+    for number, members in enumerate(by_size[:12], 1):
         report(f"looking for signals in {number} of {len(kinds)} sets of channels")
         best: dict[str, Proposal] = {}
-        for drive in (members[len(members) // 2], members[0])[: len(members)]:
+        for files in (members[len(members) // 2], members[0])[: len(members)]:
             try:
-                found, remarks = _proposals(drive.files, options)
+                found, remarks = _proposals(files, options)
             except AqualogError as error:
-                notes.append(f"{drive.files[0].name}: {error.what}")
+                notes.append(f"{files[0].name}: {error.what}")
                 continue
             notes += remarks
             if len(found) > len(best):
                 best = found
-        proposed.append((best, members))
+        proposed.append(best)
     if len(kinds) > 1:
-        notes.append(f"the drives have {len(kinds)} different sets of channels; {_sizes(kinds)}")
-    return _joined(proposed, drives, notes)
+        notes.append(f"the drives have {len(kinds)} different sets of channels; {_sizes(by_size)}")
+    return _joined(proposed, drives, kinds, most_missing, notes)
 
 
-def _sizes(kinds: Sequence[Sequence[Drive]]) -> str:
-    parts = [f"{len(k)} as {k[0].files[0].name}" for k in kinds[:5]]
+def _sizes(kinds: Sequence[Sequence[_Files]]) -> str:
+    parts = [f"{len(k)} as {k[0][0].name}" for k in kinds[:5]]
     return ", ".join(parts) + (f" and {len(kinds) - 5} sets more" if len(kinds) > 5 else "")
 
 
-def _proposals(files: Sequence[LogFile], options: ReadOptions | None) -> tuple[dict[str, Proposal], list[str]]:
-    """Proposed signals of one drive, and remarks on their channels."""
+def _proposals(files: _Files, options: ReadOptions | None) -> tuple[dict[str, Proposal], list[str]]:
+    """Return the proposed signals of one drive, and remarks on their channels."""
     with DriveLog([f.path for f in files], options) as log:
-        channels: list[Channel] = list(log.read(log.channels()).values())
-    origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
-    views = [overview(c, origin_ns=origin) for c in channels if c.t_ns.size]
-    rotated = rotated_channels(views)
-    found = propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated])
-    remarks = {(v.file, v.path): v.remark for v in views if v.remark}
+        channels = list(log.read(log.channels()).values())
+    found, proposals = look_at(channels)
+    remarks = {(v.file, v.path): v.remark for v in found if v.remark}
     odd = []
-    for proposal in found.values():
+    for proposal in proposals.values():
         hits = matching([c.info for c in channels], proposal.entry.channel[0])
         remark = remarks.get((hits[0].file, hits[0].path), "") if hits else ""
         if remark and "constant" not in remark:
             odd.append(f"{proposal.entry.channel[0]}: {remark}")
-    return found, odd
+    return proposals, odd
 
 
 def _joined(
-    proposed: Sequence[tuple[dict[str, Proposal], list[Drive]]], drives: Sequence[Drive], notes: list[str]
+    proposed: Sequence[dict[str, Proposal]],
+    drives: Sequence[_Files],
+    kinds: _Kinds,
+    most_missing: float,
+    notes: list[str],
 ) -> MapProposal:
     entries: dict[str, Entry] = {}
     remarks: dict[str, str] = {}
     left_out: dict[str, str] = {}
     found: list[str] = []
     absent: dict[str, list[str]] = {}
-    for symbol in dict.fromkeys(s for p, _ in proposed for s in p):
-        own = [(p[symbol], members) for p, members in proposed if symbol in p]
-        entry = _one_entry(symbol, [_by_name(symbol, p) for p, _ in own], notes)
-        lacking, doubled = _without(entry, drives)
-        is_rare = len(lacking) > MOST_MISSING * len(drives) and not symbol.startswith("omega_")
+    for symbol in dict.fromkeys(s for p in proposed for s in p):
+        own = [p[symbol] for p in proposed if symbol in p]
+        entry = _one_entry(symbol, [_by_name(symbol, p) for p in own], notes)
+        lacking, doubled = _without(entry, drives, kinds)
+        is_rare = len(lacking) > most_missing * len(drives) and not symbol.startswith("omega_")
         if is_rare and not _is_canonical(symbol, entry):
             left_out[symbol] = f"{_entry_words(entry)}: not in {_some(lacking)}"
             continue
@@ -132,7 +164,7 @@ def _joined(
         found.append(symbol)
         if not _is_canonical(symbol, entry):
             entries[symbol] = entry
-            remarks[symbol] = own[0][0].reason
+            remarks[symbol] = own[0].reason
     notes += [f"{', '.join(symbols)}: {told}" for told, symbols in absent.items()]
     missing = [f"omega_{w}" for w in WHEELS if f"omega_{w}" not in found]
     if missing:
@@ -141,7 +173,7 @@ def _joined(
         notes.append(
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
         )
-    unmapped = _unmapped(drives, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
+    unmapped = _unmapped(kinds, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
     speeds = [n for n in unmapped if "[" not in n and {"speed", "velocity"} & set(words_of(n)) and _is_road_speed(n)]
     if "v_x" not in found and "v_x" not in left_out:
         hint = (
@@ -158,16 +190,11 @@ def _is_road_speed(name: str) -> bool:
     return not _NO_ROAD_SPEED & set(words_of(name))
 
 
-def _unmapped(drives: Sequence[Drive], mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     """Channels of any drive that no name of the map means; by their path where the name alone would be doubtful."""
-    seen: dict[tuple[frozenset[tuple[str, str]], ...], None] = {}
     told: dict[str, None] = {}
-    for drive in drives:
-        key = tuple(f.signature for f in drive.files)
-        if key in seen:
-            continue
-        seen[key] = None
-        infos = [c for f in drive.files for c in f.channels]
+    for members in kinds.values():
+        infos = [c for f in members[0] for c in f.channels]
         used: set[tuple[str, str]] = set()
         for wanted in mapped:  # of several names the first that hits is the one that is read
             hits = next(filter(None, (matching(infos, name) for name in wanted)), [])
@@ -215,23 +242,18 @@ def _entry_words(entry: Entry) -> str:
     return f"{' or '.join(entry.channel)}{f' [{entry.unit}]' if entry.unit else ''}{scale}"
 
 
-def _without(entry: Entry, drives: Sequence[Drive]) -> tuple[list[Drive], list[Drive]]:
+def _without(entry: Entry, drives: Sequence[_Files], kinds: _Kinds) -> tuple[list[_Files], list[_Files]]:
     """Drives without any channel of an entry, and those in which its name is not unique."""
-    memory: dict[tuple[frozenset[tuple[str, str]], ...], int] = {}
-    lacking, doubled = [], []
-    for drive in drives:
-        key = tuple(f.signature for f in drive.files)
-        if key not in memory:
-            infos = [c for f in drive.files for c in f.channels]
-            memory[key] = len(next((m for name in entry.channel if (m := matching(infos, name))), []))
-        if not memory[key]:
-            lacking.append(drive)
-        elif memory[key] > 1:
-            doubled.append(drive)
-    return lacking, doubled
+    hits = {}
+    for kind, members in kinds.items():
+        infos = [c for f in members[0] for c in f.channels]
+        hits[kind] = len(next((m for name in entry.channel if (m := matching(infos, name))), []))
+    counts = [hits[tuple(f.signature for f in files)] for files in drives]
+    lacking = [files for files, n in zip(drives, counts, strict=True) if n == 0]
+    return lacking, [files for files, n in zip(drives, counts, strict=True) if n > 1]
 
 
-def _some(drives: Sequence[Drive]) -> str:
-    names = [d.files[0].name for d in drives[:3]]
+def _some(drives: Sequence[_Files]) -> str:
+    names = [files[0].name for files in drives[:3]]
     more = f" and {len(drives) - 3} more" if len(drives) > 3 else ""
     return f"{len(drives)} drive{'' if len(drives) == 1 else 's'} ({', '.join(names)}{more})"
