@@ -45,7 +45,11 @@ def tags(elements):
     return {(t, frozenset(a)) for t, a in elements.found}
 
 
-@pytest.mark.parametrize("page", PAGES)
+# that of the reproduction is long; the figures of it are a page of their own
+_SLOW = {"reproduction": pytest.mark.nightly}
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, marks=_SLOW.get(p, ())) for p in PAGES])
 def test_a_name_is_text(page, tmp_path):
     plain = made(page, "plain name", tmp_path)
     known = tags(Elements(plain))
