@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from aqualog.calibrate.records import Calibration as Found
     from aqualog.core.records import Signals
+    from aqualog.report.sections import Report
 
 __all__ = ["Calibration", "calibrate"]
 
@@ -84,10 +85,14 @@ class Calibration(Result):
 
     def text(self) -> str:
         """Return parameters, drives and polynomials, and what could not be estimated."""
-        from aqualog.report.calibration import calibration_report
         from aqualog.report.text import report_text
 
-        return report_text(calibration_report(self.found))
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.calibration import calibration_report
+
+        return calibration_report(self.found, self.file_notes)
 
     def headline(self) -> str:
         """Return the estimated parameters of the car, and the names of those that the drives do not determine."""
@@ -119,16 +124,13 @@ class Calibration(Result):
     def files(self) -> Writers:
         """Return `calibration.json`, `calibrated.toml` and `calibration.html`."""
         from aqualog.config.vehicle import calibrated_toml
-        from aqualog.report.calibration import calibration_report
         from aqualog.report.page import report_page
 
         title = f"{self.found.vehicle_name}, {len(self.drives)} drives"
         return {
             "calibration.json": text_file(lambda: self.to_json() + "\n"),
             "calibrated.toml": text_file(lambda: calibrated_toml(self.before, self.found)),
-            "calibration.html": page_file(
-                lambda: report_page(calibration_report(self.found, self.file_notes), title=title)
-            ),
+            "calibration.html": page_file(lambda: report_page(self._report(), title=title)),
         }
 
     def write_vehicle(self, path: PathLike, *, force: bool = False) -> Path:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from aqualog.core.records import Signals
     from aqualog.diagnose.records import Diagnosis as Found
     from aqualog.model.term import Model
+    from aqualog.report.sections import Report
 
 __all__ = ["Diagnosis", "check_apart", "diagnose"]
 
@@ -113,10 +114,14 @@ class Diagnosis(Result):
 
     def text(self) -> str:
         """Return the verdict and its basis."""
-        from aqualog.report.diagnosis.sections import diagnosis_report
         from aqualog.report.text import report_text
 
-        return report_text(diagnosis_report(self.document))
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.diagnosis.sections import diagnosis_report
+
+        return diagnosis_report(self.document)
 
     def headline(self) -> str:
         """Return the verdict, the causes with their intervals, and the next drive if one is proposed."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from aqualog.evaluate.drives import LogSource
     from aqualog.evaluate.run import Evaluation
     from aqualog.face.evaluate_inputs import Inputs
+    from aqualog.report.sections import Report
 
 __all__ = ["Comparison", "evaluate"]
 
@@ -73,10 +74,14 @@ class Comparison(Result):
 
     def text(self) -> str:
         """Return the tables that the command prints."""
-        from aqualog.report.evaluation import evaluation_report
         from aqualog.report.text import report_text
 
-        return report_text(evaluation_report(self.evaluation, by=self.keys))
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.evaluation import evaluation_report
+
+        return evaluation_report(self.evaluation, by=self.keys)
 
     def headline(self) -> str:
         """Return the answer in one sentence."""
@@ -126,10 +131,9 @@ class Comparison(Result):
         return Path(path)
 
     def _page(self) -> str:
-        from aqualog.report.evaluation import evaluation_report
         from aqualog.report.page import report_page
 
-        return report_page(evaluation_report(self.evaluation, by=self.keys), title=self.name)
+        return report_page(self._report(), title=self.name)
 
     def _thresholds(self) -> str:
         from aqualog.config.thresholds import joint_text, thresholds_text

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.report.sections import Report
+
 __all__ = ["PathLike", "Result", "Writers", "page_file", "printable", "text_file"]
 
 PathLike = str | Path
@@ -105,9 +107,18 @@ class Result(ABC):
         return "\n".join(printable(line) for line in shown)
 
     def _repr_html_(self) -> str:
+        report = self._report()
+        if report is not None:
+            from aqualog.report.page import report_fragment
+
+            return f"<pre>{escape(repr(self))}</pre>{report_fragment(report)}"
         table = next(iter(self.tables.values()), None)
         html = "" if table is None or table.is_empty() else table._repr_html_()
         return f"<pre>{escape(repr(self))}</pre>{html}"
+
+    def _report(self) -> Report | None:
+        """The sections that text and page show, where this kind of result has any."""
+        return None
 
 
 def text_file(text: Callable[[], str]) -> Callable[[Path], None]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from aqualog.detect.slip_slope.direct_records import DirectResult, Recursion
     from aqualog.detect.slip_slope.regression import Line
+    from aqualog.report.sections import Report
 
 __all__ = ["SLIP_SLOPE_FILES", "SlipSlope", "slip_slope"]
 
@@ -89,10 +90,14 @@ class SlipSlope(Result):
 
     def text(self) -> str:
         """Return slopes, stability, and which part of the drive was used."""
-        from aqualog.report.slope import slope_report
         from aqualog.report.text import report_text
 
-        return report_text(slope_report(self.slopes))
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.slope import slope_report
+
+        return slope_report(self.slopes, self.file_notes)
 
     def headline(self) -> str:
         """Return a line for each place: slope, 95 % interval, stability."""
@@ -117,14 +122,12 @@ class SlipSlope(Result):
     def files(self) -> Writers:
         """Return `slip_slope.json`, `slip_slope.csv` and `slip_slope.html`."""
         from aqualog.report.page import report_page
-        from aqualog.report.slope import slope_csv, slope_report
+        from aqualog.report.slope import slope_csv
 
         return {
             "slip_slope.json": text_file(lambda: self.to_json() + "\n"),
             "slip_slope.csv": text_file(lambda: slope_csv(self.slopes)),
-            "slip_slope.html": page_file(
-                lambda: report_page(slope_report(self.slopes, self.file_notes), title=self.drive.title)
-            ),
+            "slip_slope.html": page_file(lambda: report_page(self._report(), title=self.drive.title)),
         }
 
 

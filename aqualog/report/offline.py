@@ -18,7 +18,7 @@ from aqualog import __version__
 from aqualog.core.units import displayed_text
 from aqualog.report.wording import readable
 
-__all__ = ["content_policy", "plotly_js", "render", "write_page"]
+__all__ = ["content_policy", "fragment", "plotly_js", "render", "write_page"]
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Stands for plotly.js while a template is filled, so that megabytes need not go through it; nothing that is escaped can
@@ -69,6 +69,11 @@ def render(
     )  # fmt: skip
     before, found, after = page.partition(_PLOTLY_HERE)
     return f"{before}{plotly_js()}{after}" if found else page
+
+
+def fragment(template: str, **values: Any) -> str:
+    """A part of a page without style and scripts; texts are escaped."""
+    return _environment(TEMPLATES).get_template(template).render(**values)
 
 
 def write_page(path: Path, page: str) -> None:

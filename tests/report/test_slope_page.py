@@ -10,7 +10,7 @@ from straight_drive import AWD, RWD, drive
 
 from aqualog.detect.slip_slope.direct import slip_slopes
 from aqualog.report.offline import write_page
-from aqualog.report.page import report_page
+from aqualog.report.page import report_fragment, report_page
 from aqualog.report.slope import slope_report
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
@@ -87,3 +87,11 @@ def test_browser_draws_it_without_requests(browser, found, tmp_path):
     assert browser.execute_script("return document.querySelectorAll('#scatter-0 .scatterlayer .point').length") > 1000
     assert requests(browser) == []
     assert severe(browser) == []
+
+
+def test_a_notebook_shows_the_sections_without_figures(found):
+    html = report_fragment(slope_report(replace(found, vehicle_name=HOSTILE), (HOSTILE,)))
+    assert "<h2>Over the session</h2>" in html
+    assert f"{found.places[0].line.slope:.1f}" in html
+    assert html.count("<table") == 2
+    assert not re.search('<(script|style|img|html)|class="panel', html)
