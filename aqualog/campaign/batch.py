@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,59 +13,28 @@ from polars.exceptions import PanicException
 
 from aqualog.align.load import load_drive
 from aqualog.align.mapping import SignalMap
-from aqualog.campaign.key import Contents, Seen, change_since, result_key
-from aqualog.campaign.loaded import loaded
+from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
 from aqualog.campaign.measure import Measurement, measure, measure_long
 from aqualog.campaign.place import Address
-from aqualog.campaign.records import Campaign, Run
+from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
 from aqualog.campaign.tables import write_tables
 from aqualog.core.errors import AqualogError, ConfigError, FitError, LogError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
-from aqualog.evaluate.labels import Label
 from aqualog.guard.limits import VARIABLES, limits_from, size_of
 from aqualog.guard.pool import WorkOn, work_on
 from aqualog.guard.worker import NO_LIMITS, Crashed, Limits
+from aqualog.io.content import Contents, Seen, change_since
 
-__all__ = [
-    "BatchOutcome", "Compared", "Configured", "Fault", "Job", "compared", "measure_one", "name_of",
-    "plan_jobs", "run_batch",
-]  # fmt: skip
+__all__ = ["BatchOutcome", "Compared", "Fault", "compared", "measure_one", "run_batch"]
 
 Report = Callable[[int, int, int], None]
 """Called with the numbers of finished logs, of all logs and of failed logs."""
 
 CRASHED = "its process ended without a message: out of memory, or a fault of a reading library"
 _HERE = 4  # for so few logs no processes are started
-
-
-@dataclass(frozen=True, slots=True)
-class Configured:
-    """A campaign with the content of its files: vehicles and labels by path, signal map, databases, settings."""
-
-    campaign: Campaign
-    vehicles: Mapping[Path, Vehicle]
-    labels: Mapping[Path, tuple[Label, ...]] = field(default_factory=dict)
-    signal_map: SignalMap = field(default_factory=SignalMap)
-    dbc: tuple[Path, ...] = ()
-    settings: Settings = field(default_factory=Settings)
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """A log with the car that drove it, and the runs (by index) that it serves. `reason` if it cannot be worked on.
-
-    `seen` is the state of its files and databases, whose content `key` identifies.
-    """
-
-    key: str
-    logs: tuple[Path, ...]
-    vehicle: Vehicle
-    runs: tuple[int, ...]
-    reason: str = ""
-    seen: Seen = ()
 
 
 class Fault(NamedTuple):
@@ -92,39 +61,6 @@ class BatchOutcome:
     def done(self) -> int:
         """Logs that have results."""
         return self.made + self.kept
-
-
-def plan_jobs(configured: Configured, contents: Contents) -> list[Job]:
-    """Jobs of a campaign: runs on the same logs with the same car and load share one."""
-    runs = configured.campaign.runs
-    found: dict[tuple[tuple[Path, ...], str], list[int]] = {}
-    cars: dict[tuple[tuple[Path, ...], str], Vehicle | str] = {}
-    for index, run in enumerate(runs):
-        car = _car(configured, run)
-        at = (run.logs, car if isinstance(car, str) else repr(car))
-        found.setdefault(at, []).append(index)
-        cars[at] = car
-    return [_job(configured, contents, logs, cars[logs, said], indices) for (logs, said), indices in found.items()]
-
-
-def _car(configured: Configured, run: Run) -> Vehicle | str:
-    try:
-        return loaded(configured.vehicles[run.vehicle], run)
-    except AqualogError as error:
-        return error.line()
-
-
-def _job(
-    configured: Configured, contents: Contents, logs: tuple[Path, ...], car: Vehicle | str, indices: Sequence[int]
-) -> Job:
-    if isinstance(car, str):
-        return Job("", logs, Vehicle(), tuple(indices), car)
-    try:
-        key = result_key(contents, logs, car, configured.signal_map, configured.dbc, configured.settings)
-    except OSError as error:
-        what = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror or str(error)
-        return Job("", logs, car, tuple(indices), f"{error.filename or logs[0]}: {what}")
-    return Job(key, logs, car, tuple(indices), seen=contents.seen((*logs, *configured.dbc)))
 
 
 class Compared(NamedTuple):
@@ -221,7 +157,7 @@ def run_batch(
         except BaseException:
             if not store.part:
                 with suppress(AqualogError):  # the user should see the reason that ended the batch
-                    write_tables(configured, store, todo)
+                    write_tables(load_results(configured, store, todo, damaged_fail=True))
             raise
         if lost := tally.made - len(store.keys()[0] & plan.new.keys()):
             raise AqualogError(
@@ -229,7 +165,7 @@ def run_batch(
                 hint="its mounts; the same command goes on with the rest",
             )  # fmt: skip
         if is_held and not store.part:
-            write_tables(configured, store, todo)
+            write_tables(load_results(configured, store, todo, damaged_fail=True))
     return BatchOutcome(tally.made, plan.kept, tally.failed)
 
 
@@ -396,9 +332,3 @@ def _measured(
         return measure(loaded_drive, vehicle, settings=settings)
     with loaded_drive.opened:
         return measure_long(loaded_drive.drive, vehicle, settings=settings, faults=loaded_drive.faults)
-
-
-def name_of(campaign: Campaign, logs: Sequence[Path]) -> str:
-    """Name of a drive as in the campaign file."""
-    base = campaign.path.parent
-    return "; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aqualog import __version__
-from aqualog.campaign.key import code_stamp
-from aqualog.campaign.place import is_url, place_of
+from aqualog.campaign.jobs import code_stamp
+from aqualog.campaign.place import is_url
+from aqualog.campaign.store import place_of
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.io.whole import write_text
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from aqualog.campaign.loaded import loads_of
+from aqualog.campaign.records import loads_of
 from aqualog.campaign.samples import RunInfo
 from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import FloatArray

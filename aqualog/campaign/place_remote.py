@@ -8,13 +8,13 @@ import re
 import struct
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from aqualog.campaign.place import is_orphan, temporary_name
+from aqualog.campaign.place import Place, is_orphan, temporary_name
 from aqualog.core.errors import AqualogError, ConfigError
 
 __all__ = ["Remote"]
@@ -30,7 +30,7 @@ _OLD = timedelta(days=1)  # age of a half-written file that nobody can still be 
 _MAGIC = b"PAR1"
 
 
-class Remote:
+class Remote(Place):
     """A `Place` behind a URL. Options, as an endpoint or keys, come from the environment and fsspec's own files.
 
     There are no locks: parallel writers write the same complete bytes under the same names.
@@ -46,6 +46,8 @@ class Remote:
     AqualogError
         If it cannot be reached.
     """
+
+    address: str
 
     def __init__(self, url: str) -> None:
         self.address = url
@@ -63,18 +65,7 @@ class Remote:
         self._copies: dict[str, Path] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def at(self, name: str) -> str:
-        """Address of a file for messages."""
-        return f"{self.name.rstrip('/')}/{name}"
-
     def check(self, folders: Iterable[str], files: Iterable[str]) -> bool:
-        """Whether it is there.
-
-        Raises
-        ------
-        ConfigError
-            If it is a file.
-        """
         with self._told(""):
             self._fs.invalidate_cache()
             try:
@@ -92,12 +83,7 @@ class Remote:
                 for name in ("", *folders):
                     self._fs.makedirs(self._path(name), exist_ok=True)
 
-    def held(self, lock: str, *, together: bool = False) -> AbstractContextManager[None]:
-        """No lock to hold."""
-        return nullcontext()
-
     def names(self, folder: str = "") -> set[str]:
-        """Names in a folder."""
         with self._told(folder):
             self._fs.invalidate_cache()
             try:
@@ -109,7 +95,6 @@ class Remote:
         return {p.rsplit("/", 1)[-1] for p in paths if p != self._path(folder).strip("/")}
 
     def has(self, name: str) -> bool:
-        """Whether there is such a file."""
         with self._told(name):
             self._fs.invalidate_cache()
             try:
@@ -118,12 +103,10 @@ class Remote:
                 return False
 
     def read(self, name: str) -> bytes:
-        """A file's content."""
         with self._told(name):
             return bytes(self._fs.cat_file(self._path(name)))
 
     def write(self, name: str, data: bytes | memoryview) -> None:
-        """Write a complete file."""
         self._footers.pop(name, None)
         with self._told(name):
             if self._is_objects:
@@ -139,7 +122,6 @@ class Remote:
                 raise
 
     def remove(self, name: str) -> None:
-        """Remove a file."""
         self._footers.pop(name, None)
         try:
             with self._told(name):
@@ -208,10 +190,6 @@ class Remote:
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
-
-    def holds(self, path: Path) -> bool:
-        """No path of this machine is inside it."""
-        return False
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{name}" if name else self._root

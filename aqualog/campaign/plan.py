@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from aqualog.campaign.batch import Configured, Job, compared, plan_jobs
-from aqualog.campaign.shard import number_of
+from aqualog.campaign.batch import compared
+from aqualog.campaign.batch_cost import BatchCost, LogCost
+from aqualog.campaign.jobs import Configured, Job, plan_jobs
+from aqualog.campaign.records import number_of
 from aqualog.campaign.store import Store
-from aqualog.campaign.trial import Trial, Tried
 from aqualog.core.errors import LogError
 from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
@@ -132,7 +133,7 @@ def _spread(n: int, k: int) -> list[int]:
     return [n - 1] if k == 1 else sorted({round(x) for x in np.linspace(0, n - 1, k)})
 
 
-def foretell(work: Work, trial: Trial, *, processes: int, cores: int, lead_s: float, lead_cpu_s: float) -> Plan:
+def foretell(work: Work, trial: BatchCost, *, processes: int, cores: int, lead_s: float, lead_cpu_s: float) -> Plan:
     """Cost of the whole from that of the sample.
 
     Computing time is a constant plus a part that grows with size, per format where there are enough logs of it.
@@ -144,7 +145,7 @@ def foretell(work: Work, trial: Trial, *, processes: int, cores: int, lead_s: fl
     ----------
     work : Work
         At least one log of a known format.
-    trial : Trial
+    trial : BatchCost
         At least one log with a result.
     processes : int
         Requested number; no more work in parallel than there are cores.
@@ -209,7 +210,7 @@ def makespan(seconds: FloatArray, processes: int) -> float:
 
 
 def _over_all(
-    good: Sequence[Tried], cost: Callable[[Tried], float], forms: Sequence[str], sizes: FloatArray
+    good: Sequence[LogCost], cost: Callable[[LogCost], float], forms: Sequence[str], sizes: FloatArray
 ) -> tuple[FloatArray, float]:
     """Cost of every log, and the relative scatter of the sample about its line."""
     x = np.array([t.size for t in good], dtype=np.float64)
@@ -254,7 +255,7 @@ def _shape(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     return float(np.sum(one) / np.sum(one**2)), 0.0
 
 
-def _stretch(good: Sequence[Tried]) -> tuple[float, float]:
+def _stretch(good: Sequence[LogCost]) -> tuple[float, float]:
     """Wall-clock over computing time of the sample, and half its interval relative to it."""
     wall, cpu = np.array([t.wall_s for t in good]), np.array([t.cpu_s for t in good])
     ratio = float(wall.sum() / max(cpu.sum(), 1e-6))
@@ -277,7 +278,7 @@ def _interval(value: float, half: float, around: float) -> Estimate:
     return Estimate(value + around, value / (1.0 + half) + around, value * (1.0 + half) + around)
 
 
-def _notes(work: Work, trial: Trial, logs_s: float, start_s: float) -> tuple[str, ...]:
+def _notes(work: Work, trial: BatchCost, logs_s: float, start_s: float) -> tuple[str, ...]:
     notes = []
     failed = [t for t in trial.tried if t.reason]
     if failed:

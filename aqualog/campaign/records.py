@@ -1,14 +1,24 @@
-"""A measuring campaign: which logs were driven in which configuration."""
+"""A measuring campaign: which logs were driven in which configuration, with which load; parts of it for machines."""
 
 from __future__ import annotations
 
+import difflib
+import re
+import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
+from aqualog.physics.load import centre_shift
 
-__all__ = ["GROUP_NAMES", "Campaign", "Run", "group_keys"]
+__all__ = [
+    "GROUP_NAMES", "Campaign", "Run", "Shard", "group_keys", "loads_of", "number_of", "part_of", "shard_of",
+    "with_load",
+]  # fmt: skip
+
+_MOST_PARTS = 100_000
 
 GROUP_NAMES: dict[str, tuple[str, ...]] = {
     "depth": ("water_depth_mm",),
@@ -68,8 +78,6 @@ def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     ConfigError
         Names all unknown keys, with the most similar existing ones.
     """
-    import difflib
-
     found: list[str] = []
     wrong: list[str] = []
     for name in names:
@@ -81,3 +89,75 @@ def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     if wrong:
         raise ConfigError(f"by {', '.join(wrong)}: no run has this key", expected=", ".join(known) or "a campaign")
     return tuple(dict.fromkeys(found))
+
+
+def loads_of(run: Run) -> tuple[float, float]:
+    """Load over the front and over the rear axle of a run; 0 where none is given. [kg]"""
+    front, rear = (run.values.get(f"load_{axle}_kg", 0.0) for axle in ("front", "rear"))
+    return float(front), float(rear)
+
+
+def with_load(vehicle: Vehicle, run: Run) -> Vehicle:
+    """The vehicle with the run's load over its axles; the height of its centre of mass stays.
+
+    Raises
+    ------
+    ConfigError
+        If less than 30 % of the car's mass would remain, or no load on one axle.
+    """
+    for delta, x in zip(loads_of(run), (0.0, vehicle.wheelbase), strict=True):
+        if delta == 0.0:
+            continue
+        mass = vehicle.mass + delta
+        moved = centre_shift(vehicle.mass, vehicle.l_f, delta, x) if mass > 0.3 * vehicle.mass else float("nan")
+        if not (vehicle.l_f + moved > 0.05 and vehicle.l_r - moved > 0.05):
+            raise ConfigError(
+                f"a load of {delta:g} kg on a car of {vehicle.mass:g} kg", where=", ".join(map(str, run.logs)),
+                expected="load_front_kg and load_rear_kg that leave load on both axles",
+            )  # fmt: skip
+        vehicle = replace(vehicle, mass=mass, l_f=vehicle.l_f + moved, l_r=vehicle.l_r - moved)
+    return vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """The `index`-th of `count` parts, counted from 1."""
+
+    index: int
+    count: int
+
+    @property
+    def name(self) -> str:
+        """As a part of a file's name."""
+        return f"{self.index}-of-{self.count}"
+
+
+def shard_of(text: str) -> Shard:
+    """The shard of a text such as `2/8`.
+
+    Raises
+    ------
+    ConfigError
+    """
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+    shard = Shard(int(match[1]), int(match[2])) if match else Shard(0, 0)
+    if not 1 <= shard.index <= shard.count <= _MOST_PARTS:
+        raise ConfigError(f"shard {text}", expected="I/N with I from 1 to N", hint="2/8 is the second of eight parts")
+    return shard
+
+
+def part_of(campaign: Campaign, shard: Shard) -> Campaign:
+    """The campaign with the runs of one shard.
+
+    The names of its logs assign a run to a shard. So no log must be read, runs on the same logs stay together, and new
+    logs do not move others.
+    """
+    own = (r for r in campaign.runs if number_of(campaign, r.logs) % shard.count == shard.index - 1)
+    return replace(campaign, runs=tuple(own))
+
+
+def number_of(campaign: Campaign, logs: Sequence[Path]) -> int:
+    """A number of a drive by the names of its logs, whose remainder gives its shard."""
+    base = campaign.path.parent
+    names = [p.relative_to(base) if p.is_relative_to(base) else p for p in logs]
+    return zlib.crc32("\n".join(p.as_posix() for p in names).encode())

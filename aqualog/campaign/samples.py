@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from aqualog.campaign.batch import Configured, Job, name_of, plan_jobs
-from aqualog.campaign.key import Contents
+from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
 from aqualog.campaign.records import Run
 from aqualog.campaign.store import Store
+from aqualog.core.errors import AqualogError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import AQUAPLANING, Label, Span
+from aqualog.io.content import Contents
 
 __all__ = ["SETTLING_S", "CampaignData", "RunInfo", "RunSamples", "load_results"]
 
@@ -135,8 +136,16 @@ class CampaignData:
         return None if info.run.labels is None else self.configured.labels[info.run.labels]
 
 
-def load_results(configured: Configured, store: Store, jobs: Sequence[Job] | None = None) -> CampaignData:
-    """The store's results of a campaign; runs without results are included, with the reason."""
+def load_results(
+    configured: Configured, store: Store, jobs: Sequence[Job] | None = None, *, damaged_fail: bool = False
+) -> CampaignData:
+    """The store's results of a campaign; runs without results are included, with the reason.
+
+    Raises
+    ------
+    AqualogError
+        If a result is damaged; with `damaged_fail` its run has failed.
+    """
     jobs = plan_jobs(configured, Contents(store.read_json("contents.json"))) if jobs is None else jobs
     done, failed = store.keys()
     store.look_at(done & {j.key for j in jobs})
@@ -150,7 +159,12 @@ def load_results(configured: Configured, store: Store, jobs: Sequence[Job] | Non
         if job.reason:
             state = "failed"
         elif job.key in done:
-            state, about = "done", store.about(job.key)
+            try:
+                state, about = "done", store.about(job.key)
+            except AqualogError as error:
+                if not damaged_fail:
+                    raise
+                state, reason = "failed", error.line()
         elif job.key in failed:
             state, reason = "failed", store.failure(job.key)
         name = name_of(configured.campaign, run.logs)

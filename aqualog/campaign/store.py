@@ -23,11 +23,11 @@ from typing import Any
 import polars as pl
 
 from aqualog.campaign.measure import Measurement
-from aqualog.campaign.place import Address, Place, is_orphan, place_of
+from aqualog.campaign.place import Address, Folder, Place, address_of, is_orphan
 from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.core.notation import WHEELS
 
-__all__ = ["MARK", "Store"]
+__all__ = ["MARK", "Store", "place_of"]
 
 MARK = "aqualog_store.json"
 _METADATA_KEY = "aqualog"
@@ -48,6 +48,24 @@ _PARTS: Mapping[str, type] = {
     "v_max": object, "slip_against": str, "traction": str, "signals": list, "events": list, "unavailable": dict,
     "limited": dict, "quality": dict, "notes": list,
 }  # fmt: skip
+
+
+def place_of(address: Address) -> Place:
+    """The place behind an address.
+
+    Raises
+    ------
+    ConfigError
+        If a package for it is missing, or fsspec does not know it.
+    AqualogError
+        If it cannot be reached.
+    """
+    address = address_of(address)
+    if isinstance(address, Path):
+        return Folder(address)
+    from aqualog.campaign.place_remote import Remote
+
+    return Remote(address)
 
 
 class Store:

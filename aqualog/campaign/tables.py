@@ -1,22 +1,24 @@
-"""Tables of a store that open by themselves in polars or DuckDB: runs, events; and the manifest."""
+"""Tables of a store that open by themselves in polars or DuckDB, runs and events; the manifest; and what they hold."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import polars as pl
 
 from aqualog import __version__
-from aqualog.campaign.key import code_stamp
-from aqualog.campaign.store import Store
-from aqualog.core.errors import AqualogError
+from aqualog.campaign.jobs import code_stamp, name_of
+from aqualog.campaign.records import Campaign
+from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
 
-if TYPE_CHECKING:
-    from aqualog.campaign.batch import Configured, Job
-
-__all__ = ["NUMBERS", "TEXTS", "write_tables"]
+__all__ = [
+    "NUMBERS", "TEXTS", "StoredRun", "events_table", "lane_faults", "runs_table", "stored_runs", "write_tables",
+]  # fmt: skip
 
 TEXTS = ("tyre", "wear", "manoeuvre")
 NUMBERS = (
@@ -34,47 +36,34 @@ _EVENT = {
 }  # fmt: skip
 
 
-def write_tables(configured: Configured, store: Store, jobs: Sequence[Job]) -> None:
-    """Write runs.parquet, events.parquet and manifest.json, a row per run of the campaign."""
-    done, failed = store.keys()
-    store.look_at(done & {j.key for j in jobs})
-    of_run = {index: job for job in jobs for index in job.runs}
-    runs, events, logs = [], [], []
-    for index, run in enumerate(configured.campaign.runs):
-        job = of_run[index]
-        about: Mapping[str, Any] = {}
-        state, reason = "to do", job.reason
-        if job.reason:
-            state = "failed"
-        elif job.key in done:
-            try:
-                about, state = store.about(job.key), "done"
-            except AqualogError as error:
-                state, reason = "failed", error.line()
-        elif job.key in failed:
-            state, reason = "failed", store.failure(job.key)
-        name = _name(configured, run.logs)
-        runs.append(_run_row(index, name, job, run.vehicle.stem, run.values, run.lane, state, reason, about))
-        events += [_event_row(index, name, job.key, e) for e in about.get("events", [])]
-        logs.append({"run": index, "log": name, "state": state, "reason": reason, "key": job.key,
-                     "truncated": about.get("quality", {}).get("truncated", False)})  # fmt: skip
-    extra = sorted({k for r in configured.campaign.runs for k in r.values if k.startswith("x_")})
-    store.write_table("runs.parquet", pl.DataFrame(runs, schema=_run_schema(extra), strict=False))
-    store.write_table("events.parquet", pl.DataFrame(events, schema=_EVENT, strict=False))
-    states = [x["state"] for x in logs]
+def write_tables(data: CampaignData) -> None:
+    """Write runs.parquet, events.parquet and manifest.json of a campaign into its store."""
+    store, infos = data.store, data.runs
+    store.write_table("runs.parquet", runs_table(infos))
+    store.write_table("events.parquet", events_table(infos))
+    states = [i.state for i in infos]
     store.write_json(
         "manifest.json",
         {
             "schema_version": 1, "tool_version": __version__, "code": code_stamp(),
-            "campaign": configured.campaign.name, "states": {s: states.count(s) for s in dict.fromkeys(states)},
-            "logs": logs,
+            "campaign": data.name, "states": {s: states.count(s) for s in dict.fromkeys(states)},
+            "logs": [
+                {"run": i.index, "log": i.name, "state": i.state, "reason": i.reason, "key": i.key,
+                 "truncated": i.about.get("quality", {}).get("truncated", False)} for i in infos
+            ],
         },
     )  # fmt: skip
 
 
-def _name(configured: Configured, logs: Sequence[Any]) -> str:
-    base = configured.campaign.path.parent
-    return "; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs)
+def runs_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
+    """A row for each run: state, configuration, range, events of each detector, quality. [s, m, km/h, Hz]"""
+    extra = sorted({k for i in infos for k in i.run.values if k.startswith("x_")})
+    return pl.DataFrame([_run_row(i) for i in infos], schema=_run_schema(extra), strict=False)
+
+
+def events_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
+    """A row for each event of each run. [s, m/s]"""
+    return pl.DataFrame([_event_row(i, e) for i in infos for e in i.events], schema=_EVENT, strict=False)
 
 
 def _run_schema(extra: Sequence[str]) -> dict[str, Any]:
@@ -88,22 +77,14 @@ def _run_schema(extra: Sequence[str]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _run_row(
-    index: int,
-    name: str,
-    job: Job,
-    vehicle: str,
-    values: Mapping[str, Any],
-    lane: tuple[float, float] | None,
-    state: str,
-    reason: str,
-    about: Mapping[str, Any],
-) -> dict[str, Any]:
+def _run_row(info: RunInfo) -> dict[str, Any]:
+    about = info.about
     row: dict[str, Any] = {
-        "run": index, "name": name, "key": job.key, "state": state, "reason": reason, "vehicle": vehicle, **values
+        "run": info.index, "name": info.name, "key": info.key, "state": info.state, "reason": info.reason,
+        "vehicle": info.run.vehicle.stem, **info.run.values,
     }  # fmt: skip
-    if lane is not None:
-        row |= {"lane_start_s": lane[0], "lane_end_s": lane[1]}
+    if info.run.lane is not None:
+        row |= dict(zip(("lane_start_s", "lane_end_s"), info.run.lane, strict=True))
     if not about:
         return row
     row |= {n: about[n] for n in ("start_ns", "duration_s", "distance_m", "sample_rate_hz", "slip_against", "traction")}
@@ -118,11 +99,58 @@ def _run_row(
     return row
 
 
-def _event_row(index: int, name: str, key: str, event: Mapping[str, Any]) -> dict[str, Any]:
+def _event_row(info: RunInfo, event: Mapping[str, Any]) -> dict[str, Any]:
     evidence = event["evidence"]
-    row = {n: event[n] for n in _EVENT if n in event}
     decided = evidence.get("decided_by")
-    return row | {
-        "run": index, "name": name, "key": key, "v_x": evidence.get("v_x"), "slip_min": evidence.get("slip_min"),
-        "decided_by": ", ".join(decided) if decided else None,
+    return {n: event[n] for n in _EVENT if n in event} | {
+        "run": info.index, "name": info.name, "key": info.key, "v_x": evidence.get("v_x"),
+        "slip_min": evidence.get("slip_min"), "decided_by": ", ".join(decided) if decided else None,
     }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRun:
+    """A run in the store: `speeds` are lowest and highest v_x [km/h], () if unknown; `duration_s` of its log."""
+
+    state: str
+    reason: str
+    speeds: tuple[float, ...]
+    duration_s: float | None
+
+
+def stored_runs(campaign: Campaign, folder: Path) -> dict[int, StoredRun]:
+    """Runs of the campaign that the store's table holds, by index; empty without such a table.
+
+    A run is found by its logs: the table may be older than the campaign file, and lanes do not change the content of a
+    log.
+
+    Raises
+    ------
+    ConfigError
+        If the table cannot be read.
+    """
+    path = folder / "runs.parquet"
+    if not path.is_file():
+        return {}
+    columns = ("name", "state", "reason", "v_min_kmh", "v_max_kmh", "duration_s")
+    try:
+        rows = pl.read_parquet(path, columns=list(columns)).rows()
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise ConfigError("is not a table of runs", where=str(path), hint="aqualog batch makes it again") from error
+    known = {}
+    for name, state, reason, low, high, duration in rows:
+        known[name] = StoredRun(state, reason or "", () if low is None or high is None else (low, high), duration)
+    names = [name_of(campaign, run.logs) for run in campaign.runs]
+    return {i: known[name] for i, name in enumerate(names) if name in known}
+
+
+def lane_faults(campaign: Campaign, stored: dict[int, StoredRun], places: Sequence[str]) -> list[str]:
+    """Runs whose lane ends after their log, as far as the store knows its length."""
+    return [
+        f"{places[i]}: lane_end_s = {run.lane[1]:g} is after the log's end at {m.duration_s:.1f} s"
+        for i, run in enumerate(campaign.runs)
+        if run.lane is not None
+        and (m := stored.get(i))
+        and m.duration_s is not None
+        and run.lane[1] > m.duration_s + 1.0
+    ]

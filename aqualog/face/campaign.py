@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.campaign.batch import BatchOutcome, Configured
+    from aqualog.campaign.batch import BatchOutcome
+    from aqualog.campaign.jobs import Configured
     from aqualog.campaign.place import Address
+    from aqualog.campaign.records import Shard
     from aqualog.campaign.samples import CampaignData
-    from aqualog.campaign.shard import Shard
     from aqualog.face.bins import BinnedResistance, BinnedSlopes
     from aqualog.face.matrix import Matrix
     from aqualog.face.plan import BatchPlan
@@ -242,7 +243,7 @@ class Campaign:
         ------
         ConfigError
         """
-        from aqualog.campaign.batch import name_of
+        from aqualog.campaign.jobs import name_of
         from aqualog.report.campaign.folder import check_folder, targets_of
 
         check_folder(folder, force=force)
@@ -328,7 +329,7 @@ class Campaign:
         AqualogError
             If the store cannot be written, or another batch writes there.
         """
-        from aqualog.campaign.shard import part_of, shard_of
+        from aqualog.campaign.records import part_of, shard_of
         from aqualog.guard.worker import Limits
 
         began = time.monotonic()
@@ -413,26 +414,17 @@ class CampaignRuns(Result):
 
     @property
     def runs(self) -> pl.DataFrame:
-        """A row for each run: state, configuration, quality, events of each detector."""
-        import polars as pl
+        """A row for each run, as `runs.parquet` of the store: state, configuration, range, events, quality."""
+        from aqualog.campaign.tables import runs_table
 
-        rows = [
-            {"run": r.index, "name": r.name, "state": r.state, "reason": r.reason or None, **r.run.values,
-             **{f"events_{d}": sum(e["detector"] == d for e in r.events) if r.is_done else None for d in _detectors()}}
-            for r in self.data.runs
-        ]  # fmt: skip
-        return pl.DataFrame(rows, infer_schema_length=None)
+        return runs_table(self.data.runs)
 
     @property
     def events(self) -> pl.DataFrame:
-        """A row for each event of each run."""
-        import polars as pl
+        """A row for each event of each run, as `events.parquet` of the store."""
+        from aqualog.campaign.tables import events_table
 
-        flat = ("detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold")
-        rows = [
-            {"run": r.index, "name": r.name, **{k: e.get(k) for k in flat}} for r in self.data.done for e in r.events
-        ]
-        return pl.DataFrame(rows, None if rows else ["run", "name", *flat], infer_schema_length=None)
+        return events_table(self.data.runs)
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
-from aqualog.campaign.loaded import loaded
-from aqualog.campaign.records import Run
+from aqualog.campaign.records import Run, with_load
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
@@ -97,7 +96,7 @@ def _source(
     return LogSource(
         name="; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs),
         paths=logs,
-        vehicle=loaded(vehicles[first.vehicle], first),
+        vehicle=with_load(vehicles[first.vehicle], first),
         signal_map=signal_map,
         dbc=tuple(dbc),
         labels=tuple(dict.fromkeys(x for labels in named for x in labels)) if named else None,

@@ -93,7 +93,7 @@ def matrix(path: PathLike) -> Matrix:
     """
     from aqualog.campaign.logs import log_states
     from aqualog.campaign.matrix import campaign_matrix, speeds_of
-    from aqualog.campaign.measured import lane_faults, measured_runs
+    from aqualog.campaign.tables import lane_faults, stored_runs
     from aqualog.config.campaign import read_campaign
     from aqualog.config.vehicle import load_vehicle
 
@@ -101,7 +101,7 @@ def matrix(path: PathLike) -> Matrix:
     read = read_campaign(file)
     campaign = read.campaign
     states = log_states(campaign, read.places)
-    measured = measured_runs(campaign, file.with_suffix(".store"))
+    measured = stored_runs(campaign, file.with_suffix(".store"))
     ranges = {i: m.speeds for i, m in measured.items() if m.speeds}
     found = campaign_matrix(campaign, lambda index, run: speeds_of(run) or ranges.get(index, ()))
     lanes = lane_faults(campaign, measured, read.places)

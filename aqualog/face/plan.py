@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.campaign.batch_cost import BatchCost
     from aqualog.campaign.place import Address
     from aqualog.campaign.plan import Estimate, Plan, Work
     from aqualog.campaign.store import Store
-    from aqualog.campaign.trial import Trial
     from aqualog.face.campaign import Campaign
 
 __all__ = ["BatchPlan", "plan"]
@@ -40,7 +40,7 @@ class BatchPlan(Result):
     campaign: Campaign
     work: Work
     store: Store
-    trial: Trial | None = None
+    trial: BatchCost | None = None
     estimate: Plan | None = None
     processes: int = 1
     within: str | None = None
@@ -123,9 +123,9 @@ def plan(
     began, began_cpu = time.monotonic(), time.process_time()
     seconds = _seconds(within) if within is not None else None
     hear = listener(progress)
+    from aqualog.campaign.batch_cost import measure_cost
     from aqualog.campaign.plan import choose, foretell, shards_within, work_of
     from aqualog.campaign.store import Store
-    from aqualog.campaign.trial import tried
     from aqualog.guard.pool import most_processes
 
     place = Store(campaign.store)
@@ -144,7 +144,7 @@ def plan(
         if work.new or not work.kept:
             raise FitError("no log can be measured", where=campaign.inputs[0], expected="logs that exist")
         return BatchPlan(campaign, work, place, within=within)
-    trial = tried(
+    trial = measure_cost(
         campaign.configured, chosen, processes=min(processes, cores, len(chosen)),
         reporter=lambda: Counted(hear, "logs"),
         told=lambda: hear.note("the detectors were compiled, once after an installation; the sample is measured again"),
@@ -175,10 +175,10 @@ def _left(work: Work) -> dict[str, Any]:
 
 
 def _document(
-    work: Work, trial: Trial, found: Plan, processes: int, store: Store, within_s: float | None,
+    work: Work, trial: BatchCost, found: Plan, processes: int, store: Store, within_s: float | None,
     parts: tuple[int, float] | None,
 ) -> dict[str, Any]:  # fmt: skip
-    from aqualog.campaign.trial import peak_memory
+    from aqualog.campaign.batch_cost import peak_memory
 
     worker = found.worker
     # one process beside the workers leads; without workers it is the one that works
@@ -243,7 +243,12 @@ def _free(store: Address) -> int | None:
 
 
 def _text(
-    work: Work, trial: Trial, found: Plan, document: dict[str, Any], within: str | None, parts: tuple[int, float] | None
+    work: Work,
+    trial: BatchCost,
+    found: Plan,
+    document: dict[str, Any],
+    within: str | None,
+    parts: tuple[int, float] | None,
 ) -> str:
     from aqualog.report.text import table
 

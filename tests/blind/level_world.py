@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from aqualog.campaign.batch import Configured
-from aqualog.campaign.loaded import loaded
-from aqualog.campaign.records import Campaign, Run
+from aqualog.campaign.jobs import Configured
+from aqualog.campaign.records import Campaign, Run, with_load
 from aqualog.campaign.samples import CampaignData, RunInfo
 from aqualog.core.vehicle import Vehicle
 
@@ -65,7 +64,7 @@ def campaign_of(rows, vehicles):
         frames[name] = samples
         about = {"duration_s": float(samples["t"][-1]), "slip_against": "v_x", "signals": []}
         water = "lane times" if lane else "dry run"
-        infos.append(RunInfo(i, name, run, name, "done", "", loaded(vehicles[path], run), about, water))
+        infos.append(RunInfo(i, name, run, name, "done", "", with_load(vehicles[path], run), about, water))
     configured = Configured(Campaign("blind", Path("blind.toml"), None, tuple(runs)), vehicles)
     return CampaignData(configured, Frames(frames), infos)
 

@@ -1,6 +1,8 @@
 """A small campaign on disk: short passes over a lane, with canonical names."""
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
@@ -17,6 +19,15 @@ def pass_of(kmh, seed, *, depth=1.3e-3, duration=4.0, tyre="worn_summer", lane=(
     )  # fmt: skip
 
 
+@cache
+def log_of(kmh, seed, suffix):
+    """Bytes of a log, simulated once in a session."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"log{suffix}"
+        write_simulation(path, simulate(pass_of(kmh, seed)), suffix=suffix, comment="made")
+        return path.read_bytes()
+
+
 def make_campaign(folder: Path, speeds=(70, 100), repeats=2, suffix=".parquet", extra=""):
     """Folder with car.toml, runs.csv, campaign.toml and logs; returns the campaign file."""
     (folder / "logs").mkdir(parents=True, exist_ok=True)
@@ -25,7 +36,7 @@ def make_campaign(folder: Path, speeds=(70, 100), repeats=2, suffix=".parquet", 
     for kmh in speeds:
         for k in range(repeats):
             name = f"v{kmh:03d}_{k}{suffix}"
-            write_simulation(folder / "logs" / name, simulate(pass_of(kmh, k)), suffix=suffix, comment="made")
+            (folder / "logs" / name).write_bytes(log_of(kmh, k, suffix))
             rows.append(f"logs/{name},worn_summer,1.3,1.9,1.9,1.2,3.2")
     (folder / "runs.csv").write_text("\n".join(rows) + "\n" + extra)
     (folder / "campaign.toml").write_text('name = "made"\nvehicle = "car.toml"\nruns = "runs.csv"\n')

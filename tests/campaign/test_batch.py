@@ -16,9 +16,8 @@ from typer.testing import CliRunner
 from aqualog.align.load import load_signals
 from aqualog.campaign import batch
 from aqualog.campaign.batch import CRASHED, run_batch
-from aqualog.campaign.loaded import loaded
 from aqualog.campaign.measure import measure
-from aqualog.campaign.records import Run
+from aqualog.campaign.records import Run, with_load
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
 from aqualog.cli.main import app
@@ -75,13 +74,13 @@ def test_dips_are_kept_although_samples_are_thinned(made):
 
 def test_the_load_of_a_run_is_on_its_car():
     run_ = Run((), None, None, None, {"load_front_kg": 100.0, "load_rear_kg": 200.0})
-    car = loaded(SEDAN, run_)
+    car = with_load(SEDAN, run_)
     moments = SEDAN.mass * SEDAN.l_f + 100.0 * 0.0 + 200.0 * SEDAN.wheelbase
     assert car.mass == SEDAN.mass + 300.0
     assert car.l_f == pytest.approx(moments / car.mass)
     assert car.wheelbase == pytest.approx(SEDAN.wheelbase)
     with pytest.raises(ConfigError, match="load"):
-        loaded(SEDAN, Run((), None, None, None, {"load_front_kg": -1600.0}))
+        with_load(SEDAN, Run((), None, None, None, {"load_front_kg": -1600.0}))
 
 
 def test_water_is_known_without_the_ends_of_the_lane(made):
@@ -256,7 +255,13 @@ def begun_and_ended(folder, number):
     return campaign, samples, code, error
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGKILL, id="killed"),
+        pytest.param(signal.SIGINT, id="interrupted", marks=pytest.mark.nightly),
+    ],
+)
 def test_ended_half_way_and_started_again(tmp_path, number):
     for attempt in "abc":  # on a busy machine the batch may be done before the signal is on its way
         (tmp_path / attempt).mkdir()

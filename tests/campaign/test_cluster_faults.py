@@ -79,7 +79,7 @@ def badly(kind, folder):
     return os.getpid()
 
 
-@pytest.mark.parametrize("kind", ["leaves", "hangs", "takes"])
+@pytest.mark.parametrize("kind", ["leaves", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("hangs", "takes"))])
 def test_an_item_that_ends_its_process_costs_itself_only(tmp_path, monkeypatch, kind):
     """Not the worker, which here is the process of the tests; and it is tried no more than twice."""
     monkeypatch.setenv("AQUALOG_LIMIT_MB", "1500")
@@ -148,7 +148,7 @@ def test_workers_that_have_what_is_asked(tmp_path):
     assert found == {i: 2 * i for i in range(9)}
 
 
-@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("late", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_logs_that_a_worker_does_not_see(campaign, tmp_path, monkeypatch, late):
     """A worker behind another mount, there from the start or joined later: the file that it looks for is not there."""
     log = campaign.parent / "logs" / "v080_0.parquet"
@@ -281,7 +281,7 @@ def test_what_answers_but_is_no_scheduler(campaign, tmp_path):
     assert time.monotonic() - began < 30.0
 
 
-@pytest.mark.parametrize("kind", ["tcp", "ws"])
+@pytest.mark.parametrize("kind", ["tcp", pytest.param("ws", marks=pytest.mark.nightly)])
 def test_what_talks_before_it_is_asked_is_no_scheduler(kind):
     # as a length, what this says is more memory than there is
     with socket.create_server(("127.0.0.1", 0)) as server:

@@ -12,7 +12,7 @@ from campaign.dask_here import cluster, free_port, with_children
 from campaign.made import make_campaign
 from typer.testing import CliRunner
 
-from aqualog.campaign.shard import Shard, part_of, shard_of
+from aqualog.campaign.records import Shard, part_of, shard_of
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError
@@ -83,6 +83,7 @@ def test_the_same_shard_twice_and_a_batch_beside_a_shard_are_refused(whole, tmp_
     assert plain.exit_code != 0
 
 
+@pytest.mark.nightly
 def test_a_worker_that_is_killed_half_way_leaves_no_trace(tmp_path):
     campaign = make_campaign(tmp_path, speeds=(70, 80, 90, 100), repeats=12)
     assert run("batch", campaign, "-o", tmp_path / "plain").exit_code == 0

@@ -14,12 +14,12 @@ import pytest
 from campaign.made import make_campaign
 from typer.testing import CliRunner
 
-from aqualog.campaign.batch import Job, run_batch
+from aqualog.campaign.batch import run_batch
+from aqualog.campaign.batch_cost import BatchCost, LogCost, measure_cost
+from aqualog.campaign.jobs import Job
 from aqualog.campaign.plan import Work, choose, foretell, makespan, shards_within, work_of
-from aqualog.campaign.records import Campaign, Run
-from aqualog.campaign.shard import Shard, part_of
+from aqualog.campaign.records import Campaign, Run, Shard, part_of
 from aqualog.campaign.store import Store
-from aqualog.campaign.trial import Trial, Tried, tried
 from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
@@ -40,12 +40,12 @@ def jobs(count, form="csv", *, step=1_000_000, name="log"):
 
 
 def sampled(chosen, cost, *, store=1000):
-    return tuple(Tried(j.logs, f, s, 2.0 * cost(f, s), cost(f, s), store, "") for j, f, s in chosen)
+    return tuple(LogCost(j.logs, f, s, 2.0 * cost(f, s), cost(f, s), store, "") for j, f, s in chosen)
 
 
 def trial(found, **more):
     given = {"hashing_s": 0.0, "tables_s": 0.0, "start_s": 3.0, "start_cpu_s": 1.0, "ending_s": 0.5, "peak_bytes": 1}
-    return Trial(found, 2, **(given | more))
+    return BatchCost(found, 2, **(given | more))
 
 
 def told(work, found, **more):
@@ -212,9 +212,11 @@ def test_errors(tmp_path, campaign):
 def test_a_sample_in_which_was_compiled_is_measured_again(kept, times, monkeypatch):
     """Only the first plan after an installation compiles; the batch behind it does not."""
     states, measured, heard = iter(kept), [], []
-    monkeypatch.setattr("aqualog.campaign.trial.kept_code", lambda: frozenset(next(states)))
-    monkeypatch.setattr("aqualog.campaign.trial._tried_once", lambda *given: measured.append(given) or len(measured))
-    assert tried(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
+    monkeypatch.setattr("aqualog.campaign.batch_cost.kept_code", lambda: frozenset(next(states)))
+    monkeypatch.setattr(
+        "aqualog.campaign.batch_cost._tried_once", lambda *given: measured.append(given) or len(measured)
+    )
+    assert measure_cost(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
     assert heard == [1] * (times - 1)
 
 

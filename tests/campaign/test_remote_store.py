@@ -22,10 +22,9 @@ from fsspec.implementations.memory import MemoryFileSystem
 from typer.testing import CliRunner
 
 from aqualog.campaign.cluster_worker import asked_of, unlike
-from aqualog.campaign.place import address_of, place_of
-from aqualog.campaign.place_local import Folder
+from aqualog.campaign.place import Folder, address_of
 from aqualog.campaign.place_remote import Remote
-from aqualog.campaign.store import Store
+from aqualog.campaign.store import Store, place_of
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError, LogError
 
@@ -220,7 +219,7 @@ def test_without_fsspec(plain, monkeypatch):
 
 def test_a_folder_imports_no_fsspec(plain):
     code = (
-        "import sys; from pathlib import Path; from aqualog.campaign.place import place_of\n"
+        "import sys; from pathlib import Path; from aqualog.campaign.store import place_of\n"
         "place_of(Path(sys.argv[1])).names(); print(any(m.startswith('fsspec') for m in sys.modules))"
     )
     assert subprocess.check_output([sys.executable, "-c", code, str(plain[1])], text=True) == "False\n"

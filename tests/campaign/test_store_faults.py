@@ -15,15 +15,16 @@ import pytest
 from campaign.made import make_campaign
 from typer.testing import CliRunner
 
-from aqualog.campaign import batch, place_local
+from aqualog.campaign import batch, place
 from aqualog.campaign.batch import run_batch
-from aqualog.campaign.key import _BEHIND, Contents, code_stamp
+from aqualog.campaign.jobs import _BEHIND, code_stamp
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import MARK, Store
 from aqualog.cli.main import app
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
 from aqualog.guard.pool import most_processes
+from aqualog.io.content import Contents
 
 
 @pytest.fixture(scope="module")
@@ -204,8 +205,8 @@ def test_no_space_left(bare, monkeypatch):
             raise OSError(28, "No space left on device")
         real(path, write, **options)
 
-    real = place_local.write_whole
-    monkeypatch.setattr(place_local, "write_whole", full)
+    real = place.write_whole
+    monkeypatch.setattr(place, "write_whole", full)
     with pytest.raises(AqualogError, match=r"campaign\.store: no space left on device; expected room") as caught:
         batched(bare)
     assert caught.value.exit_code == 1
@@ -420,7 +421,7 @@ def children_of(number):
         return []
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.15, 0.4])
+@pytest.mark.parametrize("delay_s", [0.15, *(pytest.param(s, marks=pytest.mark.nightly) for s in (0.0, 0.4))])
 def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
     campaign = make_campaign(tmp_path, speeds=(70, 80), repeats=6)
     command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "--jobs", "2", "--progress", "plain"]

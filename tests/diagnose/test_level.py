@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from blind.level_world import CAR, Hidden, campaign_of, world
 
-from aqualog.campaign.loaded import loaded
 from aqualog.campaign.measure import measure
-from aqualog.campaign.records import Run
+from aqualog.campaign.records import Run, with_load
 from aqualog.core.intervals import chi2_log_p
 from aqualog.diagnose.level import diagnose_campaign
 from aqualog.diagnose.level.expect import Driven, respond
@@ -112,7 +111,7 @@ def simulated(model, seed, runs=40):
             "tyre": tyre, "pressure_front_bar": 1.9, "pressure_rear_bar": 1.9, "water_depth_mm": depth * 1e3,
             "water_depth_left_mm": 0.6 * depth * 1e3,
         }  # fmt: skip
-        car = loaded(SEDAN, Run((), CAR_FILE, None, span, values))
+        car = with_load(SEDAN, Run((), CAR_FILE, None, span, values))
         samples = measure(as_signals(simulate(s, model), vehicle=car, truth=False), car).samples
         rows.append((f"run{k}", CAR_FILE, values, span, samples))
     return campaign_of(rows, {CAR_FILE: SEDAN})

@@ -3,9 +3,9 @@
 from functools import cache
 from pathlib import Path
 
-from aqualog.campaign.loaded import loaded as with_load
 from aqualog.campaign.logs import log_states, missing_lines
 from aqualog.campaign.matrix import campaign_matrix
+from aqualog.campaign.records import with_load
 from aqualog.config.campaign import read_campaign
 from aqualog.config.configured import configure, files_of
 from aqualog.core.errors import ConfigError

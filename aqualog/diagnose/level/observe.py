@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.campaign.loaded import loads_of
+from aqualog.campaign.records import loads_of
 from aqualog.campaign.resistance import dry_level
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import WIND_UP

@@ -8,9 +8,9 @@ from typing import Any
 from aqualog import __version__
 from aqualog.campaign.logs import LogState, missing_lines
 from aqualog.campaign.matrix import FEW, TOO_FEW, Configuration, Matrix
-from aqualog.campaign.measured import Measured
 from aqualog.campaign.propose_files import NEEDED
 from aqualog.campaign.records import Campaign
+from aqualog.campaign.tables import StoredRun
 from aqualog.core.vehicle import Vehicle
 from aqualog.report.text import table
 
@@ -26,7 +26,7 @@ def matrix_text(
     matrix: Matrix,
     logs: Sequence[LogState],
     vehicles: Mapping[str, Vehicle],
-    measured: Mapping[int, Measured],
+    measured: Mapping[int, StoredRun],
     lanes: Sequence[str] = (),
 ) -> str:
     """Summary of the campaign, its configurations, and missing combinations."""
@@ -77,7 +77,7 @@ def _vehicle(vehicle: Vehicle) -> str:
     return f"{vehicle.name}, {vehicle.drivetrain}, {vehicle.mass:g} kg"
 
 
-def _failed(measured: Mapping[int, Measured], most: int = 5) -> list[str]:
+def _failed(measured: Mapping[int, StoredRun], most: int = 5) -> list[str]:
     reasons = list(dict.fromkeys(m.reason for m in measured.values() if m.state != "done"))
     more = [f"and {len(reasons) - most} more runs could not be measured"] if len(reasons) > most else []
     return [*(f"not measured: {r}" for r in reasons[:most]), *more]
@@ -152,7 +152,7 @@ def matrix_document(
     matrix: Matrix,
     logs: Sequence[LogState],
     vehicles: Mapping[str, Vehicle],
-    measured: Mapping[int, Measured],
+    measured: Mapping[int, StoredRun],
     lanes: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The same as a document of plain values; `runs` are indices from 0 in the order of the campaign file."""

@@ -12,21 +12,22 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from aqualog.campaign.batch import CRASHED, Configured, Fault, Job, measure_one, run_batch
+from aqualog.campaign.batch import CRASHED, Fault, measure_one, run_batch
+from aqualog.campaign.jobs import Configured, Job
 from aqualog.campaign.store import Store
 from aqualog.core.compiled import kept_code
 from aqualog.guard.pool import work_on
 from aqualog.guard.worker import Crashed
 
-__all__ = ["Trial", "Tried", "peak_memory", "tried"]
+__all__ = ["BatchCost", "LogCost", "measure_cost", "peak_memory"]
 
 Report = Callable[[int, int, int], None]
 
 _met: set[str] = set()  # formats that this process has met: their libraries are loaded
 
 
-class Cost(NamedTuple):
-    """Cost of one log in its process: wall-clock and computing time once everything is loaded [s].
+class Timing(NamedTuple):
+    """Timing of one log in its process: wall-clock and computing time once everything is loaded [s].
 
     Where the process met its format first it was measured twice, and `loading_s`, `loading_cpu_s` are what the first
     time took longer; else None. `ended` and `cpu_ended_s` are the process's own clocks afterwards, `peak_bytes` the
@@ -45,7 +46,7 @@ class Cost(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class LogCost:
     """One log of the sample; `reason` if it gave no result."""
 
     logs: tuple[Path, ...]
@@ -58,15 +59,15 @@ class Tried:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
-    """Cost of a batch of the sample.
+class BatchCost:
+    """Timing of a batch of the sample.
 
     `hashing_s` before and `tables_s` behind the logs, in the process that leads; `start_s` and `start_cpu_s` of a
     process that meets all formats: all but the logs themselves; `ending_s` until all processes have ended; `peak_bytes`
     of the process that held most.
     """
 
-    tried: tuple[Tried, ...]
+    tried: tuple[LogCost, ...]
     processes: int
     hashing_s: float
     tables_s: float
@@ -76,14 +77,14 @@ class Trial:
     peak_bytes: int
 
 
-def tried(
+def measure_cost(
     configured: Configured,
     sample: Sequence[tuple[Job, str, int]],
     *,
     processes: int,
     reporter: Callable[[], Report] = lambda: lambda done, total, failed: None,
     told: Callable[[], None] = lambda: None,
-) -> Trial:
+) -> BatchCost:
     """Measure a few logs into a store that is thrown away.
 
     After an installation the detectors are compiled with the first logs, which no other run pays: the sample is then
@@ -99,19 +100,19 @@ def tried(
         Makes the callable that receives the numbers of finished, all and failed logs.
     """
     before = kept_code()
-    found = _tried_once(configured, sample, processes, reporter())
+    found = _measured_once(configured, sample, processes, reporter())
     if kept_code() <= before:
         return found
     told()
-    return _tried_once(configured, sample, processes, reporter())
+    return _measured_once(configured, sample, processes, reporter())
 
 
-def _tried_once(
+def _measured_once(
     configured: Configured, sample: Sequence[tuple[Job, str, int]], processes: int, report: Report
-) -> Trial:
+) -> BatchCost:
     runs = tuple(configured.campaign.runs[j.runs[0]] for j, _, _ in sample)
     of = {j.logs: (form, size) for j, form, size in sample}
-    costs: dict[str, Cost | Crashed] = {}
+    costs: dict[str, Timing | Crashed] = {}
     spent: dict[str, tuple[Path, ...]] = {}
     marks: list[float] = []
     asked: list[float] = []  # of a clock that all processes of a machine share and nobody sets
@@ -124,7 +125,7 @@ def _tried_once(
         timed = {key: (of[task[3]][0], task) for key, task in tasks.items()}
         spent.update({key: task[3] for key, task in tasks.items()})
 
-        def taken(key: str, cost: Cost | Crashed) -> None:
+        def taken(key: str, cost: Timing | Crashed) -> None:
             costs[key] = cost
             record(key, cost if isinstance(cost, Crashed) else cost.outcome)
 
@@ -140,20 +141,20 @@ def _tried_once(
             report=report,
         )  # fmt: skip
         ended = time.perf_counter()
-        found = tuple(_tried(spent[k], of, c, store.size_of(k)) for k, c in costs.items())
-    real = [(of[spent[k]][0], c) for k, c in costs.items() if isinstance(c, Cost)]
+        found = tuple(_log_cost(spent[k], of, c, store.size_of(k)) for k, c in costs.items())
+    real = [(of[spent[k]][0], c) for k, c in costs.items() if isinstance(c, Timing)]
     first, last = marks[:2] or (ended, ended)
-    return Trial(
+    return BatchCost(
         found, processes, first - began, ended - last, _beside(real, asked[0], is_cpu=False),
         _beside(real, 0.0, is_cpu=True), max(asked[1] - max((c.ended for _, c in real), default=asked[1]), 0.0),
         max((c.peak_bytes for _, c in real), default=0),
     )  # fmt: skip
 
 
-def _beside(costs: Sequence[tuple[str, Cost]], began: float, *, is_cpu: bool) -> float:
+def _beside(costs: Sequence[tuple[str, Timing]], began: float, *, is_cpu: bool) -> float:
     """Time of a process besides its logs: its start, libraries of all formats, waiting. Median. [s]"""
     loading: dict[str, list[float]] = {}
-    of: dict[int, list[tuple[str, Cost]]] = {}
+    of: dict[int, list[tuple[str, Timing]]] = {}
     for form, cost in costs:
         of.setdefault(cost.process, []).append((form, cost))
     totals = []
@@ -169,17 +170,17 @@ def _beside(costs: Sequence[tuple[str, Cost]], began: float, *, is_cpu: bool) ->
     return median(t + sum(s for f, s in each.items() if f not in met) for t, met in totals) if totals else 0.0
 
 
-def _tried(
-    logs: tuple[Path, ...], of: Mapping[tuple[Path, ...], tuple[str, int]], cost: Cost | Crashed, stored: int
-) -> Tried:
+def _log_cost(
+    logs: tuple[Path, ...], of: Mapping[tuple[Path, ...], tuple[str, int]], cost: Timing | Crashed, stored: int
+) -> LogCost:
     form, size = of[logs]
     if isinstance(cost, Crashed):
-        return Tried(logs, form, size, cost.seconds, 0.0, 0, CRASHED)
+        return LogCost(logs, form, size, cost.seconds, 0.0, 0, CRASHED)
     reason = cost.outcome.reason if cost.outcome is not None else ""
-    return Tried(logs, form, size, cost.wall_s, cost.cpu_s, stored, reason)
+    return LogCost(logs, form, size, cost.wall_s, cost.cpu_s, stored, reason)
 
 
-def _timed(form: str, task: tuple[Any, ...]) -> Cost:
+def _timed(form: str, task: tuple[Any, ...]) -> Timing:
     """Measure a log, and once more if this process had to load something for it."""
     outcome, wall_s, cpu_s = _measured(task)
     loading_s = loading_cpu_s = None
@@ -188,7 +189,7 @@ def _timed(form: str, task: tuple[Any, ...]) -> Cost:
         first_s, first_cpu_s = wall_s, cpu_s
         outcome, wall_s, cpu_s = _measured(task)
         loading_s, loading_cpu_s = first_s - wall_s, first_cpu_s - cpu_s
-    return Cost(
+    return Timing(
         outcome, os.getpid(), wall_s, cpu_s, loading_s, loading_cpu_s, time.monotonic(), time.process_time(),
         peak_memory(),
     )  # fmt: skip
