@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.compiled import compiled
+from aqualog.core.moments import block_moments, second_difference
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "APART", "Design", "Moments", "Working", "about_own_mean", "huber_weights", "moments_of", "run_starts",
+    "APART", "Design", "Moments", "Working", "about_own_mean", "huber_weights", "moments_of",
     "working_model",
 ]  # fmt: skip
 
@@ -61,19 +62,10 @@ class Working(NamedTuple):
     memory: float
 
 
-def run_starts(run: _Index) -> _Index:
-    """Where each run's samples begin."""
-    return np.flatnonzero(np.diff(run, prepend=run[0] - 1))
-
-
 def moments_of(d: Design, first: _Index, weight: FloatArray) -> Moments:
     """Moments of each run; those of the noise per unit of weight, times the run's weight."""
-    p, g = len(d.columns), first.size
-    h, c = np.empty((g, p, p)), np.empty((g, p))
-    for i in range(p):
-        c[:, i] = np.add.reduceat(weight * d.columns[i] * d.y, first)
-        for j in range(i + 1):
-            h[:, i, j] = h[:, j, i] = np.add.reduceat(weight * d.columns[i] * d.columns[j], first)
+    p = len(d.columns)
+    h, c = block_moments(d.columns, d.y, first, weight=weight)
     total = np.add.reduceat(weight, first)
     h_noise, c_noise = np.zeros_like(h), np.zeros_like(c)
     for i in (i for i in range(p) if d.noisy[i]):
@@ -108,7 +100,7 @@ def _second_differences(d: Design, i: int, first: _Index) -> tuple[FloatArray, F
     if d.y.size <= a:
         return np.zeros(first.size), np.zeros(first.size), np.zeros(first.size)
     whole = (run[a:] == run[:-a]) & (d.step[a:] - d.step[:-a] == a) & (d.step[APART:-APART] - d.step[:-a] == APART)
-    d_x, d_y = (v[a:] - 2.0 * v[APART:-APART] + v[:-a] for v in (d.columns[i], d.y))
+    d_x, d_y = (second_difference(v, APART) for v in (d.columns[i], d.y))
     r = run[a:][whole]
     both = np.bincount(r, (d_x * d_y)[whole], first.size).astype(np.float64)
     same = np.bincount(r, (d_x * d_x)[whole], first.size).astype(np.float64)

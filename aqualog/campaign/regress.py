@@ -16,10 +16,10 @@ from aqualog.campaign.moments import (
     about_own_mean,
     huber_weights,
     moments_of,
-    run_starts,
     working_model,
 )
 from aqualog.core.intervals import student_quantile
+from aqualog.core.moments import block_starts
 from aqualog.core.records import FloatArray
 
 __all__ = ["ATTENUATION_MAX", "NOWHERE", "Design", "Estimate", "Interval", "RunParts", "estimate"]
@@ -110,7 +110,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     unit = np.sqrt(np.mean(design.columns**2, axis=1))
     unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
     d = design._replace(columns=design.columns / unit[:, None])
-    first = run_starts(d.run)
+    first = block_starts(d.run)
     weight = np.ones_like(d.y)
     moments = moments_of(d, first, weight)
     working = working_model(d, first, moments, weight)

@@ -38,12 +38,13 @@ def made(runs: int, samples: int) -> Samples:
 
 def lines_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope and offset of each run in each bin (cells, 2), by the moments that all fits rest on."""
-    from aqualog.campaign.moments import Design, moments_of, run_starts
+    from aqualog.campaign.moments import Design, moments_of
+    from aqualog.core.moments import block_starts
 
     cell = s.run * BINS + s.bin
     columns = np.stack([s.mu, np.ones_like(s.mu)])
     design = Design(columns, s.slip, cell, s.step, (True, True), (False, False))
-    m = moments_of(design, run_starts(cell), np.ones_like(s.mu))
+    m = moments_of(design, block_starts(cell), np.ones_like(s.mu))
     return np.linalg.solve(m.h, m.c[:, :, None])[:, :, 0]
 
 

@@ -8,6 +8,7 @@ from slope_coverage import World, made, study
 
 from aqualog.campaign import moments
 from aqualog.campaign.regress import Design, estimate
+from aqualog.core.moments import block_starts
 
 
 def line(mu, slip, run, step=None):
@@ -132,7 +133,7 @@ def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
     )
     grid = np.concatenate([np.zeros((1, p)), 10.0 ** rng.uniform(-2, 2, (6, p))])
     d = Design(columns, y, run, np.arange(run.size), (True,) * p, (False,) * p)
-    found = moments._unlikelihood(moments.moments_of(d, moments.run_starts(run), np.ones_like(y)), variance, grid)
+    found = moments._unlikelihood(moments.moments_of(d, block_starts(run), np.ones_like(y)), variance, grid)
     dense = []
     for t in grid:
         V = np.where(run[:, None] == run, columns.T @ (t[:, None] * columns), 0.0) + variance * np.eye(run.size)

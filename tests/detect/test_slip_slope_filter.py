@@ -13,8 +13,8 @@ from bench.ekf import OPEN, aqualog_slopes, disagreement, drive, numpy_slopes, p
 from numba import njit
 
 from aqualog.detect.slip_slope import ekf, estimator, observability
-from aqualog.detect.slip_slope.change import cusum_input
 from aqualog.detect.slip_slope.ekf import Belief
+from aqualog.detect.slip_slope.estimator import cusum_input
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import activation, estimator
-from aqualog.detect.slip_slope.change import cusum_input
+from aqualog.detect.slip_slope.estimator import cusum_input
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation

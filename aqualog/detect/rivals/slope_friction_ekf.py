@@ -12,8 +12,7 @@ from aqualog.core.compiled import compiled, inlined
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
-from aqualog.detect.rivals.slope_inputs import driven_wheels, reference_slope
-from aqualog.detect.rivals.slope_rls import PATIENCE
+from aqualog.detect.rivals.slope_inputs import PATIENCE, driven_wheels, reference_slope
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.features.smoothing import gain
 from aqualog.physics.tyre_brush import brush_force, brush_slope

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.braking import hold_on
 from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.rivals.rival import alarm_bits
 from aqualog.detect.slip_slope.activation import ACTIVE, JUMPING, LIMITS, SPINNING, inactive_reason
 from aqualog.detect.slip_slope.watch import AFTER_JUMP, TAU_SMOOTH
 from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.load import G
 
-__all__ = ["Driven", "driven_wheels", "loss_of_slope", "reference_slope", "velocity_lag"]
+__all__ = ["PATIENCE", "Driven", "driven_wheels", "line_tracks", "reference_slope", "velocity_lag"]
 
+PATIENCE = 1.0  # [s] an alarm outlasts missing estimates by this
+SLIP_LINE = 0.1  # [-] beyond, a line says no more
 A_X_MAX_LATE = 0.5  # [m/s^2] beyond, what is left of a reference's lag (0.03 s) is a third of the slip
 # Traction below which errors of the velocity are as large as the slip: 1e-3 of free wheels, 2e-3 of a reference
 SHOWN, SHOWN_LATE = 0.03, 0.06  # [-]
@@ -137,9 +141,19 @@ def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArra
     return reference
 
 
-def loss_of_slope(slope: FloatArray, reference: FloatArray) -> FloatArray:
-    """Return the share of the dry slope that is lost, 1 - C / C_ref; below 0 for a stiffer one. [-]"""
-    return 1.0 - slope / reference
+def line_tracks(r: Scene, setup: Setup, slope_of: Callable[[Driven, FloatArray], FloatArray]) -> tuple[Track, ...]:
+    """Return a track per driven wheel: the lost share of the dry slope, 1 - C / C_ref.
+
+    `slope_of` (wheel, its slip within the line (n,)) -> slope (n,), NaN where not active. [-]
+    """
+    tracks = []
+    for w in driven_wheels(r, setup):
+        slope = slope_of(w, np.clip(w.slip, -SLIP_LINE, SLIP_LINE))
+        loss = 1.0 - slope / reference_slope(w, slope, dt=setup.dt)
+        statistic = np.where(w.is_shown, loss, np.nan)
+        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
+        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
+    return tuple(tracks)
 
 
 def velocity_lag(v_x: FloatArray, a_x: FloatArray, *, dt: float) -> FloatArray:

@@ -12,9 +12,8 @@ from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.detect.detector import Scene, Setup
-from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
-from aqualog.detect.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
-from aqualog.detect.rivals.slope_rls import PATIENCE, SLIP_LINE
+from aqualog.detect.rivals.rival import needs_slip, rival
+from aqualog.detect.rivals.slope_inputs import line_tracks
 from aqualog.detect.slip_slope import ekf
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
@@ -114,14 +113,7 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     Thesis [15]: slope and offset by a Kalman filter whose covariance is raised when a CUSUM of its residual alarms.
     """
     p = KalmanParams.make(setup.dt)
-    tracks = []
-    for w in driven_wheels(r, setup):
-        slope, _, _ = scan(p, np.clip(w.slip, -SLIP_LINE, SLIP_LINE), w.mu, w.is_active, slope=w.expected)
-        loss = loss_of_slope(slope, reference_slope(w, slope, dt=setup.dt))
-        statistic = np.where(w.is_shown, loss, np.nan)
-        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
-        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
-    return tuple(tracks)
+    return line_tracks(r, setup, lambda w, slip: scan(p, slip, w.mu, w.is_active, slope=w.expected)[0])
 
 
 SLOPE_KALMAN = rival(

@@ -10,17 +10,15 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.detector import Scene, Setup
-from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
-from aqualog.detect.rivals.slope_inputs import driven_wheels, loss_of_slope, reference_slope
+from aqualog.detect.rivals.rival import needs_slip, rival
+from aqualog.detect.rivals.slope_inputs import line_tracks
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 
-__all__ = ["PATIENCE", "SLOPE_RLS", "THRESHOLD", "RlsParams", "scan"]
+__all__ = ["SLOPE_RLS", "THRESHOLD", "RlsParams", "scan"]
 
 THRESHOLD = 0.7  # [-]
-PATIENCE = 1.0  # [s] an alarm outlasts missing estimates by this
 R = 1.4e-7  # [s] spectral density of the slip's noise, the unit of the covariances
-SLIP_LINE = 0.1  # [-] beyond, a line says no more
 
 
 class RlsParams(NamedTuple):
@@ -95,14 +93,7 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     slope, which orders drives as the slope does, so that the slope itself is compared.
     """
     p = RlsParams.make(setup.dt)
-    tracks = []
-    for w in driven_wheels(r, setup):
-        slope, _ = scan(p, np.clip(w.slip, -SLIP_LINE, SLIP_LINE), w.mu, w.is_active, slope=w.expected)
-        loss = loss_of_slope(slope, reference_slope(w, slope, dt=setup.dt))
-        statistic = np.where(w.is_shown, loss, np.nan)
-        bits = alarm_bits(statistic, setup.threshold, off_share=0.8, patience_s=PATIENCE, dt=setup.dt)
-        tracks.append(setup.track(statistic, bits, wheel=w.wheel))
-    return tuple(tracks)
+    return line_tracks(r, setup, lambda w, slip: scan(p, slip, w.mu, w.is_active, slope=w.expected)[0])
 
 
 SLOPE_RLS = rival(

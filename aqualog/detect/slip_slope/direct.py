@@ -19,9 +19,11 @@ from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.direct_inputs import (
     BESIDE,
     LEFT_OUT,
+    Method,
     Place,
     Reference,
     accelerometer_traction,
+    choose_way,
     earlier,
     left_out,
     mean_of,
@@ -30,17 +32,12 @@ from aqualog.detect.slip_slope.direct_inputs import (
     smoothed,
     torque_traction,
 )
-from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
-from aqualog.detect.slip_slope.direct_remarks import (
-    notes_on,
-    refuse,
-)
+from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion, notes_on, refuse
 from aqualog.detect.slip_slope.estimator import BLIND, K_MAX, K_MIN, Estimate
 from aqualog.detect.slip_slope.regression import Late, Line, fit_line, lag_of_slip, noise_of_traction
 from aqualog.detect.slip_slope.stability import block_labels, judge_stability, make_segments
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
-from aqualog.detect.slip_slope.ways import Method, choose_way
 from aqualog.features.stream import FeatureStream
 
 __all__ = ["MU_MAX", "slip_slopes"]
@@ -74,7 +71,7 @@ def slip_slopes(
     vehicle : Vehicle
         Drivetrain, radii, mass and its distribution.
     method, traction : str
-        As in `ways.choose_way`.
+        As in `choose_way`.
     mu_max : float
         Largest traction coefficient used. [-]
     delay : float, optional
@@ -83,7 +80,7 @@ def slip_slopes(
     Raises
     ------
     ConfigError, SignalError
-        As `ways.choose_way`.
+        As `choose_way`.
     FitError
         If no wheel's slope can be estimated, with the reason.
 

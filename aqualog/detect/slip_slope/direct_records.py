@@ -1,16 +1,24 @@
-"""Slip slopes of one drive by regression: the records."""
+"""Slip slopes of one drive by regression: the records, remarks on them, and the refusal without any slope."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from aqualog.core.errors import FitError
 from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect.slip_slope.direct_inputs import Method, TractionSource, Way
 from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.stability import Segment, Stability
-from aqualog.detect.slip_slope.ways import Method, TractionSource
 
-__all__ = ["DirectResult", "PlaceSlope", "Recursion"]
+__all__ = ["DirectResult", "PlaceSlope", "Recursion", "notes_on", "refuse"]
+
+LAG_NOTED = 0.1  # [s] twice what the lag is good to
+DELAY_NOTED = 0.01  # [s]
+SHARED_NOTED = 0.8  # share of the traction that goes with a / v, from which the delay widens the interval 2.2 times
+OFFSET_NOTED = 0.03  # [-] tyres of one size and different wear differ by less
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,3 +79,83 @@ class DirectResult:
     places: tuple[PlaceSlope, ...]
     recursions: tuple[Recursion, ...]
     notes: tuple[str, ...]
+
+
+def refuse(places: Sequence[PlaceSlope], recursions: Sequence[Recursion], where: str, duration: float) -> None:
+    """Stop with one line if no slope can be estimated."""
+    if any(p.line.told for p in places):
+        return
+    if not places:
+        if any(math.isfinite(r.slope) for r in recursions):
+            return
+        if any(r.seconds > 0.0 for r in recursions):
+            raise FitError(
+                "the recursive estimate ends at a slope that no tyre has (1 or 300)", where=where,
+                hint="check radii, drivetrain, wheel mapping, and the sign and unit of the torque",
+            )  # fmt: skip
+        raise FitError(
+            "both axles slip alike or the traction is too even: the recursive estimator could not work", where=where,
+            hint="a drive with changing speed and another torque split, or a log with v_x",
+        )  # fmt: skip
+    best = max(places, key=lambda p: p.seconds)
+    most = sorted(best.left_out.items(), key=lambda item: -item[1])[:3]
+    out = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in most if seconds >= 0.5)
+    low, high = best.mu_range
+    text = f"{best.seconds:.1f} s of {duration:.0f} s can be used" + (f" (left out: {out})" if out else "")
+    if math.isfinite(low) and not best.line.reason.startswith("too few"):
+        text += f", traction {low:.3f} to {high:.3f} there"
+    raise FitError(f"cannot estimate the slip slope: {best.line.reason}; {text}", where=where, hint=best.line.hint)
+
+
+def notes_on(places: Sequence[PlaceSlope], vehicle: Vehicle, way: Way, *, has_brake: bool) -> list[str]:
+    """Return sentences on what the slopes rest on, and what does not fit."""
+    notes = []
+    if way.traction == "accelerometer" and not has_brake:
+        notes.append("no brake_pressure: braking and engine drag look alike, so only driving (mu > 0) is used")
+    keys = ("mass", "l_f", "l_r") if way.traction == "torque" else ("l_f", "l_r")
+    lacking = [k for k in keys if k not in vehicle.given]
+    if lacking:
+        notes.append(f"{', '.join(lacking)} not in the vehicle file: wheel loads, and the slope with them, are a guess")
+    if way.method == "differential":
+        notes.append("differential slip only: recursive estimate, no regression and no interval from the data")
+    corrected = [p for p in places if p.line.is_corrected]
+    if corrected:
+        shares = ", ".join(f"{p.place} {100 * p.line.attenuation:.1f} %" for p in corrected)
+        notes.append(f"noise of the traction lowers 1 / slope, which is corrected: {shares}")
+    late = [p for p in places if abs(p.lag_s) > LAG_NOTED]
+    if late:
+        shares = ", ".join(f"{p.place} {p.lag_s:+.2f} s" for p in late)
+        notes.append(
+            f"the slip follows the traction best with a delay of {shares}: check the clocks of wheels and "
+            "traction (`aqualog align`, [sources] offset_s in the map)"
+        )
+    notes += _notes_on_reference(places)
+    changed = [p for p in places if p.recursion.alarms]
+    if changed:
+        counts = ", ".join(f"{p.place} {p.recursion.alarms}" for p in changed)
+        notes.append(f"the recursive estimator found sudden changes of the slope: {counts}")
+    return notes
+
+
+def _notes_on_reference(places: Sequence[PlaceSlope]) -> list[str]:
+    notes = []
+    odd = [p for p in places if p.line.told and abs(p.line.offset) > OFFSET_NOTED]
+    if odd:
+        shares = ", ".join(f"{p.place} {100 * p.line.offset:+.1f} %" for p in odd)
+        notes.append(f"slip without traction: {shares}; the radii in the vehicle file do not fit")
+    delayed = [p for p in places if p.line.told and _is_noted(p.line)]
+    if delayed:
+        shares = ", ".join(f"{p.place} {p.line.delay:+.3f} s" for p in delayed)
+        notes.append(f"v_x is late against the wheels, which is corrected: {shares}")
+    wide = [p.place for p in places if p.line.told and p.line.shared > SHARED_NOTED]
+    if wide:
+        notes.append(
+            f"{', '.join(wide)}: traction and acceleration over speed go together, so the delay of v_x widens the "
+            "interval of the slope; narrower with other speeds or grades, or --delay where it is known"
+        )
+    return notes
+
+
+def _is_noted(line: Line) -> bool:
+    low, high = line.delay_ci
+    return abs(line.delay) > DELAY_NOTED and (low > 0.0 or high < 0.0)

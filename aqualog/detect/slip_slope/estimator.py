@@ -12,12 +12,11 @@ from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import ekf, observability
-from aqualog.detect.slip_slope.change import cusum_input
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.observability import Window
 from aqualog.detect.slip_slope.tuning import Params, Tuning
 
-__all__ = ["STATUS", "Estimate", "State", "initial_state", "scan"]
+__all__ = ["STATUS", "Estimate", "State", "cusum_input", "initial_state", "scan"]
 
 STATUS = {
     0: "estimating",
@@ -87,6 +86,32 @@ def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
     belief = Belief(k, beta, 0.0, sd_k**2, 0.0, 0.0, tuning.sd_beta**2, 0.0, tuning.sd_delta**2)
     before = Before(belief.k, belief.delta, belief.P_dd)
     return State(belief, observability.EMPTY, 0.0, 0.0, before, before, before, 0)
+
+
+@compiled
+def cusum_input(innovation, direction, adapted):  # type: ignore[no-untyped-def]
+    """Return the statistic to sum: the prediction error, or its projection on the sign of the traction.
+
+    Parameters
+    ----------
+    innovation : float
+        epsilon = y - h(x, 0). [-]
+    direction : float
+        Has the sign of the slip: the differential traction mu_delta. The thesis takes the differential slip. There the
+        radii's error is often larger than the slip, so that its sign does not alternate. With the estimated offset
+        removed it does (E12), but it then holds the same noise as epsilon, and sgn(u + v) v drifts upwards by up to
+        0.8 of the noise's rms. The traction has neither fault. [-]
+    adapted : bool
+        True: sgn(direction) epsilon, positive where the slip is larger than the slope explains, whichever way the
+        traction goes. False: epsilon.
+
+    Thesis: Eq. (3.23); adapted, (3.25) with E12. The sums (3.24) are `detect.cusum.step`.
+    """
+    if not adapted:
+        return innovation
+    if direction > 0.0:
+        return innovation
+    return -innovation if direction < 0.0 else 0.0
 
 
 @compiled

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.intervals import student_quantile
+from aqualog.core.moments import Noise, block_moments, block_starts, second_difference
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["Interval", "Late", "Line", "Trend", "fit_line", "fit_trend", "lag_of_slip", "noise_of_traction"]
@@ -110,11 +111,6 @@ class Trend:
 
     change: float
     change_ci: Interval
-
-
-class _Noise(NamedTuple):
-    variance: float
-    enters: tuple[FloatArray | float, ...]  # by how much into each column
 
 
 def fit_line(
@@ -260,10 +256,10 @@ def _fit(
 ) -> tuple[FloatArray, FloatArray]:
     one = np.ones_like(mu)
     if late is None:
-        return _jackknife([mu, one], slip, label, [_Noise(noise, (1.0, 0.0))])
-    noises = [_Noise(noise, (1.0, 0.0, 0.0))]
+        return _jackknife([mu, one], slip, label, [Noise(noise, (1.0, 0.0))])
+    noises = [Noise(noise, (1.0, 0.0, 0.0))]
     if with_noise:
-        noises.append(_Noise(1.0, (0.0, 0.0, late.noise)))
+        noises.append(Noise(1.0, (0.0, 0.0, late.noise)))
     return _jackknife([mu, one, late.column], slip, label, noises)
 
 
@@ -298,9 +294,9 @@ def fit_trend(
     is_corrected = CORRECTED_FROM < noise / float(np.var(mu)) <= NOISE_MAX
     if late is not None:
         columns, noisy = [*columns, late.column], (*noisy, 0.0)
-    noises = [_Noise(noise if is_corrected else 0.0, noisy)]
+    noises = [Noise(noise if is_corrected else 0.0, noisy)]
     if late is not None and is_corrected:
-        noises.append(_Noise(1.0, (0.0, 0.0, 0.0, 0.0, late.noise)))
+        noises.append(Noise(1.0, (0.0, 0.0, 0.0, 0.0, late.noise)))
     value, half = _jackknife(columns, slip, label, noises)
     k = abs(float(value[0]))
     low, middle, high = (_change_of_slope((float(value[2]) + r * float(half[2])) / k) for r in (1.0, 0.0, -1.0))
@@ -342,9 +338,7 @@ def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, a
     whole = is_used[2 * apart :] & is_used[apart:-apart] & is_used[: -2 * apart]
     if np.count_nonzero(whole) < 20:
         return 0.0
-    d_mu, d_s = (
-        (x[2 * apart :] - 2.0 * x[apart:-apart] + x[: -2 * apart])[whole] for x in (mu, slip)
-    )  # fmt: skip
+    d_mu, d_s = (second_difference(x, apart)[whole] for x in (mu, slip))
     real = float(np.mean(d_mu * d_s)) / k
     return max(float(np.mean(d_mu * d_mu)) - max(real, 0.0), 0.0) / 6.0
 
@@ -395,7 +389,7 @@ def _correlation(x: FloatArray, y: FloatArray) -> float:
 
 
 def _jackknife(
-    columns: list[FloatArray], y: FloatArray, label: NDArray[np.int64], noises: list[_Noise]
+    columns: list[FloatArray], y: FloatArray, label: NDArray[np.int64], noises: list[Noise]
 ) -> tuple[FloatArray, FloatArray]:
     """Fit by least squares with the noise of the design subtracted from its moments; errors by leaving out blocks.
 
@@ -406,7 +400,7 @@ def _jackknife(
     y : array (n,)
     label : int array (n,)
         Ascending.
-    noises : list of _Noise
+    noises : list of Noise
         Independent of each other.
 
     Returns
@@ -414,17 +408,11 @@ def _jackknife(
     value, half : array (p,)
         Estimate and half width of the 95 % interval.
     """
-    first = np.flatnonzero(np.diff(label, prepend=label[0] - 1))
+    first = block_starts(label)
     unit = np.array([math.sqrt(float(np.mean(c * c))) or 1.0 for c in columns])  # they differ by orders of magnitude
     p = unit.size
-    h, g = np.empty((first.size, p, p)), np.empty((first.size, p))
-    for i in range(p):
-        g[:, i] = np.add.reduceat(columns[i] * y, first) / unit[i]
-        for j in range(i + 1):
-            product = columns[i] * columns[j]
-            for variance, enters in noises:
-                product -= variance * enters[i] * enters[j]
-            h[:, i, j] = h[:, j, i] = np.add.reduceat(product, first) / (unit[i] * unit[j])
+    h, g = block_moments(columns, y, first, noises=noises)
+    h, g = h / np.multiply.outer(unit, unit), g / unit
     inverse = np.linalg.pinv(h.sum(axis=0), rcond=1e-9, hermitian=True)
     value = inverse @ g.sum(axis=0)
     without = np.einsum("bij,bj->bi", np.linalg.pinv(h.sum(axis=0) - h, rcond=1e-9, hermitian=True), g.sum(axis=0) - g)
