@@ -15,8 +15,8 @@ from aqualog.evaluate.intervals import wilson
 from aqualog.features.stream import FeatureStream
 from aqualog.model.situations import SCORING_POOL, draw
 from aqualog.thesis.claims import Check, judge
-from aqualog.thesis.evidence.drives import WATER, Score, Taken, detected, drives, made, score, threshold_for
-from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, ratio_of_counts, share, spread_over
+from aqualog.thesis.evidence.drives import WATER, Score, Taken, detected, drives, made, score, starts, threshold_for
+from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, share, spread_over
 
 __all__ = ["CHECKS"]
 
@@ -47,11 +47,6 @@ def _acceleration_difference(plan: Plan) -> Check:
     return judge("C24.drives", outcome, whole=worst < 0.3, part=worst < 1.0, value=worst)
 
 
-def _starts(bits: BoolArray) -> list[int]:
-    """Samples at which a bit goes on."""
-    return [int(k) for k in np.flatnonzero(np.diff(np.concatenate([[False], bits]).astype(np.int8)) > 0)]
-
-
 def _sign_of_speed(plan: Plan) -> Check:
     """C25: detections by the sums with and without the sign of the speed difference, against the true slip."""
     right, wrong = {"with": 0, "without": 0}, {"with": 0, "without": 0}
@@ -65,7 +60,7 @@ def _sign_of_speed(plan: Plan) -> Check:
             a = result.features[f"a_w_delta_{track.wheel}"].to_numpy()
             _, plain, _ = cusum.scan(spin.SpinParams.make(sign, d.signals.dt).cusum, cusum.initial_state(), sign * a)
             for name, bits in (("with", track.active), ("without", plain)):
-                for k in _starts(bits):
+                for k in starts(bits):
                     slip = sign * d.truth[f"slip_{track.wheel}"][k]
                     right[name] += int(slip > 0.0)
                     wrong[name] += int(slip < 0.0)
@@ -117,19 +112,20 @@ def _summed_up(plan: Plan) -> Check:
     best = {
         name: threshold_for(wanted.recall, [float(x) for x in grid], partial(of, name)) for name, grid in grids.items()
     }
-    (limit_sum, by_sum), (limit, direct) = best["summed"], best["direct"]
-    whole = by_sum.episodes > 20 and direct.false > 0 and by_sum.false <= 0.5 * direct.false
+    (limit_sum, by_sum), (limit_direct, direct) = best["summed"], best["direct"]
+    # how near dry roads come to either threshold
+    near = {
+        name: max(float(np.nanmax(values[name])) for _, values in other) / at
+        for name, at in (("summed", limit_sum), ("direct", limit_direct))
+    }
+    no_more = by_sum.episodes > 20 and by_sum.false <= direct.false
+    ratio = near["summed"] / near["direct"]
     outcome = (
-        f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}; direct, beyond {limit:.1f} m/s²: {direct.in_words()}"
+        f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}, dry roads up to {near['summed']:.0%} of it; direct, "
+        f"beyond {limit_direct:.1f} m/s²: {direct.in_words()}, up to {near['direct']:.0%}"
     )
     return judge(
-        "C26.drives",
-        outcome,
-        whole=whole,
-        part=by_sum.false < direct.false,
-        value=by_sum.false / max(direct.false, 1),
-        ci95=ratio_of_counts(by_sum.false, direct.false),
-        fields={"threshold": threshold},
+        "C26.drives", outcome, whole=no_more and ratio < 1.0, part=no_more, value=ratio, fields={"threshold": threshold}
     )
 
 

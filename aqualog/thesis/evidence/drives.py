@@ -100,6 +100,11 @@ def detected(d: Taken, settings: Settings | None = None) -> DriveResult:
     return detect_drive(d.signals, d.vehicle, settings=settings)
 
 
+def starts(bits: BoolArray) -> list[int]:
+    """Samples at which a bit goes on."""
+    return [int(k) for k in np.flatnonzero(np.diff(np.concatenate([[False], bits]).astype(np.int8)) > 0)]
+
+
 @dataclass(frozen=True, slots=True)
 class Score:
     """Episodes and those found in time; alarms begun outside water, and over which time [s]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Pass:
 
     `a` [m/s²]: speed rises through the pass; `wiggles`: drive torque that varies by 250 N·m with 1 s, for a slope to
     be regressed; `kick` [N·m]: extra drive torque for 0.7 s on the lane; `even`: both tracks alike; `scatter` scales
-    the fluctuation of the contact. A depth of 0 is a dry road.
+    the fluctuation of the contact; `rear_share` of the drive torque. A depth of 0 is a dry road.
     """
 
     kmh: float
@@ -55,6 +55,7 @@ class Pass:
     kick: float = 0.0
     even: bool = False
     scatter: float = 1.0
+    rear_share: float = 1.0
 
 
 def scenario_of(p: Pass, seed: int) -> Scenario:
@@ -68,9 +69,11 @@ def scenario_of(p: Pass, seed: int) -> Scenario:
     speed: Profile = ((0.0, v),)
     if p.a != 0.0:
         speed = ((0.0, v - p.a * 4.5), (DURATION, v + p.a * (DURATION - 4.5)))
-    tyre = TYRES[p.tyre]
+    tyre, car = TYRES[p.tyre], SEDAN
+    if p.rear_share < 1.0:
+        car = replace(SEDAN, drivetrain="awd" if p.rear_share > 0.0 else "fwd", torque_split_rear=p.rear_share)
     return Scenario(
-        SEDAN, tyre, tyre, p.p, p.p, p.load_front, p.load_rear, DURATION, 100.0, seed, speed,
+        car, tyre, tyre, p.p, p.p, p.load_front, p.load_rear, DURATION, 100.0, seed, speed,
         (lane,) if p.h > 0.0 else (), extra_torque=_torque(p), water_scatter=p.scatter, sensors=IDEAL,
     )  # fmt: skip
 

@@ -33,7 +33,7 @@ PANELS: dict[str, Case] = {
 }
 _FINE = tuple(float(2.0 ** (k / 4.0)) for k in range(25))  # 1 to 64 s
 _END = 16.0
-_WITHIN = limit("within", "C109.figure")  # largest over smallest adaption time that counts as similar
+_WITHIN = limit("within", "C109.figure")  # of the time shown, by which similar adaption times differ at most
 _VARIANTS = {
     "as tuned": (1.0, 1.0), "zeta halved": (0.5, 1.0), "zeta doubled": (2.0, 1.0), "h halved": (1.0, 0.5),
     "h doubled": (1.0, 2.0),
@@ -110,18 +110,15 @@ def figure_3_09() -> Figure:
     alarms = {n: [_at_alarm(replace(c, period=p)) for p in OCTAVES] for n, c in PANELS.items()}
     spreads = {n: _spread_of([a[2] for a in rows]) for n, rows in alarms.items()}
     slowest = max((a[2] for rows in alarms.values() for a in rows if not np.isnan(a[2])), default=0.0)
+    differ = {n: _difference([a[2] for a in rows]) for n, rows in alarms.items()}
     outcome = (
         "; ".join(f"{n.split(',')[0]}: {listed([a[2] for a in alarms[n]])} s, ratio {spreads[n]:.0f}" for n in PANELS)
         + f"; none above {slowest:.1f} s"
     )
-    c109 = judge(
-        "C109.figure",
-        outcome,
-        whole=max(spreads.values()) < _WITHIN,
-        part=min(spreads.values()) < _WITHIN,
-        value=_finite(max(spreads.values())),
-        fields={"why": _why_adaption(alarms)},
-    )
+    most = _WITHIN * _END
+    whole, part = max(differ.values()) <= most, min(differ.values()) <= most
+    value, why = _finite(max(differ.values())), _why_adaption(alarms)
+    c109 = judge("C109.figure", outcome, whole=whole, part=part, value=value, fields={"why": why})
     panels = []
     for n, c in PANELS.items():
         lines: list[Line] = []
@@ -176,6 +173,12 @@ def _period(p: float) -> str:
 
 def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
+
+
+def _difference(values: list[float]) -> float:
+    """Largest less smallest of the available ones; infinite if all are missing."""
+    known = [v for v in values if not np.isnan(v)]
+    return max(known) - min(known) if known else float("inf")
 
 
 def _spread(best: dict[str, float]) -> float:

@@ -304,22 +304,18 @@ def _c51(found: Slopes) -> Check | None:
     falls = {f"{x.name} {w}": e for x in found.levels for w in found.wheels if (e := fall(found.of(x, w))) is not None}
     if not falls:
         return None
-    down = [n for n, e in falls.items() if e.is_below]
-    least = max(falls.values(), key=lambda e: e.high)
-    whole = len(down) == len(falls)
+    down = [n for n, e in falls.items() if e.value < 0.0]
+    sure = sum(e.is_below for e in falls.values())
+    least = max(falls.values(), key=lambda e: e.value)
     outcome = (
-        f"below 0 in {len(down)} of {len(falls)} curves; changes {min(e.value for e in falls.values()):.0f} to "
-        f"{max(e.value for e in falls.values()):.0f} % per 10 km/h; the least certain one"
+        f"below 0 in {len(down)} of {len(falls)} curves, with the interval in {sure}; changes "
+        f"{min(e.value for e in falls.values()):.0f} to {least.value:.0f} % per 10 km/h; the least one"
     )
+    part = 2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values())
     return judge(
-        "C51.figure",
-        outcome,
-        whole=whole,
-        part=2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values()),
-        value=least.value,
-        ci95=least.ci,
+        "C51.figure", outcome, whole=len(down) == len(falls), part=part, value=least.value, ci95=least.ci,
         fields={"level": ", ".join(n for n in falls if n not in down)},
-    )
+    )  # fmt: skip
 
 
 def _c52(found: Slopes) -> Check | None:

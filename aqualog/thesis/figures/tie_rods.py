@@ -246,6 +246,7 @@ def figure_2_22() -> Figure:
 _DRY = (8.0, 22.5)  # [s] slalom before the water
 _SHORT, _LEFT, _BOTH = (22.9, 23.8), (26.0, 27.1), (27.1, 29.0)  # [s] as the text has it: 23, 26, shortly after 27
 _LIGHT_DOWN = -0.02  # [-] slip of a light spin-down
+_STEADY = limit("steady", "C63.figure")  # of the speed that it may change: "almost constant"
 _STOP = -0.9  # [-] of a wheel that stands
 _A_Y = limit("a_y", "C63.figure")  # [m/s^2] "up to 2"
 _FALL = limit("fall", "C63.figure")  # of the slalom's amplitude that is left at most when control is lost
@@ -279,15 +280,21 @@ def _amplitude(r: SceneRun, span: tuple[float, float]) -> float:
     return float(np.nanmax(np.abs(r.feature("a_y_slow")[r.within(*span)])))
 
 
+def _is_steady(r: SceneRun) -> bool:
+    """Whether the speed is almost constant until control is lost."""
+    v = r.velocity[r.within(_DRY[0], _BOTH[0])]
+    return float(np.ptp(v)) < _STEADY * float(np.mean(v))
+
+
 def _parts(r: SceneRun) -> dict[str, bool]:
     left, right = (_peak(r, w, _SHORT) for w in ("fl", "fr"))
     fall = _amplitude(r, (_BOTH[0] + 0.3, _BOTH[1])) / _amplitude(r, _DRY)
     return {
-        "match in the dry slalom": _explained(r) >= _EXPLAINED and _amplitude(r, _DRY) <= _A_Y,
+        "match in the dry slalom": _explained(r) >= _EXPLAINED and _amplitude(r, _DRY) <= _A_Y and _is_steady(r),
         "both at 23 s": min(left, right) > _SCATTERS and all(_went(r, w, _SHORT) for w in ("fl", "fr")),
         "right more": right > left,
         "left from 26 s": _peak(r, "fl", _LEFT) > _SCATTERS and _went(r, "fl", _LEFT),
-        "both after 27 s": min(_peak(r, w, _BOTH) for w in ("fl", "fr")) > _SCATTERS,
+        "both after 27 s": all(_peak(r, w, _BOTH) > _SCATTERS and _went(r, w, _BOTH) for w in ("fl", "fr")),
         "lateral acceleration falls": fall < _FALL,
     }
 
