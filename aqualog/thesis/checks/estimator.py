@@ -50,14 +50,8 @@ def _linear_tyre(plan: Plan) -> Check:
         f"at most {left:.1e} of slip left; slope within {100 * spread[True]:.1f} % with the offset, "
         f"{100 * spread[False]:.0f} % without ({len(plan.seeds)} runs of 200 points)"
     )
-    return judge(
-        "C83.half_car",
-        outcome,
-        whole=whole,
-        part=fits,
-        value=spread[True],
-        ci95=bootstrap(errors[True], lambda e: 0.5 * float(np.subtract(*np.quantile(e, [0.84, 0.16])))),
-    )
+    ci95 = bootstrap(errors[True], lambda e: 0.5 * float(np.subtract(*np.quantile(e, [0.84, 0.16]))))
+    return judge("C83.half_car", outcome, whole=whole, part=fits, value=spread[True], ci95=ci95)
 
 
 def _common_drop(plan: Plan) -> Check:
@@ -87,14 +81,8 @@ def _common_drop(plan: Plan) -> Check:
         f"found within 4 s in {share(soon, n)}, slope right in {share(right['slow'], n)} ({right['fast']} with "
         f"the fast ratio); ratio off by {moved['slow']:.3f} (slow) and {moved['fast']:.3f} (fast)"
     )
-    return judge(
-        "C85.half_car",
-        outcome,
-        whole=whole,
-        part=soon >= 0.95 * n and right["slow"] >= 0.95 * n,
-        value=soon / n,
-        ci95=wilson(soon, n),
-    )
+    part = soon >= 0.95 * n and right["slow"] >= 0.95 * n
+    return judge("C85.half_car", outcome, whole=whole, part=part, value=soon / n, ci95=wilson(soon, n))
 
 
 def _change_detection(plan: Plan) -> Check:
@@ -125,16 +113,10 @@ def _change_detection(plan: Plan) -> Check:
         f"largest deviation {worst:.1e} over 6000 samples; settled after {t['with']:.1f} s with, "
         f"{t['without']:.1f} s without (median of {len(seeds)} runs, {d.t[-1]:.0f} s at most)"
     )
-    return judge(
-        "C89.half_car",
-        outcome,
-        whole=False,
-        part=right,
-        value=t["with"] / t["without"],
-        ci95=bootstrap(
-            np.array([settled["with"], settled["without"]]).T, lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1]))
-        ),
+    ci95 = bootstrap(
+        np.array([settled["with"], settled["without"]]).T, lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1]))
     )
+    return judge("C89.half_car", outcome, whole=False, part=right, value=t["with"] / t["without"], ci95=ci95)
 
 
 def _activation(plan: Plan) -> Check:
@@ -174,13 +156,10 @@ def _activation(plan: Plan) -> Check:
         f"60 s in which nothing changed; rms error of the slope {100 * rms['with']:.1f} and "
         f"{100 * rms['without']:.0f} % (medians)"
     )
+    ci95 = ratio_of_counts(wrong["with"], wrong["without"])
+    part = wrong["with"] < wrong["without"] and rms["with"] < rms["without"]
     return judge(
-        "C91.half_car",
-        outcome,
-        whole=whole,
-        part=wrong["with"] < wrong["without"] and rms["with"] < rms["without"],
-        value=wrong["with"] / max(wrong["without"], 1),
-        ci95=ratio_of_counts(wrong["with"], wrong["without"]),
+        "C91.half_car", outcome, whole=whole, part=part, value=wrong["with"] / max(wrong["without"], 1), ci95=ci95
     )
 
 
@@ -217,14 +196,9 @@ def _slow_and_sudden(plan: Plan) -> Check:
         f"drift alone: alarms in {share(alarms['drift'], m)}, slope off by at most {100 * max(worst):.0f} %; "
         f"drop found in {share(alarms['sudden'], m)}, after {np.median(delays):.1f} s (median)"
     )
-    return judge(
-        "C115.half_car",
-        outcome,
-        whole=whole,
-        part=alarms["drift"] <= 0.05 * m and alarms["sudden"] >= 0.8 * m,
-        value=alarms["sudden"] / m,
-        ci95=wilson(alarms["sudden"], m),
-    )
+    ci95 = wilson(alarms["sudden"], m)
+    part = alarms["drift"] <= 0.05 * m and alarms["sudden"] >= 0.8 * m
+    return judge("C115.half_car", outcome, whole=whole, part=part, value=alarms["sudden"] / m, ci95=ci95)
 
 
 CHECKS = (

@@ -117,13 +117,8 @@ def _negative_forces(_: Plan) -> Check:
         f"the dry samples used; positive only (least {positive[1]:.0f} N) {text(positive[0])}, "
         f"{100 * positive[2]:.0f} % used"
     )
-    return judge(
-        "C116.half_car",
-        outcome,
-        whole=whole,
-        part=bool(found and not positive[0] <= negative[0]),
-        value=negative[0] if found else None,
-    )
+    part = bool(found and not positive[0] <= negative[0])
+    return judge("C116.half_car", outcome, whole=whole, part=part, value=negative[0] if found else None)
 
 
 def _vehicle_tests(_: Plan) -> Check:

@@ -163,13 +163,7 @@ def c70(plan: Plan, pool: Pool = SCORING_POOL, count: int = OF_KIND) -> Check:
         f"others. As measured: {base}. Not alike: {'; '.join(other) or 'none'}"
     )
     return judge(
-        "C70.drives",
-        outcome,
-        whole=all(like.values()),
-        part=part,
-        value=share,
-        ci95=ci,
-        fields={"pool": pool.name},
+        "C70.drives", outcome, whole=all(like.values()), part=part, value=share, ci95=ci, fields={"pool": pool.name}
     )
 
 
@@ -215,14 +209,10 @@ def _joint_check(
     text = "; ".join(f"{d} {_scored(covered[d], s)}" for d, s in {name: own, **singles}.items())
     lacks = [w for ok, w in ((more, "situations"), (keen, "recall"), (calm, "false alarms")) if not ok]
     outcome = f"{n} drives in {len(SITUATIONS)} situations. {text}"
+    part = more and (keen or calm)
+    fields = {"name": name.replace("_", " "), "pool": pool, "lacks": ", ".join(lacks)}
     return judge(
-        "C78.drives",
-        outcome,
-        whole=whole,
-        part=more and (keen or calm),
-        value=own.partial.share,
-        ci95=own.partial.ci95,
-        fields={"name": name.replace("_", " "), "pool": pool, "lacks": ", ".join(lacks)},
+        "C78.drives", outcome, whole=whole, part=part, value=own.partial.share, ci95=own.partial.ci95, fields=fields
     )
 
 

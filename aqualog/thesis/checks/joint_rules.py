@@ -17,17 +17,7 @@ from aqualog.evaluate.intervals import wilson
 from aqualog.evaluate.truth import CONTACT_FULL
 from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
 from aqualog.thesis.claims import Check, Checks, judge, limit
-from aqualog.thesis.evidence.drives import (
-    NUISANCE,
-    WATER,
-    Score,
-    Taken,
-    detected,
-    drives,
-    score,
-    starts,
-    variants,
-)
+from aqualog.thesis.evidence.drives import NUISANCE, WATER, Score, Taken, detected, drives, score, starts, variants
 from aqualog.thesis.evidence.seeds import Maker, Plan, ratio_of_counts, share
 
 __all__ = ["CHECKS"]
@@ -63,14 +53,9 @@ def _gate(plan: Plan) -> Check:
         f"full aquaplaning with the gate {gated.in_words()}; without {ungated.in_words()}; partial "
         f"{partial[0].found} and {partial[1].found} of {partial[1].episodes}; breaches of the rule: {breaches}"
     )
-    return judge(
-        "C64.drives",
-        outcome,
-        whole=whole,
-        part=gated.false < ungated.false and breaches == 0,
-        value=gated.false / max(ungated.false, 1),
-        ci95=ratio_of_counts(gated.false, ungated.false),
-    )
+    ci95 = ratio_of_counts(gated.false, ungated.false)
+    part = gated.false < ungated.false and breaches == 0
+    return judge("C64.drives", outcome, whole=whole, part=part, value=gated.false / max(ungated.false, 1), ci95=ci95)
 
 
 def _spin_down(plan: Plan) -> Check:
@@ -80,14 +65,9 @@ def _spin_down(plan: Plan) -> Check:
     kept = with_.recall >= without.recall - 0.05
     whole = kept and without.false > 0 and with_.false <= 0.1 * without.false
     outcome = f"criterion 1: {with_.in_words()}; under braking forces too: {without.in_words()}"
-    return judge(
-        "C65.drives",
-        outcome,
-        whole=whole,
-        part=kept and with_.false <= 0.5 * without.false,
-        value=with_.false / max(without.false, 1),
-        ci95=ratio_of_counts(with_.false, without.false),
-    )
+    ci95 = ratio_of_counts(with_.false, without.false)
+    part = kept and with_.false <= 0.5 * without.false
+    return judge("C65.drives", outcome, whole=whole, part=part, value=with_.false / max(without.false, 1), ci95=ci95)
 
 
 def _minor(plan: Plan) -> Check:

@@ -57,14 +57,8 @@ def _sign(plan: Plan) -> Check:
         f"slope {gain:.4f}, offset {offset:+.4f} m/s², largest deviation {left:.4f} m/s² over {len(found)} "
         f"pairs of drives ({min(wanted):+.2f} to {max(wanted):.2f} m/s²)"
     )
-    return judge(
-        "C34.drives",
-        outcome,
-        whole=whole,
-        part=gain > 0.0,
-        value=float(gain),
-        ci95=bootstrap(np.column_stack([wanted, found]), lambda x: float(np.polyfit(x[:, 0], x[:, 1], 1)[0])),
-    )
+    ci95 = bootstrap(np.column_stack([wanted, found]), lambda x: float(np.polyfit(x[:, 0], x[:, 1], 1)[0]))
+    return judge("C34.drives", outcome, whole=whole, part=gain > 0.0, value=float(gain), ci95=ci95)
 
 
 def _balance(plan: Plan) -> Check:
@@ -147,14 +141,9 @@ def _not_directly(plan: Plan) -> Check:
         f"sum, beyond {limit_sum:.2f} m/s: {g.in_words()}; direct, beyond {limit:.2f} m/s²: {plain.in_words()}; "
         f"direct at 0.2 m/s²: {at_thesis.false} false alarms"
     )
-    return judge(
-        "C46.drives",
-        outcome,
-        whole=whole,
-        part=g.false < plain.false,
-        value=g.false / max(plain.false, 1),
-        ci95=ratio_of_counts(g.false, plain.false),
-    )
+    value = g.false / max(plain.false, 1)
+    ci95 = ratio_of_counts(g.false, plain.false)
+    return judge("C46.drives", outcome, whole=whole, part=g.false < plain.false, value=value, ci95=ci95)
 
 
 # what changes in operation: passengers and luggage; tyres from 0 to 40 degC (8 % per 10 K, [unece_r117_2011]) or soft

@@ -67,16 +67,11 @@ def _c48(table: Table) -> Check:
         f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
         "higher"
     )
+    fields = {
+        "away": "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
+    }
     return judge(
-        "C48.passes",
-        outcome,
-        whole=ci[1] < 0.8 and is_near,
-        part=value < 1.0,
-        value=value,
-        ci95=ci,
-        fields={
-            "away": "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
-        },
+        "C48.passes", outcome, whole=ci[1] < 0.8 and is_near, part=value < 1.0, value=value, ci95=ci, fields=fields
     )
 
 
@@ -161,14 +156,8 @@ def _c52(table: Table) -> Check:
     outcome = (
         f"left over right {told(value, ci, 3)}; scatter {uneven[0]:.3f} left, {uneven[1]:.3f} right, ratio {ratio}"
     )
-    return judge(
-        "C52.passes",
-        outcome,
-        whole=higher and uneven[0] > uneven[1],
-        part=higher or uneven[0] > uneven[1],
-        value=value,
-        ci95=ci,
-    )
+    whole = higher and uneven[0] > uneven[1]
+    return judge("C52.passes", outcome, whole=whole, part=higher or uneven[0] > uneven[1], value=value, ci95=ci)
 
 
 def _ratio(a: float, b: float) -> float:
@@ -208,14 +197,8 @@ def _c53(table: Table) -> Check:
         + f" at {', '.join(map(str, FEW))} km/h; decrease at high over low {told(value, ci, 2)}; gap {gap[0]:.1f} "
         f"to {gap[1]:.1f}"
     )
-    return judge(
-        "C53.passes",
-        outcome,
-        whole=smaller and flatter and gap[1] < gap[0],
-        part=smaller and flatter,
-        value=value,
-        ci95=ci,
-    )
+    whole = smaller and flatter and gap[1] < gap[0]
+    return judge("C53.passes", outcome, whole=whole, part=smaller and flatter, value=value, ci95=ci)
 
 
 def _c54(table: Table) -> Check:
@@ -248,15 +231,8 @@ def _c55(table: Table) -> Check:
     outcome = f"{np.nanmean(base):.1f}; " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items()) + " more"
     more = "" if all(above) else " Not each of them raises the slope."
     more += "" if is_slight else f" The largest is {share:.0%} of the slope, which is more than slight."
-    return judge(
-        "C55.passes",
-        outcome,
-        whole=all(above) and is_slight,
-        part=sum(above) >= 2,
-        value=value,
-        ci95=ci,
-        fields={"more": more},
-    )
+    whole = all(above) and is_slight
+    return judge("C55.passes", outcome, whole=whole, part=sum(above) >= 2, value=value, ci95=ci, fields={"more": more})
 
 
 def _mean_of(values: FloatArray) -> Statistic:
@@ -325,18 +301,11 @@ def _check(manoeuvre: str, found: list[Found]) -> Check:
         f"{k} of {n} ({len(there)} found at all), {when}; traction coefficient at most {max(f.mu for f in found):.3f}, "
         f"utilisation {max(f.utilisation for f in found):.2f}; found before the lane in {early}"
     )
-    return judge(
-        "C47.drives",
-        outcome,
-        whole=whole,
-        part=k >= SOME * n,
-        value=k / n,
-        ci95=wilson(k, n),
-        fields={
-            "manoeuvre": manoeuvre,
-            "speed": "100 km/h" if manoeuvre == "constant speed" else "0.8 m/s^2 from 92 km/h",
-        },
-    )
+    fields = {
+        "manoeuvre": manoeuvre,
+        "speed": "100 km/h" if manoeuvre == "constant speed" else "0.8 m/s^2 from 92 km/h",
+    }
+    return judge("C47.drives", outcome, whole=whole, part=k >= SOME * n, value=k / n, ci95=wilson(k, n), fields=fields)
 
 
 def detected(plan: Plan) -> Checks:

@@ -74,14 +74,9 @@ def _history(plan: Plan) -> Check:
         f"{false['robust']} (upper quartile of its means, the default) of {n} drives; snow missed "
         f"{missed['file']}, {missed['max']}, {missed['robust']} of {n}"
     )
-    return judge(
-        "C56.drives",
-        outcome,
-        whole=whole,
-        part=wrong["max"] < wrong["file"],
-        value=wrong["max"] / (2 * n),
-        ci95=wilson(wrong["max"], 2 * n),
-    )
+    ci95 = wilson(wrong["max"], 2 * n)
+    part = wrong["max"] < wrong["file"]
+    return judge("C56.drives", outcome, whole=whole, part=part, value=wrong["max"] / (2 * n), ci95=ci95)
 
 
 def _learn(gain: float, seed: int) -> History:
@@ -111,14 +106,8 @@ def _not_unique(plan: Plan) -> Check:
         + ", ".join(f"{k.replace('_', ' ')} {r[1]} and {r[2]} of {r[0]}" for k, r in rows.items())
         + ")"
     )
-    return judge(
-        "C57.drives",
-        outcome,
-        whole=whole,
-        part=joint <= 0.2 * drops and drops > 0,
-        value=drops / n,
-        ci95=wilson(drops, n),
-    )
+    part = joint <= 0.2 * drops and drops > 0
+    return judge("C57.drives", outcome, whole=whole, part=part, value=drops / n, ci95=wilson(drops, n))
 
 
 def _unchanged(plan: Plan) -> Checks:

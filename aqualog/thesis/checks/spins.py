@@ -100,14 +100,9 @@ def _c5(table: Table) -> Check:
         f"{middle:.3f} s ({times.min():.3f} to {times.max():.3f}), {stops} of {times.size} within 1 s "
         "(150 km/h, even contact)"
     )
-    return judge(
-        "C5.passes",
-        outcome,
-        whole=stops == times.size,
-        part=2 * stops >= times.size,
-        value=middle if np.isfinite(middle) else None,
-        ci95=(float(times.min()), float(times.max())),
-    )
+    value = middle if np.isfinite(middle) else None
+    ci95 = (float(times.min()), float(times.max()))
+    return judge("C5.passes", outcome, whole=stops == times.size, part=2 * stops >= times.size, value=value, ci95=ci95)
 
 
 def _c3_needs() -> Iterator[Pass]:
@@ -179,14 +174,10 @@ def _c17(table: Table) -> Check:
     value, ci = estimate(lambda r: full(r) - minor(r), n)
     there = np.isfinite(value)
     outcome = f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h"
-    return judge(
-        "C17.passes",
-        outcome,
-        whole=bool(there and ci[0] >= 15.0 and ci[1] <= 25.0),
-        part=bool(there and 10.0 <= value <= 30.0),
-        value=value if there else None,
-        ci95=ci if np.all(np.isfinite(ci)) else None,
-    )
+    part = bool(there and 10.0 <= value <= 30.0)
+    ci95 = ci if np.all(np.isfinite(ci)) else None
+    whole = bool(there and ci[0] >= 15.0 and ci[1] <= 25.0)
+    return judge("C17.passes", outcome, whole=whole, part=part, value=value if there else None, ci95=ci95)
 
 
 def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
@@ -281,14 +272,9 @@ def _c20(table: Table) -> Check:
     outcome = (
         ", ".join(f"{T:.0f} N m: {said(f, n)}" for T, f in at.items()) + f" km/h; {told(fall, ci)} km/h sooner in all"
     )
-    return judge(
-        "C20.passes",
-        outcome,
-        whole=whole,
-        part=bool(v[-1] < v[0]),
-        value=fall if np.isfinite(fall) else None,
-        ci95=ci if np.isfinite(ci).all() else None,
-    )
+    value = fall if np.isfinite(fall) else None
+    ci95 = ci if np.isfinite(ci).all() else None
+    return judge("C20.passes", outcome, whole=whole, part=bool(v[-1] < v[0]), value=value, ci95=ci95)
 
 
 def _c21(table: Table) -> Check:
@@ -330,13 +316,9 @@ def _c22(table: Table) -> Check:
     whole = all(r < 0.0 for r, _ in ranks.values())
     there = bool(np.isfinite(value))
     outcome = "; ".join(text)
+    part = any(r < 0.0 for r, _ in ranks.values())
     return judge(
-        "C22.passes",
-        outcome,
-        whole=whole,
-        part=any(r < 0.0 for r, _ in ranks.values()),
-        value=value if there else None,
-        ci95=ci if there else None,
+        "C22.passes", outcome, whole=whole, part=part, value=value if there else None, ci95=ci if there else None
     )
 
 
@@ -363,14 +345,8 @@ def _c23(table: Table) -> Check:
     apart = bool(np.isfinite(a) and (ci[0] > 0.0 or ci[1] < 0.0))
     whole = apart and bool(np.isfinite(b) and abs(a) > 3.0 * abs(b))
     outcome = f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s², 102 to 126 km/h)"
-    return judge(
-        "C23.passes",
-        outcome,
-        whole=whole,
-        part=apart,
-        value=a if np.isfinite(a) else None,
-        ci95=ci if np.isfinite(a) else None,
-    )
+    ci95 = ci if np.isfinite(a) else None
+    return judge("C23.passes", outcome, whole=whole, part=apart, value=a if np.isfinite(a) else None, ci95=ci95)
 
 
 _DIFFERENT = Pass(106, kick=1000.0)

@@ -71,13 +71,9 @@ def _sign_of_speed(plan: Plan) -> Check:
         f"with the sign {share(wrong['with'], n['with'])}, without {share(wrong['without'], n['without'])} of "
         f"the detections, in {len(water)} drives on water"
     )
+    part = shares["with"] < shares["without"]
     return judge(
-        "C25.drives",
-        outcome,
-        whole=whole,
-        part=shares["with"] < shares["without"],
-        value=shares["with"],
-        ci95=wilson(wrong["with"], n["with"]),
+        "C25.drives", outcome, whole=whole, part=part, value=shares["with"], ci95=wilson(wrong["with"], n["with"])
     )
 
 
@@ -268,14 +264,8 @@ def _traction_limit(plan: Plan) -> Check:
         f"drives with a report, without and with the limit: {words}; on water {n_water[1]} to {n_water[2]} of "
         f"{n_water[0]} wheels that spun"
     )
-    return judge(
-        "C27.drives",
-        outcome,
-        whole=whole,
-        part=seen and kept and less,
-        value=caught / max(n, 1),
-        ci95=wilson(caught, n),
-    )
+    part = seen and kept and less
+    return judge("C27.drives", outcome, whole=whole, part=part, value=caught / max(n, 1), ci95=wilson(caught, n))
 
 
 CHECKS = (

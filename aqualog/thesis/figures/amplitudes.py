@@ -124,13 +124,8 @@ def _c110(times: dict[str, dict[tuple[float, float], float]]) -> Check:
         )
         + f" s; smallest axle force {least:.0f} N"
     )
-    return judge(
-        "C110.figure",
-        outcome,
-        whole=all(falls_with_amplitude) and all(falls_with_a) and least > 0.0,
-        part=all(falls_with_amplitude) or all(falls_with_a),
-        value=least,
-    )
+    whole = all(falls_with_amplitude) and all(falls_with_a) and least > 0.0
+    return judge("C110.figure", outcome, whole=whole, part=all(falls_with_amplitude) or all(falls_with_a), value=least)
 
 
 def _c111(times: dict[str, dict[tuple[float, float], float]], causes: dict[float, dict[str, list[float]]]) -> Check:
@@ -148,13 +143,8 @@ def _c111(times: dict[str, dict[tuple[float, float], float]], causes: dict[float
         )
         + f"; smallest axle force {least:.0f} N{_whose(verdicts)}"
     )
-    return judge(
-        "C111.figure",
-        outcome,
-        verdict=verdict,
-        value=_known(ratios["sine"][0.07]),
-        fields={"causes": ", ".join(f"{n} {_number(left[0.07][n])} / {_number(left[0.03][n])}" for n in _CAUSES)},
-    )
+    fields = {"causes": ", ".join(f"{n} {_number(left[0.07][n])} / {_number(left[0.03][n])}" for n in _CAUSES)}
+    return judge("C111.figure", outcome, verdict=verdict, value=_known(ratios["sine"][0.07]), fields=fields)
 
 
 def _c112(times: dict[str, list[float]]) -> Check:
@@ -162,13 +152,8 @@ def _c112(times: dict[str, list[float]]) -> Check:
     verdicts = {w: judged(whole=all(b), part=b[-1]) for w, b in below.items()}
     verdict = _both(verdicts)
     outcome = "; ".join(f"{w}: {listed(ts)} s" for w, ts in times.items()) + f"{_whose(verdicts)}"
-    return judge(
-        "C112.figure",
-        outcome,
-        verdict=verdict,
-        value=_known(times["sine"][-1]),
-        fields={"error": 1e3 * _largest_error()},
-    )
+    fields = {"error": 1e3 * _largest_error()}
+    return judge("C112.figure", outcome, verdict=verdict, value=_known(times["sine"][-1]), fields=fields)
 
 
 def _largest_error() -> float:
@@ -195,13 +180,8 @@ def _c113(times: dict[str, list[float]]) -> Check:
         )
         + f"{_whose(verdicts)}"
     )
-    return judge(
-        "C113.figure",
-        outcome,
-        verdict=verdict,
-        value=_known(times["sine"][-1]),
-        fields={"tangent": tangent, "mu": mu, "estimated": estimated},
-    )
+    fields = {"tangent": tangent, "mu": mu, "estimated": estimated}
+    return judge("C113.figure", outcome, verdict=verdict, value=_known(times["sine"][-1]), fields=fields)
 
 
 def _known(value: float) -> float | None:

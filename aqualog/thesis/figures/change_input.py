@@ -66,13 +66,8 @@ def figure_3_02() -> Figure:
         f"adapted {1e3 * adapted:.1f}e-3 s, plain {1e3 * plain:.1f}e-3 s (at most {1e3 * peak:.1f}e-3 s), threshold "
         f"{1e3 * TUNING.h:.0f}e-3 s"
     )
-    c90 = judge(
-        "C90.figure",
-        outcome,
-        whole=adapted > TUNING.h and adapted > 3.0 * peak,
-        part=adapted > peak,
-        value=adapted / max(peak, 1e-12),
-    )
+    whole = adapted > TUNING.h and adapted > 3.0 * peak
+    c90 = judge("C90.figure", outcome, whole=whole, part=adapted > peak, value=adapted / max(peak, 1e-12))
     outcome = (
         f"sgn(s_delta) {1e3 * raw:.1f}e-3 s, sgn(s_delta - delta_hat) {1e3 * corrected:.1f}e-3 s, sgn(mu_delta) "
         f"{1e3 * by_traction:.1f}e-3 s; without an error "

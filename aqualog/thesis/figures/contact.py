@@ -177,14 +177,10 @@ def _measured(found: Slopes) -> tuple[list[Line], list[Check]]:
     least = max(falls.values(), key=lambda e: e.high)
     whole = len(down) == len(falls)
     outcome = "; ".join(f"{w} {e.words(0)} %" for w, e in falls.items())
+    value = least.value
+    fields = {"level": ", ".join(w for w in falls if w not in down)}
     finding = judge(
-        "C10.figure_measured",
-        outcome,
-        whole=whole,
-        part=bool(down),
-        value=least.value,
-        ci95=least.ci,
-        fields={"level": ", ".join(w for w in falls if w not in down)},
+        "C10.figure_measured", outcome, whole=whole, part=bool(down), value=value, ci95=least.ci, fields=fields
     )
     return lines, [finding]
 

@@ -273,14 +273,9 @@ def _c76(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
         + ", ".join(f"{n} {in_runs(_share(x))}" for n, x in pairs.items())
         + ")"
     )
-    return judge(
-        "C76.figure",
-        outcome,
-        whole=whole,
-        part=in_time or order >= MANY,
-        value=_value(_median(five)),
-        fields={"drag": spread([_resistance(r) for r in all_runs]), "threshold": DEFAULT.resistance},
-    )
+    part = in_time or order >= MANY
+    fields = {"drag": spread([_resistance(r) for r in all_runs]), "threshold": DEFAULT.resistance}
+    return judge("C76.figure", outcome, whole=whole, part=part, value=_value(_median(five)), fields=fields)
 
 
 def _active_stretches(r: SceneRun) -> int:
@@ -298,13 +293,8 @@ def _c77(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
         f"{spread([t.cross for t in times])} s, rise after {spread([t.rise for t in times])} s), more than once "
         f"in {in_runs(again)}"
     )
-    return judge(
-        "C77.figure",
-        outcome,
-        whole=whole,
-        part=in_order >= MANY and active >= MANY,
-        value=_value(_median([t.cross for t in times])),
-    )
+    value = _value(_median([t.cross for t in times]))
+    return judge("C77.figure", outcome, whole=whole, part=in_order >= MANY and active >= MANY, value=value)
 
 
 def panels_2_25(r: DriveRun) -> tuple[Panel, ...]:

@@ -240,19 +240,17 @@ def figure_3_11() -> Figure:
         f"over q_k {_percent(by_q_near)} (to 10000 times: {_percent(by_q)}), over h {_percent(by_h)}; false alarms: "
         f"{false}"
     )
+    value = by_h if np.isfinite(by_h) else None
+    whole = by_q_near > _CHANGE and by_h > _CHANGE
+    fields = {
+        "q_k": TUNING.q_k,
+        "known": told(known),
+        "tuned": told(_TUNED),
+        "fast": slope_after(_tuned_case(1e4, 1.0), 2.0),
+        "slow": slope_after(_TUNED, 2.0),
+    }
     c114 = judge(
-        "C114.figure",
-        outcome,
-        whole=by_q_near > _CHANGE and by_h > _CHANGE,
-        part=by_h > _CHANGE and by_q > _CHANGE,
-        value=by_h if np.isfinite(by_h) else None,
-        fields={
-            "q_k": TUNING.q_k,
-            "known": told(known),
-            "tuned": told(_TUNED),
-            "fast": slope_after(_tuned_case(1e4, 1.0), 2.0),
-            "slow": slope_after(_TUNED, 2.0),
-        },
+        "C114.figure", outcome, whole=whole, part=by_h > _CHANGE and by_q > _CHANGE, value=value, fields=fields
     )
     over_q: list[Line] = []
     for q, c in zip(Q, COLOURS, strict=True):

@@ -93,15 +93,8 @@ def rising(found: Resistance) -> Check | None:
         f"above 0 at {len(up)} of {len(told)} levels; gradients {min(e.value for e in told.values()):.3f} to "
         f"{max(e.value for e in told.values()):.3f} {PER_TEN}; the least certain one"
     )
-    return judge(
-        "C39.figure",
-        outcome,
-        whole=whole,
-        part=2 * len(up) >= len(told) and not any(e.is_below for e in told.values()),
-        value=least.value,
-        ci95=least.ci,
-        fields={"flat": flat},
-    )
+    part = 2 * len(up) >= len(told) and not any(e.is_below for e in told.values())
+    return judge("C39.figure", outcome, whole=whole, part=part, value=least.value, ci95=least.ci, fields={"flat": flat})
 
 
 def over_speed(number: str, evidence: Evidence) -> Figure:
@@ -251,15 +244,10 @@ def _c38(found: Resistance) -> Check | None:
             f"{shallow[0].name} to {shallow[-1].name}: level {flat[0].words()} {UNIT}, gradient {flat[1].words()} "
             f"{PER_TEN}; {words}"
         )
-    return judge(
-        "C38.figure",
-        words,
-        whole=is_flat and is_risen,
-        part=is_flat or is_risen,
-        value=rise[0].value,
-        ci95=rise[0].ci,
-        fields={"why": _reason(flat, rise)},
-    )
+    part = is_flat or is_risen
+    whole = is_flat and is_risen
+    fields = {"why": _reason(flat, rise)}
+    return judge("C38.figure", words, whole=whole, part=part, value=rise[0].value, ci95=rise[0].ci, fields=fields)
 
 
 def _reason(flat: tuple[Effect, Effect] | None, rise: tuple[Effect, Effect]) -> str:
@@ -298,15 +286,8 @@ def _c45(found: Resistance) -> Check | None:
     whole = len(down) == len(effects)
     first = effects[names[0]]
     outcome = "; ".join(f"{n}: {e.words()} {UNIT}" for n, e in effects.items())
-    return judge(
-        "C45.figure",
-        outcome,
-        whole=whole,
-        part=bool(down),
-        value=first.value,
-        ci95=first.ci,
-        fields={"first": names[0], "others": ", ".join(n for n in effects if n not in down)},
-    )
+    fields = {"first": names[0], "others": ", ".join(n for n in effects if n not in down)}
+    return judge("C45.figure", outcome, whole=whole, part=bool(down), value=first.value, ci95=first.ci, fields=fields)
 
 
 _OF_FIGURE: Mapping[str, tuple[Callable[[Resistance], Check | None], ...]] = {

@@ -38,13 +38,8 @@ def figure_3_01() -> Figure:
         f"on ice: friction {100 * snows:.0f} % apart, slopes {100 * snow_slopes:.0f} %, bends at "
         f"{100 * bends['snow']:.1f} and {100 * bends['snow_on_ice']:.1f} % slip"
     )
-    c81 = judge(
-        "C81.figure",
-        outcome,
-        whole=min(ratios) > 1.15 and snows < 0.10 and snow_slopes > 0.25,
-        part=min(ratios) > 1.15,
-        value=min(ratios),
-    )
+    whole = min(ratios) > 1.15 and snows < 0.10 and snow_slopes > 0.25
+    c81 = judge("C81.figure", outcome, whole=whole, part=min(ratios) > 1.15, value=min(ratios))
 
     # the curve's own slope near zero against the law of springs in series
     small = np.array([1e-6])
@@ -100,14 +95,9 @@ def figure_3_03() -> Figure:
     left = abs(s_f_equal - rho_equal * s_r_equal)
     initial_error, chord_error = abs(initial / _FRONT - 1.0), abs(chord / _FRONT - 1.0)
     outcome = f"initial slope {initial:.2f}, slope between the points {chord:.1f}, front tyre {_FRONT:.0f}"
-    c92 = judge(
-        "C92.figure",
-        outcome,
-        whole=initial_error < 0.01 and chord_error < 0.15,
-        part=initial_error < 0.01,
-        value=chord,
-        fields={"flatter": 100 * chord_error, "left": 100 * left},
-    )
+    whole = initial_error < 0.01 and chord_error < 0.15
+    fields = {"flatter": 100 * chord_error, "left": 100 * left}
+    c92 = judge("C92.figure", outcome, whole=whole, part=initial_error < 0.01, value=chord, fields=fields)
     first = (
         Line("rear tyre", 100.0 * s, rear, colour=COLOURS[1]),
         Line("rear working point", np.array([100.0 * s_r]), np.array([_POINTS[1]]), colour=COLOURS[1], mode="markers",

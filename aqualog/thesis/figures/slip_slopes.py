@@ -175,15 +175,8 @@ def _c48(rows: Sequence[SlopeRow]) -> Check | None:
         "; ".join(f"{w} {x:.2f} [{c[0]:.2f}, {c[1]:.2f}]" for w, (x, c) in told.items())
         + f" at {rows[0].low_kmh:.0f} to {rows[0].high_kmh:.0f} km/h"
     )
-    return judge(
-        "C48.figure",
-        outcome,
-        whole=whole,
-        part=bool(low),
-        value=value,
-        ci95=(ci[0], ci[1]),
-        fields={"level": ", ".join(w for w in told if w not in low)},
-    )
+    fields = {"level": ", ".join(w for w in told if w not in low)}
+    return judge("C48.figure", outcome, whole=whole, part=bool(low), value=value, ci95=(ci[0], ci[1]), fields=fields)
 
 
 def _cloud(evidence: Evidence, found: Slopes, row: SlopeRow, *, is_wet: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -341,18 +334,15 @@ def _c52(found: Slopes) -> Check | None:
         + "; ".join(e.words(2) for e in effects)
         + f"; left less uniform in {rougher} of {len(rough)}"
     )
-    return judge(
-        "C52.figure",
-        outcome,
-        whole=is_higher and is_rougher,
-        part=is_higher or is_rougher,
-        value=mean.value,
-        ci95=mean.ci,
-        reason=""
+    part = is_higher or is_rougher
+    whole = is_higher and is_rougher
+    reason = (
+        ""
         if is_higher and is_rougher
         else f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
-        + ("." if is_rougher else "; the right wheels, on more water, scatter as much."),
+        + ("." if is_rougher else "; the right wheels, on more water, scatter as much.")
     )
+    return judge("C52.figure", outcome, whole=whole, part=part, value=mean.value, ci95=mean.ci, reason=reason)
 
 
 _SLOW_KMH = limit("slow_kmh", "C53.figure")  # "low velocities", far below aquaplaning
@@ -382,15 +372,9 @@ def _c53(found: Slopes) -> Check | None:
         "less "
         f"by {over_all[1].words(1)} %{middle}"
     )
-    return judge(
-        "C53.figure",
-        outcome,
-        whole=whole,
-        part=is_less or is_flatter,
-        value=slow[0].value,
-        ci95=slow[0].ci,
-        fields={"lacking": ", ".join(lacking)},
-    )
+    part = is_less or is_flatter
+    fields = {"lacking": ", ".join(lacking)}
+    return judge("C53.figure", outcome, whole=whole, part=part, value=slow[0].value, ci95=slow[0].ci, fields=fields)
 
 
 _NONE = limit("none", "C54.figure")  # [% per 10 km/h] a fall that does not count: a tenth over the speeds driven
@@ -411,15 +395,9 @@ def _c54(found: Slopes) -> Check | None:
     worst = min((r[2] for r in rows), key=lambda e: e.low)
     whole = len(level) == len(rows) and len(falling) == len(rows)
     outcome = "; ".join(f"{n}: worn {a.words(1)}, less worn {b.words(1)} %" for n, a, b in rows)
-    return judge(
-        "C54.figure",
-        outcome,
-        whole=whole,
-        part=len(less) == len(rows),
-        value=worst.value,
-        ci95=worst.ci,
-        fields={"still": len(level), "all": len(rows), "falling": len(falling)},
-    )
+    part = len(less) == len(rows)
+    fields = {"still": len(level), "all": len(rows), "falling": len(falling)}
+    return judge("C54.figure", outcome, whole=whole, part=part, value=worst.value, ci95=worst.ci, fields=fields)
 
 
 _SLIGHT_PERCENT = limit("slight", "C55.figure")  # [%] more is not "slight"
@@ -451,19 +429,17 @@ def _c55(found: Slopes) -> Check | None:
     name, first = next(iter(effects.items()))
     whole = len(up) == len(effects) and slight
     outcome = "; ".join(f"{n}: {e.words(1)} %" for n, e in effects.items())
-    return judge(
-        "C55.figure",
-        outcome,
-        whole=whole,
-        part=bool(up),
-        value=first.value,
-        ci95=first.ci,
-        reason=""
+    value = first.value
+    fields = {"name": name}
+    reason = (
+        ""
         if whole
         else "Not higher by " + ", ".join(n for n in effects if n not in up) + "."
         if len(up) < len(effects)
-        else "More than slightly.",
-        fields={"name": name},
+        else "More than slightly."
+    )
+    return judge(
+        "C55.figure", outcome, whole=whole, part=bool(up), value=value, ci95=first.ci, reason=reason, fields=fields
     )
 
 

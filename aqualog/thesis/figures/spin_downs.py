@@ -44,15 +44,9 @@ def _shares(found: Sequence[Pass], kmh: float, holds: Callable[[Pass], bool], cl
     low, high = wilson(hit, len(near))
     share = hit / len(near)
     outcome = f"{hit} of {len(near)} passes at {kmh:g} ± {_NEAR / KMH:g} km/h {word}"
-    return judge(
-        f"{claim}.figure",
-        outcome,
-        whole=share >= 0.5 and low > 0.0,
-        part=hit > 0,
-        value=share,
-        ci95=(low, high),
-        fields={"full": _full(found)},
-    )
+    fields = {"full": _full(found)}
+    whole = share >= 0.5 and low > 0.0
+    return judge(f"{claim}.figure", outcome, whole=whole, part=hit > 0, value=share, ci95=(low, high), fields=fields)
 
 
 def _full(found: Sequence[Pass]) -> str:
@@ -105,19 +99,15 @@ def rising_number(found: Sequence[Pass]) -> Check | None:
         f"({len(part)} "
         "passes)"
     )
-    return judge(
-        "C15.figure",
-        outcome,
-        whole=all(both),
-        part=any(both),
-        value=number[1].value,
-        ci95=number[1].ci,
-        reason=""
+    value = number[1].value
+    reason = (
+        ""
         if all(both)
         else "Several short dips merge into one longer spin-down."
         if both[1]
-        else "The passes are few, or cover little speed.",
+        else "The passes are few, or cover little speed."
     )
+    return judge("C15.figure", outcome, whole=all(both), part=any(both), value=value, ci95=number[1].ci, reason=reason)
 
 
 def before_full(found: Sequence[Pass]) -> Check | None:
@@ -134,14 +124,9 @@ def before_full(found: Sequence[Pass]) -> Check | None:
     outcome = (
         f"full at {full / KMH:.0f} km/h, minor from {first / KMH:.0f} km/h on: {away:.0f} km/h ({len(found)} passes)"
     )
+    part = low <= hi and high >= lo
     return judge(
-        "C17.figure",
-        outcome,
-        whole=whole,
-        part=low <= hi and high >= lo,
-        value=away,
-        ci95=(low, high),
-        fields={"lo": lo, "hi": hi},
+        "C17.figure", outcome, whole=whole, part=part, value=away, ci95=(low, high), fields={"lo": lo, "hi": hi}
     )
 
 
@@ -162,19 +147,14 @@ def exponential(found: Sequence[Pass]) -> Check | None:
         f"{rate.words(0)} % deeper per 10 km/h; rms about the exponential {100 * curve:.2f} %, about the line "
         f"{100 * line:.2f} % of slip ({v.size} passes)"
     )
-    return judge(
-        "C18.figure",
-        outcome,
-        whole=whole,
-        part=rate.is_above,
-        value=rate.value,
-        ci95=rate.ci,
-        reason=""
+    reason = (
+        ""
         if whole
         else "The slip rises, but not faster than a straight line."
         if rate.is_above
-        else "No rise exceeds the scatter.",
+        else "No rise exceeds the scatter."
     )
+    return judge("C18.figure", outcome, whole=whole, part=rate.is_above, value=rate.value, ci95=rate.ci, reason=reason)
 
 
 def _rms_line(v: FloatArray, y: FloatArray) -> float:
@@ -208,14 +188,10 @@ def new_tread(found: Sequence[Pass], words: str) -> Check | None:
     low, high = wilson(hit, len(found))
     top = max(p.v_mean for p in found) / KMH
     outcome = f"{hit} of {len(found)} passes of {words}, up to {top:.0f} km/h"
+    fields = {"where": _where(found)}
+    part = hit <= 0.05 * len(found)
     return judge(
-        "C19.figure",
-        outcome,
-        whole=hit == 0,
-        part=hit <= 0.05 * len(found),
-        value=hit / len(found),
-        ci95=(low, high),
-        fields={"where": _where(found)},
+        "C19.figure", outcome, whole=hit == 0, part=part, value=hit / len(found), ci95=(low, high), fields=fields
     )
 
 

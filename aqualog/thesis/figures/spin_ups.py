@@ -160,15 +160,8 @@ def falling_traction(pools: dict[str, Pool]) -> Check | None:
     worst = max(effects.values(), key=lambda e: e.high)
     whole = len(down) == len(effects)
     outcome = "per 10 km/h: " + "; ".join(f"{w} {e.words(4)}" for w, e in effects.items())
-    return judge(
-        "C22.figure",
-        outcome,
-        whole=whole,
-        part=bool(down),
-        value=worst.value,
-        ci95=worst.ci,
-        fields={"why": _unsure(effects, pools)},
-    )
+    fields = {"why": _unsure(effects, pools)}
+    return judge("C22.figure", outcome, whole=whole, part=bool(down), value=worst.value, ci95=worst.ci, fields=fields)
 
 
 def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
@@ -188,18 +181,16 @@ def sides_differ(pools: dict[str, Pool]) -> Check | None:
         return None
     level = found[0]
     outcome = f"left less right {level.words(4)}"
-    return judge(
-        "C23.figure",
-        outcome,
-        whole=level.is_above,
-        part=level.value > 0.0,
-        value=level.value,
-        ci95=level.ci,
-        reason=""
+    part = level.value > 0.0
+    reason = (
+        ""
         if level.is_above
         else "The two sides do not differ significantly."
         if level.low <= 0.0 <= level.high
-        else "The right wheel carries more.",
+        else "The right wheel carries more."
+    )
+    return judge(
+        "C23.figure", outcome, whole=level.is_above, part=part, value=level.value, ci95=level.ci, reason=reason
     )
 
 

@@ -169,12 +169,9 @@ def figure_3_05() -> Figure:
     zero = force.size // 2
     origin = max(max(abs(float(p.s_delta[zero])), abs(float(p.mu_delta[zero]))) for p in lines.values())
     outcome = f"largest deviation: nu = 0 {front:.1e}, nu = 1 {rear:.1e}, origin {origin:.1e}"
+    whole = max(front, rear, origin) < 1e-12
     c94 = judge(
-        "C94.figure",
-        outcome,
-        whole=max(front, rear, origin) < 1e-12,
-        part=max(front, rear, origin) < 1e-3,
-        value=max(front, rear, origin),
+        "C94.figure", outcome, whole=whole, part=max(front, rear, origin) < 1e-3, value=max(front, rear, origin)
     )
 
     blind = [blind_split(f) for f in _FORCES]

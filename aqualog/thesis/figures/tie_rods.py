@@ -196,14 +196,9 @@ def _c60(all_runs: tuple[SceneRun, ...]) -> Check:
         f"there are {len(begun)} events in {in_runs(reported)} runs, {spun:.0%} of them with a spin; set in "
         f"{rate:.1%} of {0.01 * bits.size:.0f} s of partial aquaplaning without"
     )
-    return judge(
-        "C60.figure",
-        outcome,
-        whole=spun >= 0.95 and rate < _RARE and reported >= MANY,
-        part=spun >= 0.95 or rate < _RARE,
-        value=spun,
-        fields={"contact": np.median(contact), "scatter": spread([scatter(r, "fl") for r in all_runs], 0)},
-    )
+    whole = spun >= 0.95 and rate < _RARE and reported >= MANY
+    fields = {"contact": np.median(contact), "scatter": spread([scatter(r, "fl") for r in all_runs], 0)}
+    return judge("C60.figure", outcome, whole=whole, part=spun >= 0.95 or rate < _RARE, value=spun, fields=fields)
 
 
 @lru_cache(maxsize=1)

@@ -52,13 +52,9 @@ def _c104_phase() -> tuple[Check, Table]:
     outcome = "mean (shortest to longest) at 1 m/s²: " + ", ".join(
         f"{w} {mean[w]:.2f} ({min(times[w]):.2f} to {max(times[w]):.2f}) s" for w in reversed(WAVES)
     )
-    finding = judge(
-        "C104.figure_phase",
-        outcome,
-        whole=in_order and _STEP_RANGE[0] <= mean["step"] <= _STEP_RANGE[1] and mean["ramp"] > _OTHERS,
-        part=in_order,
-        value=None if np.isnan(mean["step"]) else mean["step"],
-    )
+    value = None if np.isnan(mean["step"]) else mean["step"]
+    whole = in_order and _STEP_RANGE[0] <= mean["step"] <= _STEP_RANGE[1] and mean["ramp"] > _OTHERS
+    finding = judge("C104.figure_phase", outcome, whole=whole, part=in_order, value=value)
     table = Table(
         "Detection time [s] at 1 m/s² over the phase at the change",
         ("phase [period]", *WAVES),
@@ -84,21 +80,18 @@ def figure_3_06() -> Figure:
         + ", ".join(f"{w} {seconds(still[w])}" for w in ("step", "ramp", "sine", "triangle"))
         + f"; false alarms before the change: {false}"
     )
+    whole = in_order and _STEP_RANGE[0] <= step <= _STEP_RANGE[1] and ramp > _OTHERS
+    fields = {
+        "swing": 1e3 * swing,
+        "drift": 1e3 * TUNING.zeta,
+        "late": late,
+        "end": _END,
+        "slope": slope,
+        "mu": mu,
+        "estimated": estimated,
+    }
     c104 = judge(
-        "C104.figure",
-        outcome,
-        whole=in_order and _STEP_RANGE[0] <= step <= _STEP_RANGE[1] and ramp > _OTHERS,
-        part=in_order,
-        value=None if np.isnan(step) else step,
-        fields={
-            "swing": 1e3 * swing,
-            "drift": 1e3 * TUNING.zeta,
-            "late": late,
-            "end": _END,
-            "slope": slope,
-            "mu": mu,
-            "estimated": estimated,
-        },
+        "C104.figure", outcome, whole=whole, part=in_order, value=None if np.isnan(step) else step, fields=fields
     )
     by_phase, phases = _c104_phase()
     panels = []
