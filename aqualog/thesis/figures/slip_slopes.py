@@ -264,7 +264,7 @@ def figure_2_16(number: str, evidence: Evidence) -> Figure:
 
 _SAME = limit("same", "C50.figure")  # of the slope: less is no clear influence
 # share of bins with so many runs in which the method gives a slope
-_TOLD, _LEAST_RUNS = limit("told", "C49.figure"), limit("least_runs", "C49.figure")
+_TOLD, _LEAST_RUNS = limit("given", "C49.figure"), limit("least_runs", "C49.figure")
 _SLIGHT_RATIO = limit("slight", "C52.figure")  # times: "slightly higher"
 
 

@@ -234,7 +234,7 @@ def _comfort() -> tuple[list[Check], Table]:
     kept = (
         f"velocity within {', '.join(f'{w} {v:.3f}' for w, (v, _) in drift.items())} km/h, mean acceleration within "
         f"{max(a for _, a in drift.values()):.4f} m/s²; at one moment at "
-        f"most {dry}e-3 m/s^2, after the change {after}e-3"
+        f"most {dry}e-3 m/s², after the change {after}e-3"
     )
     smooth = all(holds[w] for w in _SMOOTH)
     checks = [

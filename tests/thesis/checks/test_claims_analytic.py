@@ -13,8 +13,8 @@ PLAN = Plan(range(1, 100))
 MODULES = (contact, differential, estimator, excitation)
 MAKERS = {m.claims: m.checks for module in MODULES for m in module.CHECKS}
 ELSE = {
-    # contact lengths are the simulator's, offset's sign, clamp, reason of the half-car, phase; perception
-    "C9": DIFFERENCE, "C10": DIFFERENCE, "C86": DIFFERENCE, "C89": DIFFERENCE, "C98": DIFFERENCE, "C103": DIFFERENCE,
+    # contact lengths are the simulator's, offset's sign, clamp, phase; perception
+    "C9": DIFFERENCE, "C10": DIFFERENCE, "C86": DIFFERENCE, "C89": DIFFERENCE, "C103": DIFFERENCE,
     "C117": NEEDS_DATA,
 }  # fmt: skip
 
