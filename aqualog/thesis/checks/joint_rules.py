@@ -9,8 +9,8 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.detect import ewvar
+from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.minor_spin_down import MinorParams
-from aqualog.detect.scene import BrakeWatch
 from aqualog.detect.slip_slope.watch import TAU_VARIANCE, VARIANCE_MAX, Memory
 from aqualog.detect.stream import detect_drive
 from aqualog.evaluate.intervals import wilson
