@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import AqualogError, ConfigError
+from aqualog.core.units import displayed_text, displayed_unit
 from aqualog.face.arguments import file_of
 from aqualog.face.campaign import Campaign, CampaignRuns
 from aqualog.face.listener import Listener, Progress, listener
@@ -99,7 +100,7 @@ class Figures(Result):
                 f.number,
                 c.verdict,
                 *((_value(c),) if has_values else ()),
-                shorten(c.found, width, placeholder=" ..."),
+                shorten(displayed_text(c.found), width, placeholder=" ..."),
             )
             for f, c in self.findings
         ]
@@ -349,7 +350,7 @@ def _value(c: Check) -> str:
     """The number judged with its interval, if it has one."""
     if c.value is None or c.ci95 is None:
         return "–"
-    return f"{c.value:.3g} [{c.ci95[0]:.3g}, {c.ci95[1]:.3g}] {c.unit}".strip()
+    return f"{c.value:.3g} [{c.ci95[0]:.3g}, {c.ci95[1]:.3g}] {displayed_unit(c.unit)}".strip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -396,7 +397,11 @@ class Reproduction(Result):
         from aqualog.report.text import table
 
         rows = [
-            (c.claim.id, c.verdict, shorten("; ".join(k.found for k in c.checks), width, placeholder=" ..."))
+            (
+                c.claim.id,
+                c.verdict,
+                shorten(displayed_text("; ".join(k.found for k in c.checks)), width, placeholder=" ..."),
+            )
             for c in self.conclusions
         ]
         return table(("claim", "verdict", "found"), rows) + f"\n{self.headline()}\n"
