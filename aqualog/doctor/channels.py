@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from aqualog.align.freezes import Stretch, longest_stop
 from aqualog.align.overview import ChannelOverview
 from aqualog.core.records import Channel, TimeFaults
-from aqualog.doctor.records import Finding, Level
+from aqualog.doctor.findings import Finding, Level
 
 __all__ = ["channel_findings"]
 

@@ -12,7 +12,7 @@ from aqualog.align.quantity import Quantity, find_quantity
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Channel
 from aqualog.core.vehicle import Vehicle
-from aqualog.doctor.records import Finding
+from aqualog.doctor.findings import Finding
 
 __all__ = ["clock_findings", "on_clock", "speed_of"]
 

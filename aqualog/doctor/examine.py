@@ -18,7 +18,7 @@ from aqualog.detect.registry import DETECTORS
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
 from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
-from aqualog.doctor.records import Examination, FileState, Finding
+from aqualog.doctor.findings import Examination, FileState, Finding
 from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.content import changed_files, state_of

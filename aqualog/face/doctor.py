@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.doctor.records import Examination
+    from aqualog.doctor.findings import Examination
     from aqualog.face.drive import Drive
 
 __all__ = ["Health", "doctor", "exit_code"]
@@ -55,7 +55,7 @@ class Health(Result):
         """`findings` and `files`."""
         import polars as pl
 
-        from aqualog.doctor.records import FileState, Finding
+        from aqualog.doctor.findings import FileState, Finding
 
         records = {"findings": Finding, "files": FileState}
         return {

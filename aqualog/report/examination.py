@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from aqualog import __version__
-from aqualog.doctor.records import Examination, Finding
+from aqualog.doctor.findings import Examination, Finding
 from aqualog.report.wording import CELL, NOTE, cut, lacking
 
 __all__ = ["examination_document", "examination_text"]

@@ -308,7 +308,10 @@ def test_intervals_cover_the_truth(seconds, sd, memory_s):
     assert share[4] >= 0.98
 
 
-@pytest.mark.parametrize(("seconds", "max_offset_s", "cases"), [(60.0, 10.0, 300), (150.0, 60.0, 200)])
+@pytest.mark.parametrize(
+    ("seconds", "max_offset_s", "cases"),
+    [(60.0, 10.0, 300), pytest.param(150.0, 60.0, 200, marks=pytest.mark.nightly)],
+)
 def test_unrelated_drives_are_refused(seconds, max_offset_s, cases):
     accepted = 0
     for seed in range(cases):

@@ -14,7 +14,7 @@ from aqualog.cli.main import app
 from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
-from aqualog.doctor.records import Examination, FileState, Finding
+from aqualog.doctor.findings import Examination, FileState, Finding
 from aqualog.face.doctor import exit_code
 from aqualog.io.write_mdf import MdfGroup, write_mf4
 

@@ -135,7 +135,7 @@ def test_modules_of_a_folder_beside_a_function():
         "import aqualog.detect.stream as s; import aqualog as aq; assert s.ROWS and callable(aq.detect)\n"
         "import aqualog.align.clock; assert callable(aqualog.align) and aqualog.align.clock.estimate_clock\n"
         "from aqualog.diagnose import run; assert callable(aq.diagnose) and aq.diagnose.run is run\n"
-        "import importlib; importlib.reload(aq); import aqualog.doctor.records as r; assert r.Finding\n"
+        "import importlib; importlib.reload(aq); import aqualog.doctor.findings as r; assert r.Finding\n"
         "from aqualog import *; assert detect is aq.detect and callable(doctor)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

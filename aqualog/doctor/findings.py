@@ -1,4 +1,4 @@
-"""Records of an examination."""
+"""What an examination found: faults, files, and what a drive lacks."""
 
 from __future__ import annotations
 
