@@ -129,7 +129,7 @@ def test_minor_spin_downs_begin_by_their_rule(monkeypatch):
     monkeypatch.setattr(joint_rules, "_all", lambda plan: [taken("lane_deep", 1), taken("puddle", 1)])
     assert joint_rules._minor(FEW).value > 0.8
     # a detector that begins far below its limits begins against the rule
-    strict = joint_rules.MinorParams.make(0.01, 1e3)
+    strict = joint_rules.MinorParams.make(0.01, 1e9)
     monkeypatch.setattr(joint_rules, "MinorParams", SimpleNamespace(make=lambda dt: strict))
     assert joint_rules._minor(FEW).found.startswith("0 of ")
 
