@@ -86,7 +86,7 @@ def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
         parameters[a.parameter] = replace(e, low=max(e.value - half, low), high=min(e.value + half, high))
     if parameters == dict(cause.parameters):
         return cause
-    sentence = cause_sentence(cause.effect, cause.where, EFFECTS[cause.effect].sentence, parameters)
+    sentence = cause_sentence(EFFECTS[cause.effect], cause.where, parameters)
     return replace(cause, parameters=parameters, sentence=sentence)
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.day_to_day import Kind, as_value, day_to_day, kind_of
+from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
+from aqualog.model.term import Kind
 
 __all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
 

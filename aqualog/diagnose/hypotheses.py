@@ -17,63 +17,13 @@ from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.tolerances import STAND_IN, TOLERANCES, WATER_TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
-from aqualog.model.term import Effect, Model, Parameter, Term
+from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
 __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "value_in", "with_values"]
 
 THREADS = 2
-_WET = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
-# effects on wheel speed under force: without wheel speeds these would only distort other effects
-_AT_WHEELS = (
-    "slip_stiffness", "slip_stiffness_drift", "load_sensitivity", "relaxation_length", "tyre_radius",
-    "tyre_radius_growth", "pressure_loss",
-)  # fmt: skip
-_PLACES: Mapping[str, tuple[str | None, ...]] = {
-    "signal_delay": ("v_x", "a_x", "omega", "torque"),
-    "clock_skew": ("v_x", "a_x", "torque_fl"),
-    "payload_mass": (None, "f", "r"),
-    "uneven_water": ("left", "right"),
-    "velocity_scale": ("v_x",),
-    "accelerometer_bias": ("a_x", "a_y"),
-    "accelerometer_gain": ("a_x", "a_y"),
-    "accelerometer_drift": ("a_x", "a_y"),
-}
-_FREE: Mapping[str, tuple[str, ...]] = {
-    "tyre_warmup": ("extra",),
-    "trailer": ("mass", "delta_drag_area"),
-    "pressure_loss": ("radius",),
-    "uneven_water": ("depth_gain",),
-}
-# the effect of a force is judged against the torque; a replaced torque comes from the file's own mass and drag
-_OF_TORQUE = (
-    "torque_gain", "payload_mass", "trailer", "aero_drag", "head_wind", "rolling_resistance", "tyre_warmup",
-    "cornering_drag", "brake_drag", "wheel_inertia", "water_drag", "load_sensitivity",
-)  # fmt: skip
-_NOT_ASKED: Mapping[str, str] = {
-    "tone_ring": "once per turn is faster than the residuals, which are means over 0.1 s",
-}
-# effects that may act at a single wheel; others are tested by axle
-_BY_WHEEL = ("tyre_radius", "brake_drag", "slip_stiffness", "pressure_loss")
-# effects that a car may have or not; all others are known within a tolerance
-_EVENTS = ("trailer",)
-# tolerances where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes change
-# by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
-# crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K)
-_LOOSE: Mapping[str, float] = {
-    "slip_stiffness": 0.05, "load_sensitivity": 0.25, "wheel_inertia": 0.15, "relaxation_length": 0.15,
-    "signal_delay": 0.005, "cornering_drag": 0.003, "tyre_warmup": 0.1, "pressure_loss": 1e-3,
-    "accelerometer_bias@a_y": 0.1, "accelerometer_gain@a_y": 0.03,
-}  # fmt: skip
-# tolerances of default values in the vehicle file, by axle, as a share of the value: tyres of one size differ by
-# 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K)
-_NOT_GIVEN: Mapping[str, tuple[str, float]] = {
-    "tyre_radius": ("wheels.r_e_", 0.01), "wheel_inertia": ("wheels.inertia_", 0.3),
-    "slip_stiffness": ("tyre.slip_slope_", 0.2),
-}  # fmt: skip
-_SHIFTS = ("signal_delay", "clock_skew")
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
-LEAKS = 5  # moments at which a tyre may begin to lose its air
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +43,7 @@ class Hypothesis:
     @property
     def of_water(self) -> bool:
         """Whether it is an effect of water."""
-        return self.effect in WATER_TOLERANCES or self.effect.name in _WET
+        return self.effect in WATER_TOLERANCES or self.effect.of_water
 
     @property
     def key(self) -> str:
@@ -109,26 +59,30 @@ class Hypothesis:
         tested."""
         if self.allowed:
             return self.parameter(name).sigma
-        if _sums(self) or (self.effect.name == "payload_mass" and self.where is not None):
+        if _sums(self) or (self.effect.drive.is_single and self.where is not None):
             return 0.0  # its parts have theirs
-        if self.effect.name in _EVENTS:
-            return 0.0
-        usual = self.parameter(name).smallest * TOLERANCE
-        return _LOOSE.get(self.key, _LOOSE.get(self.effect.name, usual))
+        own = self._own_tolerance
+        return self.parameter(name).smallest * TOLERANCE if own is None else own
 
     def worth_naming(self, name: str) -> float:
         """Smallest deviation that is worth naming: the effect's own, or twice the usual error of a file."""
         smallest = self.parameter(name).smallest
-        return max(smallest, WORTH * _LOOSE.get(self.key, _LOOSE.get(self.effect.name, 0.0)))
+        return max(smallest, WORTH * (self._own_tolerance or 0.0))
+
+    @property
+    def _own_tolerance(self) -> float | None:
+        return self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
 
     def tolerance_of(self, name: str, vehicle: Vehicle) -> float:
         """`tolerance` for this vehicle file: wide for an axle whose key it does not set."""
         own = self.tolerance(name)
-        key, share = _NOT_GIVEN.get(self.effect.name, ("", 0.0))
-        if self.where not in AXLES or not key or key + self.where in vehicle.given:
+        if self.effect.drive.unset is None or self.where not in AXLES:
             return own
-        # radius and slope are relative to the file's
-        return max(own, share * (vehicle.inertia(self.where) if self.effect.name == "wheel_inertia" else 1.0))
+        key, share = self.effect.drive.unset
+        if key + self.where in vehicle.given:
+            return own
+        is_relative = self.parameter(name).unit == "-"
+        return max(own, share * (1.0 if is_relative else float(getattr(vehicle, key.partition(".")[2] + self.where))))
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""
@@ -146,29 +100,24 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     wet = any(d.course.lanes for d in drives)
     torque = not any(d.untorqued for d in drives)
     wheels = all(f"omega_{w}" in present for w in WHEELS)
+    has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
+    length = max(d.duration_s for d in drives)
     out: list[Hypothesis] = []
-    untested: dict[str, str] = dict(_NOT_ASKED)
+    untested = {e.name: e.drive.never for e in EFFECTS.values() if e.drive.never}
     for effect in EFFECTS.values():
-        if effect.name in _NOT_ASKED:
+        if effect.drive.never:
             continue
-        if effect.name in _WET and not wet:
-            untested[effect.name] = "no water depth in the log"
+        missing = next((need for need in effect.drive.needs if not has[need]), None)
+        if missing is not None:
+            untested[effect.name] = f"no {missing} in the log"
             continue
-        if effect.name in _OF_TORQUE and not torque:
-            untested[effect.name] = "no wheel torque in the log"
-            continue
-        if effect.name in _AT_WHEELS and not wheels:
-            untested[effect.name] = "no wheel speeds in the log"
-            continue
-        free = _FREE.get(effect.name, (effect.parameters[0].name,))
-        if not {p.name for p in effect.parameters} >= set(free):
-            continue
-        places = _PLACES.get(effect.name) or _wheel_places(effect)
+        free = tuple(p.name for p in effect.parameters[: effect.drive.count])
+        places = effect.drive.places or _wheel_places(effect)
         asked = [w for w in places if _has_signal(w, present, torque=torque)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in asked:
-            out += [Hypothesis(effect, where, free, fixed) for fixed in _variants(effect, drives)]
+            out += [Hypothesis(effect, where, free, fixed) for fixed in effect.drive.variants(length)]
     tolerances = (*TOLERANCES, *(WATER_TOLERANCES if wet else ()), *(() if torque else (STAND_IN,)))
     out += [Hypothesis(e, None, ("by",)) for e in tolerances]
     return tuple(out), untested
@@ -177,7 +126,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
 def _wheel_places(effect: Effect) -> tuple[str | None, ...]:
     if "fl" not in effect.places:
         return (None,)
-    return (*WHEELS, "f", "r", None) if effect.name in _BY_WHEEL else ("f", "r", None)
+    return (*WHEELS, "f", "r", None) if effect.drive.by_wheel else ("f", "r", None)
 
 
 def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> bool:
@@ -190,15 +139,6 @@ def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> 
     if where in ("torque", "torque_fl"):
         return torque
     return True
-
-
-def _variants(effect: Effect, drives: Sequence[Drive]) -> list[dict[str, float]]:
-    if effect.name == "tyre_warmup":
-        return [{"time_constant": x} for x in (150.0, 600.0)]
-    if effect.name == "pressure_loss":
-        length = max(d.duration_s for d in drives)
-        return [{"start": length * (i + 0.5) / LEAKS, "duration": 10.0} for i in range(LEAKS)]
-    return [{}]
 
 
 def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, float]]]) -> Model:
@@ -262,7 +202,7 @@ def signatures(
         out = []
         for name in h.free:
             at, step = value_in(model, h, name), h.step(name)
-            if h.effect.name in _SHIFTS:
+            if h.effect.drive.is_shift:
                 # noise of an input, shifted one way only, would correlate with itself in the residual
                 p = h.parameter(name)
                 low, high = max(at - step, p.low), min(at + step, p.high)
@@ -295,7 +235,7 @@ def signatures(
 
 
 def _parts(h: Hypothesis) -> tuple[str, ...]:
-    if h.effect.name not in _BY_WHEEL:
+    if not h.effect.drive.by_wheel:
         return ("f", "r")
     return WHEELS if h.where is None else tuple(w for w in WHEELS if w[0] == h.where)
 
@@ -303,4 +243,4 @@ def _parts(h: Hypothesis) -> tuple[str, ...]:
 def _sums(h: Hypothesis) -> bool:
     if "fl" not in h.effect.places:
         return False
-    return h.where is None or (h.where in ("f", "r") and h.effect.name in _BY_WHEEL)
+    return h.where is None or (h.where in ("f", "r") and h.effect.drive.by_wheel)

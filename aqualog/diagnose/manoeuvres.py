@@ -11,19 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from aqualog.diagnose.drive import Drive
+from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import PERFECT
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
-from aqualog.model.term import Model, Term
+from aqualog.model.term import Check, Model, Term
 
 __all__ = [
-    "CHECKS",
     "LENGTH_S",
     "RUNS",
     "SENSORS",
-    "TURNING",
-    "Check",
     "Run",
     "Sensor",
+    "checks",
     "fitting",
     "programme",
     "turned",
@@ -32,8 +31,6 @@ __all__ = [
 LENGTH_S = 60.0
 RATE_HZ = 50.0  # [Hz] of a simulated run; residuals are means over 0.1 s
 KMH = 1.0 / 3.6
-TURNING = ("head_wind", "road_grade")  # effects that change their sign when the road is driven the other way
-WATER = ("water_drag", "contact_loss", "track_clearing", "uneven_water")
 WET_S = 5.0  # [s] on and beside the water, in turn
 WET_STEP, WET_LEAST, WET_MOST = 20.0 * KMH, 30.0 * KMH, 90.0 * KMH  # [m/s]
 
@@ -54,19 +51,6 @@ class Run:
     rolls: float | None = None
     opposite: bool = False
     water: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """A value that is read without driving: of one parameter, with standard deviation `sd` in its unit."""
-
-    name: str
-    how: str
-    minutes: float
-    effect: str
-    where: tuple[str | None, ...]
-    parameter: str
-    sd: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +92,6 @@ RUNS: tuple[Run, ...] = (
     Run("wet_pass_faster", "through the same water 20 km/h faster, at most at 90 km/h", 2.0, water=1),
 )  # fmt: skip
 
-CHECKS: tuple[Check, ...] = (
-    # level to 0.3 %: twice in opposite directions at one place, and the mean of both
-    Check("standstill", "Stand for half a minute, turn the car round at the same place and stand again: the mean of "
-          "both readings of the accelerometer is its bias", 5.0, "accelerometer_bias", ("a_x", None), "bias", 0.01),
-    Check("weighing", "Weigh the car as it was driven", 30.0, "payload_mass", (None,), "delta_mass", 10.0),
-)  # fmt: skip
-
 SENSORS: tuple[Sensor, ...] = (
     Sensor("a reference velocity", ("v_x",)),
     Sensor("a longitudinal accelerometer", ("a_x",)),
@@ -123,13 +100,17 @@ SENSORS: tuple[Sensor, ...] = (
 )
 
 
+def checks(effects: frozenset[str]) -> tuple[Check, ...]:
+    """Values of these effects that are read without driving, the shortest first."""
+    rows = (EFFECTS[name].drive.check for name in effects if name in EFFECTS)
+    return tuple(sorted((c for c in rows if c is not None), key=lambda c: (c.minutes, c.name)))
+
+
 def fitting(effects: frozenset[str], *, wet: bool) -> tuple[Run, ...]:
     """Runs that make sense for these effects: water only for effects of water, the way back where it changes a sign."""
-    return tuple(
-        r
-        for r in RUNS
-        if (r.water is None or (wet and effects & set(WATER))) and (not r.opposite or effects & set(TURNING))
-    )
+    rows = [EFFECTS[name] for name in effects if name in EFFECTS]
+    on_water, turning = wet and any(e.of_water for e in rows), any(e.drive.turns for e in rows)
+    return tuple(r for r in RUNS if (r.water is None or on_water) and (not r.opposite or turning))
 
 
 def programme(run: Run, drive: Drive) -> Scenario:
@@ -161,7 +142,7 @@ def _lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
 
 def turned(model: Model) -> Model:
     """The model as it acts when the same road is driven the other way: wind and slope come from the other side."""
-    return Model(tuple(_turned(t) if t.effect.name in TURNING else t for t in model.terms))
+    return Model(tuple(_turned(t) if t.effect.drive.turns else t for t in model.terms))
 
 
 def _turned(term: Term) -> Term:

@@ -18,13 +18,13 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.isolate import p_correct
-from aqualog.diagnose.manoeuvres import CHECKS, SENSORS, Check, Run, Sensor, fitting
+from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.diagnose.search import CREDIBLE, Candidate
 from aqualog.diagnose.trial import Case, of_check, of_log, of_run
 from aqualog.diagnose.words import listed, name_of
-from aqualog.model.term import Model
+from aqualog.model.term import Check, Model
 
 __all__ = ["next_manoeuvre", "resolving"]
 
@@ -107,7 +107,7 @@ def next_manoeuvre(
     everything = tuple(range(len(forgiven)))
     first: list[Run | Check] = []
     first += fitting(case.effects, wet=bool(case.drive.course.lanes))
-    first += [c for c in CHECKS if c.effect in case.effects]
+    first += checks(case.effects)
     options = _options(case, log, first, case.near)
     confirmed: list[_Option] = []
     # a run that decides a pair with a part of the tolerances may not do so with all of them

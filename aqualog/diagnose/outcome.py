@@ -155,7 +155,7 @@ def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, 
         for name, v in h.fixed.items():
             if name in {p.name for p in h.effect.parameters} and name not in parameters:
                 parameters[name] = Estimate(float(v), math.nan, math.nan, h.parameter(name).unit)
-        sentence = cause_sentence(h.effect.name, h.where, h.effect.sentence, parameters)
+        sentence = cause_sentence(h.effect, h.where, parameters)
         out.append(Cause(h.effect.name, h.where, parameters, explained[i], sentence))
     return tuple(out)
 

@@ -11,12 +11,9 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.model.effects import EFFECTS
 
-__all__ = ["RELATIONS", "imitations"]
-
-# offset b of the accelerometer = slope b / g and rolling resistance -b / g, except for the slip due to rolling
-# resistance (D)
-RELATIONS: tuple[tuple[str, str, str], ...] = (("accelerometer_bias", "road_grade", "rolling_resistance"),)
+__all__ = ["imitations"]
 
 
 def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tuple[int, ...]]:
@@ -25,7 +22,7 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
     Any two effects of a relation span what all three do. Effects are taken at the whole car or at their usual place.
     """
     out = []
-    for relation in RELATIONS:
+    for relation in [(e.name, *e.drive.equals) for e in EFFECTS.values() if e.drive.equals]:
         usual = {
             h.effect.name: i for i, h in enumerate(asked)
             if h.effect.name in relation and h.where in (None, h.effect.default)

@@ -85,14 +85,15 @@ def compatible(bench: Bench, members: Sequence[int]) -> bool:
 
     Delays are relative: a delay of all signals only shifts the start of the log's clock.
     """
-    late = {bench.asked[m].where for m in members if bench.asked[m].effect.name == "signal_delay"}
-    if len(late) > 1 and late == {h.where for h in bench.asked if h.effect.name == "signal_delay"}:
-        return False
+    for effect in {bench.asked[m].effect.name for m in members if bench.asked[m].effect.drive.is_relative}:
+        late = {bench.asked[m].where for m in members if bench.asked[m].effect.name == effect}
+        if len(late) > 1 and late == {h.where for h in bench.asked if h.effect.name == effect}:
+            return False
     seen: set[tuple[str, str]] = set()
     for m in members:
         h = bench.asked[m]
         # a load at the front and one removed at the rear are not two loads, but a shift of the centre of mass
-        whole = h.where is None or h.effect.name == "payload_mass"
+        whole = h.where is None or h.effect.drive.is_single
         places = WHEELS if whole else AXLES.get(h.where or "", (h.where or "",))
         for p in places:
             if (h.effect.name, p) in seen:

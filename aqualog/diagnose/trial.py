@@ -14,12 +14,12 @@ from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.isolate import separation
-from aqualog.diagnose.manoeuvres import TURNING, Check, Run, Sensor, programme, turned
+from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
 from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
 from aqualog.diagnose.search import Candidate
 from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
-from aqualog.model.term import Model
+from aqualog.model.term import Check, Model
 
 __all__ = ["Case", "of_check", "of_log", "of_run"]
 
@@ -143,7 +143,7 @@ def _signatures(
     """Signatures by the values that the same road has in the log's direction. (k, C, m)"""
     parts = signatures(drive, model, asked, base=base, each=each)
     if run.opposite:
-        parts = [-s if h.effect.name in TURNING else s for h, s in zip(asked, parts, strict=True)]
+        parts = [-s if h.effect.drive.turns else s for h, s in zip(asked, parts, strict=True)]
     return np.concatenate(parts)
 
 
@@ -180,9 +180,9 @@ def of_check(case: Case, check: Check, kept: Sequence[int]) -> FloatArray:
     """One column: the remainder of the reading after each set, and the change by its parameters."""
 
     def meant(h: Hypothesis, name: str) -> bool:
-        return h.effect.name == check.effect and h.where in check.where and name == check.parameter
+        return h.effect.drive.check is check and h.where in check.where and name == check.parameter
 
-    asked = next(h for h in case.bench.asked if h.effect.name == check.effect and h.where in check.where)
+    asked = next(h for h in case.bench.asked if h.effect.drive.check is check and h.where in check.where)
     left = [-value_in(c.refit.model, asked, check.parameter) for c in case.credible]
     own = [float(meant(c.refit.members[i], n)) for c in case.credible for i, n in c.refit.names]
     forgiven = [float(meant(*case.forgiven[i][:2])) for i in kept]

@@ -8,6 +8,7 @@ from string import Formatter
 
 from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import Cause, Estimate
+from aqualog.model.term import Effect
 
 __all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "verdict_sentence"]
 
@@ -36,16 +37,16 @@ def name_of(effect: str, where: str | None) -> str:
     return effect.replace("_", " ") + place(where)
 
 
-def cause_sentence(effect: str, where: str | None, sentence: str, parameters: Mapping[str, Estimate]) -> str:
+def cause_sentence(effect: Effect, where: str | None, parameters: Mapping[str, Estimate]) -> str:
     """The effect's own sentence with its values and the interval of the first one."""
     name, first = next(iter(parameters.items()))
     values = {n: e.value for n, e in parameters.items()}
     low, high, unit = first.low, first.high, first.unit
-    if effect == "payload_mass" and first.value < 0.0:
-        text = f"The car weighed {-first.value:.0f} kg less than the vehicle file says"
+    sentence = effect.sentence
+    if effect.less and first.value < 0.0:
+        sentence, values[name] = effect.less, -first.value
         low, high = -high, -low
-    else:
-        text = sentence.format(where=where or "", **values).rstrip(".")
+    text = sentence.format(where=where or "", **values).rstrip(".")
     if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"

@@ -1,8 +1,8 @@
 """Table of the effects that a model may have on top of the base simulation.
 
-Each entry names its target, its parameters with unit, prior and bounds, and a source. Neutral values leave a drive
-unchanged to the last bit. Sizes follow published figures where available: V read in a source, D derived, K general
-knowledge.
+Each entry names its target, its parameters with unit, prior and bounds, a source, and how a diagnosis searches for it:
+a new effect is one entry. Neutral values leave a drive unchanged to the last bit. Sizes follow published figures where
+available: V read in a source, D derived, K general knowledge.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ import numpy as np
 
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.plant import Plant, with_mass_at
 from aqualog.model.sensors import Channel
-from aqualog.model.term import Effect, Parameter, Setup
+from aqualog.model.term import CampaignSearch, Check, DayToDay, DriveSearch, Effect, Need, Parameter, Setup
+from aqualog.physics.load import G
 
 __all__ = ["EFFECTS", "wheels_at"]
 
@@ -113,29 +115,86 @@ def _payload(p: Plant, v: Values, where: str | None) -> Plant:
     return with_mass_at(p, v["delta_mass"], x)
 
 
+def _axles(where: str | None) -> tuple[str, ...]:
+    return ("f", "r") if where is None else (where[0],)
+
+
+def _as_mass(share: float, car: Vehicle, _: str | None, _v: float) -> float:
+    return share * car.mass
+
+
+def _as_inertia(share: float, car: Vehicle, where: str | None, _: float) -> float:
+    return share * (car.mass / sum([2.0 / car.r_l(axle) ** 2 for axle in _axles(where)]))
+
+
+def _as_wind(sd: float, car: Vehicle, _: str | None, v: float) -> float:
+    # (v + w)^2 = v^2 (1 + 2 w / v) to first order
+    return 0.5 * v * sd / car.drag_area if car.drag_area > 0.0 else sd
+
+
+def _as_rolling(sd: float, car: Vehicle, where: str | None, _: float) -> float:
+    front = car.l_r / car.wheelbase
+    return sd * {"f": 1.0 / front, "r": 1.0 / (1.0 - front)}.get(where or "", 1.0)
+
+
+def _as_brake(sd: float, car: Vehicle, where: str | None, _: float) -> float:
+    wheels = 1 if where in WHEELS else 2 * len(_axles(where))
+    return sd * (car.mass * G * car.r_l(_axles(where)[0]) / wheels)
+
+
+def _leaks(length: float) -> tuple[dict[str, float], ...]:
+    """Moments at which a tyre may begin to lose its air."""
+    return tuple({"start": length * (i + 0.5) / 5, "duration": 10.0} for i in range(5))
+
+
+_SPAN = "(95 %: {0.low:.2f} ... {0.high:.2f})"
+# a replaced torque comes from the file's own mass and drag, so a force is judged against a measured one only; slip and
+# radius show in wheel speeds only
+_WATER: Need = "water depth"
+_TORQUE: Need = "wheel torque"
+_SPEEDS: Need = "wheel speeds"
+_PAIR = ("a_x", "a_y")
+# relation (D): an offset b of the accelerometer is a slope b / g and a rolling resistance -b / g, but for its slip
+_LIKE_AN_OFFSET = ("road_grade", "rolling_resistance")
+# Tolerances are given where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes
+# change by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
+# crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K). Tyres of
+# one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K).
+_STANDSTILL = Check(  # level to 0.3 %: twice in opposite directions at one place, and the mean of both
+    "standstill", "Stand for half a minute, turn the car round at the same place and stand again: the mean of both "
+    "readings of the accelerometer is its bias", 5.0, ("a_x", None), "bias", 0.01,
+)  # fmt: skip
+
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
         "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
         twins=("accelerometer_bias",),
+        drive=DriveSearch(turns=True),
     ),
     Effect(
         "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
-        (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive"),),
+        (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive",
+            DayToDay("drag", _as_wind)),),
         _on_plant(lambda p, v, _: p._replace(head_wind=p.head_wind + v["speed"])), twins=("aero_drag",),
+        drive=DriveSearch((_TORQUE,), turns=True),
     ),
     Effect(
         "aero_drag", "drag area c_w A [m²]", "The drag area is {delta_drag_area:+.2f} m² off.", "roof box +0.2 (K)",
-        (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's"),),
+        (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's",
+            DayToDay("drag", lambda sd, *_: sd, "drag_area")),),
         _on_plant(lambda p, v, _: p._replace(drag_area=p.drag_area + v["delta_drag_area"])), twins=("head_wind",),
+        drive=DriveSearch((_TORQUE,)),
     ),
     Effect(
         "rolling_resistance", "rolling resistance coefficient [-]", "Rolling resistance is {delta_r_w:+.4f} off.",
         "0.007-0.017 (V, TRB [trb2006])",
-        (Parameter("delta_r_w", "-", 0.0, 0.002, -0.01, 0.05, 0.0005, "on top of the vehicle file's"),),
+        (Parameter("delta_r_w", "-", 0.0, 0.002, -0.01, 0.05, 0.0005, "on top of the vehicle file's",
+            DayToDay("rolling", _as_rolling, "rolling_resistance")),),
         _on_plant(lambda p, v, w: p._replace(r_w=_shifted(p.r_w, w, v["delta_r_w"]))), _WHEEL_PLACES,
         twins=("brake_drag",),
+        drive=DriveSearch((_TORQUE,)),
     ),
     Effect(
         "tyre_warmup", "rolling resistance over time", "Cold tyres rolled {extra:.0%} harder at the start.",
@@ -145,6 +204,8 @@ _ALL = [
             Parameter("time_constant", "s", 600.0, 300.0, 30.0, 5000.0, 60.0, "of the warm-up"),
         ),
         _on_plant(lambda p, v, _: p._replace(warmup_extra=p.warmup_extra + v["extra"], warmup_time=v["time_constant"])),
+        drive=DriveSearch(
+            (_TORQUE,), variants=lambda _: ({"time_constant": 150.0}, {"time_constant": 600.0}), tolerance=0.1),
     ),
     Effect(
         "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
@@ -152,87 +213,116 @@ _ALL = [
         (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.3, "on film and wave"),),
         _on_plant(lambda p, v, w: p._replace(water_drag_gain=_scaled(p.water_drag_gain, w, v["gain"]))), _WHEEL_PLACES,
         twins=("track_clearing", "contact_loss"),
+        drive=DriveSearch((_WATER, _TORQUE)),
+        campaign=CampaignSearch(2, (None, "f", "r"), "drag of the water",
+            "Film and bow wave drag {0.value:.2f} times as much on {place} " + _SPAN + " as in the model.",
+        ),
     ),
     Effect(
         "brake_drag", "torque against a wheel [N·m]", "The brake drags with {torque:.0f} N·m.", "a few N·m a wheel (K)",
-        (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel"),),
+        (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel",
+            DayToDay("rolling", _as_brake)),),
         _on_plant(lambda p, v, w: p._replace(brake_drag=_shifted(p.brake_drag, w, v["torque"]))), _WHEEL_PLACES,
         twins=("rolling_resistance",),
+        drive=DriveSearch((_TORQUE,), by_wheel=True),
     ),
     Effect(
         "cornering_drag", "resistance in curves [s^2/m]", "Curves cost more than the two-track model says.",
         "scrub, toe (K)",
         (Parameter("coefficient", "s^2/m", 0.0, 0.005, -0.02, 0.1, 0.001, "F = coefficient m a_y^2"),),
         _on_plant(lambda p, v, _: p._replace(cornering_drag=p.cornering_drag + v["coefficient"])),
+        drive=DriveSearch((_TORQUE,), tolerance=0.003),
     ),
     Effect(
         "payload_mass", "mass [kg]", "The car weighed {delta_mass:.0f} kg more than the vehicle file says.",
         "passengers and load (K)",
-        (Parameter("delta_mass", "kg", 0.0, 100.0, -500.0, 3000.0, 20.0, "at the place"),), _on_plant(_payload),
+        (Parameter("delta_mass", "kg", 0.0, 100.0, -500.0, 3000.0, 20.0, "at the place",
+            DayToDay("inertia", _as_mass, "mass")),), _on_plant(_payload),
         ("f", "r"), twins=("torque_gain",),
+        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True,
+            check=Check("weighing", "Weigh the car as it was driven", 30.0, (None,), "delta_mass", 10.0)),
+        less="The car weighed {delta_mass:.0f} kg less than the vehicle file says.",
     ),
     Effect(
         "torque_gain", "torque at the wheels over the reported one [-]", "The wheels get {gain:.3f} of the torque.",
         "axle efficiency 95-97 % (V)",
-        (Parameter("gain", "-", 1.0, 0.05, 0.3, 2.0, 0.01, "true over reported"),),
+        (Parameter("gain", "-", 1.0, 0.05, 0.3, 2.0, 0.01, "true over reported",
+            DayToDay("inertia", lambda share, *_: share, "torque_gain")),),
         _on_plant(lambda p, v, _: p._replace(torque_gain=p.torque_gain * v["gain"])), twins=("payload_mass",),
+        drive=DriveSearch((_TORQUE,)),
     ),
     Effect(
         "trailer", "mass and air drag of a trailer", "A trailer of {mass:.0f} kg was towed.", "caravans 0.5-1.5 t (K)",
         (
-            Parameter("mass", "kg", 0.0, 500.0, 0.0, 4000.0, 50.0, "on its own wheels"),
-            Parameter("delta_drag_area", "m^2", 0.0, 0.5, 0.0, 5.0, 0.05, "on top of the car's"),
+            Parameter("mass", "kg", 0.0, 500.0, 0.0, 4000.0, 50.0, "on its own wheels",
+                DayToDay("inertia", _as_mass)),
+            Parameter("delta_drag_area", "m^2", 0.0, 0.5, 0.0, 5.0, 0.05, "on top of the car's",
+                DayToDay("drag", lambda sd, *_: sd)),
         ),
         _on_plant(lambda p, v, _: p._replace(
             towed_mass=p.towed_mass + v["mass"], drag_area=p.drag_area + v["delta_drag_area"])),
         twins=("payload_mass", "aero_drag"),
+        drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0),
     ),
     Effect(
         "wheel_inertia", "inertia of the wheels [kg·m²]", "A wheel has {delta_inertia:+.2f} kg·m² more inertia.",
         "1.0-1.8 with the driveline (K)",
-        (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel"),),
+        (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel",
+            DayToDay("inertia", _as_inertia)),),
         _on_plant(lambda p, v, w: p._replace(inertia=np.maximum(_shifted(p.inertia, w, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
+        drive=DriveSearch((_TORQUE,), tolerance=0.15, unset=("wheels.inertia_", 0.3)),
     ),
     Effect(
         "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
         "ESC sensors ±50-100 mg, 20 mg short term (V)",
         (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
         _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
+        drive=DriveSearch(
+            places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=_STANDSTILL),
     ),
     Effect(
         "accelerometer_gain", "accelerometer [-]", "The accelerometer reads {gain:.3f} times the truth.", "1-3 % (K)",
         (Parameter("gain", "-", 1.0, 0.02, 0.5, 1.5, 0.01, "on the true value"),),
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
+        drive=DriveSearch(places=_PAIR, tolerance_at={"a_y": 0.03}),
     ),
     Effect(
         "accelerometer_drift", "accelerometer [m/s³]", "The accelerometer drifts by {drift:.1e} m/s² a second.",
         "20 mg short term (V)",
         (Parameter("drift", "m/s^3", 0.0, 5e-4, -0.02, 0.02, 1e-4, "from the start"),),
         _on_channels(lambda c, v: replace(c, drift=c.drift + v["drift"])), ("a_x", "a_y"), "a_x",
+        drive=DriveSearch(places=_PAIR),
     ),
     Effect(
         "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
+        drive=DriveSearch(places=("v_x", "a_x", "omega", "torque"), tolerance=0.005, is_shift=True, is_relative=True),
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
         "6.8e-4 per tooth (V, Gustafsson [gustafsson2000])",
         (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.0005, "once per turn, relative"),), _tone_ring,
         _WHEEL_PLACES,
+        drive=DriveSearch(never="once per turn is faster than the residuals, which are means over 0.1 s"),
     ),
     Effect(
         "velocity_scale", "reference velocity [-]", "The reference velocity reads {scale:.4f} times the truth.",
         "mounting, Doppler optics: 1 % (K)",
         (Parameter("scale", "-", 1.0, 0.01, 0.8, 1.2, 0.002, "on the true value"),),
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["scale"])), ("v_x",), "v_x", twins=("tyre_radius",),
+        drive=DriveSearch(places=("v_x",)),
     ),
     Effect(
         "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
         "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _on_plant(lambda p, v, w: p._replace(slip_slope=_scaled(p.slip_slope, w, v["gain"]))), _WHEEL_PLACES,
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, unset=("tyre.slip_slope_", 0.2)),
+        campaign=CampaignSearch(5, ("f", "r"), "slip slope",
+            "The slip slope of {place} is {0.value:.2f} times the vehicle file's " + _SPAN + ".", driven=True,
+        ),
     ),
     Effect(
         "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
@@ -240,6 +330,7 @@ _ALL = [
         (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, exp(rate t)"),),
         _on_plant(lambda p, v, w: p._replace(slip_slope_drift=_shifted(p.slip_slope_drift, w, v["rate"]))),
         _WHEEL_PLACES,
+        drive=DriveSearch((_SPEEDS,)),
     ),
     Effect(
         "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
@@ -247,6 +338,10 @@ _ALL = [
         (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
         _on_plant(lambda p, v, w: p._replace(load_sensitivity=_shifted(p.load_sensitivity, w, v["delta"]))),
         _WHEEL_PLACES,
+        drive=DriveSearch((_TORQUE, _SPEEDS), tolerance=0.25),
+        campaign=CampaignSearch(4, (None,), "slip slope over load",
+            "The load sensitivity of the slip slope differs by {0.value:+.2f} from the tyre model's " + _SPAN + ".",
+        ),
     ),
     Effect(
         "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
@@ -257,6 +352,7 @@ _ALL = [
             )
         ),
         _WHEEL_PLACES, twins=("velocity_scale",),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, unset=("wheels.r_e_", 0.01)),
     ),
     Effect(
         "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",
@@ -271,12 +367,14 @@ _ALL = [
             leak_radius=_shifted(p.leak_radius, w, v["radius"]), leak_slope=_shifted(p.leak_slope, w, v["slope"]),
             leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, tolerance=1e-3),
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
         "2.9e-6 in MF6.1 (V, D, [besselink2010])",
         (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
         _on_plant(lambda p, v, w: p._replace(radius_growth=_shifted(p.radius_growth, w, v["growth"]))), _WHEEL_PLACES,
+        drive=DriveSearch((_SPEEDS,)),
     ),
     Effect(
         "relaxation_length", "build-up of tyre forces [m]", "Tyre forces build up over {length:.2f} m.",
@@ -284,6 +382,7 @@ _ALL = [
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _on_plant(lambda p, v, w: p._replace(relaxation_length=_shifted(p.relaxation_length, w, v["length"]))),
         _WHEEL_PLACES, twins=("signal_delay",),
+        drive=DriveSearch((_SPEEDS,), tolerance=0.15),
     ),
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
@@ -291,6 +390,10 @@ _ALL = [
         (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.3, "on the lost share"),),
         _on_plant(lambda p, v, w: p._replace(contact_gain=_scaled(p.contact_gain, w, v["gain"]))), _WHEEL_PLACES,
         twins=("water_drag", "uneven_water"),
+        drive=DriveSearch((_WATER,)),
+        campaign=CampaignSearch(1, (None, "f", "r"), "lost contact on water",
+            "The water lifts {0.value:.2f} times as much of the contact of {place} " + _SPAN + " as in the model.",
+        ),
     ),
     Effect(
         "track_clearing", "film in the track of the front wheels [m]", "The front wheels leave another film.",
@@ -298,6 +401,11 @@ _ALL = [
         (Parameter("delta_film", "m", 0.0, 6e-4, -5e-4, 5e-3, 2e-4, "on the tyre's own"),),
         _on_plant(lambda p, v, _: p._replace(h_track=np.maximum(p.h_track + v["delta_film"], 0.0))),
         twins=("water_drag",),
+        drive=DriveSearch((_WATER,)),
+        campaign=CampaignSearch(0, (None,), "film in the front wheels' track",
+            "The film that the front wheels leave to the rear ones differs by {0.value:+.2f} mm "
+            "(95 %: {0.low:+.2f} ... {0.high:+.2f} mm) from the tyre model's.", scale=1e3,
+        ),
     ),
     Effect(
         "uneven_water", "water of one side", "The {where} track has {depth_gain:.2f} of the water.",
@@ -307,12 +415,18 @@ _ALL = [
             Parameter("irregularity", "-", 0.0, 0.2, 0.0, 2.0, 0.05, "added rms, relative to the depth"),
         ),
         _uneven_water, ("left", "right"), "left", twins=("contact_loss", "water_drag"),
+        drive=DriveSearch((_WATER,), places=("left", "right")),
+        campaign=CampaignSearch(3, ("left", "right"), "water of the track",
+            "{Place} has {0.value:.2f} times the depth of the table of runs " + _SPAN + ", and its irregularity is "
+            "larger by {1.value:.2f} of the depth (95 %: {1.low:.2f} ... {1.high:.2f}).",
+        ),
     ),
     Effect(
         "clock_skew", "clock of a bus [ppm]", "The clock of the signal runs {skew:.0f} ppm off.",
         "quartz 20-100 ppm (K)",
         (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 20.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
         twins=("signal_delay",),
+        drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True),
     ),
 ]  # fmt: skip
 

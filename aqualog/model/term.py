@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from aqualog.core.errors import ConfigError
+from aqualog.core.vehicle import Vehicle
 from aqualog.model.plant import Plant
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import Sensors
 
-__all__ = ["Effect", "Knots", "Model", "Parameter", "Setup", "Table", "Term"]
+__all__ = [
+    "CampaignSearch", "Check", "DayToDay", "DriveSearch", "Effect", "Kind", "Knots", "Model", "Need", "Parameter",
+    "Setup", "Table", "Term",
+]  # fmt: skip
+
+Kind = Literal["", "inertia", "drag", "rolling"]  # of the differences between drives of the same car
+Need = Literal["water depth", "wheel torque", "wheel speeds"]
 
 Knots = tuple[tuple[float, float], ...]
 
@@ -24,6 +31,82 @@ class Setup(NamedTuple):
     plant: Plant
     sensors: Sensors
     scenario: Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class DayToDay:
+    """How a parameter looks like a difference between drives of the same car.
+
+    `value` turns the standard deviation of its kind into one of the parameter, at a place and a speed [m/s]: a share of
+    the mass (inertia), a drag area [m²] (drag), a coefficient (rolling). `key`: key of the vehicle file whose spread is
+    the parameter's own, at the whole car.
+    """
+
+    kind: Kind
+    value: Callable[[float, Vehicle, str | None, float], float]
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A value that is read without driving: of one parameter, with standard deviation `sd` in its unit."""
+
+    name: str
+    how: str
+    minutes: float
+    where: tuple[str | None, ...]
+    parameter: str
+    sd: float
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSearch:
+    """How a diagnosis of drives searches for an effect.
+
+    `needs`: what a log must hold; `never`: why no log shows it. `places` where it is searched, None the whole car;
+    empty: the car, both axles where it acts on wheels, and with `by_wheel` every wheel. The first `count` parameters
+    are sought; `variants` are values of the others, by the length of the longest drive [s].
+
+    `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
+    effect or not; `tolerance_at` some places. `unset`: start of a key of the vehicle file, and the share by which cars
+    differ where an axle's key is not set. `equals`: effects that together look like this one on every log. `check`: how
+    it is read without driving.
+
+    `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
+    together it changes nothing; `is_single`: it counts once per car, wherever it acts.
+    """
+
+    needs: tuple[Need, ...] = ()
+    never: str = ""
+    places: tuple[str | None, ...] = ()
+    by_wheel: bool = False
+    count: int = 1
+    variants: Callable[[float], Sequence[Mapping[str, float]]] = lambda _: ({},)
+    tolerance: float | None = None
+    tolerance_at: Mapping[str, float] = field(default_factory=dict)
+    unset: tuple[str, float] | None = None
+    equals: tuple[str, ...] = ()
+    check: Check | None = None
+    turns: bool = False
+    is_shift: bool = False
+    is_relative: bool = False
+    is_single: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignSearch:
+    """How a diagnosis of a campaign searches for an effect: as number `order`, at `places` (None: all wheels).
+
+    `driven`: only at axles that are driven. `sentence` names the place as `{place}` or `{Place}`, and the values, times
+    `scale`, as `{0.value}`, `{0.low}` and `{0.high}`; `title` is short.
+    """
+
+    order: int
+    places: tuple[str | None, ...]
+    title: str
+    sentence: str
+    driven: bool = False
+    scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +125,7 @@ class Parameter:
     high: float
     smallest: float
     meaning: str
+    day_to_day: DayToDay | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +164,8 @@ class Effect:
     """One physical effect that a model may have.
 
     `target`: the quantity that it changes. `places`: where it may sit, as `fl`, `f`, `left`, a signal's name; empty:
-    the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup.
+    the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup. `less`:
+    sentence for a negative first value, which it shows as positive. `campaign` None: a campaign does not show it.
     """
 
     name: str
@@ -93,6 +178,14 @@ class Effect:
     default: str | None = None
     twins: tuple[str, ...] = ()
     table: Table | None = None
+    less: str = ""
+    drive: DriveSearch = DriveSearch()
+    campaign: CampaignSearch | None = None
+
+    @property
+    def of_water(self) -> bool:
+        """Whether it acts on water only."""
+        return "water depth" in self.drive.needs
 
 
 @dataclass(frozen=True, slots=True)

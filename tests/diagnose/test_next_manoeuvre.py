@@ -12,7 +12,7 @@ from aqualog.diagnose.bench import gram_of, noises_after, tolerant
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses
-from aqualog.diagnose.manoeuvres import KMH, RUNS, TURNING, programme, turned
+from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre, resolving
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.refit import metric, refit
@@ -168,4 +168,3 @@ def test_the_way_back_turns_wind_and_slope_and_nothing_else():
     back = turned(there)
     assert [dict(t.values) for t in back.terms] == [{"speed": -4.0}, {"grade": -0.01}, {"delta_mass": 50.0}]
     assert turned(back) == there
-    assert set(TURNING) <= set(EFFECTS)

@@ -8,7 +8,7 @@ from aqualog.model.effects import EFFECTS
 
 
 def told(effect, where, **estimates):
-    return cause_sentence(effect, where, EFFECTS[effect].sentence, estimates)
+    return cause_sentence(EFFECTS[effect], where, estimates)
 
 
 @pytest.mark.parametrize(

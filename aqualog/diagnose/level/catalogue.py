@@ -16,13 +16,6 @@ from aqualog.model.term import Effect, Model, Parameter, Term
 __all__ = ["Hypothesis", "Library", "hypotheses", "library", "model_with", "untested"]
 
 STEP = 0.5  # standard deviations of the prior to either side, of a finite difference
-_PLACES: dict[str, tuple[str | None, ...]] = {
-    "track_clearing": (None,),
-    "contact_loss": (None, "f", "r"),
-    "water_drag": (None, "f", "r"),
-    "uneven_water": ("left", "right"),
-    "load_sensitivity": (None,),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +57,11 @@ class Library(NamedTuple):
 
 def hypotheses(passes: Passes) -> tuple[Hypothesis, ...]:
     """Hypotheses that these runs can test: stiffness of the driven axles, load only where it differs."""
-    axles = tuple(dict.fromkeys(n[-2] for n in passes.names if n.startswith("slip_slope_")))
-    found = [Hypothesis(EFFECTS[name], where) for name, places in _PLACES.items() for where in places]
-    return (*found, *(Hypothesis(EFFECTS["slip_stiffness"], axle) for axle in axles))
+    driven = {n[-2] for n in passes.names if n.startswith("slip_slope_")}
+    searches = sorted(((e.campaign, e) for e in EFFECTS.values() if e.campaign is not None), key=lambda x: x[0].order)
+    return tuple(
+        Hypothesis(e, where) for asked, e in searches for where in asked.places if not asked.driven or where in driven
+    )
 
 
 def untested(tested: Sequence[Hypothesis]) -> dict[str, str]:

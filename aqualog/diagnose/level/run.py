@@ -199,7 +199,7 @@ def _causes(chosen: Refit, passes: Passes, scatter: Fit) -> tuple[Cause, ...]:
     out = []
     column = 0
     for h in chosen.chosen:
-        values = [(p.name, Estimate(*next(found), p.unit)) for p in h.parameters]
+        values = {p.name: Estimate(*next(found), p.unit) for p in h.parameters}
         k = len(h.parameters)
         change = np.einsum("rck,k->rc", chosen.x[:, :, column : column + k], chosen.theta[column : column + k])
         column += k
@@ -209,7 +209,7 @@ def _causes(chosen: Refit, passes: Passes, scatter: Fit) -> tuple[Cause, ...]:
             n for n, s in zip(passes.names, size, strict=True) if not n.startswith("dry_") and s > SHARE * size.max()
         )  # fmt: skip
         out.append(
-            Cause(h.effect.name, h.where, dict(values), explains, cause_sentence(h.effect.name, h.where, values))
+            Cause(h.effect.name, h.where, values, explains, cause_sentence(h.effect, h.where, [*values.values()]))
         )
     return tuple(out)
 
