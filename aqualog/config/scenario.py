@@ -13,10 +13,8 @@ from aqualog.config.reader import Key, Table, is_number, is_real, quoted, read
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
-from aqualog.model.faults import FAULT_KINDS, SensorFault
-from aqualog.model.scenario import Excitation, Kick, Lane, Profile, Scenario, Steering
-from aqualog.model.sensors import SENSORS, Sensors
-from aqualog.model.surface import SURFACES
+from aqualog.model.scenario import SURFACES, Excitation, Kick, Lane, Profile, Scenario, Steering
+from aqualog.model.sensors import FAULT_KINDS, SENSORS, SensorFault, Sensors
 from aqualog.model.tyre import TYRE_KEYS, TYRES, Tyre
 
 __all__ = ["SAMPLE_RATES_HZ", "SCENARIO_KEYS", "load_scenario", "vehicle_of"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
 from aqualog.diagnose.outcome import Z
 from aqualog.diagnose.records import AGREES, Agreement, ByDrive, Cause, Estimate
@@ -26,12 +26,14 @@ from aqualog.model.effects import EFFECTS
 __all__ = ["agreements", "widened"]
 
 
-def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base: FloatArray) -> tuple[Agreement, ...]:
+def agreements(
+    evidence: Evidence, candidate: Candidate, noises: Sequence[Noise], base: FloatArray
+) -> tuple[Agreement, ...]:
     """One agreement for each value of the refitted set; empty for a single drive.
 
     Parameters
     ----------
-    bench : Bench
+    evidence : Evidence
     candidate : Candidate
         Its signatures at its values apply to every drive.
     noises : sequence of Noise
@@ -43,12 +45,12 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
     as if the file had a different error in each.
     """
     r = candidate.refit
-    if len(bench.drives) < 2:
+    if len(evidence.drives) < 2:
         return ()
-    columns = [c for h in r.members for c in bench.columns[bench.asked.index(h)]]
-    G, b, apart = _normal(bench, r, noises, columns)
+    columns = [c for h in r.members for c in evidence.columns[evidence.asked.index(h)]]
+    G, b, apart = _normal(evidence, r, noises, columns)
     G, b = G / candidate.inflation, b / candidate.inflation
-    keep = np.diag((PRIOR_WIDTH * _prior(bench, r)) ** -2.0)
+    keep = np.diag((PRIOR_WIDTH * _prior(evidence, r)) ** -2.0)
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
@@ -63,10 +65,10 @@ def agreements(bench: Bench, candidate: Candidate, noises: Sequence[Noise], base
         values = r.values[k] + alone[:, k]
         half = Z * sd[:, k]
         each = [Estimate(float(v), float(v - h), float(v + h), unit) for v, h in zip(values, half, strict=True)]
-        p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(bench.drives) - 1)
+        p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(evidence.drives) - 1)
         of_drives = tuple(
             ByDrive(d.name, e, float(r.values[k] + o), float(gain))
-            for d, e, o, gain in zip(bench.drives, each, others[:, k], gains, strict=True)
+            for d, e, o, gain in zip(evidence.drives, each, others[:, k], gains, strict=True)
         )
         out.append(Agreement(r.members[i].key, name, of_drives, p))
     return tuple(out)
@@ -98,15 +100,15 @@ def _heterogeneity(each: Sequence[Estimate]) -> float:
 
 
 def _normal(
-    bench: Bench, r: Refit, noises: Sequence[Noise], columns: Sequence[int]
+    evidence: Evidence, r: Refit, noises: Sequence[Noise], columns: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Normal equations of each drive around the set's values (D, k, k), (D, k), and the spread between drives (k,)."""
     G, b = [], []
     apart: FloatArray = np.zeros(len(columns))
     for d, noise, residual, own, s, p in zip(
-        bench.drives, noises, r.residuals, r.signatures, bench.signatures, bench.prepared, strict=True
+        evidence.drives, noises, r.residuals, r.signatures, evidence.signatures, evidence.prepared, strict=True
     ):
-        one = replace(bench, drives=(d,), residuals=(residual,), signatures=(s,), prepared=(p,))
+        one = replace(evidence, drives=(d,), residuals=(residual,), signatures=(s,), prepared=(p,))
         measure = metric(one, [noise], share=KNOWN, beside=columns)
         J = whitened(spectra(bridged(own, d.mask)), noise)
         y = whitened_residual(one, [noise], [residual])
@@ -116,7 +118,7 @@ def _normal(
     return np.array(G), np.array(b), apart
 
 
-def _prior(bench: Bench, r: Refit) -> FloatArray:
+def _prior(evidence: Evidence, r: Refit) -> FloatArray:
     return np.array([r.members[i].parameter(n).sigma for i, n in r.names])
 
 

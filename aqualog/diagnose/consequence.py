@@ -15,12 +15,12 @@ from aqualog.diagnose.records import Consequence
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.labels import Labels, Span, joined, without
 from aqualog.evaluate.match import LIMITS_S, beginning_in, hits
+from aqualog.model.drawing import KMH, Drawing, full_speed
+from aqualog.model.log import as_signals
 from aqualog.model.pools import TUNING_POOL
 from aqualog.model.scenario import Lane, Profile, Scenario
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS
-from aqualog.model.sketch import KMH, Sketch, full_speed
 from aqualog.model.term import Model
 from aqualog.model.tyre import TYRES
 
@@ -180,17 +180,17 @@ def _summed(seen: Sequence[_Pair]) -> tuple[Consequence, ...]:
 
 def _scenarios(vehicle: Vehicle, seed: int) -> Iterable[Scenario]:
     for i, name in enumerate(DRY):
-        yield SITUATIONS[name].make(_sketch(vehicle, seed, i)).scenario
+        yield SITUATIONS[name].make(_drawing(vehicle, seed, i)).scenario
     for i, share in enumerate(PASSES):
-        yield _pass(_sketch(vehicle, seed, len(DRY) + i), share, A_ON_LANE if i % 2 else 0.0)
+        yield _pass(_drawing(vehicle, seed, len(DRY) + i), share, A_ON_LANE if i % 2 else 0.0)
 
 
-def _sketch(vehicle: Vehicle, seed: int, number: int) -> Sketch:
+def _drawing(vehicle: Vehicle, seed: int, number: int) -> Drawing:
     rng = np.random.default_rng([seed, number])
-    return Sketch(rng, TUNING_POOL, vehicle, TYRES["worn_summer"], P_LOW, int(rng.integers(2**31)))
+    return Drawing(rng, TUNING_POOL, vehicle, TYRES["worn_summer"], P_LOW, int(rng.integers(2**31)))
 
 
-def _pass(k: Sketch, share: float, a: float) -> Scenario:
+def _pass(k: Drawing, share: float, a: float) -> Scenario:
     v = min(share * full_speed(k, DEPTH), V_MOST)
     t = APPROACH_S + ON_LANE_S
     speed: Profile = ((0.0, v), (APPROACH_S, v), (t, v + a * ON_LANE_S), (t + RUN_OUT_S, v + a * ON_LANE_S))

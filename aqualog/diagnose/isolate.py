@@ -10,7 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
 from aqualog.diagnose.words import listed, name_of, quantity
@@ -40,13 +40,13 @@ def p_correct(lam: float) -> float:
     return NormalDist().cdf(0.5 * math.sqrt(max(lam, 0.0)))
 
 
-def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, threshold: float) -> FloatArray:
+def reference_sizes(evidence: Evidence, gram: FloatArray, inflation: FloatArray, threshold: float) -> FloatArray:
     """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger.
 
     NaN where no physical size would be detected.
     """
-    out = np.full(bench.count, np.nan)
-    for i, columns in enumerate(bench.columns):
+    out = np.full(evidence.count, np.nan)
+    for i, columns in enumerate(evidence.columns):
         for c in columns:
             energy = gram[c, c]
             if energy <= 1e-12:
@@ -54,15 +54,15 @@ def reference_sizes(bench: Bench, gram: FloatArray, inflation: FloatArray, thres
             # the test's statistic is the gain per value of the effect
             asked = math.sqrt(threshold * len(columns) * inflation[i])
             seen = (asked + NormalDist().inv_cdf(POWER) * math.sqrt(inflation[i])) / math.sqrt(energy)
-            if seen <= max(bench.high[c], -bench.low[c]):
-                out[c] = max(seen, bench.smallest[c])
+            if seen <= max(evidence.high[c], -evidence.low[c]):
+                out[c] = max(seen, evidence.smallest[c])
     return out
 
 
-def limits(bench: Bench, sizes: FloatArray) -> tuple[Limit, ...]:
+def limits(evidence: Evidence, sizes: FloatArray) -> tuple[Limit, ...]:
     """Detection limit of each effect and place, by its first parameter."""
     out: dict[str, Limit] = {}
-    for h, columns in zip(bench.asked, bench.columns, strict=True):
+    for h, columns in zip(evidence.asked, evidence.columns, strict=True):
         if h.allowed:
             continue
         size = float(sizes[columns[0]])
@@ -72,21 +72,21 @@ def limits(bench: Bench, sizes: FloatArray) -> tuple[Limit, ...]:
     return tuple(out.values())
 
 
-def confusions(bench: Bench, gram: FloatArray, sizes: FloatArray, inflation: FloatArray) -> tuple[Confusion, ...]:
+def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray, inflation: FloatArray) -> tuple[Confusion, ...]:
     """All pairs, and for each effect the sets of two and three rivals that imitate it much better than any one.
 
     Effects have their reference sizes; effects that the log cannot show are left out.
     """
     G = gram[:-1, :-1]
     seen = [
-        i for i, c in enumerate(bench.columns)
-        if math.isfinite(sizes[c[0]]) and len(c) == 1 and not bench.asked[i].allowed
+        i for i, c in enumerate(evidence.columns)
+        if math.isfinite(sizes[c[0]]) and len(c) == 1 and not evidence.asked[i].allowed
     ]  # fmt: skip
     first: dict[str, int] = {}
     for i in seen:
-        first.setdefault(bench.asked[i].key, i)
+        first.setdefault(evidence.asked[i].key, i)
     index = list(first.values())
-    c = np.array([bench.columns[i][0] for i in index], dtype=np.intp)
+    c = np.array([evidence.columns[i][0] for i in index], dtype=np.intp)
     inner = G[np.ix_(c, c)]
     energy = np.diag(inner)
     theta = sizes[c] / np.sqrt(inflation[index])
@@ -95,16 +95,16 @@ def confusions(bench: Bench, gram: FloatArray, sizes: FloatArray, inflation: Flo
     out = []
     for k, i in enumerate(index):
         own = float(theta[k] ** 2 * energy[k])
-        out += [_confusion(bench, G, i, (j,), float(pairs[k, m]), own) for m, j in enumerate(index) if m != k]
-        near = [m for m in np.argsort(pairs[k]).tolist() if m != k and compatible(bench, (i, index[m]))][:RIVALS]
+        out += [_confusion(evidence, G, i, (j,), float(pairs[k, m]), own) for m, j in enumerate(index) if m != k]
+        near = [m for m in np.argsort(pairs[k]).tolist() if m != k and compatible(evidence, (i, index[m]))][:RIVALS]
         for size in (2, 3):
-            sets = [s for s in combinations(near, size) if compatible(bench, (i, *(index[m] for m in s)))]
+            sets = [s for s in combinations(near, size) if compatible(evidence, (i, *(index[m] for m in s)))]
             lam = _kept(inner, k, np.array(sets, dtype=np.intp).reshape(-1, size)) * theta[k] ** 2
             if not sets:
                 continue
             best = int(np.argmin(lam))
             if lam[best] < 0.5 * min(pairs[k, m] for m in sets[best]) and p_correct(lam[best]) < TOLD_APART:
-                out.append(_confusion(bench, G, i, tuple(index[m] for m in sets[best]), float(lam[best]), own))
+                out.append(_confusion(evidence, G, i, tuple(index[m] for m in sets[best]), float(lam[best]), own))
                 break
     return tuple(out)
 
@@ -119,23 +119,25 @@ def _kept(inner: FloatArray, k: int, sets: np.ndarray[tuple[int, int], np.dtype[
     return np.asarray(np.maximum(left, 0.0) * inner[k, k])
 
 
-def _confusion(bench: Bench, G: FloatArray, i: int, rivals: tuple[int, ...], lam: float, energy: float) -> Confusion:
-    key, others = bench.asked[i].key, tuple(bench.asked[j].key for j in rivals)
+def _confusion(
+    evidence: Evidence, G: FloatArray, i: int, rivals: tuple[int, ...], lam: float, energy: float
+) -> Confusion:
+    key, others = evidence.asked[i].key, tuple(evidence.asked[j].key for j in rivals)
     if lam >= EXACT * energy:
         return Confusion(key, others, lam, p_correct(lam))
-    c = bench.columns[i][0]
-    r = [bench.columns[j][0] for j in rivals]
-    size = float(bench.smallest[c])
+    c = evidence.columns[i][0]
+    r = [evidence.columns[j][0] for j in rivals]
+    size = float(evidence.smallest[c])
     alike = np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size
     sizes = (size, *(float(a) for a in alike))
-    return Confusion(key, others, lam, p_correct(lam), _relation(bench, (i, *rivals), sizes), sizes)
+    return Confusion(key, others, lam, p_correct(lam), _relation(evidence, (i, *rivals), sizes), sizes)
 
 
-def _relation(bench: Bench, effects: Sequence[int], sizes: Sequence[float]) -> str:
+def _relation(evidence: Evidence, effects: Sequence[int], sizes: Sequence[float]) -> str:
     """Sentence: the sizes of the rivals that look like a certain size of the effect on this log."""
     parts = []
     for i, size in zip(effects, sizes, strict=True):
-        h = bench.asked[i]
+        h = evidence.asked[i]
         unit = h.parameter(h.free[0]).unit
         parts.append(f"{name_of(h.effect.name, h.where)} of {quantity(size, unit, change=True)}")
     return f"On this log {parts[0]} looks exactly like {listed(parts[1:])}."

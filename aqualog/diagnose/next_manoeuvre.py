@@ -15,14 +15,14 @@ from itertools import combinations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.isolate import p_correct
 from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
 from aqualog.diagnose.records import Manoeuvre
+from aqualog.diagnose.run_information import Case, of_check, of_log, of_run
 from aqualog.diagnose.search import CREDIBLE, Candidate
-from aqualog.diagnose.trial import Case, of_check, of_log, of_run
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Check, Model
 
@@ -71,13 +71,13 @@ class _Option:
 
 
 def next_manoeuvre(
-    bench: Bench, credible: Sequence[Candidate], noises: Sequence[Noise], model: Model
+    evidence: Evidence, credible: Sequence[Candidate], noises: Sequence[Noise], model: Model
 ) -> Manoeuvre | None:
     """The run, check or sensor that distinguishes sets that the log cannot distinguish.
 
     Parameters
     ----------
-    bench : Bench
+    evidence : Evidence
         Drives with the signatures of all hypotheses.
     credible : sequence of Candidate
         Refitted sets, best first.
@@ -99,10 +99,10 @@ def next_manoeuvre(
     )
     if not pairs:
         return None
-    names = [(h, n) for h in bench.asked for n in h.free]  # in the order of the bench's columns
-    forgiven = tuple((h, n, sd) for (h, n), sd in zip(names, bench.forgiven.tolist(), strict=True) if sd > 0.0)
-    like = max(range(len(bench.drives)), key=lambda d: bench.drives[d].used_s)
-    case = Case(bench, tuple(credible), tuple(noises), model, pairs, forgiven, like)
+    names = [(h, n) for h in evidence.asked for n in h.free]  # in the order of the evidence's columns
+    forgiven = tuple((h, n, sd) for (h, n), sd in zip(names, evidence.forgiven.tolist(), strict=True) if sd > 0.0)
+    like = max(range(len(evidence.drives)), key=lambda d: evidence.drives[d].used_s)
+    case = Case(evidence, tuple(credible), tuple(noises), model, pairs, forgiven, like)
     log = of_log(case)
     everything = tuple(range(len(forgiven)))
     first: list[Run | Check] = []

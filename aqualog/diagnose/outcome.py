@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import value_in
 from aqualog.diagnose.records import Alternative, Cause, Estimate, Verdict
 from aqualog.diagnose.refit import Refit
@@ -40,7 +40,7 @@ class Outcome(NamedTuple):
     certain: frozenset[str] = frozenset()
 
 
-def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_value: float) -> Outcome:
+def conclude(evidence: Evidence, candidates: Sequence[Candidate], model: Model, *, p_value: float) -> Outcome:
     """The verdict on refitted sets, best first; without any: `no_effect`, or `unexplained` if the test is beyond doubt.
 
     A set is credible if the best one's evidence is less than 20 times its own. Members of every credible set are
@@ -52,19 +52,19 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     every_place = [c for c in candidates if c.evidence_ratio < CREDIBLE]
     credible = one_per_name(every_place)
     best = credible[0]
-    own = causes_of(bench, best, model)
+    own = causes_of(evidence, best, model)
     worth = [_worth_naming(best, i, model) for i in range(len(best.refit.members))]
     small = tuple(
         f"Significant, but too small to be worth naming: {c.sentence}" for c, w in zip(own, worth, strict=True) if not w
     )
     if not any(worth):
         return Outcome("no_effect", (), (), None, small)
-    small += _other_places(bench, best, every_place, model)
+    small += _other_places(evidence, best, every_place, model)
     named = tuple(c for c, w in zip(own, worth, strict=True) if w)
     others = tuple(
         Alternative(large, c.evidence_ratio)
         for c in credible[1:]
-        if (large := _large(bench, c, model)) and {x.effect for x in large} != {x.effect for x in named}
+        if (large := _large(evidence, c, model)) and {x.effect for x in large} != {x.effect for x in named}
     )
     if not others:
         return Outcome("named" if len(named) == 1 else "compound", named, (), best.refit, small)
@@ -80,7 +80,7 @@ def conclude(bench: Bench, candidates: Sequence[Candidate], model: Model, *, p_v
     return Outcome("cannot_tell", shown, others, best.refit, small, frozenset(certain))
 
 
-def _other_places(bench: Bench, best: Candidate, credible: Sequence[Candidate], model: Model) -> tuple[str, ...]:
+def _other_places(evidence: Evidence, best: Candidate, credible: Sequence[Candidate], model: Model) -> tuple[str, ...]:
     """Sentences about the same effects at other places that explain the log as well, or nearly so."""
     names = sorted(h.effect.name for h in best.refit.members)
     own = {h.key for h in best.refit.members}
@@ -88,7 +88,7 @@ def _other_places(bench: Bench, best: Candidate, credible: Sequence[Candidate], 
     for c in credible:
         is_near = _sharp(c) - _sharp(best) < 2.0 * math.log(CREDIBLE) * best.inflation
         if c.refit is not best.refit and is_near and sorted(h.effect.name for h in c.refit.members) == names:
-            out += [f"Equally possible: {x.sentence}" for x in causes_of(bench, c, model) if x.key not in own]
+            out += [f"Equally possible: {x.sentence}" for x in causes_of(evidence, c, model) if x.key not in own]
     return tuple(dict.fromkeys(out))
 
 
@@ -119,9 +119,9 @@ def _whole(c: Candidate) -> int:
     return sum(h.where is None for h in c.refit.members)
 
 
-def _large(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
+def _large(evidence: Evidence, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
     """The causes of a set that are worth naming."""
-    causes = causes_of(bench, candidate, model)
+    causes = causes_of(evidence, candidate, model)
     return tuple(c for i, c in enumerate(causes) if _worth_naming(candidate, i, model))
 
 
@@ -139,11 +139,11 @@ def _worth_naming(candidate: Candidate, member: int, model: Model) -> bool:
     return False
 
 
-def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
+def causes_of(evidence: Evidence, candidate: Candidate, model: Model) -> tuple[Cause, ...]:
     """The members of a set with values, intervals and sentences."""
     r = candidate.refit
     sd = candidate.sd
-    explained = _explained(bench, r, model)
+    explained = _explained(evidence, r, model)
     out = []
     for i, h in enumerate(r.members):
         parameters = {}
@@ -160,20 +160,20 @@ def causes_of(bench: Bench, candidate: Candidate, model: Model) -> tuple[Cause, 
     return tuple(out)
 
 
-def _explained(bench: Bench, r: Refit, model: Model) -> list[tuple[str, ...]]:
+def _explained(evidence: Evidence, r: Refit, model: Model) -> list[tuple[str, ...]]:
     """Channels whose rms would rise again without a member."""
-    channels = bench.drives[0].channels
+    channels = evidence.drives[0].channels
     out: list[tuple[str, ...]] = []
     k = 0
     for h in r.members:
         shares = np.zeros(len(channels))
-        for d, left, own in zip(bench.drives, r.residuals, r.signatures, strict=True):
+        for d, left, own in zip(evidence.drives, r.residuals, r.signatures, strict=True):
             theta = r.values[k : k + len(h.free)] - np.array([value_in(model, h, n) for n in h.free])
             without = left + np.tensordot(theta, own[k : k + len(h.free)], axes=1)
             now = np.sqrt((left[:, d.mask] ** 2).mean(axis=1))
             then = np.sqrt((without[:, d.mask] ** 2).mean(axis=1))
             shares += then / np.maximum(now, 1e-15) - 1.0
-        shares /= len(bench.drives)
+        shares /= len(evidence.drives)
         k += len(h.free)
         names = tuple(c for c, s in zip(channels, shares, strict=True) if s > EXPLAINS)
         out.append(names or (channels[int(np.argmax(shares))],))

@@ -9,7 +9,7 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
 from aqualog.diagnose.subsets import PRIOR_WIDTH, SetFit
@@ -67,8 +67,8 @@ class Metric:
         return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
 
 
-def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
-    """Inner products under noise and a share of the tolerances, as in `bench.tolerant`.
+def metric(evidence: Evidence, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
+    """Inner products under noise and a share of the tolerances, as in `evidence.tolerant`.
 
     Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
     by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. The
@@ -79,36 +79,36 @@ def metric(bench: Bench, noises: Sequence[Noise], *, share: float = 1.0, beside:
     Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
     ways agree as long as a signature does not change with its value (D). Only the second stays right if it does.
     """
-    apart = np.zeros(bench.count)
-    apart[list(beside)] = bench.as_values[list(beside)]
-    sought = {bench.kinds[c] for c in beside} - {""}
-    known = np.where([k in sought for k in bench.kinds], 0.0, bench.spread)
-    owner = {c: h for h, columns in zip(bench.asked, bench.columns, strict=True) for c in columns}
-    shares = np.array([DOUBT if owner[c].of_water else share for c in range(bench.count)])
-    sd = np.maximum(shares * bench.tolerance, known)
+    apart = np.zeros(evidence.count)
+    apart[list(beside)] = evidence.as_values[list(beside)]
+    sought = {evidence.kinds[c] for c in beside} - {""}
+    known = np.where([k in sought for k in evidence.kinds], 0.0, evidence.spread)
+    owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
+    shares = np.array([DOUBT if owner[c].of_water else share for c in range(evidence.count)])
+    sd = np.maximum(shares * evidence.tolerance, known)
     k = np.flatnonzero(sd > 0.0).tolist()
-    A = np.concatenate([whitened(p.of(k), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1)
+    A = np.concatenate([whitened(p.of(k), n) for p, n in zip(evidence.prepared, noises, strict=True)], axis=1)
     seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
     A = A[seen]
     M = np.linalg.inv(A @ A.T + np.diag(sd[k][seen] ** -2.0))
     return Metric(tuple(noises), A, M, apart)
 
 
-def whitened_residual(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
+def whitened_residual(evidence: Evidence, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
     """All drives' residuals as unit innovations, flat."""
     parts = [
         whitened(spectra(bridged(r, d.mask)[None]), n)[0]
-        for r, d, n in zip(residuals, bench.drives, noises, strict=True)
+        for r, d, n in zip(residuals, evidence.drives, noises, strict=True)
     ]
     return np.concatenate(parts)
 
 
-def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | None:
+def refit(evidence: Evidence, fit: SetFit, measure: Metric, model: Model) -> Refit | None:
     """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds.
 
     Parameters
     ----------
-    bench : Bench
+    evidence : Evidence
     fit : SetFit
         Its values are where the search starts.
     measure : Metric
@@ -117,17 +117,17 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
         On which the set comes.
     """
     noises = measure.noises
-    members = tuple(bench.asked[m] for m in fit.members)
+    members = tuple(evidence.asked[m] for m in fit.members)
     names = tuple((i, n) for i, h in enumerate(members) for n in h.free)
     columns = list(fit.columns)
     base = np.array([value_in(model, members[i], n) for i, n in names])
-    low, high = base + bench.low[columns], base + bench.high[columns]
-    width = PRIOR_WIDTH * bench.prior[columns]
+    low, high = base + evidence.low[columns], base + evidence.high[columns]
+    width = PRIOR_WIDTH * evidence.prior[columns]
     J = np.concatenate(
-        [whitened(p.of(columns), n) for p, n in zip(bench.prepared, noises, strict=True)], axis=1
+        [whitened(p.of(columns), n) for p, n in zip(evidence.prepared, noises, strict=True)], axis=1
     )  # (k, N): change of the residual by one unit
     values = np.clip(base + fit.theta, low, high)
-    found = _try(bench, members, names, values, noises, model)
+    found = _try(evidence, members, names, values, noises, model)
     if found is None:
         return None
     y, residuals, extended = found
@@ -141,7 +141,7 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
         won = 0.0
         for shrink in SHRINK if promised >= ENOUGH else ():
             new = np.clip(values + shrink * step, low, high)
-            tried = _try(bench, members, names, new, noises, model)
+            tried = _try(evidence, members, names, new, noises, model)
             if tried is None:
                 continue
             won = loss - _loss(measure, tried[0], (new - base) / width)
@@ -157,13 +157,13 @@ def refit(bench: Bench, fit: SetFit, measure: Metric, model: Model) -> Refit | N
         elif fresh:
             break
         if not fresh:
-            J = _rows(bench, _slopes(bench, members, residuals, extended), noises)
+            J = _rows(evidence, _slopes(evidence, members, residuals, extended), noises)
             fresh = True
-    slopes = _slopes(bench, members, residuals, extended)
-    J = _rows(bench, slopes, noises)
+    slopes = _slopes(evidence, members, residuals, extended)
+    J = _rows(evidence, slopes, noises)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
-    unlikely = _unlikely((values - base) / bench.prior[columns])
+    unlikely = _unlikely((values - base) / evidence.prior[columns])
     loss += unlikely - float((((values - base) / width) ** 2).sum())
     return Refit(
         members,
@@ -194,7 +194,7 @@ def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:
 
 
 def _try(
-    bench: Bench,
+    evidence: Evidence,
     members: tuple[Hypothesis, ...],
     names: tuple[tuple[int, str], ...],
     values: FloatArray,
@@ -206,21 +206,21 @@ def _try(
         by_member[i][n] = v
     try:
         extended = with_values(model, list(zip(members, by_member, strict=True)))
-        residuals = [residual(d, extended) for d in bench.drives]
+        residuals = [residual(d, extended) for d in evidence.drives]
     except ConfigError:
         return None
-    return whitened_residual(bench, noises, residuals), residuals, extended
+    return whitened_residual(evidence, noises, residuals), residuals, extended
 
 
 def _slopes(
-    bench: Bench, members: tuple[Hypothesis, ...], residuals: Sequence[FloatArray], extended: Model
+    evidence: Evidence, members: tuple[Hypothesis, ...], residuals: Sequence[FloatArray], extended: Model
 ) -> tuple[FloatArray, ...]:
     return tuple(
         np.concatenate(signatures(d, extended, members, base=r, each=True))
-        for d, r in zip(bench.drives, residuals, strict=True)
+        for d, r in zip(evidence.drives, residuals, strict=True)
     )
 
 
-def _rows(bench: Bench, slopes: Sequence[FloatArray], noises: Sequence[Noise]) -> FloatArray:
-    parts = [whitened(spectra(bridged(s, d.mask)), n) for s, d, n in zip(slopes, bench.drives, noises, strict=True)]
+def _rows(evidence: Evidence, slopes: Sequence[FloatArray], noises: Sequence[Noise]) -> FloatArray:
+    parts = [whitened(spectra(bridged(s, d.mask)), n) for s, d, n in zip(slopes, evidence.drives, noises, strict=True)]
     return np.concatenate(parts, axis=1)

@@ -13,20 +13,20 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
-from aqualog.diagnose.bench import Bench, Stack, without_deviations
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import Defect, accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
+from aqualog.diagnose.evidence import Evidence, Stack, without_deviations
+from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
-from aqualog.diagnose.heldout import measured_gain
 from aqualog.diagnose.hypotheses import hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
 from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
-from aqualog.diagnose.support import supported
+from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_term import as_term
 from aqualog.diagnose.words import verdict_sentence
@@ -113,19 +113,19 @@ def diagnose(
         model = with_profile(model, road)
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
-    bench = simulated(ready, asked, model, tell)
-    bench = supported(bench)
-    found = search(bench, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
-    outcome = conclude(bench, found.candidates, model, p_value=found.tests[0].p_value)
-    outcome, agreed = _by_drive(bench, found, outcome, model)
+    evidence = simulated(ready, asked, model, tell)
+    evidence = supported(evidence)
+    found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
+    outcome = conclude(evidence, found.candidates, model, p_value=found.tests[0].p_value)
+    outcome, agreed = _by_drive(evidence, found, outcome, model)
     tell("describing what is not explained", 0.8)
-    outcome, remainders = _remainders(bench, found, outcome, options)
+    outcome, remainders = _remainders(evidence, found, outcome, options)
     if road is not None:
         outcome = _with_road(outcome, road, named=hilly)
     extended = _extended(outcome, remainders, model if hilly else given, vehicle)
-    sizes = isolate.reference_sizes(bench, found.gram, found.calibration.inflation, found.calibration.threshold)
-    before = [_led(d, given) for d in ready] if road is not None else list(bench.residuals)
-    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else list(bench.residuals)
+    sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
+    before = [_led(d, given) for d in ready] if road is not None else list(evidence.residuals)
+    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else list(evidence.residuals)
     gained = None
     if extended.terms != given.terms:
         tell("measuring the gain", 0.88)
@@ -142,7 +142,7 @@ def diagnose(
     next_run = None
     if outcome.verdict == "cannot_tell":
         tell("searching for a run that distinguishes the causes", 0.95)
-        next_run = next_manoeuvre(bench, one_per_name(found.candidates), found.noises, model)
+        next_run = next_manoeuvre(evidence, one_per_name(found.candidates), found.noises, model)
     reason = (
         f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of the logged quantities does"
     )
@@ -162,8 +162,8 @@ def diagnose(
         causes=outcome.causes,
         alternatives=outcome.alternatives,
         significance=found.tests[0],
-        limits=isolate.limits(bench, sizes),
-        confusions=isolate.confusions(bench, found.gram, sizes, found.calibration.inflation),
+        limits=isolate.limits(evidence, sizes),
+        confusions=isolate.confusions(evidence, found.gram, sizes, found.calibration.inflation),
         remainders=remainders,
         manoeuvre=next_run,
         gain=gained,
@@ -176,13 +176,17 @@ def diagnose(
     )
 
 
-def _by_drive(bench: Bench, found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
+def _by_drive(
+    evidence: Evidence, found: Found, outcome: Outcome, model: Model
+) -> tuple[Outcome, tuple[Agreement, ...]]:
     """Values of the chosen set drive by drive; intervals grow where the drives differ."""
     chosen = next((c for c in found.candidates if c.refit is outcome.chosen), None)
     if chosen is None:
         return outcome, ()
     r = chosen.refit
-    agreed = agreements(bench, chosen, found.noises, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
+    agreed = agreements(
+        evidence, chosen, found.noises, np.array([value_in(model, r.members[i], n) for i, n in r.names])
+    )
     named = {c.key for c in outcome.causes}
     causes = tuple(widened(c, agreed) for c in outcome.causes)
     return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)
@@ -225,13 +229,13 @@ def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...
 
 
 def _remainders(
-    bench: Bench, found: Found, outcome: Outcome, options: Options
+    evidence: Evidence, found: Found, outcome: Outcome, options: Options
 ) -> tuple[Outcome, tuple[Remainder, ...]]:
     """Functions in the remainder of the longest drive; they overrule a cause that explains less than they do."""
-    d = max(range(len(bench.drives)), key=lambda i: bench.drives[i].used_s)
+    d = max(range(len(evidence.drives)), key=lambda i: evidence.drives[i].used_s)
     named = outcome.verdict in ("named", "compound", "cannot_tell") and outcome.chosen is not None
-    left = outcome.chosen.residuals[d] if named and outcome.chosen is not None else bench.residuals[d]
-    remainders = _functions(bench, found, d, left, options)
+    left = outcome.chosen.residuals[d] if named and outcome.chosen is not None else evidence.residuals[d]
+    remainders = _functions(evidence, found, d, left, options)
     if not remainders:
         return outcome, ()
     if named:
@@ -239,27 +243,27 @@ def _remainders(
         strong = [r for r in remainders if r.channel in own and r.share > PARTIAL]
         if not strong:
             return outcome, remainders
-        whole = _functions(bench, found, d, bench.residuals[d], options)
+        whole = _functions(evidence, found, d, evidence.residuals[d], options)
         if not whole:
             return outcome, remainders
         remainders = whole
     return Outcome("unexplained", (), (), None, outcome.small), remainders
 
 
-def _functions(bench: Bench, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
-    drive = bench.drives[d]
+def _functions(evidence: Evidence, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
+    drive = evidence.drives[d]
     # an error of a water law within the range of its sources is not an unexplained function, nor is what the car's
     # drives differ by
-    open_ = [c for h, columns in zip(bench.asked, bench.columns, strict=True) if h.of_water for c in columns]
-    left = without_deviations(bench, d, left, sorted({*open_, *np.flatnonzero(bench.spread > 0.0).tolist()}))
+    open_ = [c for h, columns in zip(evidence.asked, evidence.columns, strict=True) if h.of_water for c in columns]
+    left = without_deviations(evidence, d, left, sorted({*open_, *np.flatnonzero(evidence.spread > 0.0).tolist()}))
     # nor are the usual errors of a file or a tyre
-    left = without_deviations(bench, d, left, range(bench.count), farthest=FARTHEST)
+    left = without_deviations(evidence, d, left, range(evidence.count), farthest=FARTHEST)
     noise = fit_noise(left, drive.mask, contrasts(drive.channels))
     stack = Stack(left, drive.mask, block_step(drive.dt), drive.channels, drive.coordinates, noise)
     known: dict[str, FloatArray] = {}
-    for h, columns in zip(bench.asked, bench.columns, strict=True):
+    for h, columns in zip(evidence.asked, evidence.columns, strict=True):
         if not h.allowed:
-            known.setdefault(h.key, bench.signatures[d][columns[0]])
+            known.setdefault(h.key, evidence.signatures[d][columns[0]])
     surrogates = max(options.surrogates, round(1.0 / options.level) - 1)
     remainders = find_remainders(stack, signatures=known, level=options.level, seed=options.seed, surrogates=surrogates)
     sd = dict(zip(drive.channels, left[:, drive.mask].std(axis=1).tolist(), strict=True))

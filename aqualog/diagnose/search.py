@@ -11,16 +11,15 @@ import numpy as np
 
 from aqualog.core.notation import AXLES
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench, make_bench, noises_after
+from aqualog.diagnose.any_effect import Calibration, bonferroni, calibrate, chance, gumbel_p, largest
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive, led_by
-from aqualog.diagnose.family import Calibration, bonferroni, calibrate, chance, gumbel_p, largest
+from aqualog.diagnose.evidence import Evidence, make_evidence, noises_after
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
 from aqualog.diagnose.records import Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, whitened_residual
-from aqualog.diagnose.relations import imitations
-from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set
+from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set, imitations
 from aqualog.model.term import Model
 
 __all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
@@ -75,7 +74,7 @@ class Found:
     noises: tuple[Noise, ...]
 
 
-def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Bench:
+def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Evidence:
     """Residuals of the drives under a model, and their change by every hypothesis."""
     residuals, all_signatures = [], []
     total = len(asked) * len(drives)
@@ -89,18 +88,18 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
         residuals.append(residual(d, model))
         all_signatures.append(signatures(d, model, asked, base=residuals[-1], tick=tick))
     values = {(i, n): value_in(model, h, n) for i, h in enumerate(asked) for n in h.free}
-    return make_bench(drives, asked, residuals, all_signatures, values)
+    return make_evidence(drives, asked, residuals, all_signatures, values)
 
 
 def search(
-    bench: Bench, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
+    evidence: Evidence, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
 ) -> Found:
     """Test, best set, refit; repeated beside that set until the test finds no more or the set has three effects."""
     tests: list[Significance] = []
     first: tuple[FloatArray, Calibration] | None = None
     accepted: tuple[int, ...] = ()
     candidates: tuple[Candidate, ...] = ()
-    work = bench
+    work = evidence
     while True:
         tell("testing for any effect" if not accepted else "testing for one more effect", 0.3 + 0.1 * len(tests))
         gains, gram = largest(work, work.residuals, accepted)
@@ -124,12 +123,12 @@ def search(
             break
         candidates = found
         best = found[0].refit
-        accepted = tuple(_index(bench, h) for h in best.members)
-        work = _around(bench, best, accepted, model)
-        work = replace(work, drives=tuple(led_by(d, best.model) for d in bench.drives))
+        accepted = tuple(_index(evidence, h) for h in best.members)
+        work = _around(evidence, best, accepted, model)
+        work = replace(work, drives=tuple(led_by(d, best.model) for d in evidence.drives))
     assert first is not None
-    quiet = list(candidates[0].refit.residuals) if candidates else list(bench.residuals)
-    noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, bench.drives, strict=True))
+    quiet = list(candidates[0].refit.residuals) if candidates else list(evidence.residuals)
+    noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True))
     return Found(tuple(tests), first[0], first[1], candidates, noises)
 
 
@@ -145,9 +144,9 @@ def _ticker(tell: Tell, start: float, surrogates: int) -> Callable[[], None]:
 
 
 def _tested(
-    bench: Bench, gains: FloatArray, base: Sequence[int], c: Calibration, level: float, surrogates: int
+    evidence: Evidence, gains: FloatArray, base: Sequence[int], c: Calibration, level: float, surrogates: int
 ) -> Significance:
-    sizes = np.array([len(x) for x in bench.columns], dtype=np.float64)
+    sizes = np.array([len(x) for x in evidence.columns], dtype=np.float64)
     ratio = gains / c.inflation / sizes
     statistic = float(ratio.max())
     if c.maxima.size:
@@ -157,28 +156,28 @@ def _tested(
     return Significance(statistic, c.threshold, p, level, float("nan"), 0)
 
 
-def _surely_nothing(bench: Bench, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
+def _surely_nothing(evidence: Evidence, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
     """The test's result if no gain reaches Bonferroni's bound [bonferroni1936], even without coloured noise.
 
     The bound is the minimum of every threshold. Surrogates, which take most of the time, could not turn this into a
     finding.
     """
-    statistic = float((gains / [len(x) for x in bench.columns]).max())
+    statistic = float((gains / [len(x) for x in evidence.columns]).max())
     p = chance(statistic, c.tested)
     if p <= level:
         return None
     return Significance(statistic, bonferroni(level, c.tested), p, level, c.achieved, 0)
 
 
-def _after(bench: Bench, fit: SetFit) -> list[FloatArray]:
+def _after(evidence: Evidence, fit: SetFit) -> list[FloatArray]:
     return [
         r - np.tensordot(fit.theta, s[list(fit.columns)], axes=1)
-        for r, s in zip(bench.residuals, bench.signatures, strict=True)
+        for r, s in zip(evidence.residuals, evidence.signatures, strict=True)
     ]
 
 
 def _refitted(
-    bench: Bench,
+    evidence: Evidence,
     gram: FloatArray,
     base: Sequence[int],
     calibration: Calibration,
@@ -193,22 +192,22 @@ def _refitted(
     the form of any effect.
     """
     size = len(base) + 1
-    top = best_sets(bench, gram, size, within=0.0, most=1)
+    top = best_sets(evidence, gram, size, within=0.0, most=1)
     if not top:
         return ()
     inflation = max(1.0, float(np.mean([calibration.inflation[m] for m in top[0].members])))
-    noises = noises_after(bench, bench.residuals, dict(zip(top[0].columns, top[0].theta.tolist(), strict=True)))
-    known = fit_set(bench, gram, base) if base else None
+    noises = noises_after(evidence, evidence.residuals, dict(zip(top[0].columns, top[0].theta.tolist(), strict=True)))
+    known = fit_set(evidence, gram, base) if base else None
     won = top[0].gain - (known.gain if known is not None else 0.0)
     within = (2.0 * math.log(CREDIBLE)) * inflation + SLACK + BENT * max(won, 0.0)
-    fits = best_sets(bench, gram, size, within=within, most=REFITTED)
-    fits += _twins(bench, gram, fits[0], {f.members for f in fits})
+    fits = best_sets(evidence, gram, size, within=within, most=REFITTED)
+    fits += _twins(evidence, gram, fits[0], {f.members for f in fits})
     if size == 1:
-        fits += _of_water(bench, gram, {f.members for f in fits})
-    measure = metric(bench, noises)
+        fits += _of_water(evidence, gram, {f.members for f in fits})
+    measure = metric(evidence, noises)
     tell("refitting in the simulator", min(share, 0.95))
     with ThreadPoolExecutor(THREADS) as pool:
-        refits = list(pool.map(lambda fit: refit(bench, fit, measure, model), fits))
+        refits = list(pool.map(lambda fit: refit(evidence, fit, measure, model), fits))
     done = [r for r in refits if r is not None and not r.at_bound]
     losses = {id(r): r.loss / inflation + PER_PARAMETER * len(r.values) for r in done}
     done.sort(key=lambda r: losses[id(r)])
@@ -218,16 +217,16 @@ def _refitted(
     # a set with a member too small to be named is dropped if another effect explains as much
     if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
         done = large
-    y = whitened_residual(bench, noises, now.residuals if now is not None else bench.residuals)[None]
+    y = whitened_residual(evidence, noises, now.residuals if now is not None else evidence.residuals)[None]
     # the penalty of known values is in the loss of every set that has them
     known_loss = float(measure.inner(y, y)[0, 0]) + (now.unlikely if now is not None else 0.0)
-    if known is not None and (again := refit(bench, known, measure, model)) is not None:
+    if known is not None and (again := refit(evidence, known, measure, model)) is not None:
         known_loss = min(known_loss, again.loss)
     if not done or known_loss - done[0].loss < HALF * calibration.threshold * inflation:
         return ()
     best = done[0]
     members = next(f.members for f, own in zip(fits, refits, strict=True) if own is best)
-    for fit, same in _imitated(bench, gram, members, measure, model):
+    for fit, same in _imitated(evidence, gram, members, measure, model):
         # the relation holds on every log: that it takes more effects, in these sizes, is no evidence against it
         fits.append(fit)
         refits.append(same)
@@ -242,15 +241,15 @@ def _refitted(
     starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
 
     def sharpened(start: SetFit, found: Refit) -> Refit | None:
-        led = replace(bench, drives=tuple(led_by(d, found.model) for d in bench.drives))
-        return refit(led, start, metric(bench, noises, share=KNOWN, beside=start.columns), model)
+        led = replace(evidence, drives=tuple(led_by(d, found.model) for d in evidence.drives))
+        return refit(led, start, metric(evidence, noises, share=KNOWN, beside=start.columns), model)
 
     with ThreadPoolExecutor(THREADS) as pool:
         sharp = list(pool.map(sharpened, starts, (r for r, _ in credible)))
-    known_only = metric(bench, noises, share=KNOWN)
+    known_only = metric(evidence, noises, share=KNOWN)
 
     def as_candidate(r: Refit, ratio: float) -> Candidate:
-        y = whitened_residual(bench, noises, r.residuals)[None]
+        y = whitened_residual(evidence, noises, r.residuals)[None]
         return Candidate(r, ratio, inflation, float(known_only.inner(y, y)[0, 0]) + r.unlikely)
 
     return tuple(
@@ -258,33 +257,33 @@ def _refitted(
     )
 
 
-def _twins(bench: Bench, gram: FloatArray, top: SetFit, known: set[tuple[int, ...]]) -> list[SetFit]:
+def _twins(evidence: Evidence, gram: FloatArray, top: SetFit, known: set[tuple[int, ...]]) -> list[SetFit]:
     """The best set with one member replaced by its known twin: always refitted, whatever their signatures predict."""
     out = []
     for k, m in enumerate(top.members):
-        for name in bench.asked[m].effect.twins:
-            for i, h in enumerate(bench.asked):
+        for name in evidence.asked[m].effect.twins:
+            for i, h in enumerate(evidence.asked):
                 if h.effect.name != name or h.where not in (None, h.effect.default):
                     continue
                 members = tuple(sorted((*top.members[:k], i, *top.members[k + 1 :])))
-                fit = fit_set(bench, gram, members) if len(set(members)) == len(members) else None
-                if fit is not None and members not in known and compatible(bench, members):
+                fit = fit_set(evidence, gram, members) if len(set(members)) == len(members) else None
+                if fit is not None and members not in known and compatible(evidence, members):
                     known = known | {members}
                     out.append(fit)
     return out
 
 
-def _of_water(bench: Bench, gram: FloatArray, known: set[tuple[int, ...]]) -> list[SetFit]:
+def _of_water(evidence: Evidence, gram: FloatArray, known: set[tuple[int, ...]]) -> list[SetFit]:
     """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict.
 
     Near floating, slip is proportional to one over the square of the remaining contact, so a linear signature is valid
     only locally.
     """
     alone = [
-        (i,) for i, h in enumerate(bench.asked)
+        (i,) for i, h in enumerate(evidence.asked)
         if h.of_water and not h.allowed and h.where not in AXLES and (i,) not in known
     ]  # fmt: skip
-    return [f for m in alone if (f := fit_set(bench, gram, m)) is not None]
+    return [f for m in alone if (f := fit_set(evidence, gram, m)) is not None]
 
 
 def _about_water(r: Refit) -> bool:
@@ -292,13 +291,13 @@ def _about_water(r: Refit) -> bool:
 
 
 def _imitated(
-    bench: Bench, gram: FloatArray, members: Sequence[int], measure: Metric, model: Model
+    evidence: Evidence, gram: FloatArray, members: Sequence[int], measure: Metric, model: Model
 ) -> list[tuple[SetFit, Refit]]:
     """Refits of the sets that a relation makes equal to the best one, without those at a physical bound."""
     out = []
-    for other in imitations(bench.asked, members):
-        fit = fit_set(bench, gram, other) if len(other) <= MOST else None
-        same = refit(bench, fit, measure, model) if fit is not None and compatible(bench, other) else None
+    for other in imitations(evidence.asked, members):
+        fit = fit_set(evidence, gram, other) if len(other) <= MOST else None
+        same = refit(evidence, fit, measure, model) if fit is not None and compatible(evidence, other) else None
         if fit is not None and same is not None and not same.at_bound and _all_there(same, model) and _usual(same):
             out.append((fit, same))
     return out
@@ -324,23 +323,23 @@ def _all_there(r: Refit, model: Model) -> bool:
     )
 
 
-def _index(bench: Bench, h: Hypothesis) -> int:
-    return bench.asked.index(h)
+def _index(evidence: Evidence, h: Hypothesis) -> int:
+    return evidence.asked.index(h)
 
 
-def _around(bench: Bench, best: Refit, members: Sequence[int], model: Model) -> Bench:
-    """The bench with the signatures of the best set at its own values.
+def _around(evidence: Evidence, best: Refit, members: Sequence[int], model: Model) -> Evidence:
+    """The evidence with the signatures of the best set at its own values.
 
     Residuals are those that a linear model around these values would have had at the start, so that the search for sets
     can begin again from there.
     """
-    columns = [c for m in members for c in bench.columns[m]]
+    columns = [c for m in members for c in evidence.columns[m]]
     start = best.values - np.array([value_in(model, best.members[i], n) for i, n in best.names])
     new_signatures, new_residuals = [], []
-    for s, r, own in zip(bench.signatures, best.residuals, best.signatures, strict=True):
+    for s, r, own in zip(evidence.signatures, best.residuals, best.signatures, strict=True):
         changed = s.copy()
         changed[columns] = own
         new_signatures.append(changed)
         new_residuals.append(r + np.tensordot(start, own, axes=1))
-    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(new_signatures, bench.drives, strict=True))
-    return replace(bench, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared)
+    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(new_signatures, evidence.drives, strict=True))
+    return replace(evidence, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared)

@@ -14,10 +14,17 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.unknown_basis import Basis, bases
-from aqualog.diagnose.unknown_fit import energies, parts_of, roughness, simultaneous
-from aqualog.diagnose.unknown_null import noise_level, noise_like, null_scores
+from aqualog.diagnose.unknown_fit import (
+    energies,
+    noise_level,
+    noise_like,
+    null_scores,
+    parts_of,
+    roughness,
+    simultaneous,
+)
 from aqualog.diagnose.unknown_proxy import Candidate, Choice, blocks_of_rows, choose
-from aqualog.diagnose.unknown_words import describe
+from aqualog.diagnose.unknown_term import describe
 
 __all__ = ["Residuals", "find_remainders"]
 

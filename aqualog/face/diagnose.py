@@ -395,7 +395,7 @@ def _of_campaign(
     runs = campaign.run(progress=hear) if isinstance(campaign, Campaign) else campaign
     if not runs.outcome.done:
         raise NothingUsableError([f"{name}: {reason}" for name, reason in runs.outcome.failed.items()])
-    from aqualog.diagnose.level import diagnose_campaign
+    from aqualog.diagnose.campaign import diagnose_campaign
 
     configured = runs.campaign.configured
     drawn: Any = {} if surrogates is None else {"surrogates": surrogates}

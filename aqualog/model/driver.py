@@ -1,15 +1,15 @@
-"""The driver in the compiled simulation: pedals, steering wheel, and the excitation of the axles."""
+"""The driver in the compiled simulation: pedals, antilock brakes, steering wheel, and the excitation of the axles."""
 
 from __future__ import annotations
 
 from aqualog.core.compiled import inlined, part
 from aqualog.model import excitation
-from aqualog.model.state import BRAKE, DRIVE, INTEGRAL, OMEGA, PSI, STEER, V_X, Y_LAT
+from aqualog.model.state import AT, BRAKE, DRIVE, INTEGRAL, OMEGA, PSI, STEER, V_X, Y_LAT
 from aqualog.model.wheel import Command
 from aqualog.physics.load import G
 from aqualog.physics.resistance import rolling_resistance_force
 
-__all__ = ["driver", "keep_lane"]
+__all__ = ["antilock", "driver", "keep_lane"]
 
 # gains of a calm driver (K)
 K_SPEED = 0.8  # [1/s]
@@ -97,3 +97,30 @@ def keep_lane(m, keeps_lane):  # type: ignore[no-untyped-def]
         f[STEER] = (-K_LATERAL * (y[Y_LAT] + PREVIEW_TIME * y[V_X] * y[PSI]) - y[STEER]) / STEER_TIME
     else:
         f[STEER] = -y[STEER] / STEER_TIME
+
+
+SLIP_RELEASE = 0.12  # [-] brake slip at which pressure is let go, about the peak of a tyre on any road (K)
+SLIP_BUILD = 0.04  # [-] at which it comes back (K)
+RELEASE_RATE = 9.0  # [1/s] of the whole torque: a valve empties a brake in about a tenth of a second (K)
+BUILD_RATE = 2.5  # [1/s] stepwise build-up, on average (K)
+V_OFF = 2.0  # [m/s] below, wheels may lock: 3-10 km/h on series cars (K)
+
+
+@part
+def antilock(m, dt):  # type: ignore[no-untyped-def]
+    """One step of a two-state controller per wheel, in place, by the speeds that the step recorded.
+
+    `m.released` (4,) is the share of the brake torque that is held off, `m.releasing` (4,) 1 while it falls. The cycle
+    of 3 to 10 Hz follows from rates, thresholds and the wheel's inertia.
+    """
+    for i in range(4):
+        v = m.out[AT.v_along + i]
+        slip = 1.0 - m.out[AT.omega + i] * m.out[AT.r_e + i] / max(v, 0.1)
+        if v < V_OFF or slip < SLIP_BUILD:
+            m.releasing[i] = 0.0
+        elif slip > SLIP_RELEASE:
+            m.releasing[i] = 1.0
+        if m.releasing[i] > 0.0:
+            m.released[i] = min(m.released[i] + RELEASE_RATE * dt, 1.0)
+        else:
+            m.released[i] = max(m.released[i] - BUILD_RATE * dt, 0.0)

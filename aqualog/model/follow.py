@@ -18,8 +18,7 @@ from aqualog.model.road import build_road
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
-from aqualog.model.start import resistance_at, rolling_state
-from aqualog.model.state import DRIVE, column, wheel_columns
+from aqualog.model.state import DRIVE, column, resistance_at, rolling_state, wheel_columns
 from aqualog.model.term import Model, Setup
 from aqualog.physics.load import G
 

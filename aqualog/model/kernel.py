@@ -12,8 +12,7 @@ import numpy as np
 
 from aqualog.core.compiled import compiled, inlined, part
 from aqualog.core.records import FloatArray
-from aqualog.model.antilock import antilock
-from aqualog.model.driver import driver, keep_lane
+from aqualog.model.driver import antilock, driver, keep_lane
 from aqualog.model.plant import Plant, flat, records
 from aqualog.model.road import GRADE, Road, at_position, stretch_at, track_row
 from aqualog.model.state import (

@@ -1,12 +1,13 @@
-"""Write a simulated drive as a log file."""
+"""A simulated drive as a log file, or as the table of signals without a file between."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
-from aqualog.align.mapping import SignalMap, resolve
+from aqualog.align.mapping import Entry, SignalMap, resolve
 from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.table import build_signals
 from aqualog.core.notation import ACCEPTED, SYMBOLS
@@ -16,7 +17,7 @@ from aqualog.io.write_log import LogGroup, write_log
 from aqualog.model.sensors import Measured
 from aqualog.model.simulate import TRUTH_SYMBOLS, Simulation
 
-__all__ = ["START_NS", "grid_of", "groups_of", "signals_of", "table_of", "write_simulation"]
+__all__ = ["START_NS", "as_signals", "grid_of", "groups_of", "signals_of", "table_of", "write_simulation"]
 
 START_NS = 1_748_000_000_000_000_000  # arbitrary: a drive must be the same whenever it is simulated
 _OWN_STAMPS = (".mf4", ".mcap")  # formats in which each group keeps the time stamps of its messages
@@ -85,3 +86,54 @@ def _onto(grid: TimeArray, t_ns: TimeArray, name: str, x: FloatArray) -> FloatAr
     if 0 < median_period_ns(t_ns) < dt_ns / 2:
         return bin_mean(t_ns, x, grid, dt_ns=dt_ns, gap_ns=gap_ns)[0]
     return linear(t_ns, x, grid, gap_ns=gap_ns)[0]
+
+
+_FILE = "simulated"
+
+
+def as_signals(simulation: Simulation, *, vehicle: Vehicle | None = None, truth: bool = True) -> Signals:
+    """Return the signals that loading this drive's written table gives, and the truth beside them.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    vehicle : Vehicle, optional
+        The car as the reader of the log knows it (it decides which wheel speeds are impossible); default the
+        simulated one.
+    truth : bool
+        With the columns `true_*` on the same grid. No detector reads them, nor the labels (`on_water`,
+        `water_depth_left`): `aqualog.features.stream.INPUTS`.
+
+    Returns
+    -------
+    signals : Signals
+        `frame`: `t` [s] from 0 on the grid of the scenario's rate, canonical columns, truth last; a sample that no
+        sensor gave is null. `start_ns` is that of the written logs; `origins` has the canonical columns only.
+
+    Raises
+    ------
+    SignalError
+        If no signal has a sample.
+    """
+    grid = grid_of(simulation)
+    columns = {n: (unit, x) for g in table_of(simulation) for n, (unit, _, x) in g.columns.items()}
+    mapped = {}
+    for name, (unit, x) in columns.items():
+        if name in SYMBOLS or name in ACCEPTED:
+            info = ChannelInfo(name, name, unit, x.size, _FILE)
+            mapped[name] = (Entry(name, (name,)), Channel(info, START_NS + grid, x, absolute=True))
+    signals = build_signals(mapped, signal_map=SignalMap(), vehicle=vehicle or simulation.setup.scenario.vehicle)
+    if not truth:
+        return signals
+    known = [pl.Series(n, x).fill_nan(None) for n, (_, x) in columns.items() if n.startswith("true_")]
+    # a grid that begins or ends with dropped samples is shorter than the drive
+    first = round((signals.start_ns or START_NS) - START_NS) // signals.dt_ns
+    known = [s.slice(first, signals.frame.height) for s in known]
+    return Signals(
+        signals.frame.with_columns(known),
+        signals.dt_ns,
+        signals.start_ns,
+        signals.origins,
+        signals.quality,
+        signals.files,
+    )

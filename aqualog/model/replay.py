@@ -11,8 +11,7 @@ from aqualog.core.records import FloatArray
 from aqualog.model import kernel
 from aqualog.model.plant import Plant
 from aqualog.model.road import DRY
-from aqualog.model.start import resistance_at, rolling_state
-from aqualog.model.state import column, wheel_columns
+from aqualog.model.state import column, resistance_at, rolling_state, wheel_columns
 
 __all__ = ["Replay", "replay"]
 

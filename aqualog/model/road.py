@@ -8,8 +8,7 @@ import numpy as np
 
 from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
-from aqualog.model.scenario import Kick, Lane, Scenario
-from aqualog.model.surface import Surface
+from aqualog.model.scenario import Kick, Lane, Scenario, Surface
 
 __all__ = ["DRY", "Road", "at_position", "build_road", "stretch_at", "track_row"]
 

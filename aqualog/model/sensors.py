@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import SYMBOLS, WHEELS
 from aqualog.core.records import FloatArray
-from aqualog.model.faults import SensorFault, with_faults
 from aqualog.model.pickup import edge_times, reported_speed, ring_angles, rolled_angle
 
-__all__ = ["ESC", "IDEAL", "SENSORS", "Channel", "Group", "Measured", "Sensors", "Truth", "measure"]
+__all__ = [
+    "ESC",
+    "FAULT_KINDS",
+    "IDEAL",
+    "SENSORS",
+    "Channel",
+    "FaultKind",
+    "Group",
+    "Measured",
+    "SensorFault",
+    "Sensors",
+    "Truth",
+    "measure",
+    "with_faults",
+]
 
 SNAP = 1e-6  # [grid steps] a time this close to a point of the fine grid is that point
 
@@ -314,3 +328,33 @@ ESC = Sensors(
 )
 
 SENSORS: Mapping[str, Sensors] = {"esc": ESC, "ideal": IDEAL}
+
+FaultKind = Literal["missing", "frozen"]
+FAULT_KINDS: tuple[FaultKind, ...] = ("missing", "frozen")
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFault:
+    """A signal, or all of a bus message by the name of its group, fails from `start_s` to before `end_s`.
+
+    `missing`: no value (NaN); `frozen`: the last value before; without one, missing.
+    """
+
+    where: str
+    start_s: float
+    end_s: float
+    kind: FaultKind = "missing"
+
+
+def with_faults(x: FloatArray, t: FloatArray, faults: Collection[SensorFault], *, names: Collection[str]) -> FloatArray:
+    """Put the faults that name a signal (its own name, its group's) into it: signal (n,) at the times t (n,) [s].
+
+    A signal without faults is returned unchanged.
+    """
+    for fault in faults:
+        if fault.where not in names:
+            continue
+        out = (t >= fault.start_s) & (t < fault.end_s)
+        before = int(np.searchsorted(t, fault.start_s)) - 1
+        x = np.where(out, x[before] if fault.kind == "frozen" and before >= 0 else np.nan, x)
+    return x

@@ -15,8 +15,7 @@ from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, Plant, build_pla
 from aqualog.model.road import GRADE, build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
-from aqualog.model.start import resistance_at, rolling_state
-from aqualog.model.state import COLUMNS, column, wheel_columns
+from aqualog.model.state import COLUMNS, column, resistance_at, rolling_state, wheel_columns
 from aqualog.model.term import Model, Setup
 from aqualog.physics.contact import contact_half_length
 from aqualog.physics.load import G

@@ -11,11 +11,11 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import KEYS, Vehicle
-from aqualog.model import situations_dry, situations_faults, situations_water
+from aqualog.model import situations_dry, situations_water
+from aqualog.model.drawing import Drawing, Drawn, Taken
 from aqualog.model.plant import build_plant
 from aqualog.model.pools import SCORING_POOL, TUNING_POOL, Pool
 from aqualog.model.scenario import Scenario
-from aqualog.model.sketch import Drawn, Sketch, Taken
 
 __all__ = ["SCORING_POOL", "SITUATIONS", "TUNING_POOL", "Drawn", "Pool", "Situation", "believed_vehicle", "draw"]
 
@@ -25,19 +25,19 @@ MASS_ERROR, RADIUS_ERROR, ROLLING_ERROR, DRAG_ERROR, SLOPE_ERROR = 0.03, 0.002, 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """One situation: `make` turns a sketch of car and tyre into a drive. Nuisances must not raise an alarm."""
+    """One situation: `make` turns a drawing of car and tyre into a drive. Nuisances must not raise an alarm."""
 
     name: str
     title: str
     kind: Literal["aquaplaning", "nuisance"]
-    make: Callable[[Sketch], Taken]
+    make: Callable[[Drawing], Taken]
 
 
 SITUATIONS: dict[str, Situation] = {
     **{n: Situation(n, title, "aquaplaning", make) for n, (title, make) in situations_water.MAKERS.items()},
     **{
         n: Situation(n, title, "nuisance", make)
-        for n, (title, make) in (situations_dry.MAKERS | situations_faults.MAKERS).items()
+        for n, (title, make) in (situations_dry.MAKERS | situations_dry.FAULTS).items()
     },
 }
 
@@ -66,7 +66,7 @@ def draw(name: str, seed: int, pool: Pool) -> Drawn:
     vehicle = pool.vehicles[int(rng.integers(len(pool.vehicles)))]
     tyre = pool.tyres[int(rng.integers(len(pool.tyres)))]
     p = pool.pressures[int(rng.integers(len(pool.pressures)))]
-    scenario, model, note = situation.make(Sketch(rng, pool, vehicle, tyre, p, int(rng.integers(2**31))))
+    scenario, model, note = situation.make(Drawing(rng, pool, vehicle, tyre, p, int(rng.integers(2**31))))
     return Drawn(name, situation.kind, scenario, model, believed_vehicle(scenario, rng), f"{vehicle.name}, {note}")
 
 

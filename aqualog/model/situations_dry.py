@@ -1,46 +1,46 @@
-"""Situations of road, weather and driving in which no wheel floats."""
+"""Situations in which no wheel floats: road, weather and driving, and things that fail or hit."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-from aqualog.model.scenario import Lane, Profile, Steering
-from aqualog.model.sensors import ESC
-from aqualog.model.sketch import KMH, Sketch, Taken, lagging_torque, slalom_angle, terms
-from aqualog.model.surface import Surface
+from aqualog.core.notation import WHEELS
+from aqualog.model.drawing import KMH, Drawing, Taken, lagging_torque, slalom_angle, terms
+from aqualog.model.scenario import Kick, Lane, Profile, Steering, Surface
+from aqualog.model.sensors import ESC, SensorFault
 from aqualog.model.term import Model
 from aqualog.physics.load import G
 
-__all__ = ["MAKERS"]
+__all__ = ["FAULTS", "MAKERS"]
 
 NONE = Model()
 
 
-def _cruise(k: Sketch, low: float, high: float, *, spread: float = 0.08, **given: Any) -> Taken:
+def _cruise(k: Drawing, low: float, high: float, *, spread: float = 0.08, **given: Any) -> Taken:
     duration, v = k.between(60.0, 120.0), k.between(low, high) * KMH
     scenario = k.drive(duration, k.cruise(duration, v, spread=spread), **given)
     return Taken(scenario, NONE, f"about {v / KMH:.0f} km/h")
 
 
-def _dry(k: Sketch) -> Taken:
+def _dry(k: Drawing) -> Taken:
     return _cruise(k, 60.0, 110.0, spread=0.15)
 
 
-def _motorway(k: Sketch) -> Taken:
+def _motorway(k: Drawing) -> Taken:
     """Turbulence behind lorries: gusts of 3 m/s rms, faster than those of the weather (K)."""
     return _cruise(k, 110.0, 140.0, wind=k.gusts(125.0, 3.0, mean=k.between(-3.0, 3.0), every_s=1.0))
 
 
-def _hilly(k: Sketch) -> Taken:
+def _hilly(k: Drawing) -> Taken:
     return _cruise(k, 50.0, 90.0, grade=k.hills(0.05, every_m=k.between(60.0, 150.0)))
 
 
-def _head_wind(k: Sketch) -> Taken:
+def _head_wind(k: Drawing) -> Taken:
     return _cruise(k, 80.0, 120.0, head_wind=10.0, wind=k.gusts(125.0, 2.0))
 
 
-def _wind_shelter(k: Sketch) -> Taken:
+def _wind_shelter(k: Drawing) -> Taken:
     """A steady head wind that pauses behind woods and lorries for 5 to 15 s."""
     wind, t = k.rng.uniform(8.0, 12.0), 25.0
     profile = [(0.0, wind)]
@@ -51,7 +51,7 @@ def _wind_shelter(k: Sketch) -> Taken:
     return _cruise(k, 80.0, 120.0, wind=tuple(profile))
 
 
-def _all_the_way(k: Sketch, surface: Surface, low: float, high: float, **given: Any) -> Taken:
+def _all_the_way(k: Drawing, surface: Surface, low: float, high: float, **given: Any) -> Taken:
     taken = _cruise(k, low, high, lanes=(Lane(0.0, 1e5, in_metres=True, surface=surface),), **given)
     return taken._replace(note=f"{taken.note}, {_told(surface)}")
 
@@ -60,35 +60,35 @@ def _told(surface: Surface) -> str:
     return surface.name + ("" if surface.mu is None else f" of mu {surface.mu:.2f}")
 
 
-def _damp(k: Sketch) -> Taken:
+def _damp(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("damp", k.pool.damp), 70.0, 120.0, spread=0.12)
 
 
-def _snow(k: Sketch) -> Taken:
+def _snow(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("snow", k.pool.snow), 40.0, 80.0)
 
 
-def _deep_snow(k: Sketch) -> Taken:
+def _deep_snow(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("deep_snow", k.pool.snow, rolling=k.between(0.02, 0.04)), 30.0, 60.0)
 
 
-def _ice(k: Sketch) -> Taken:
+def _ice(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("ice", k.pool.ice), 30.0, 60.0, grade=k.hills(0.005))
 
 
-def _wet_ice(k: Sketch) -> Taken:
+def _wet_ice(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("wet_ice", k.pool.wet_ice), 20.0, 50.0, spread=0.04, grade=k.hills(0.002))
 
 
-def _gravel(k: Sketch) -> Taken:
+def _gravel(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("gravel", (0.5, 0.7)), 40.0, 80.0)
 
 
-def _rough(k: Sketch) -> Taken:
+def _rough(k: Drawing) -> Taken:
     return _all_the_way(k, k.surface("rough", roughness=k.between(40.0, 80.0)), 50.0, 100.0)
 
 
-def _snow_entry(k: Sketch) -> Taken:
+def _snow_entry(k: Drawing) -> Taken:
     """From a cleared road onto snow, at a steady speed, gently faster or slower."""
     v, a = k.between(60.0, 100.0) * KMH, k.between(-0.5, 0.3)
     entry, stay = k.between(15.0, 30.0), k.between(5.0, 25.0)
@@ -98,7 +98,7 @@ def _snow_entry(k: Sketch) -> Taken:
     return Taken(scenario, NONE, f"{_told(surface)} from {entry:.0f} s at {v / KMH:.0f} km/h")
 
 
-def _split(k: Sketch) -> Taken:
+def _split(k: Drawing) -> Taken:
     """Snow or ice under the wheels of one side, asphalt under the others: a road that is half cleared."""
     name = k.one_of("snow", "ice")
     low, dry = k.surface(name, k.pool.snow if name == "snow" else k.pool.ice), k.surface("asphalt")
@@ -112,7 +112,7 @@ def _split(k: Sketch) -> Taken:
     return Taken(scenario, NONE, f"{_told(low)} {'left' if left is low else 'right'}, {v / KMH:.0f} km/h")
 
 
-def _braking(k: Sketch, surface: Surface, mu: float, *, demand: float, antilock: bool) -> Taken:
+def _braking(k: Drawing, surface: Surface, mu: float, *, demand: float, antilock: bool) -> Taken:
     """Two stops, or nearly; the driver requests `demand` of the available friction."""
     v, low = k.between(70.0, 110.0) * KMH if mu > 0.5 else k.between(50.0, 80.0) * KMH, 10.0 * KMH
     a = min(demand, 0.85) * mu * G
@@ -132,25 +132,25 @@ def _braking(k: Sketch, surface: Surface, mu: float, *, demand: float, antilock:
     return Taken(scenario, NONE, f"{_told(surface)}, from {v / KMH:.0f} km/h")
 
 
-def _abs_dry(k: Sketch) -> Taken:
+def _abs_dry(k: Drawing) -> Taken:
     return _braking(k, k.surface("asphalt"), 1.0, demand=1.3, antilock=True)
 
 
-def _abs_damp(k: Sketch) -> Taken:
+def _abs_damp(k: Drawing) -> Taken:
     surface = k.surface("damp", k.pool.damp)
     return _braking(k, surface, surface.mu or 1.0, demand=1.35, antilock=True)
 
 
-def _abs_snow(k: Sketch) -> Taken:
+def _abs_snow(k: Drawing) -> Taken:
     surface = k.surface("snow", k.pool.snow)
     return _braking(k, surface, surface.mu or 0.3, demand=1.6, antilock=True)
 
 
-def _hard_braking(k: Sketch) -> Taken:
+def _hard_braking(k: Drawing) -> Taken:
     return _braking(k, k.surface("asphalt"), 1.0, demand=k.between(0.5, 0.75), antilock=False)
 
 
-def _hard_acceleration(k: Sketch) -> Taken:
+def _hard_acceleration(k: Drawing) -> Taken:
     a, v_0, v_1 = k.between(2.5, 4.0), k.between(15.0, 40.0) * KMH, k.between(90.0, 130.0) * KMH
     t, t_1 = k.between(5.0, 10.0), (v_1 - v_0) / k.between(2.5, 4.0)
     speed: Profile = ((0.0, v_0), (t, v_0), (t + t_1, v_1), (t + t_1 + 10.0, v_1), (t + t_1 + 25.0, v_0 + 5.0))
@@ -158,7 +158,7 @@ def _hard_acceleration(k: Sketch) -> Taken:
     return Taken(k.drive(speed[-1][0] + 5.0, speed), NONE, f"{a:.1f} m/s^2")
 
 
-def _gear_shifts(k: Sketch) -> Taken:
+def _gear_shifts(k: Drawing) -> Taken:
     """Torque that breaks off and comes back a little too high, three to six times, reported late."""
     n, share, t = int(k.rng.integers(3, 7)), [(0.0, 1.0)], k.between(6.0, 10.0)
     for _ in range(n):
@@ -173,14 +173,14 @@ def _gear_shifts(k: Sketch) -> Taken:
     return Taken(scenario, NONE, f"{n} shifts, {a:.1f} m/s^2")
 
 
-def _cornering(k: Sketch) -> Taken:
+def _cornering(k: Drawing) -> Taken:
     v, a_y = k.between(50.0, 90.0) * KMH, k.between(0.7, 0.9) * G
     steering = Steering(1.1 * slalom_angle(k.vehicle, k.tyre, v, a_y), k.between(10.0, 16.0), k.between(4.0, 8.0))
     scenario = k.drive(k.between(40.0, 60.0), ((0.0, v),), steering=steering)
     return Taken(scenario, NONE, f"{a_y / G:.2f} g at {v / KMH:.0f} km/h")
 
 
-def _stop_and_go(k: Sketch) -> Taken:
+def _stop_and_go(k: Drawing) -> Taken:
     points, t = [(0.0, 30.0 * KMH), (5.0, 30.0 * KMH)], 5.0
     while t < 80.0:
         v = k.between(15.0, 50.0) * KMH
@@ -191,14 +191,14 @@ def _stop_and_go(k: Sketch) -> Taken:
     return Taken(k.drive(t + 3.0, tuple(points)), NONE, "")
 
 
-def _standstill(k: Sketch) -> Taken:
+def _standstill(k: Drawing) -> Taken:
     """Waiting, a short way, waiting."""
     wait, v = k.between(10.0, 20.0), k.between(20.0, 40.0) * KMH
     points = ((0.0, 0.0), (wait, 0.0), (wait + v, v), (wait + v + 8.0, v), (wait + 2.0 * v + 8.0, 0.0))
     return Taken(k.drive(points[-1][0] + wait, points, grade=()), NONE, "")
 
 
-def _roof_box(k: Sketch) -> Taken:
+def _roof_box(k: Drawing) -> Taken:
     """Four passengers and a box on the roof; the vehicle file knows neither."""
     taken = _cruise(k, 80.0, 130.0)
     people = k.between(220.0, 330.0)
@@ -207,7 +207,7 @@ def _roof_box(k: Sketch) -> Taken:
     return Taken(scenario, terms(("aero_drag", box, None)), f"{taken.note}, {people:.0f} kg")
 
 
-def _trailer(k: Sketch) -> Taken:
+def _trailer(k: Drawing) -> Taken:
     taken = _cruise(k, 70.0, 100.0, spread=0.12)
     mass = k.between(500.0, 1200.0)
     model = terms(("trailer", {"mass": mass, "delta_drag_area": k.between(0.5, 1.5)}, None))
@@ -240,4 +240,68 @@ MAKERS = {
     "standstill": ("standstill, a short way, standstill", _standstill),
     "roof_box": ("roof box and four passengers, unknown to the vehicle file", _roof_box),
     "trailer": ("a trailer, unknown to the vehicle file", _trailer),
+}
+
+BUSES = ("wheels", "esc", "drive", "brake", "steering", "gnss")
+
+
+def _kerbs(k: Drawing) -> Taken:
+    """Holes and kerbs of 10 to 50 cm: blows of 1 to 5 kN, most of it through the axle and little about it (K)."""
+    v, duration = k.between(40.0, 100.0) * KMH, k.between(50.0, 80.0)
+    kicks = tuple(
+        Kick(
+            v * t, k.between(0.2, 0.6), k.one_of("left", "right", "right", "both"), k.between(60.0, 500.0),
+            k.between(1000.0, 5000.0),
+        )
+        for t in sorted(k.between(6.0, duration - 5.0) for _ in range(int(k.rng.integers(4, 11))))
+    )  # fmt: skip
+    scenario = k.drive(duration, k.cruise(duration, v, spread=0.04), kicks=kicks)
+    return Taken(scenario, Model(), f"{len(kicks)} blows at {v / KMH:.0f} km/h")
+
+
+def _pressure_loss(k: Drawing) -> Taken:
+    v, wheel = k.between(80.0, 130.0) * KMH, k.one_of(*WHEELS)
+    loss = {
+        "radius": k.between(0.005, 0.015), "slope": k.between(0.05, 0.25), "start": k.between(15.0, 25.0),
+        "duration": k.between(20.0, 60.0),
+    }  # fmt: skip
+    scenario = k.drive(110.0, k.cruise(110.0, v))
+    note = f"{wheel} loses {loss['radius']:.1%} of its radius over {loss['duration']:.0f} s"
+    return Taken(scenario, terms(("pressure_loss", loss, wheel)), note)
+
+
+def _dropouts(k: Drawing) -> Taken:
+    """Blocks without values in single signals, whole messages missing for 0.2 to 3 s, values that stand still."""
+    duration, v = k.between(60.0, 90.0), k.between(60.0, 120.0) * KMH
+    signals = tuple(s for g in ESC.groups if g.name in BUSES for s in g.signals)
+
+    def fault(names: tuple[str, ...], low: float, high: float, kind: str) -> SensorFault:
+        t = k.between(5.0, duration - 5.0)
+        return SensorFault(k.one_of(*names), t, t + k.between(low, high), "frozen" if kind == "frozen" else "missing")
+
+    faults = (
+        *(fault(signals, 0.1, 2.0, "missing") for _ in range(int(k.rng.integers(4, 11)))),
+        *(fault(BUSES, 0.2, 3.0, "missing") for _ in range(int(k.rng.integers(1, 4)))),
+        *(fault(signals, 0.5, 3.0, "frozen") for _ in range(int(k.rng.integers(1, 4)))),
+    )
+    scenario = k.drive(duration, k.cruise(duration, v, spread=0.12), sensors=replace(ESC, faults=faults))
+    return Taken(scenario, Model(), f"{len(faults)} faults at {v / KMH:.0f} km/h")
+
+
+def _accelerometer(k: Drawing) -> Taken:
+    """An accelerometer that is off by up to 0.2 m/s² from the start, or drifts there."""
+    duration, v = k.between(60.0, 120.0), k.between(70.0, 120.0) * KMH
+    error = k.between(0.08, 0.2) * k.one_of(-1.0, 1.0)
+    if k.between(0.0, 1.0) < 0.5:
+        model, note = terms(("accelerometer_bias", {"bias": error}, "a_x")), "off"
+    else:
+        model, note = terms(("accelerometer_drift", {"drift": error / duration}, "a_x")), "drifts"
+    return Taken(k.drive(duration, k.cruise(duration, v)), model, f"{note} by {error:+.2f} m/s^2")
+
+
+FAULTS = {
+    "kerbs_and_holes": ("kerbs and holes", _kerbs),
+    "pressure_loss": ("a tyre loses its air", _pressure_loss),
+    "dropouts": ("sensors and buses that fail for a while", _dropouts),
+    "accelerometer": ("an accelerometer that is off or drifts", _accelerometer),
 }

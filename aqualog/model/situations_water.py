@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from aqualog.model.drawing import KMH, Drawing, Taken, full_speed, slalom_angle
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
-from aqualog.model.sketch import KMH, Sketch, Taken, full_speed, slalom_angle
 from aqualog.model.term import Model
 from aqualog.physics.load import G
 
@@ -19,8 +19,8 @@ APPROACH_S = (10.0, 20.0)  # dry road before it
 RUN_OUT_S = 6.0
 
 
-def _water(k: Sketch, deeper: float = 1.0) -> tuple[Sketch, float, float]:
-    """A sketch whose tyre aquaplanes at a speed that can be driven, the depth of the water [m], and that speed."""
+def _water(k: Drawing, deeper: float = 1.0) -> tuple[Drawing, float, float]:
+    """A drawing whose tyre aquaplanes at a speed that can be driven, the depth of the water [m], and that speed."""
     tyres = [t for t in k.pool.tyres for _ in k.pool.depths]
     pairs = [(t, h * deeper, p) for t, h in zip(tyres, k.pool.depths * len(k.pool.tyres), strict=True)
              for p in k.pool.pressures]  # fmt: skip
@@ -30,7 +30,7 @@ def _water(k: Sketch, deeper: float = 1.0) -> tuple[Sketch, float, float]:
     return k, depth, full_speed(k, depth)
 
 
-def _lane(k: Sketch, start_m: float, length: float, depth: float, **given: Any) -> Lane:
+def _lane(k: Drawing, start_m: float, length: float, depth: float, **given: Any) -> Lane:
     """A lane as on a proving ground: the left track has less water and less even (thesis 2.1)."""
     usual = {
         "depth_left": depth * k.between(0.6, 1.0), "depth_right": depth,
@@ -40,7 +40,7 @@ def _lane(k: Sketch, start_m: float, length: float, depth: float, **given: Any) 
 
 
 def _through(
-    k: Sketch, depth: float, v: float, v_full: float, a: float = 0.0, before: float = 0.0, **given: Any
+    k: Drawing, depth: float, v: float, v_full: float, a: float = 0.0, before: float = 0.0, **given: Any
 ) -> tuple[Scenario, str]:
     """Through a lane that is met at the speed v [m/s], at the acceleration a on it and `before` ahead of it. [m/s²]"""
     approach = k.between(*APPROACH_S)
@@ -57,31 +57,31 @@ def _through(
     return scenario, f"{k.tyre.name}, {lane.depth_right * 1e3:.1f} mm, entry at {v / KMH:.0f} km/h"
 
 
-def _below(k: Sketch, v_full: float, low: float = -40.0, high: float = 10.0) -> float:
+def _below(k: Drawing, v_full: float, low: float = -40.0, high: float = 10.0) -> float:
     return max(v_full + k.between(low, high) * KMH, 40.0 * KMH)
 
 
-def _constant(k: Sketch) -> Taken:
+def _constant(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     scenario, note = _through(k, depth, _below(k, v_full), v_full)
     return Taken(scenario, Model(), note)
 
 
-def _accelerating(k: Sketch) -> Taken:
+def _accelerating(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     a = k.between(0.5, 1.5)
     scenario, note = _through(k, depth, _below(k, v_full, -30.0, 0.0), v_full, a, before=a)
     return Taken(scenario, Model(), f"{note}, {a:.1f} m/s^2")
 
 
-def _coasting(k: Sketch) -> Taken:
+def _coasting(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     a = -k.between(0.2, 0.8)
     scenario, note = _through(k, depth, _below(k, v_full, -20.0, 10.0), v_full, a, before=a)
     return Taken(scenario, Model(), f"{note}, {a:.1f} m/s^2")
 
 
-def _slalom(k: Sketch) -> Taken:
+def _slalom(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     v = _below(k, v_full, -30.0, 5.0)
     a_y = k.between(1.0, 2.0)
@@ -90,7 +90,7 @@ def _slalom(k: Sketch) -> Taken:
     return Taken(scenario, Model(), f"{note}, {a_y:.1f} m/s^2 to the side")
 
 
-def _one_sided(k: Sketch) -> Taken:
+def _one_sided(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     side = k.one_of("left", "right")
     dry = {f"depth_{'right' if side == 'left' else 'left'}": 0.0, f"depth_{side}": depth}
@@ -98,27 +98,27 @@ def _one_sided(k: Sketch) -> Taken:
     return Taken(scenario, Model(), f"{note}, water on the {side}")
 
 
-def _puddle(k: Sketch) -> Taken:
+def _puddle(k: Drawing) -> Taken:
     k, depth, v_full = _water(k, 1.25)
     length = k.between(5.0, 15.0)
     scenario, note = _through(k, depth, _below(k, v_full, -20.0, 10.0), v_full, lane={"length": length})
     return Taken(scenario, Model(), f"{note}, {length:.0f} m long")
 
 
-def _uneven(k: Sketch) -> Taken:
+def _uneven(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     rms = {"irregularity_left": k.between(0.5, 1.0), "irregularity_right": k.between(0.4, 0.9)}
     scenario, note = _through(k, depth, _below(k, v_full, -30.0, 10.0), v_full, lane=rms)
     return Taken(scenario, Model(), note)
 
 
-def _deep(k: Sketch) -> Taken:
+def _deep(k: Drawing) -> Taken:
     k, depth, v_full = _water(k, 2.0)
     scenario, note = _through(k, depth, _below(k, v_full, 15.0, 30.0), v_full, lane={"depth_left": depth * 0.9})
     return Taken(scenario, Model(), note)
 
 
-def _foot_off(k: Sketch) -> Taken:
+def _foot_off(k: Drawing) -> Taken:
     k, depth, v_full = _water(k)
     v = _below(k, v_full, -25.0, 10.0)
     scenario, note = _through(k, depth, v, v_full, -0.4)

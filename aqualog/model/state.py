@@ -1,4 +1,4 @@
-"""Layout of the compiled simulation: states, stiff part of the Jacobian, recorded columns by name."""
+"""Layout of the compiled simulation: states, Jacobian, recorded columns by name, and states to start from."""
 
 from __future__ import annotations
 
@@ -8,8 +8,22 @@ from typing import Any
 import numpy as np
 
 from aqualog.core.records import FloatArray
+from aqualog.model.plant import Plant
+from aqualog.physics.load import G, wheel_loads
+from aqualog.physics.resistance import air_drag
+from aqualog.physics.rolling import effective_radius
 
-__all__ = ["AT", "COLUMNS", "N_JACOBIAN", "N_STATES", "WIDTH", "column", "wheel_columns"]
+__all__ = [
+    "AT",
+    "COLUMNS",
+    "N_JACOBIAN",
+    "N_STATES",
+    "WIDTH",
+    "column",
+    "resistance_at",
+    "rolling_state",
+    "wheel_columns",
+]
 
 # states: speeds and attitude, low-passed specific forces, the driver; then four of each wheel
 V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = range(12)
@@ -41,3 +55,37 @@ def column(rows: FloatArray, name: str) -> FloatArray:
 def wheel_columns(rows: FloatArray, name: str) -> list[FloatArray]:
     """Return the recorded columns (n,) of the four wheels."""
     return [np.ascontiguousarray(rows[:, COLUMNS[name] + i]) for i in range(4)]
+
+
+def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
+    """Return air drag, and the resistance of each of the four wheels, at a speed and specific force on dry road. [N]"""
+    through_air = np.array([v + plant.head_wind])
+    drag = float(air_drag(through_air, drag_area=plant.drag_area, air_density=plant.air_density)[0])
+    drag += float(np.interp(v, plant.drag_over_v[:, 0], plant.drag_over_v[:, 1]))
+    drag += plant.towed_mass * G * float(plant.r_w[2])
+    rolling = plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
+    return drag, rolling + plant.brake_drag / plant.r_l
+
+
+def _loads(plant: Plant, a: float) -> FloatArray:
+    return wheel_loads(
+        np.array([a]), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
+    )[:, 0]
+
+
+def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear: float) -> FloatArray:
+    """Return the state of a car that rolls straight on dry road, each wheel at the slip that its torque needs.
+
+    `v` [m/s], `a` specific force forward [m/s²], `drive` torque of all wheels [N·m], its rear share.
+    """
+    y = np.zeros(N_STATES)
+    y[V_X], y[A_X], y[DRIVE] = v, a, drive
+    _, rolling = resistance_at(plant, v, a)
+    share = 0.5 * np.array([1.0 - split_rear, 1.0 - split_rear, split_rear, split_rear])
+    force = share * drive / plant.r_l - rolling
+    radii = zip(plant.r_e, plant.radius_growth, strict=True)
+    slip = np.clip(force / np.maximum(plant.slip_slope * _loads(plant, a), 1.0), -0.1, 0.1)
+    r_e = np.array([float(effective_radius(np.array([r]), np.array([v]), growth=g)[0]) for r, g in radii])
+    y[OMEGA : OMEGA + 4] = v / (r_e * (1.0 - slip))
+    y[SLIP_X : SLIP_X + 4] = slip
+    return y

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from blind.level_world import CAR, CAR_AWD, Hidden, world
 
-from aqualog.diagnose.level import diagnose_campaign
+from aqualog.diagnose.campaign import diagnose_campaign
 
 BOTH = ("f", "r")
 CASES = {

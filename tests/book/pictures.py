@@ -24,7 +24,7 @@ from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
 from aqualog.detect.stream import detect_drive
-from aqualog.model.signals import as_signals
+from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.physics import hydroplaning
 from aqualog.report.theme import EVENT_SHADE, GRID, THRESHOLD, WATER, WHEEL_COLOURS

@@ -99,7 +99,7 @@ def test_sources_named_in_documents_carry_a_key(path):
 def test_tables_of_keys_name_their_sources_by_key():
     from aqualog.core.vehicle import KEYS
     from aqualog.model.effects import EFFECTS
-    from aqualog.model.surface import SURFACES
+    from aqualog.model.scenario import SURFACES
     from aqualog.model.tyre import TYRE_KEYS
 
     tables = (KEYS, TYRE_KEYS, EFFECTS, SURFACES)

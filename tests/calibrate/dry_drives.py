@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 
 from aqualog.core.vehicle import Vehicle
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import ESC
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 
 WIND_SD = 3.0  # [m/s]

@@ -10,9 +10,9 @@ from aqualog.calibrate import online
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, resistance
 from aqualog.features.stream import INPUTS, FeatureStream
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 
 DT = 0.01

@@ -7,8 +7,8 @@ from aqualog.calibrate.design import prepare
 from aqualog.calibrate.tie_rod import fit_tie_rod, transfers
 from aqualog.core.errors import FitError
 from aqualog.core.vehicle import Vehicle
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario, Steering
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.physics.steering import tie_rod_force
 

@@ -260,7 +260,7 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
         progress("binning")
         return replace(cases()["named"], drives=("c",))
 
-    level = ModuleType("aqualog.diagnose.level")
+    level = ModuleType("aqualog.diagnose.campaign")
     level.diagnose_campaign = fake
     monkeypatch.setitem(sys.modules, level.__name__, level)
     code, text, err = run(

@@ -10,10 +10,8 @@ import pytest
 from aqualog.config.scenario import SAMPLE_RATES_HZ, SCENARIO_KEYS, load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
-from aqualog.model.faults import SensorFault
-from aqualog.model.scenario import Kick, Lane, Scenario
-from aqualog.model.sensors import ESC, IDEAL
-from aqualog.model.surface import SURFACES
+from aqualog.model.scenario import SURFACES, Kick, Lane, Scenario
+from aqualog.model.sensors import ESC, IDEAL, SensorFault
 from aqualog.model.tyre import TYRE_KEYS, TYRES
 
 # letter by letter, with its comments

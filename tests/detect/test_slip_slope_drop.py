@@ -21,9 +21,8 @@ from aqualog.detect.slip_slope.history import History, Period, reference, rememb
 from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.watch import Memory, pairs
 from aqualog.detect.stream import DriveStream, detect_drive
-from aqualog.model.scenario import Excitation, Lane, Scenario
+from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
-from aqualog.model.surface import SURFACES
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.words import event_table
 

@@ -5,8 +5,8 @@ import pytest
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.consequence import DETECTORS, PASSES, consequences, consequences_on_logs
 from aqualog.model.effects import EFFECTS
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from test_drive import CAR, NOISY, signals, term
 
-from aqualog.diagnose.bench import gram_of, noises_after, tolerant, without_deviations
 from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.evidence import gram_of, noises_after, tolerant, without_deviations
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
@@ -33,11 +33,11 @@ def of_mass(sd):
         replace(CAR, spread={"mass": sd} if sd else {}),
         "a",
     )
-    bench = simulated([d], ASKED, Model(), lambda _t, _s: None)
-    noises = noises_after(bench, bench.residuals, {0: 120.0})
-    gram = tolerant(bench, gram_of(bench, noises, bench.residuals))
-    r = refit(bench, fit_set(bench, gram, (0,)), metric(bench, noises, share=KNOWN, beside=(0,)), Model())
-    return bench, gains_on_top(bench, gram, ())[0], float(r.values[0]), float(np.sqrt(r.covariance[0, 0]))
+    evidence = simulated([d], ASKED, Model(), lambda _t, _s: None)
+    noises = noises_after(evidence, evidence.residuals, {0: 120.0})
+    gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
+    r = refit(evidence, fit_set(evidence, gram, (0,)), metric(evidence, noises, share=KNOWN, beside=(0,)), Model())
+    return evidence, gains_on_top(evidence, gram, ())[0], float(r.values[0]), float(np.sqrt(r.covariance[0, 0]))
 
 
 def test_a_mass_that_differs_from_drive_to_drive_is_in_test_and_interval():
@@ -53,9 +53,9 @@ def test_a_mass_that_differs_from_drive_to_drive_is_in_test_and_interval():
 
 
 def test_a_spread_below_the_tolerance_changes_nothing():
-    bench, gain, _, _ = of_mass(1.0)
+    evidence, gain, _, _ = of_mass(1.0)
     plain, same, _, _ = of_mass(0.0)
-    assert (bench.forgiven[0], gain) == (plain.tolerance[0], same)
+    assert (evidence.forgiven[0], gain) == (plain.tolerance[0], same)
 
 
 def test_keys_of_the_file_in_units_of_the_effects():
@@ -99,24 +99,24 @@ def test_a_load_is_as_unsure_as_the_gain_that_looks_like_it(where):
     d = prepare(
         signals(term("payload_mass", delta_mass=120.0), sensors=NOISY), replace(CAR, spread={"torque_gain": 0.03}), "a"
     )
-    bench = simulated([d], (one("payload_mass", where), one("torque_gain")), Model(), lambda _t, _s: None)
-    noises = noises_after(bench, bench.residuals, {0: 120.0})
-    gram = tolerant(bench, gram_of(bench, noises, bench.residuals))
-    r = refit(bench, fit_set(bench, gram, (0,)), metric(bench, noises, share=KNOWN, beside=(0,)), Model())
+    evidence = simulated([d], (one("payload_mass", where), one("torque_gain")), Model(), lambda _t, _s: None)
+    noises = noises_after(evidence, evidence.residuals, {0: 120.0})
+    gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
+    r = refit(evidence, fit_set(evidence, gram, (0,)), metric(evidence, noises, share=KNOWN, beside=(0,)), Model())
     assert 0.03 * CAR.mass < np.sqrt(r.covariance[0, 0]) < 0.035 * CAR.mass
 
 
-def spread_of(bench):
-    return np.flatnonzero(bench.spread > 0.0).tolist()
+def spread_of(evidence):
+    return np.flatnonzero(evidence.spread > 0.0).tolist()
 
 
 def test_what_drives_differ_by_is_nothing_to_look_for():
-    bench, *_ = of_mass(60.0)
-    left = without_deviations(bench, 0, bench.residuals[0], spread_of(bench))
-    mask, force = bench.drives[0].mask, bench.drives[0].channels.index("force_balance")
-    before, after = (float(np.mean(x[force, mask] ** 2)) for x in (bench.residuals[0], left))
-    gone = bench.residuals[0] - left
+    evidence, *_ = of_mass(60.0)
+    left = without_deviations(evidence, 0, evidence.residuals[0], spread_of(evidence))
+    mask, force = evidence.drives[0].mask, evidence.drives[0].channels.index("force_balance")
+    before, after = (float(np.mean(x[force, mask] ** 2)) for x in (evidence.residuals[0], left))
+    gone = evidence.residuals[0] - left
     assert after < 0.7 * before
-    assert 60.0 < float(np.sum(gone * bench.signatures[0][0]) / np.sum(bench.signatures[0][0] ** 2)) < 125.0
+    assert 60.0 < float(np.sum(gone * evidence.signatures[0][0]) / np.sum(evidence.signatures[0][0] ** 2)) < 125.0
     plain, *_ = of_mass(0.0)
     assert without_deviations(plain, 0, plain.residuals[0], spread_of(plain)) is plain.residuals[0]

@@ -15,9 +15,9 @@ from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import residual
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL, Channel
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 

@@ -13,9 +13,9 @@ from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.model.effects import EFFECTS
 from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.sensors import ESC, IDEAL, Sensors
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 

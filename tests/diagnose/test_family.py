@@ -5,7 +5,7 @@ import pytest
 from test_noise import first_order
 from test_subsets import ASKED, AT, bench_of, made, waves
 
-from aqualog.diagnose.family import calibrate, gumbel_p, largest
+from aqualog.diagnose.any_effect import calibrate, gumbel_p, largest
 
 DRAWN = 19
 

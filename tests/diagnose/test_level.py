@@ -10,16 +10,16 @@ from blind.level_world import CAR, Hidden, campaign_of, world
 from aqualog.campaign.measure import measure
 from aqualog.campaign.records import Run, with_load
 from aqualog.core.intervals import chi2_log_p
-from aqualog.diagnose.level import diagnose_campaign
-from aqualog.diagnose.level.expect import Driven, respond
-from aqualog.diagnose.level.noise import design_of, fit
-from aqualog.diagnose.level.observe import passes_of
-from aqualog.diagnose.level.passes import expected_values
+from aqualog.diagnose.campaign import diagnose_campaign
+from aqualog.diagnose.campaign.expect import Driven, respond
+from aqualog.diagnose.campaign.noise import design_of, fit
+from aqualog.diagnose.campaign.observe import passes_of
+from aqualog.diagnose.campaign.passes import expected_values
 from aqualog.model.effects import EFFECTS
+from aqualog.model.log import as_signals
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import IDEAL
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES

@@ -8,9 +8,9 @@ import pytest
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import next_manoeuvre as module
-from aqualog.diagnose.bench import gram_of, noises_after, tolerant
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre, resolving
@@ -20,9 +20,9 @@ from aqualog.diagnose.search import Candidate, simulated
 from aqualog.diagnose.subsets import fit_set
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import PERFECT
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import Channel
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
@@ -63,20 +63,20 @@ def gusts(rms=2.0, over=5.0):
 
 
 def case(drives, sets):
-    """Bench, refitted sets and noises of drives, asked about these sets only."""
+    """Evidence, refitted sets and noises of drives, asked about these sets only."""
     names = {h.split("@")[0] for s in sets for h in s}
     asked, _ = hypotheses(drives, Model())
     asked = tuple(h for h in asked if h.allowed or h.effect.name in names)
-    bench = simulated(drives, asked, Model(), lambda _text, _share: None)
+    evidence = simulated(drives, asked, Model(), lambda _text, _share: None)
     at = {h.key: i for i, h in enumerate(asked)}
-    noises = noises_after(bench, bench.residuals, {})
+    noises = noises_after(evidence, evidence.residuals, {})
     for _ in range(3):
-        gram = tolerant(bench, gram_of(bench, noises, bench.residuals))
-        measure = metric(bench, noises)
-        found = [refit(bench, fit_set(bench, gram, [at[k] for k in s]), measure, Model()) for s in sets]
+        gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
+        measure = metric(evidence, noises)
+        found = [refit(evidence, fit_set(evidence, gram, [at[k] for k in s]), measure, Model()) for s in sets]
         # noise is what the best set leaves: an effect that is still there would pass for slow noise
         noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(found[0].residuals, drives, strict=True)]
-    return bench, [Candidate(r, 1.0, 1.0) for r in found], noises
+    return evidence, [Candidate(r, 1.0, 1.0) for r in found], noises
 
 
 RADIUS = [["tyre_radius"], ["velocity_scale@v_x"]]
@@ -101,14 +101,14 @@ def wind():
     reason="the trial forecasts little from hard acceleration since the curve of a tyre is allowed for so widely",
 )
 def test_radius_and_velocity_are_told_apart_by_accelerating_and_then_they_are(radius):
-    truth, drive, (bench, credible, noises) = radius
-    answer = next_manoeuvre(bench, credible, noises, Model())
+    truth, drive, (evidence, credible, noises) = radius
+    answer = next_manoeuvre(evidence, credible, noises, Model())
     assert answer.name == "hard_acceleration"
     assert answer.separates == (("tyre_radius", "velocity_scale@v_x"),)
     assert answer.separation_now < answer.separation_then
     assert answer.separation_then > answer.separation_now + resolving()
     assert "tyre radius" in answer.sentence
-    assert answer == next_manoeuvre(bench, credible, noises, Model())
+    assert answer == next_manoeuvre(evidence, credible, noises, Model())
     run = next(r for r in RUNS if r.name == answer.name)
     second = driven(replace(programme(run, drive), sensors=SENSORS, seed=4), truth)
     _, (right, wrong), _ = case([drive, second], RADIUS)
@@ -116,13 +116,13 @@ def test_radius_and_velocity_are_told_apart_by_accelerating_and_then_they_are(ra
 
 
 def test_wind_and_drag_need_the_way_back(wind, monkeypatch):
-    _, (bench, credible, noises) = wind
-    answer = next_manoeuvre(bench, credible, noises, Model())
+    _, (evidence, credible, noises) = wind
+    answer = next_manoeuvre(evidence, credible, noises, Model())
     assert answer.name == "opposite_direction"
     monkeypatch.setattr(
         module, "fitting", lambda _e, *, wet: tuple(r for r in RUNS if r.water is None and not r.opposite)
     )
-    alone = next_manoeuvre(bench, credible, noises, Model())
+    alone = next_manoeuvre(evidence, credible, noises, Model())
     assert alone.name == "none"
     assert alone.separates == ()
     assert "head wind from aero drag" in alone.sentence
@@ -130,18 +130,18 @@ def test_wind_and_drag_need_the_way_back(wind, monkeypatch):
 
 @pytest.mark.nightly
 def test_rolling_resistance_and_dragging_brakes_stay_one():
-    bench, credible, noises = case(
+    evidence, credible, noises = case(
         [log(model("rolling_resistance", delta_r_w=0.004))], [["rolling_resistance"], ["brake_drag"]]
     )
-    answer = next_manoeuvre(bench, credible, noises, Model())
+    answer = next_manoeuvre(evidence, credible, noises, Model())
     assert answer.name == "none"
     assert answer.separation_then < resolving()
 
 
 def test_nothing_to_decide_is_no_manoeuvre(radius):
-    _, _, (bench, credible, noises) = radius
-    assert next_manoeuvre(bench, credible[:1], noises, Model()) is None
-    assert next_manoeuvre(bench, [credible[0], credible[0]], noises, Model()) is None
+    _, _, (evidence, credible, noises) = radius
+    assert next_manoeuvre(evidence, credible[:1], noises, Model()) is None
+    assert next_manoeuvre(evidence, [credible[0], credible[0]], noises, Model()) is None
 
 
 def test_runs_are_safe(wind):

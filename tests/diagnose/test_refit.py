@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_drive import CAR, NOISY, signals, term
 
-from aqualog.diagnose.bench import gram_of, noises_after, tolerant
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit, whitened_residual
 from aqualog.diagnose.search import simulated
@@ -20,14 +20,14 @@ def one(name, where=None):
 
 def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     d = prepare(signals(*terms, sensors=NOISY, seed=seed), CAR, "a")
-    bench = simulated([d], asked, model, lambda _t, _s: None)
+    evidence = simulated([d], asked, model, lambda _t, _s: None)
     fit = None
     theta = {}
     for _ in range(2):
-        noises = noises_after(bench, bench.residuals, theta)
-        fit = fit_set(bench, gram_of(bench, noises, bench.residuals), range(len(asked)))
+        noises = noises_after(evidence, evidence.residuals, theta)
+        fit = fit_set(evidence, gram_of(evidence, noises, evidence.residuals), range(len(asked)))
         theta = {} if fit is None else dict(zip(fit.columns, fit.theta.tolist(), strict=True))
-    return bench, fit, metric(bench, noises, share=KNOWN)
+    return evidence, fit, metric(evidence, noises, share=KNOWN)
 
 
 @pytest.mark.parametrize(
@@ -40,8 +40,8 @@ def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     ids=["mass", "delay", "slip stiffness"],
 )
 def test_a_value_is_recovered_within_its_interval(hidden, h, true):
-    bench, fit, measure = prepared([h], hidden)
-    r = refit(bench, fit, measure, Model())
+    evidence, fit, measure = prepared([h], hidden)
+    r = refit(evidence, fit, measure, Model())
     sd = float(np.sqrt(r.covariance[0, 0]))
     neutral = h.parameter(h.free[0]).neutral
     assert sd < 0.1 * abs(true - neutral)
@@ -52,10 +52,10 @@ def test_a_value_is_recovered_within_its_interval(hidden, h, true):
 
 def test_two_values_are_recovered_together():
     asked = [one("payload_mass"), one("accelerometer_bias", "a_x")]
-    bench, fit, measure = prepared(
+    evidence, fit, measure = prepared(
         asked, term("payload_mass", delta_mass=250.0), term("accelerometer_bias", "a_x", bias=-0.2)
     )
-    r = refit(bench, fit, measure, Model())
+    r = refit(evidence, fit, measure, Model())
     sd = np.sqrt(np.diag(r.covariance))
     assert np.all(np.abs(r.values - [250.0, -0.2]) < 3.0 * sd)
     assert np.all(sd < [25.0, 0.03])
@@ -63,9 +63,9 @@ def test_two_values_are_recovered_together():
 
 def test_the_simulator_corrects_what_the_linear_start_got_wrong():
     h = one("slip_stiffness", "rl")
-    bench, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.8))
-    y = whitened_residual(bench, measure.noises, bench.residuals)[None]
-    r = refit(bench, fit, measure, Model())
+    evidence, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.8))
+    y = whitened_residual(evidence, measure.noises, evidence.residuals)[None]
+    r = refit(evidence, fit, measure, Model())
     assert abs(r.values[0] - 0.8) < 0.2 * abs(1.0 + fit.theta[0] - 0.8)
     assert r.loss < float(measure.inner(y, y)[0, 0])
 
@@ -73,22 +73,22 @@ def test_the_simulator_corrects_what_the_linear_start_got_wrong():
 def test_a_linear_start_that_is_far_off_is_corrected_too():
     # slip goes with one over the slope: the linear value is 0.26
     h = one("slip_stiffness", "rl")
-    bench, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.6))
-    assert refit(bench, fit, measure, Model()).values[0] == pytest.approx(0.6, abs=0.02)
+    evidence, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.6))
+    assert refit(evidence, fit, measure, Model()).values[0] == pytest.approx(0.6, abs=0.02)
 
 
 def test_a_start_far_away_ends_at_the_same_value():
     h = one("payload_mass")
-    bench, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0))
-    near = refit(bench, fit, measure, Model())
-    far = refit(bench, SetFit(fit.members, fit.columns, np.array([-100.0]), fit.gain), measure, Model())
+    evidence, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0))
+    near = refit(evidence, fit, measure, Model())
+    far = refit(evidence, SetFit(fit.members, fit.columns, np.array([-100.0]), fit.gain), measure, Model())
     assert far.values[0] == pytest.approx(near.values[0], abs=0.3 * float(np.sqrt(near.covariance[0, 0])))
 
 
 def test_a_value_stops_at_its_bound():
     # a trailer cannot weigh less than nothing: a car that is lighter is no trailer
-    bench, _, measure = prepared([one("trailer"), one("aero_drag")], term("payload_mass", delta_mass=-200.0))
-    r = refit(bench, SetFit((0,), (0,), np.array([50.0]), 0.0), measure, Model())
+    evidence, _, measure = prepared([one("trailer"), one("aero_drag")], term("payload_mass", delta_mass=-200.0))
+    r = refit(evidence, SetFit((0,), (0,), np.array([50.0]), 0.0), measure, Model())
     assert r.at_bound
     assert r.values[0] == 0.0
 
@@ -96,18 +96,18 @@ def test_a_value_stops_at_its_bound():
 def test_a_change_of_what_the_model_has_already():
     h = one("payload_mass")
     base = Model((term("payload_mass", delta_mass=100.0),))
-    bench, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0), model=base)
+    evidence, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0), model=base)
     assert fit.theta[0] == pytest.approx(150.0, abs=25.0)
-    r = refit(bench, fit, measure, base)
+    r = refit(evidence, fit, measure, base)
     assert abs(r.values[0] - 250.0) < 3.0 * float(np.sqrt(r.covariance[0, 0]))
     assert len(r.model.terms) == 1
 
 
 def test_the_metric_is_that_of_the_tolerant_inner_products():
     asked = [one("payload_mass"), one("aero_drag"), one("tyre_radius", "fl")]
-    bench, _, _ = prepared(asked, term("payload_mass", delta_mass=250.0))
-    noises = noises_after(bench, bench.residuals, {})
-    y = whitened_residual(bench, noises, bench.residuals)[None]
-    whole = tolerant(bench, gram_of(bench, noises, bench.residuals))
-    assert float(metric(bench, noises).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-8)
-    assert float(metric(bench, noises, share=KNOWN).inner(y, y)[0, 0]) > whole[-1, -1]
+    evidence, _, _ = prepared(asked, term("payload_mass", delta_mass=250.0))
+    noises = noises_after(evidence, evidence.residuals, {})
+    y = whitened_residual(evidence, noises, evidence.residuals)[None]
+    whole = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
+    assert float(metric(evidence, noises).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-8)
+    assert float(metric(evidence, noises, share=KNOWN).inner(y, y)[0, 0]) > whole[-1, -1]

@@ -5,7 +5,7 @@ from test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is 
 from test_subsets import ASKED, AT
 
 from aqualog.diagnose import run
-from aqualog.diagnose.relations import imitations
+from aqualog.diagnose.subsets import imitations
 
 BIAS, SLOPE, ROLLING = (AT[k] for k in ("accelerometer_bias@a_x", "road_grade", "rolling_resistance"))
 MASS = AT["payload_mass"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.bench import gram_of, make_bench, tolerant, without_deviations
+from aqualog.diagnose.evidence import gram_of, make_evidence, tolerant, without_deviations
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.subsets import PRIOR_WIDTH, best_sets, compatible, fit_set, gains_on_top
@@ -30,8 +30,8 @@ ASKED = tuple(
 AT = {h.key: i for i, h in enumerate(ASKED)}
 
 
-def keys(bench, members):
-    return {bench.asked[m].key for m in members}
+def keys(evidence, members):
+    return {evidence.asked[m].key for m in members}
 
 
 def bench_of(residual, signatures, asked=ASKED, mask=None):
@@ -40,7 +40,7 @@ def bench_of(residual, signatures, asked=ASKED, mask=None):
     own = {"v_x": np.full(mask.size, 20.0)}
     drive = SimpleNamespace(mask=mask, channels=CHANNELS[: len(residual)], vehicle=Vehicle(), coordinates=own)
     values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(asked)}
-    return make_bench([drive], asked, [residual], [[s[None] for s in signatures]], values)
+    return make_evidence([drive], asked, [residual], [[s[None] for s in signatures]], values)
 
 
 def waves(n, count, seed=0):
@@ -52,7 +52,7 @@ def waves(n, count, seed=0):
 
 
 def made(seed=0, n=1500, asked=ASKED, noise=1.0, **effects):
-    """A bench with white noise in which effects (key to value in sigma) are hidden; sigma of each is worth `scale`."""
+    """A evidence with white noise in which effects (key to value in sigma) are hidden; sigma of each is worth `scale`."""
     rng = np.random.default_rng(seed)
     s = waves(n, len(asked), seed=99) / np.array([h.parameter(h.free[0]).sigma for h in asked])[:, None, None]
     y = noise * rng.standard_normal((2, n))
@@ -62,9 +62,9 @@ def made(seed=0, n=1500, asked=ASKED, noise=1.0, **effects):
     return bench_of(y, s, asked)
 
 
-def gram(bench):
-    noises = [fit_noise(r, d.mask, np.eye(len(r))) for r, d in zip(bench.residuals, bench.drives, strict=True)]
-    return gram_of(bench, noises, bench.residuals)
+def gram(evidence):
+    noises = [fit_noise(r, d.mask, np.eye(len(r))) for r, d in zip(evidence.residuals, evidence.drives, strict=True)]
+    return gram_of(evidence, noises, evidence.residuals)
 
 
 def test_tolerant_is_the_dense_inverse_of_noise_and_deviations():
@@ -98,7 +98,7 @@ def test_deviations_within_the_tolerances_are_taken_off_and_no_more():
 def test_inner_products_add_up_over_drives():
     a = made(seed=1)
     noises = [fit_noise(a.residuals[0], a.drives[0].mask, np.eye(2))]
-    two = make_bench(
+    two = make_evidence(
         a.drives * 2, a.asked, a.residuals * 2, [[s[None] for s in a.signatures[0]]] * 2,
         {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(a.asked)},
     )  # fmt: skip
@@ -208,6 +208,6 @@ def test_sets_come_best_first_and_not_too_many():
 
 def test_a_delay_of_every_signal_is_another_start_of_the_clock():
     asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "torque"))
-    bench = made(asked=asked)
-    assert compatible(bench, (0, 1))
-    assert not compatible(bench, (0, 1, 2))
+    evidence = made(asked=asked)
+    assert compatible(evidence, (0, 1))
+    assert not compatible(evidence, (0, 1, 2))

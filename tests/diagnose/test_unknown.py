@@ -9,10 +9,9 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.unknown import find_remainders
 from aqualog.diagnose.unknown_basis import bases
-from aqualog.diagnose.unknown_null import noise_level, noise_like, null_scores
+from aqualog.diagnose.unknown_fit import noise_level, noise_like, null_scores
 from aqualog.diagnose.unknown_proxy import Candidate, choose
-from aqualog.diagnose.unknown_term import as_term
-from aqualog.diagnose.unknown_words import describe
+from aqualog.diagnose.unknown_term import as_term, describe
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model

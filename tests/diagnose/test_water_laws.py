@@ -6,13 +6,12 @@ import numpy as np
 from test_drive import CAR, NOISY, signals, term
 from test_floating import wet
 
-from aqualog.diagnose.bench import gram_of, noises_after, without_deviations
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.evidence import gram_of, noises_after, without_deviations
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.refit import DOUBT, KNOWN, metric
 from aqualog.diagnose.search import _of_water, simulated
-from aqualog.diagnose.subsets import gains_on_top
-from aqualog.diagnose.support import supported
+from aqualog.diagnose.subsets import gains_on_top, supported
 from aqualog.diagnose.tolerances import WATER_TOLERANCES
 from aqualog.model.term import Model
 
@@ -26,13 +25,13 @@ def test_the_laws_of_water_are_asked_about_on_water_alone():
 
 
 @cache
-def bench():
+def evidence():
     d = prepare(wet(sensors=NOISY), CAR, "a")
     return simulated([d], [h for h in hypotheses([d], Model())[0] if h.of_water], Model(), lambda _t, _s: None)
 
 
 def test_what_a_law_of_water_may_be_off_by_is_taken_from_what_is_left_and_no_more():
-    b = bench()
+    b = evidence()
     at = next(c[0] for h, c in zip(b.asked, b.columns, strict=True) if h.effect.name == "wedge_peak")
     off = b.tolerance[at] * b.signatures[0][at]
     y = b.residuals[0]
@@ -46,7 +45,7 @@ def test_what_a_law_of_water_may_be_off_by_is_taken_from_what_is_left_and_no_mor
 
 
 def test_names_and_values_allow_for_more_than_the_laws_of_water_may_be_off_by():
-    b = bench()
+    b = evidence()
     noises = noises_after(b, b.residuals, {})
     known = metric(b, noises, share=KNOWN)
     np.testing.assert_array_equal(known.M, metric(b, noises).M)
@@ -56,7 +55,7 @@ def test_names_and_values_allow_for_more_than_the_laws_of_water_may_be_off_by():
 
 
 def test_each_thing_that_water_does_is_refitted_but_what_is_known_already():
-    b = bench()
+    b = evidence()
     gram = gram_of(b, noises_after(b, b.residuals, {}), b.residuals)
     fits = _of_water(b, gram, set())
     keys = {b.asked[f.members[0]].key for f in fits}

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from aqualog.calibrate.design import prepare
 from aqualog.calibrate.tie_rod import transfers
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario, Steering
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 
 __all__ = ["with_tie_rods"]

@@ -59,7 +59,7 @@ def made(name: str, seed: int, pool_name: str):
     """A drawn drive with its labels."""
     from aqualog.evaluate.drives import Drive, labels_in
     from aqualog.model import situations
-    from aqualog.model.signals import as_signals
+    from aqualog.model.log import as_signals
     from aqualog.model.simulate import simulate
 
     pool = {"tuning": situations.TUNING_POOL, "scoring": situations.SCORING_POOL}[pool_name]

@@ -20,7 +20,7 @@ from aqualog.evaluate.roc import RocPoint, records_at
 from aqualog.evaluate.score import Rate, Recall
 from aqualog.evaluate.split import split_runs
 from aqualog.evaluate.tune import choose
-from aqualog.model.signals import as_signals
+from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 
 

@@ -49,7 +49,7 @@ def test_programme_of_the_thesis():
     assert {r.scenario.vehicle.drivetrain for r in runs} == {"rwd", "awd"}
     assert {r.manoeuvre for r in runs} == {"constant", "acceleration", "deceleration", "slalom"}
     shown = {f for r in runs for f in r.figures.split(",")}
-    # 2.1 is a sketch, 2.2 is analytic, 2.24 a diagram, 2.18 and 2.20 are regressions of the same drives
+    # 2.1 is a drawing, 2.2 is analytic, 2.24 a diagram, 2.18 and 2.20 are regressions of the same drives
     assert {f"2.{n}" for n in range(3, 26)} - {"2.24"} <= shown
 
 

@@ -15,7 +15,7 @@ from aqualog.model.road import build_road
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, simulate
-from aqualog.model.start import rolling_state
+from aqualog.model.state import rolling_state
 from aqualog.model.term import Model, Term
 
 CAR = Vehicle(name="test car")

@@ -7,10 +7,9 @@ from thesis.passes import SEDAN
 from aqualog.align.load import load_signals
 from aqualog.detect.stream import detect_drive
 from aqualog.features.stream import INPUTS
-from aqualog.model.log import write_simulation
+from aqualog.model.log import as_signals, write_simulation
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, IDEAL
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 
 LANE = Lane(3.0, 5.0, depth_left=1e-3, depth_right=1.3e-3)

@@ -11,14 +11,12 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import KEYS
 from aqualog.model.effects import EFFECTS
-from aqualog.model.faults import SensorFault
+from aqualog.model.log import as_signals
 from aqualog.model.programme import situations
-from aqualog.model.scenario import Kick, Lane, Scenario
-from aqualog.model.sensors import ESC, IDEAL
-from aqualog.model.signals import as_signals
+from aqualog.model.scenario import SURFACES, Kick, Lane, Scenario
+from aqualog.model.sensors import ESC, IDEAL, SensorFault
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, SITUATIONS, TUNING_POOL, draw
-from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
 from aqualog.physics.load import G
 

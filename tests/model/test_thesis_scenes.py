@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from aqualog.core.errors import ConfigError
+from aqualog.model.programme import SCENES, scene
 from aqualog.model.simulate import simulate
-from aqualog.model.thesis_scenes import SCENES, scene
 from aqualog.physics.steering import STEERING
 
 

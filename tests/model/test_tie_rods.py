@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aqualog.model.drawing import slalom_angle
 from aqualog.model.programme import SEDAN, SUV, SUV_REAR
 from aqualog.model.scenario import Lane, Scenario, Steering
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import simulate
-from aqualog.model.sketch import slalom_angle
 from aqualog.model.tyre import TYRES
 
 WORN = TYRES["worn_summer"]

@@ -12,10 +12,9 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS
-from aqualog.model.scenario import Excitation, Lane, Scenario, Steering
+from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario, Steering
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
-from aqualog.model.surface import SURFACES
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G, wheel_loads

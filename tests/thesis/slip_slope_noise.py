@@ -16,9 +16,8 @@ import numpy as np
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import DriveStream
-from aqualog.model.scenario import Excitation, Lane, Scenario
+from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
-from aqualog.model.surface import SURFACES
 
 __all__ = ["CAR", "SPLITS", "Outcome", "drive", "outcome", "study"]
 

@@ -11,9 +11,9 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, resistance
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.model.effects import EFFECTS
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, draw
 from aqualog.model.term import Model, Term

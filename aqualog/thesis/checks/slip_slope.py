@@ -9,8 +9,8 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.evaluate.intervals import wilson
+from aqualog.model.programme import scene
 from aqualog.model.scenario import Lane, Profile, Scenario
-from aqualog.model.thesis_scenes import scene
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
 from aqualog.thesis.claims import Check, Checks, judge, limit
 from aqualog.thesis.evidence.passes import HIGH, KMH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass

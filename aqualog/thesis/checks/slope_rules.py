@@ -15,8 +15,7 @@ from aqualog.detect.stream import detect_drive
 from aqualog.evaluate.intervals import wilson
 from aqualog.model.effects import EFFECTS
 from aqualog.model.pools import SCORING_POOL
-from aqualog.model.scenario import Lane, Scenario
-from aqualog.model.surface import SURFACES
+from aqualog.model.scenario import SURFACES, Lane, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge

@@ -20,8 +20,8 @@ from aqualog.evaluate.intervals import poisson, wilson
 from aqualog.evaluate.labels import Labels, Span, joined, without
 from aqualog.evaluate.match import LIMITS_S, beginning_in, hits
 from aqualog.evaluate.truth import spans_of
+from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, SITUATIONS, draw
 from aqualog.model.term import Model

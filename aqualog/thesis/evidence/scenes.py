@@ -18,11 +18,11 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope.history import History, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
+from aqualog.model.drawing import KMH, slalom_angle
+from aqualog.model.log import as_signals
+from aqualog.model.programme import scene
 from aqualog.model.scenario import Scenario, Steering
-from aqualog.model.signals import as_signals
 from aqualog.model.simulate import simulate
-from aqualog.model.sketch import KMH, slalom_angle
-from aqualog.model.thesis_scenes import scene
 from aqualog.thesis.claims import limit
 from aqualog.thesis.evidence.campaign import DriveRun
 

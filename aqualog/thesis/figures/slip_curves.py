@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from aqualog.model.surface import SURFACES
+from aqualog.model.scenario import SURFACES
 from aqualog.physics.surface import series_slope
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import judge

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.model.sketch import KMH
-from aqualog.model.thesis_scenes import scene
+from aqualog.model.drawing import KMH
+from aqualog.model.programme import scene
 from aqualog.report.theme import INK, MUTED
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit

@@ -9,9 +9,8 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.minor_spin_down import MinorParams
-from aqualog.model.scenario import Lane
-from aqualog.model.surface import SURFACES
-from aqualog.model.thesis_scenes import scene
+from aqualog.model.programme import scene
+from aqualog.model.scenario import SURFACES, Lane
 from aqualog.report.theme import MUTED, THRESHOLD, wheel_colour
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aqualog.detect.stream import detect_drive
-from aqualog.model.signals import as_signals
+from aqualog.model.log import as_signals
+from aqualog.model.programme import scene
 from aqualog.model.simulate import simulate
-from aqualog.model.thesis_scenes import scene
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
 from aqualog.thesis.evidence import scenes
 from aqualog.thesis.evidence.scenes import SEEDS, in_runs, known, run, spread, stretches

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.noise import Fit, inverse_of, prior_of
-from aqualog.diagnose.level.passes import RESISTANCE, Passes
-from aqualog.diagnose.level.refit import Refit
+from aqualog.diagnose.campaign.noise import Fit, inverse_of, prior_of
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
+from aqualog.diagnose.campaign.refit import Refit
 from aqualog.diagnose.records import ChannelGain, Gain
 
 __all__ = ["gain"]

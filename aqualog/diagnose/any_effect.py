@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.bench import Bench, gram_of, noises_after, tolerant
 from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.evidence import Evidence, gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import THREADS
 from aqualog.diagnose.noise import Noise, surrogate, white_noise
 from aqualog.diagnose.subsets import fit_set, gains_on_top
@@ -40,47 +40,49 @@ class Calibration(NamedTuple):
     tested: int
 
 
-def largest(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def largest(evidence: Evidence, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gains (H,) of all hypotheses beside a base set, and the whitened, tolerant inner products.
 
     The noise is estimated after the hypothesis that makes the measurement most likely. Candidates are the hypotheses
     that gain most with the residual's spectrum, and those that gain most with white noise. Otherwise a large effect
     would count as coloured noise and could not be found.
     """
-    noises = noises_after(bench, residuals, _theta(bench, residuals, base))
-    gram = tolerant(bench, gram_of(bench, noises, residuals))
-    plain = tolerant(bench, gram_of(bench, [_colourless(bench, i, r) for i, r in enumerate(residuals)], residuals))
+    noises = noises_after(evidence, residuals, _theta(evidence, residuals, base))
+    gram = tolerant(evidence, gram_of(evidence, noises, residuals))
+    plain = tolerant(
+        evidence, gram_of(evidence, [_colourless(evidence, i, r) for i, r in enumerate(residuals)], residuals)
+    )
     best = (sum(n.surprise for n in noises), noises)
     for metric, most in ((gram, FEW), (plain, FEW)):
-        gains = gains_on_top(bench, metric, base)
+        gains = gains_on_top(evidence, metric, base)
         for top in np.argsort(-gains)[:most].tolist():
-            fit = fit_set(bench, metric, (*base, top))
+            fit = fit_set(evidence, metric, (*base, top))
             if fit is None:
                 continue
-            tried = noises_after(bench, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
+            tried = noises_after(evidence, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
             surprise = sum(n.surprise for n in tried)
             if surprise < best[0]:
                 best = (surprise, tried)
-    gram = tolerant(bench, gram_of(bench, best[1], residuals))
-    return gains_on_top(bench, gram, base), gram
+    gram = tolerant(evidence, gram_of(evidence, best[1], residuals))
+    return gains_on_top(evidence, gram, base), gram
 
 
-def _colourless(bench: Bench, i: int, residual: FloatArray) -> Noise:
+def _colourless(evidence: Evidence, i: int, residual: FloatArray) -> Noise:
     """White noise of the size of a residual's steps."""
-    drive = bench.drives[i]
+    drive = evidence.drives[i]
     return white_noise(residual, drive.mask, contrasts(drive.channels))
 
 
-def _theta(bench: Bench, residuals: Sequence[FloatArray], base: Sequence[int]) -> dict[int, float]:
+def _theta(evidence: Evidence, residuals: Sequence[FloatArray], base: Sequence[int]) -> dict[int, float]:
     if not base:
         return {}
-    gram = tolerant(bench, gram_of(bench, noises_after(bench, residuals, {}), residuals))
-    fit = fit_set(bench, gram, base)
+    gram = tolerant(evidence, gram_of(evidence, noises_after(evidence, residuals, {}), residuals))
+    fit = fit_set(evidence, gram, base)
     return {} if fit is None else dict(zip(fit.columns, fit.theta.tolist(), strict=True))
 
 
 def calibrate(
-    bench: Bench,
+    evidence: Evidence,
     quiet: Sequence[FloatArray],
     gram: FloatArray,
     *,
@@ -94,7 +96,7 @@ def calibrate(
 
     Parameters
     ----------
-    bench : Bench
+    evidence : Evidence
     quiet : sequence of array (C, n)
         Residuals after the best set: their smoothed spectra make the surrogates [theiler1992].
     gram : array (K + 1, K + 1)
@@ -107,22 +109,22 @@ def calibrate(
         Share of logs without effect that may be reported as having one.
     seed : int
     """
-    H = len(bench.asked)
-    sizes = np.array([len(c) for c in bench.columns], dtype=np.float64)
-    groups = _groups(bench, gram)
-    leaders = sorted({g for g in groups.tolist() if not bench.asked[g].allowed})
-    allowed = [i for i, h in enumerate(bench.asked) if h.allowed]
+    H = len(evidence.asked)
+    sizes = np.array([len(c) for c in evidence.columns], dtype=np.float64)
+    groups = _groups(evidence, gram)
+    leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
+    allowed = [i for i, h in enumerate(evidence.asked) if h.allowed]
     if surrogates == 0:
         return Calibration(
             np.full(H, PLAIN_INFLATION), np.zeros(0), bonferroni(level, len(leaders)), level, len(leaders)
         )
     wanted = sorted({*leaders, *base, *allowed})
-    small = _restricted(bench, wanted)
+    small = _restricted(evidence, wanted)
     at = {m: i for i, m in enumerate(wanted)}
 
     def one(s: int) -> FloatArray:
         rng = np.random.default_rng(np.random.SeedSequence([seed, s]))
-        noise_only = [surrogate(r, d.mask, rng) for r, d in zip(quiet, bench.drives, strict=True)]
+        noise_only = [surrogate(r, d.mask, rng) for r, d in zip(quiet, evidence.drives, strict=True)]
         gains, _ = largest(small, noise_only, [at[m] for m in base])
         tick()
         return gains
@@ -164,17 +166,17 @@ def bonferroni(level: float, count: int) -> float:
     return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
 
 
-def _groups(bench: Bench, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _groups(evidence: Evidence, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Leader of each hypothesis: the first one with nearly the same whitened signature."""
     energy = np.diag(gram)
-    out = np.arange(len(bench.asked))
+    out = np.arange(len(evidence.asked))
     leaders: list[int] = []
-    for i, columns in enumerate(bench.columns):
+    for i, columns in enumerate(evidence.columns):
         if len(columns) > 1 or energy[columns[0]] <= 1e-12:
             leaders.append(i)
             continue
         for j in leaders:
-            other = bench.columns[j]
+            other = evidence.columns[j]
             if len(other) == 1 and energy[other[0]] > 1e-12:
                 cosine = gram[columns[0], other[0]] / math.sqrt(energy[columns[0]] * energy[other[0]])
                 if abs(cosine) > ALIKE:
@@ -185,23 +187,23 @@ def _groups(bench: Bench, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[n
     return out
 
 
-def _restricted(bench: Bench, wanted: Sequence[int]) -> Bench:
-    keep = [c for m in wanted for c in bench.columns[m]]
+def _restricted(evidence: Evidence, wanted: Sequence[int]) -> Evidence:
+    keep = [c for m in wanted for c in evidence.columns[m]]
     columns, k = [], 0
     for m in wanted:
-        columns.append(tuple(range(k, k + len(bench.columns[m]))))
-        k += len(bench.columns[m])
+        columns.append(tuple(range(k, k + len(evidence.columns[m]))))
+        k += len(evidence.columns[m])
     return replace(
-        bench,
-        asked=tuple(bench.asked[m] for m in wanted),
-        signatures=tuple(s[keep] for s in bench.signatures),
-        prepared=tuple(p.of(keep) for p in bench.prepared),
+        evidence,
+        asked=tuple(evidence.asked[m] for m in wanted),
+        signatures=tuple(s[keep] for s in evidence.signatures),
+        prepared=tuple(p.of(keep) for p in evidence.prepared),
         columns=tuple(columns),
-        prior=bench.prior[keep],
-        low=bench.low[keep],
-        high=bench.high[keep],
-        smallest=bench.smallest[keep],
-        tolerance=bench.tolerance[keep],
-        barred=bench.barred[list(wanted)],
-        spread=bench.spread[keep],
+        prior=evidence.prior[keep],
+        low=evidence.low[keep],
+        high=evidence.high[keep],
+        smallest=evidence.smallest[keep],
+        tolerance=evidence.tolerance[keep],
+        barred=evidence.barred[list(wanted)],
+        spread=evidence.spread[keep],
     )

@@ -10,11 +10,11 @@ import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.anything import Anything, anything
-from aqualog.diagnose.level.catalogue import Library
-from aqualog.diagnose.level.noise import Fit
-from aqualog.diagnose.level.passes import RESISTANCE, Passes
-from aqualog.diagnose.level.refit import conditioned
+from aqualog.diagnose.campaign.any_effect import Anything, anything
+from aqualog.diagnose.campaign.catalogue import Library
+from aqualog.diagnose.campaign.noise import Fit
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
+from aqualog.diagnose.campaign.refit import conditioned
 from aqualog.diagnose.records import Remainder
 
 __all__ = ["remainders"]
@@ -105,9 +105,12 @@ def remainders(
         return (), found
     information, score, _ = conditioned(x, residual, free, scatter.weight)
     scored = []
+    sizes: dict[int, tuple[FloatArray, FloatArray]] = {}
     for s in shapes:
         c = list(s.columns)
-        size = np.linalg.pinv(information[np.ix_(c, c)], rcond=1e-8, hermitian=True) @ score[c]
+        inverse = np.linalg.pinv(information[np.ix_(c, c)], rcond=1e-8, hermitian=True)
+        size = inverse @ score[c]
+        sizes[id(s)] = size, np.sqrt(np.maximum(np.diag(inverse), 0.0))
         scored.append((chi2_log_p(float(score[c] @ size), len(c)), s))
     scored.sort(key=lambda item: -item[0])
     out: list[Remainder] = []
@@ -117,33 +120,31 @@ def remainders(
             continue
         told |= set(s.channels)
         proxies = tuple(o.coordinate for q, o in scored if o.name == s.name and o is not s and q >= PROXY * statistic)
-        out.append(_described(passes, residual, s, x, information, score, lib, free, scatter, found.p_value, proxies))
+        made = x[:, :, list(s.columns)] @ sizes[id(s)][0]
+        nearest = _nearest(made, residual, lib, free, scatter)
+        out.append(_described(passes, residual, s, made, *sizes[id(s)], nearest, found.p_value, proxies))
     return tuple(out), found
 
 
 def _described(
-    passes: Passes, residual: FloatArray, s: _Shape, x: FloatArray, information: FloatArray, score: FloatArray,
-    lib: Library, free: FloatArray, scatter: Fit, p_value: float, proxies: Sequence[str],
+    passes: Passes, residual: FloatArray, s: _Shape, made: FloatArray, size: FloatArray, sd: FloatArray,
+    nearest: tuple[str | None, float], p_value: float, proxies: Sequence[str],
 ) -> Remainder:  # fmt: skip
-    c = list(s.columns)
-    inverse = np.linalg.pinv(information[np.ix_(c, c)], rcond=1e-8, hermitian=True)
-    size = inverse @ score[c]
     scale = AMPLITUDE * float(np.mean([np.sqrt(np.nanmean(passes.values[:, i] ** 2)) for i in s.channels]))
-    half = math.sqrt(float(_band(len(c)))) * np.sqrt(np.maximum(np.diag(inverse), 0.0)) * scale
+    half = math.sqrt(float(_band(size.size))) * sd * scale
     f = size * scale
-    made = x[:, :, c] @ size
     e = residual[:, list(s.channels)]
     left = e - made[:, list(s.channels)]
     share = max(1.0 - float(np.nansum(left**2) / np.nansum(e**2)), 0.0)
-    nearest, cosine = _nearest(made, residual, lib, free, scatter)
+    effect, cosine = nearest
     unit = "m/s²" if s.name == RESISTANCE else "slip"
     word = COORDINATES[s.coordinate]
     sentence = (
         f"{s.name} departs from the model by {f.min():+.2g} to {f.max():+.2g} ({unit}) over the {word}; "
-        f"the most similar effect is {nearest} (similarity {cosine:.2f} of 1)."
+        f"the most similar effect is {effect} (similarity {cosine:.2f} of 1)."
     )  # fmt: skip
     return Remainder(
-        s.name, (s.coordinate,), share, p_value, s.knots[:, None], f, f - half, f + half, tuple(proxies), nearest,
+        s.name, (s.coordinate,), share, p_value, s.knots[:, None], f, f - half, f + half, tuple(proxies), effect,
         cosine, sentence,
     )  # fmt: skip
 

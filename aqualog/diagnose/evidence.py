@@ -16,7 +16,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.model.term import Kind
 
-__all__ = ["Bench", "Stack", "gram_of", "make_bench", "noises_after", "tolerant", "without_deviations"]
+__all__ = ["Evidence", "Stack", "gram_of", "make_evidence", "noises_after", "tolerant", "without_deviations"]
 
 ROUNDS = 200  # rounds of coordinate descent: it converges slowly where deviations look alike
 
@@ -38,7 +38,7 @@ class Stack:
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class Evidence:
     """Drives with their residuals (C, n) and the columns of signatures (K, C, n): one for each free parameter.
 
     `columns[i]` are the columns of hypothesis i.
@@ -71,13 +71,13 @@ class Bench:
         return np.maximum(self.tolerance, self.spread)
 
 
-def make_bench(
+def make_evidence(
     drives: Sequence[Drive],
     asked: Sequence[Hypothesis],
     residuals: Sequence[FloatArray],
     signatures: Sequence[Sequence[FloatArray]],
     present_values: Mapping[tuple[int, str], float],
-) -> Bench:
+) -> Evidence:
     """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
     columns: list[tuple[int, ...]] = []
     prior, low, high, smallest, tolerance, spread = [], [], [], [], [], []
@@ -101,7 +101,7 @@ def make_bench(
             tolerance.append(h.tolerance_of(name, drives[0].vehicle))
     flat = [np.concatenate(list(s)) for s in signatures]
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
-    return Bench(
+    return Evidence(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
         np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
         np.array(spread), tuple(kinds), np.array(as_values),
@@ -114,20 +114,20 @@ def _drag_speed(drives: Sequence[Drive]) -> float:
     return float((v**3).sum() / max(float((v**2).sum()), 1e-9))
 
 
-def tolerant(bench: Bench, gram: FloatArray) -> FloatArray:
+def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
     """Inner products in a metric that tolerates the usual errors of every parameter.
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
     enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
     these deviations, I + X S^2 X'. By Woodbury's identity its inverse is I - A (S^-2 + A' A)^-1 A'.
     """
-    k = np.flatnonzero((bench.forgiven > 0.0) & (np.diag(gram)[:-1] > 1e-12))
-    inner = gram[np.ix_(k, k)] + np.diag(bench.forgiven[k] ** -2.0)
+    k = np.flatnonzero((evidence.forgiven > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+    inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
 
 
 def without_deviations(
-    bench: Bench, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
+    evidence: Evidence, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
 ) -> FloatArray:
     """A residual (C, n) of drive d minus the most likely deviations of these columns within their tolerances.
 
@@ -136,15 +136,15 @@ def without_deviations(
     round. No deviation exceeds `farthest` tolerances: a large effect must not vanish because it has the form of a
     tolerance.
     """
-    drive = bench.drives[d]
-    k = [c for c in columns if bench.forgiven[c] > 0.0]
+    drive = evidence.drives[d]
+    k = [c for c in columns if evidence.forgiven[c] > 0.0]
     left = residual
     for _ in range(2 if k else 0):
         noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-        A = whitened(bench.prepared[d].of(k), noise)
+        A = whitened(evidence.prepared[d].of(k), noise)
         y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
-        theta = _within(A @ A.T + np.diag(bench.forgiven[k] ** -2.0), A @ y, farthest * bench.forgiven[k])
-        left = residual - np.tensordot(theta, bench.signatures[d][k], axes=1)
+        theta = _within(A @ A.T + np.diag(evidence.forgiven[k] ** -2.0), A @ y, farthest * evidence.forgiven[k])
+        left = residual - np.tensordot(theta, evidence.signatures[d][k], axes=1)
     return left
 
 
@@ -160,10 +160,10 @@ def _within(G: FloatArray, b: FloatArray, most: FloatArray) -> FloatArray:
     return np.asarray(theta)
 
 
-def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
+def gram_of(evidence: Evidence, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
     """Whitened inner products of the columns, the residual last, summed over drives."""
     total: FloatArray | float = 0.0
-    for drive, ready, noise, residual in zip(bench.drives, bench.prepared, noises, residuals, strict=True):
+    for drive, ready, noise, residual in zip(evidence.drives, evidence.prepared, noises, residuals, strict=True):
         columns = whitened(ready, noise)
         y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)
         rows = np.concatenate([columns, y])
@@ -171,9 +171,9 @@ def gram_of(bench: Bench, noises: Sequence[Noise], residuals: Sequence[FloatArra
     return np.asarray(total)
 
 
-def noises_after(bench: Bench, residuals: Sequence[FloatArray], theta: Mapping[int, float]) -> list[Noise]:
+def noises_after(evidence: Evidence, residuals: Sequence[FloatArray], theta: Mapping[int, float]) -> list[Noise]:
     """Noise of each drive's residual after the columns with these values are subtracted."""
     return [
         fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
-        for d, r, s in zip(bench.drives, residuals, bench.signatures, strict=True)
+        for d, r, s in zip(evidence.drives, residuals, evidence.signatures, strict=True)
     ]

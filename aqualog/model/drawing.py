@@ -11,21 +11,20 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.model.effects import EFFECTS
 from aqualog.model.plant import understeer_gradient
 from aqualog.model.pools import Pool
-from aqualog.model.scenario import Profile, Scenario
+from aqualog.model.scenario import SURFACES, Profile, Scenario, Surface
 from aqualog.model.sensors import Sensors
-from aqualog.model.surface import SURFACES, Surface
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import Tyre
 from aqualog.physics.load import G
 
-__all__ = ["KMH", "Drawn", "Sketch", "Taken", "full_speed", "lagging_torque", "slalom_angle", "terms"]
+__all__ = ["KMH", "Drawing", "Drawn", "Taken", "full_speed", "lagging_torque", "slalom_angle", "terms"]
 
 KMH = 1.0 / 3.6  # [m/s]
 TORQUE_SIGNALS = ("torque_fl", "torque_fr", "torque_rl", "torque_rr")
 
 
 class Taken(NamedTuple):
-    """Result of a situation for a sketch: the drive, terms on top, and a sentence about the random choices."""
+    """Result of a situation for a drawing: the drive, terms on top, and a sentence about the random choices."""
 
     scenario: Scenario
     model: Model
@@ -45,7 +44,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, slots=True)
-class Sketch:
+class Drawing:
     """Car, tyre and pressure [Pa] of a drive, and its random numbers."""
 
     rng: np.random.Generator
@@ -104,11 +103,11 @@ def terms(*given: tuple[str, dict[str, float], str | None]) -> Model:
     return Model(tuple(Term(EFFECTS[name], values, where) for name, values, where in given))
 
 
-def full_speed(sketch: Sketch, depth: float) -> float:
+def full_speed(drawing: Drawing, depth: float) -> float:
     """Return the full aquaplaning speed of a static front wheel in even water; over 1e4 if drained. [m/s]"""
-    car, tyre = sketch.vehicle, sketch.tyre
+    car, tyre = drawing.vehicle, drawing.tyre
     load = 0.5 * car.mass * G * car.l_r / car.wheelbase
-    return float(tyre.full_speed(np.array(depth), np.array(load), p=sketch.p))
+    return float(tyre.full_speed(np.array(depth), np.array(load), p=drawing.p))
 
 
 def slalom_angle(vehicle: Vehicle, tyre: Tyre, v: float, a_y: float) -> float:

@@ -9,10 +9,10 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.expect import Driven, Response, respond
-from aqualog.diagnose.level.noise import Fit
-from aqualog.diagnose.level.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
-from aqualog.diagnose.level.refit import Refit
+from aqualog.diagnose.campaign.expect import Driven, Response, respond
+from aqualog.diagnose.campaign.noise import Fit
+from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
+from aqualog.diagnose.campaign.refit import Refit
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.anything import whole_fit
-from aqualog.diagnose.level.catalogue import Hypothesis, Library, library
-from aqualog.diagnose.level.noise import Fit
-from aqualog.diagnose.level.passes import Passes, expected_values
-from aqualog.diagnose.level.refit import Refit, conditioned, refit, weighed
+from aqualog.diagnose.campaign.any_effect import whole_fit
+from aqualog.diagnose.campaign.catalogue import Hypothesis, Library, library
+from aqualog.diagnose.campaign.noise import Fit
+from aqualog.diagnose.campaign.passes import Passes, expected_values
+from aqualog.diagnose.campaign.refit import Refit, conditioned, refit, weighed
 from aqualog.model.term import Model
 
 __all__ = ["CREDIBLE", "Found", "credible", "is_worth", "linear_evidence", "sets_of"]

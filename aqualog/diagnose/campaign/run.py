@@ -11,23 +11,31 @@ from aqualog.campaign.records import Campaign
 from aqualog.campaign.samples import CampaignData
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.level.advice import advice
-from aqualog.diagnose.level.anything import Anything, anything, whole_fit
-from aqualog.diagnose.level.catalogue import Library, hypotheses, library, untested
-from aqualog.diagnose.level.gain import gain
-from aqualog.diagnose.level.judge import confusions, limits
-from aqualog.diagnose.level.noise import Fit, design_of, inverse_of, prior_of
-from aqualog.diagnose.level.observe import passes_of
-from aqualog.diagnose.level.passes import Passes, doubted, steady
-from aqualog.diagnose.level.refit import Refit, intervals
-from aqualog.diagnose.level.remainder import remainders
-from aqualog.diagnose.level.search import Found, credible
-from aqualog.diagnose.level.views import views
-from aqualog.diagnose.level.words import cause_sentence, verdict_sentence
-from aqualog.diagnose.records import Alternative, Cause, Diagnosis, Estimate, Remainder, Significance, Verdict
+from aqualog.diagnose.campaign.advice import advice
+from aqualog.diagnose.campaign.any_effect import Anything, anything, whole_fit
+from aqualog.diagnose.campaign.catalogue import Library, hypotheses, library, untested
+from aqualog.diagnose.campaign.gain import gain
+from aqualog.diagnose.campaign.judge import confusions, limits
+from aqualog.diagnose.campaign.noise import Fit, design_of, inverse_of, prior_of
+from aqualog.diagnose.campaign.observe import passes_of
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
+from aqualog.diagnose.campaign.refit import Refit, intervals
+from aqualog.diagnose.campaign.remainder import remainders
+from aqualog.diagnose.campaign.search import Found, credible
+from aqualog.diagnose.campaign.words import cause_sentence, verdict_sentence
+from aqualog.diagnose.records import (
+    Alternative,
+    Cause,
+    Diagnosis,
+    Estimate,
+    Remainder,
+    ResidualView,
+    Significance,
+    Verdict,
+)
 from aqualog.model.term import Model
 
-__all__ = ["diagnose_campaign"]
+__all__ = ["diagnose_campaign", "views"]
 
 LEAST_RUNS = 12
 AGAIN_WITHIN = 15.0  # log evidence: sets that are fitted again where runs fell out
@@ -224,3 +232,21 @@ def _driven_s(data: CampaignData) -> float:
 
 def _notes(passes: Passes) -> tuple[str, ...]:
     return tuple(f"{n} {'run' if n == 1 else 'runs'} left out: {why}" for why, n in sorted(passes.left_out.items()))
+
+
+def views(name: str, passes: Passes, before: FloatArray, after: FloatArray) -> tuple[ResidualView, ...]:
+    """Views of the channels on the water; coordinates are those of the runs, in the order of their speed."""
+    order = np.argsort(passes.coordinates["v_x"], kind="stable")
+    order = order[np.isfinite(passes.values[order, -1])]
+    coordinates = {k: x[order] for k, x in passes.coordinates.items()}
+    out = []
+    for c, channel in enumerate(passes.names):
+        if channel.startswith("dry_"):
+            continue
+        is_force = channel == RESISTANCE
+        title = "resistance on the water" if is_force else f"slip of {channel[-2:]} on water minus slip on dry road"
+        unit = "m/s^2" if is_force else "-"
+        out.append(
+            ResidualView(name, channel, title, unit, math.nan, coordinates, before[order, c], after[order, c])
+        )  # fmt: skip
+    return tuple(out)

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.core.records import FloatArray, Signals
-from aqualog.diagnose.bench import Bench
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive, prepare
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.isolate import separation
 from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
 from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
 from aqualog.diagnose.search import Candidate
-from aqualog.model.signals import as_signals
+from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Check, Model
 
@@ -33,7 +33,7 @@ _ASSUMED_SPEED = 0.05  # [m/s] of all others
 class Case:
     """The decision to make: the sets, their pairs, and all tolerances as (hypothesis, parameter, its sd)."""
 
-    bench: Bench
+    evidence: Evidence
     credible: tuple[Candidate, ...]
     noises: tuple[Noise, ...]
     model: Model
@@ -44,7 +44,7 @@ class Case:
     @property
     def drive(self) -> Drive:
         """The drive whose signals a run has."""
-        return self.bench.drives[self.like]
+        return self.evidence.drives[self.like]
 
     @property
     def effects(self) -> frozenset[str]:
@@ -101,14 +101,14 @@ def _certain(gram: FloatArray, rows: tuple[int, int, int], rivals: Sequence[int]
 
 def of_log(case: Case) -> FloatArray:
     """Inner products of the remainders of the log after each set, its columns, and all tolerances."""
-    bench = case.bench
-    forgiven = np.flatnonzero(bench.forgiven > 0.0).tolist()
+    evidence = case.evidence
+    forgiven = np.flatnonzero(evidence.forgiven > 0.0).tolist()
     total: FloatArray | float = 0.0
-    for d, (drive, noise) in enumerate(zip(bench.drives, case.noises, strict=True)):
+    for d, (drive, noise) in enumerate(zip(evidence.drives, case.noises, strict=True)):
         parts = [c.refit.residuals[d][None] for c in case.credible] + [c.refit.signatures[d] for c in case.credible]
         rows = whitened(spectra(bridged(np.concatenate(parts), drive.mask)), noise)
         nothing = np.zeros((1, rows.shape[1]))
-        rows = np.concatenate([rows, nothing, whitened(bench.prepared[d].of(forgiven), noise)])
+        rows = np.concatenate([rows, nothing, whitened(evidence.prepared[d].of(forgiven), noise)])
         total = total + rows @ rows.T
     return np.asarray(total)
 
@@ -182,7 +182,7 @@ def of_check(case: Case, check: Check, kept: Sequence[int]) -> FloatArray:
     def meant(h: Hypothesis, name: str) -> bool:
         return h.effect.drive.check is check and h.where in check.where and name == check.parameter
 
-    asked = next(h for h in case.bench.asked if h.effect.drive.check is check and h.where in check.where)
+    asked = next(h for h in case.evidence.asked if h.effect.drive.check is check and h.where in check.where)
     left = [-value_in(c.refit.model, asked, check.parameter) for c in case.credible]
     own = [float(meant(c.refit.members[i], n)) for c in case.credible for i, n in c.refit.names]
     forgiven = [float(meant(*case.forgiven[i][:2])) for i in kept]

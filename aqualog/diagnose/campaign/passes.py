@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aqualog.campaign.samples import RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.level.expect import Driven, respond
+from aqualog.diagnose.campaign.expect import Driven, respond
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model

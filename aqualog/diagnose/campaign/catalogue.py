@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.passes import Passes, expected_values
+from aqualog.diagnose.campaign.passes import Passes, expected_values
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Effect, Model, Parameter, Term
 

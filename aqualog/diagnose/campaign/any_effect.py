@@ -9,8 +9,8 @@ import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.noise import Design, Fit, Scatter, design_of, fit, prior_of
-from aqualog.diagnose.level.refit import conditioned
+from aqualog.diagnose.campaign.noise import Design, Fit, Scatter, design_of, fit, prior_of
+from aqualog.diagnose.campaign.refit import conditioned
 
 __all__ = ["Anything", "Group", "anything", "whole_fit"]
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.catalogue import Hypothesis, model_with
-from aqualog.diagnose.level.noise import inverse_of, prior_of
-from aqualog.diagnose.level.passes import Passes, expected_values
+from aqualog.diagnose.campaign.catalogue import Hypothesis, model_with
+from aqualog.diagnose.campaign.noise import inverse_of, prior_of
+from aqualog.diagnose.campaign.passes import Passes, expected_values
 from aqualog.model.term import Model, Parameter
 
 __all__ = ["Refit", "conditioned", "intervals", "refit", "weighed"]

@@ -16,8 +16,8 @@ from aqualog.campaign.slip_slope import WIND_UP
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.level.expect import S_MAX, Driven, respond
-from aqualog.diagnose.level.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes, Told, channels_of, question_of
+from aqualog.diagnose.campaign.expect import S_MAX, Driven, respond
+from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes, Told, channels_of, question_of
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.tyre import TYRES

@@ -10,8 +10,8 @@ from statistics import NormalDist
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.level.catalogue import Library
-from aqualog.diagnose.level.refit import conditioned
+from aqualog.diagnose.campaign.catalogue import Library
+from aqualog.diagnose.campaign.refit import conditioned
 from aqualog.diagnose.records import Confusion, Limit
 
 __all__ = ["confusions", "limits"]
