@@ -24,7 +24,7 @@ from aqualog.diagnose.hypotheses import hypotheses, residual, value_in, with_val
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
-from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Remainder, ResidualView, Verdict
+from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.unknown import find_remainders
@@ -129,16 +129,7 @@ def diagnose(
     gained = None
     if extended.terms != given.terms:
         tell("measuring the gain", 0.88)
-        elsewhere = _without_road(extended, given)  # a road is this drive's own
-        unseen = _prepared(holdout, vehicle)[0] if holdout else []
-        unseen = [d for d in unseen if d.channels == ready[0].channels]
-        effects: tuple[Consequence, ...] = ()
-        if options.consequences and "mass" in vehicle.given:
-            effects = consequences(vehicle, elsewhere, seed=options.seed)
-        gained = measured_gain(
-            unseen or ready, given, elsewhere if unseen else extended, found.noises[0], seed=options.seed,
-            in_sample=not unseen, consequences=effects,
-        )  # fmt: skip
+        gained = _gained(ready, holdout, vehicle, given, extended, found, options)
     next_run = None
     if outcome.verdict == "cannot_tell":
         tell("searching for a run that distinguishes the causes", 0.95)
@@ -174,6 +165,23 @@ def diagnose(
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
     )
+
+
+def _gained(
+    ready: Sequence[Drive], holdout: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, extended: Model,
+    found: Found, options: Options,
+) -> Gain:  # fmt: skip
+    """Gain of the extended model over the given one: on unseen drives if there are any, else on the diagnosed ones."""
+    elsewhere = _without_road(extended, given)  # a road is this drive's own
+    unseen = _prepared(holdout, vehicle)[0] if holdout else []
+    unseen = [d for d in unseen if d.channels == ready[0].channels]
+    effects: tuple[Consequence, ...] = ()
+    if options.consequences and "mass" in vehicle.given:
+        effects = consequences(vehicle, elsewhere, seed=options.seed)
+    return measured_gain(
+        unseen or ready, given, elsewhere if unseen else extended, found.noises[0], seed=options.seed,
+        in_sample=not unseen, consequences=effects,
+    )  # fmt: skip
 
 
 def _by_drive(

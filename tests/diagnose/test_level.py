@@ -137,6 +137,7 @@ def test_track_clearing_is_named_with_its_size(cleared):
     assert again.significance == found.significance
 
 
+@pytest.mark.nightly
 def test_nothing_hidden_is_told_as_nothing():
     data = simulated(Model(), 6)
     found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=120)

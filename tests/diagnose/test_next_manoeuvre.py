@@ -115,6 +115,7 @@ def test_radius_and_velocity_are_told_apart_by_accelerating_and_then_they_are(ra
     assert wrong.refit.loss - right.refit.loss > 2.0 * np.log(20.0)
 
 
+@pytest.mark.nightly
 def test_wind_and_drag_need_the_way_back(wind, monkeypatch):
     _, (evidence, credible, noises) = wind
     answer = next_manoeuvre(evidence, credible, noises, Model())

@@ -21,8 +21,9 @@ def diagnosed(folder, seed, *of, **hidden):
 
 @pytest.mark.parametrize(
     ("seed", "programme", "noise"),
-    [(2, "mixed", "ou1"), pytest.param(20, "stop_and_go", "white", marks=pytest.mark.nightly)],
+    [(2, "mixed", "ou1"), (20, "stop_and_go", "white")],
 )
+@pytest.mark.nightly
 def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     assert diagnosed(tmp_path, seed, programme, noise).verdict == "no_effect"
 

@@ -89,6 +89,7 @@ def test_cannot_tell(monkeypatch):
     assert twins.p_correct < 0.7
 
 
+@pytest.mark.nightly
 def test_a_slope_and_an_offset_that_cancel_are_no_compound(monkeypatch):
     # without torque the two look all but the same: -9 % and +1.2 m/s^2 together would explain a few millimetres of slip
     ask(monkeypatch, ("accelerometer_bias@a_x", "road_grade", "tyre_radius@fl"))
@@ -181,6 +182,7 @@ def same(a, b):
     )  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_two_runs_are_equal_and_another_seed_says_the_same():
     hidden = term("payload_mass", delta_mass=250.0)
     a, b = told(hidden), told(hidden)
