@@ -14,11 +14,11 @@ import pytest
 pytestmark = pytest.mark.skipif(not hasattr(signal, "sigtimedwait"), reason="commands work in one process here")
 
 HOSTILE = '''
-import collections, ctypes, itertools, os, sys, tempfile, time
+import collections, ctypes, importlib, itertools, os, sys, tempfile, time
 from pathlib import Path
 import aqualog.io.open_log as opening
 from aqualog.guard.reading import unfinished
-csv = opening._READERS["csv"]
+module, name = opening._READERS["csv"]
 
 def write(path):
     with tempfile.NamedTemporaryFile() as file:
@@ -58,9 +58,9 @@ def bad(path, options):
         sys.stderr.write(f"READY {os.getpid()}\\n")
         sys.stderr.flush()
         act(path)
-    return csv(path, options)
+    return getattr(importlib.import_module(module), name)(path, options)
 
-opening._READERS["csv"] = bad
+opening._READERS["csv"] = ("__main__", "bad")
 '''
 LOOK = """
 import json
