@@ -20,7 +20,7 @@ from mcap.writer import CompressionType, Writer
 HOOK = '''
 """Readers that misbehave at logs named poison_KIND."""
 
-import collections, ctypes, importlib.util, itertools, os, sys, tempfile, time
+import collections, ctypes, importlib.util, itertools, os, sys, tempfile, time, types
 
 NAME = "aqualog.io.open_log"
 
@@ -46,18 +46,19 @@ ACTS = {
 }
 
 
-def mistreat(readers):
-    def wrapped(real):
+def mistreat(opening):
+    real, names = opening.import_module, dict(opening._READERS.values())
+
+    def import_module(module):
         def reads(path, options):
             kind = path.stem.partition("poison_")[2].partition(".")[0]
             if kind in ACTS:
                 ACTS[kind](path)
-            return real(path, options)
+            return getattr(real(module), names[module])(path, options)
 
-        return reads
+        return types.SimpleNamespace(**{names[module]: reads})
 
-    for name, real in list(readers.items()):
-        readers[name] = wrapped(real)
+    opening.import_module = import_module
 
 
 class Finder:
@@ -70,7 +71,7 @@ class Finder:
 
         def exec_module(module):
             real(module)
-            mistreat(module._READERS)
+            mistreat(module)
 
         spec.loader.exec_module = exec_module
         return spec
