@@ -75,9 +75,7 @@ def test_what_is_given_splits_the_ratio(fixed):
     assert found["rolling_resistance"] == pytest.approx(R_W, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "n", [1, 2, pytest.param(4, marks=pytest.mark.nightly), pytest.param(6, marks=pytest.mark.nightly)]
-)
+@pytest.mark.parametrize("n", [2, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 4, 6))])
 def test_intervals_cover_on_made_windows(n):
     """Wind, offset, height and residuals drawn as assumed: 92 to 98 %, give or take what the draws scatter (1 to 2 %)."""
     car = Vehicle(air_density=RHO)

@@ -39,8 +39,10 @@ def test_exact_without_noise(drivetrain, limit):
     assert found.r_e_ratio == pytest.approx(front / rear, rel=limit)
 
 
-@pytest.mark.parametrize("drivetrain", ["rwd", "fwd"])
-@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize(
+    ("count", "drivetrain"),
+    [(1, "rwd"), (4, "fwd"), *(pytest.param(*x, marks=pytest.mark.nightly) for x in ((1, "fwd"), (4, "rwd")))],
+)
 def test_spread_is_that_of_the_estimates(drivetrain, count):
     rng = np.random.default_rng(4)
     found, said = [], []

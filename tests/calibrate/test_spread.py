@@ -25,7 +25,10 @@ def test_chance_of_a_variance_ratio(ratio, dof, below):
     assert variance_ratio_chance(ratio, dof, below) == pytest.approx(expected, abs=3e-4)
 
 
-@pytest.mark.parametrize("times", [1.0, 2.0, 4.0, 25.0])
+@pytest.mark.parametrize(
+    "times",
+    [1.0, 4.0, *(pytest.param(x, marks=pytest.mark.nightly) for x in (2.0, 25.0))],
+)
 def test_combined_intervals_cover_whatever_the_drives_differ_by(times):
     """Four drives whose variance is so many times the assumed one."""
     rng = np.random.default_rng([int(times), 5])
