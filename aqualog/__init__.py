@@ -27,11 +27,10 @@ if TYPE_CHECKING:
     from aqualog.face.cache import cache
     from aqualog.face.calibrate import calibrate
     from aqualog.face.campaign import Campaign
-    from aqualog.face.convert import convert
     from aqualog.face.detect import detect
     from aqualog.face.diagnose import diagnose
     from aqualog.face.doctor import doctor
-    from aqualog.face.drive import Drive, read
+    from aqualog.face.drive import Drive, convert, read
     from aqualog.face.evaluate import evaluate
     from aqualog.face.inspect import inspect
     from aqualog.face.simulate import simulate
@@ -44,7 +43,7 @@ _FACE = {
     "read": "aqualog.face.drive",
     "detect": "aqualog.face.detect",
     "slip_slope": "aqualog.face.slip_slope",
-    "convert": "aqualog.face.convert",
+    "convert": "aqualog.face.drive",
     "Campaign": "aqualog.face.campaign",
     "align": "aqualog.face.align",
     "calibrate": "aqualog.face.calibrate",

@@ -13,7 +13,7 @@ from aqualog.cli.frame import Output, Run, command
 if TYPE_CHECKING:
     from aqualog.cli.console import Heard
     from aqualog.face.bins import BinnedResistance, BinnedSlopes
-    from aqualog.face.campaign import CampaignRuns
+    from aqualog.face.campaign_runs import CampaignRuns
 
 __all__ = ["bin_resistance", "bin_slipslope"]
 

@@ -37,7 +37,7 @@ def convert(
       aqualog convert drive.mcap -o drive.csv --decimal-comma --rate 50
     """
     from aqualog.core.errors import ExitCode
-    from aqualog.face.convert import check_target, convert
+    from aqualog.face.drive import check_target, convert
 
     check_target(out, decimal_comma=decimal_comma)
     drive = run.drive([out])

@@ -64,7 +64,7 @@ def diagnose(
       aqualog diagnose campaign.toml --page campaign.html
     """
     from aqualog.core.errors import ConfigError
-    from aqualog.face.campaign import is_campaign
+    from aqualog.face.campaign_store import is_campaign
 
     if surrogates is not None and not bootstrap:
         raise ConfigError("--surrogates beside --no-bootstrap", expected="one of them")

@@ -17,7 +17,8 @@ from aqualog.cli.options import SHARED
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
     from aqualog.cli.console import Console, Heard
-    from aqualog.face.campaign import Campaign, CampaignRuns
+    from aqualog.face.campaign import Campaign
+    from aqualog.face.campaign_runs import CampaignRuns
     from aqualog.face.drive import Drive
     from aqualog.face.result import Result
 

@@ -109,7 +109,7 @@ class Alignment(Result):
         """Return `alignment.json`, and `map.toml` if any source was aligned."""
         from aqualog.config.signal_map import map_text
 
-        files = {"alignment.json": text_file(lambda: self.to_json() + "\n")}
+        files = {"alignment.json": self._json_file()}
         return {**files, **({"map.toml": text_file(lambda: map_text(self.map))} if self.fits else {})}
 
     def write_map(self, path: PathLike, *, force: bool = False) -> Path:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of
 from aqualog.face.listener import Listener
-from aqualog.face.paths import refuse_existing, write_whole
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from aqualog.campaign.resistance import MeanRow, ResistanceTable
     from aqualog.campaign.slip_slope import SlopeTable
     from aqualog.campaign.spin_downs import SpinDownRow
-    from aqualog.face.campaign import CampaignRuns
+    from aqualog.face.campaign_runs import CampaignRuns
     from aqualog.report.campaign.findings import Curve
 
 __all__ = ["BinnedResistance", "BinnedSlopes", "binned_resistance", "binned_slopes", "check_table"]
@@ -81,15 +80,13 @@ class _Binned(Result):
         """
         target = file_of(path, "path")
         check_table(target)
-        refuse_existing([target], force=force, sources=self.sources)
-        write_whole(target, partial(_write, self.document["rows"], target.suffix.lower()))
-        return target
+        return self._write_to(target, partial(_write, self.document["rows"], target.suffix.lower()), force=force)
 
     def files(self) -> Writers:
         """Return the document and its rows as CSV and Parquet."""
         rows = self.document["rows"]
         return {
-            f"{self._NAME}.json": text_file(lambda: self.to_json() + "\n"),
+            f"{self._NAME}.json": self._json_file(),
             **{f"{self._NAME}{s}": partial(_write, rows, s) for s in _SUFFIXES},
         }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.result import Result, Writers, text_file
+from aqualog.face.result import Result, Writers
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -99,7 +99,7 @@ class KeptSignals(Result):
 
     def files(self) -> Writers:
         """Return `cache.json`."""
-        return {"cache.json": text_file(lambda: self.to_json() + "\n")}
+        return {"cache.json": self._json_file()}
 
 
 def cache(*, clean: bool = False) -> KeptSignals:

@@ -128,7 +128,7 @@ class Calibration(Result):
 
         title = f"{self.found.vehicle_name}, {len(self.drives)} drives"
         return {
-            "calibration.json": text_file(lambda: self.to_json() + "\n"),
+            "calibration.json": self._json_file(),
             "calibrated.toml": text_file(lambda: calibrated_toml(self.before, self.found)),
             "calibration.html": page_file(lambda: report_page(self._report(), title=title)),
         }

@@ -2,54 +2,31 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of, names_of, number_of, text_of, whole_number
-from aqualog.face.listener import Listener, Progress, listener
+from aqualog.face.campaign_runs import CampaignRuns
+from aqualog.face.campaign_store import bring_up_to_date, is_campaign, refuse_in_store, split
+from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import expand, list_files, refuse_existing
-from aqualog.face.progress import Progress as Counted
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike
 
 if TYPE_CHECKING:
-    import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.campaign.batch import BatchOutcome
     from aqualog.campaign.jobs import Configured
     from aqualog.campaign.place import Address
-    from aqualog.campaign.records import Shard
-    from aqualog.campaign.samples import CampaignData
-    from aqualog.face.bins import BinnedResistance, BinnedSlopes
     from aqualog.face.matrix import Matrix
     from aqualog.face.plan import BatchPlan
     from aqualog.face.propose import Proposal
     from aqualog.face.simulate import SimulatedCampaign
-    from aqualog.guard.pool import WorkOn
-    from aqualog.guard.worker import Limits
 
-__all__ = ["Campaign", "CampaignRuns", "is_campaign"]
-
-
-def is_campaign(inputs: Sequence[str]) -> bool:
-    """Return whether a campaign file is named, and nothing else.
-
-    Raises
-    ------
-    ConfigError
-        If one stands among other inputs.
-    """
-    named = [i for i in inputs if i.lower().endswith(".toml")]
-    if named and len(inputs) > 1:
-        raise ConfigError("stands among other inputs", where=named[0], expected="one campaign file, or logs only")
-    return bool(named)
+__all__ = ["Campaign"]
 
 
 class Campaign:
@@ -233,7 +210,7 @@ class Campaign:
         if self.configured.campaign.path.suffix.lower() == ".toml":
             places.append(self.configured.campaign.path.with_suffix(".store"))
         for target in targets:
-            _refuse_in_store(target, [p for p in places if isinstance(p, Path)])
+            refuse_in_store(target, [p for p in places if isinstance(p, Path)])
         refuse_existing(targets, force=force, sources=self.sources)
 
     def check_report(self, folder: Path, *, force: bool) -> None:
@@ -353,7 +330,7 @@ class Campaign:
             from aqualog.campaign.store import Store
 
             return CampaignRuns(self, CampaignData(configured, Store(self.store), ()), BatchOutcome(0, 0, {}), part)
-        data, outcome = _results(
+        data, outcome = bring_up_to_date(
             configured, self.store, listener(progress), jobs=jobs, force=force, shard=part, cluster=cluster,
             limits=Limits(limit_s, limit_mb),
         )  # fmt: skip
@@ -361,276 +338,3 @@ class Campaign:
 
     def __repr__(self) -> str:
         return f"campaign {self.name}: {len(self.configured.campaign.runs)} runs, keys {', '.join(self.keys) or 'none'}"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class CampaignRuns(Result):
-    """All runs of a campaign with their results.
-
-    `data` gives access to runs and samples, `outcome` counts what came of the logs, `seconds` is the time it took.
-    """
-
-    campaign: Campaign
-    data: CampaignData
-    outcome: BatchOutcome
-    shard: Shard | None = None
-    seconds: float = 0.0
-
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Where the results are, and what a shard leaves to do."""
-        notes = (f"results are in {self.data.store.name}, {self.seconds:.0f} s",)
-        if self.shard is None:
-            return notes
-        return (*notes, "the same without a shard makes the tables, when all parts are done")
-
-    @property
-    def sources(self) -> tuple[Path, ...]:  # type: ignore[override]
-        """All files that the campaign reads."""
-        return self.campaign.sources
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a log failed, was cut or lost samples."""
-        lost = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in self.data.done)
-        return bool(self.outcome.failed or lost)
-
-    @cached_property
-    def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog batch`."""
-        from aqualog import __version__
-
-        return {
-            "schema_version": 1,
-            "tool_version": __version__,
-            "campaign": self.data.name,
-            "store": self.data.store.name,
-            "runs": len(self.data.runs),
-            "made": self.outcome.made,
-            "kept": self.outcome.kept,
-            "failed": [{"log": name, "reason": reason} for name, reason in self.outcome.failed.items()],
-            "events": {d: n for d, (n, _) in self._counts().items()},
-        }
-
-    @property
-    def runs(self) -> pl.DataFrame:
-        """A row for each run, as `runs.parquet` of the store: state, configuration, range, events, quality."""
-        from aqualog.campaign.tables import runs_table
-
-        return runs_table(self.data.runs)
-
-    @property
-    def events(self) -> pl.DataFrame:
-        """A row for each event of each run, as `events.parquet` of the store."""
-        from aqualog.campaign.tables import events_table
-
-        return events_table(self.data.runs)
-
-    @property
-    def tables(self) -> Mapping[str, pl.DataFrame]:
-        """`runs` and `events`."""
-        return {"runs": self.runs, "events": self.events}
-
-    def text(self) -> str:
-        """Return how many logs are done, and the events of each detector."""
-        from aqualog.report.text import table
-
-        rows = [(d, str(n), f"{k} of {len(self.data.done)}") for d, (n, k) in self._counts().items()]
-        return f"{self._head()}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
-
-    def headline(self) -> str:
-        """Return how many logs are done and failed."""
-        failed = [f"  failed: {name}: {reason}" for name, reason in self.outcome.failed.items()]
-        return "\n".join([f"{self.data.name}: {self._head()}", *failed])
-
-    def _head(self) -> str:
-        o = self.outcome
-        return f"{o.done} logs done ({o.made} now, {o.kept} before), {len(o.failed)} failed"
-
-    def _counts(self) -> dict[str, tuple[int, int]]:
-        """Per detector: its events, and the runs that have one."""
-        of = {d: [sum(e["detector"] == d for e in r.events) for r in self.data.done] for d in _detectors()}
-        return {d: (sum(x), sum(n > 0 for n in x)) for d, x in of.items()}
-
-    def plot(self) -> go.Figure:
-        """Return the share of runs with an event, by detector."""
-        import plotly.graph_objects as go
-
-        from aqualog.report.wording import detector_name
-
-        counts, done = self._counts(), max(len(self.data.done), 1)
-        made = go.Figure(go.Bar(x=[detector_name(d) for d in counts], y=[k / done for _, k in counts.values()]))
-        made.update_layout(title=self.data.name, template="plotly_white")
-        made.update_yaxes(title="share of runs with an event", range=[0.0, 1.0], tickformat=".0%")
-        return made
-
-    def files(self) -> Writers:
-        """Return `campaign.json`, `runs.parquet` and `events.parquet`; the store itself stays where it is."""
-        return {
-            "campaign.json": text_file(lambda: self.to_json() + "\n"),
-            "runs.parquet": self.runs.write_parquet,
-            "events.parquet": self.events.write_parquet,
-        }
-
-    def slip_slope(
-        self,
-        by: str | Sequence[str] = (),
-        *,
-        bin_width: float = 10.0,
-        road: str = "wet",
-        robust: bool = False,
-        progress: Progress = None,
-    ) -> BinnedSlopes:
-        """Regress slip on traction in bins of speed for each configuration, and estimate the speed of full aquaplaning.
-
-        Parameters
-        ----------
-        by : str or several
-            Configuration keys, such as `tyre,pressure,water-depth`; default those that differ.
-        bin_width : float
-            Width of the speed bins. [km/h]
-        road : str
-            `wet`, `dry` or `both`.
-        robust : bool
-            Weigh outliers down (Huber [huber1981]).
-
-        Raises
-        ------
-        ConfigError
-        """
-        from aqualog.face.bins import binned_slopes
-
-        return binned_slopes(self, split(by), bin_width=bin_width, road=road, robust=robust, hear=listener(progress))
-
-    def resistance(
-        self,
-        by: str | Sequence[str] = (),
-        *,
-        bin_width: float = 10.0,
-        road: str = "wet",
-        robust: bool = False,
-        as_measured: bool = False,
-        progress: Progress = None,
-    ) -> BinnedResistance:
-        """Average the resistance measure in bins of speed for each configuration.
-
-        Parameters
-        ----------
-        by, bin_width, road, robust
-            As of `slip_slope`.
-        as_measured : bool
-            Keep each run's own level on dry road, instead of taking it off.
-
-        Raises
-        ------
-        ConfigError
-        """
-        from aqualog.face.bins import binned_resistance
-
-        return binned_resistance(
-            self, split(by), bin_width=bin_width, road=road, robust=robust, relative=not as_measured,
-            hear=listener(progress),
-        )  # fmt: skip
-
-    def report(
-        self,
-        folder: PathLike,
-        *,
-        by: str | Sequence[str] = (),
-        bin_width: float = 10.0,
-        robust: bool = False,
-        force: bool = False,
-        progress: Progress = None,
-    ) -> Path:
-        """Write the campaign's page with a page for each run, and return the page.
-
-        An earlier report in the folder is replaced; `force` writes beside other files.
-
-        Raises
-        ------
-        ConfigError
-        """
-        from aqualog.report.campaign.findings import find
-        from aqualog.report.campaign.folder import write_report
-
-        out, hear = file_of(folder, "folder"), listener(progress)
-        self.campaign.check_report(out, force=force)
-        chosen = self.campaign.check_bins(by, bin_width=bin_width)
-        findings = find(self.data, chosen, robust=robust, report=hear)
-        write_report(self.data, findings, out, report=Counted(hear, "pages of runs"))
-        return out / "index.html"
-
-
-def _detectors() -> Sequence[str]:
-    from aqualog.detect.registry import DETECTORS
-
-    return DETECTORS
-
-
-def split(by: str | Sequence[str]) -> list[str]:
-    """Return keys that stand in one text, with commas, or in several."""
-    names = by.split(",") if isinstance(by, str) else names_of(by, "by")
-    return [n.strip() for n in names if n.strip()]
-
-
-def _results(
-    configured: Configured,
-    address: Address,
-    hear: Listener,
-    *,
-    jobs: int | None,
-    force: bool,
-    shard: Shard | None,
-    cluster: str | None,
-    limits: Limits,
-) -> tuple[CampaignData, BatchOutcome]:
-    """Bring the store up to date and load it; with `shard` the campaign is that shard's already."""
-    from aqualog.core.user_folders import has_kept_code
-    from aqualog.guard.pool import most_processes
-
-    if jobs is not None and jobs > most_processes():
-        hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")
-    hear("looking at the logs")
-    from aqualog.campaign.batch import run_batch
-    from aqualog.campaign.samples import load_results
-    from aqualog.campaign.store import Store
-
-    if cluster is None and not has_kept_code():
-        hear.note("the first logs wait while the detectors are compiled, once after an installation")
-    place = Store(address, shard.name if shard is not None else "")
-    _check_apart(configured, place)
-    with _elsewhere(cluster, limits, hear) as elsewhere:
-        outcome = run_batch(
-            configured, place, jobs=jobs or os.cpu_count() or 1, force=force, limits=limits,
-            elsewhere=elsewhere, report=Counted(hear, "logs"), told=hear.failed,
-        )  # fmt: skip
-    hear.settled(place.at("manifest.json"))
-    hear("loading the results")
-    return load_results(configured, place), outcome
-
-
-@contextmanager
-def _elsewhere(address: str | None, limits: Limits, hear: Callable[[str], None]) -> Iterator[WorkOn | None]:
-    if address is None:
-        yield None
-        return
-    from aqualog.campaign.cluster import on_cluster
-
-    with on_cluster(address, limits=limits, tell=lambda text: hear(f"{address}: {text}")) as work_on:
-        yield work_on
-
-
-def _check_apart(configured: Configured, place: Any) -> None:
-    from aqualog.config.configured import files_of
-
-    if any(place.holds(p) for p in files_of(configured)):
-        raise ConfigError("holds a source of this campaign", where=place.name, expected="a folder of its own")
-
-
-def _refuse_in_store(target: Path, places: Sequence[Path]) -> None:
-    from aqualog.campaign.store import Store
-
-    above = [p for p in Path(os.path.realpath(target)).parents if Store(p).exists]
-    inside = next((p for p in [*above, *places] if Store(p).holds(target)), None)
-    if inside is not None:
-        raise ConfigError("lies in a store of results", where=str(target), expected=f"a place outside {inside}")

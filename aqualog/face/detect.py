@@ -15,8 +15,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.paths import refuse_existing, write_whole
-from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
+from aqualog.face.result import PathLike, Result, Writers, page_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -164,7 +163,7 @@ class Detection(Result):
         from aqualog.report.drive.page import drive_page
 
         files = {
-            "events.json": text_file(lambda: self.to_json() + "\n"),
+            "events.json": self._json_file(),
             "signals.parquet": lambda path: self._write(path, ".parquet"),
             "report.html": page_file(lambda: drive_page(self.drive_result, title=self.drive.title)),
         }
@@ -182,12 +181,9 @@ class Detection(Result):
         """
         from aqualog.io.write_log import check_suffix
 
-        target = file_of(path, "path")
-        suffix = check_suffix(target)
-        refuse_existing([target], force=force, sources=self.sources)
+        suffix = check_suffix(file_of(path, "path"))
         self._check_samples()
-        write_whole(target, lambda p: self._write(p, suffix))
-        return target
+        return self._write_to(path, lambda p: self._write(p, suffix), force=force)
 
     def _write(self, path: Path, suffix: str) -> None:
         import numpy as np

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, whole_number
-from aqualog.face.campaign import Campaign, CampaignRuns, is_campaign
+from aqualog.face.campaign import Campaign
+from aqualog.face.campaign_runs import CampaignRuns
+from aqualog.face.campaign_store import is_campaign
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive, vehicle_needed
 from aqualog.face.drives import DrivesLike, Grouped, Loaded, drives_of, load_drives, with_own_names
@@ -161,7 +163,7 @@ class Diagnosis(Result):
         drives = self.found.drives
         title = ", ".join([self.vehicle_name, *drives[:3]]) + (" …" if len(drives) > 3 else "")
         return {
-            "diagnosis.json": text_file(lambda: self.to_json() + "\n"),
+            "diagnosis.json": self._json_file(),
             "model.toml": text_file(lambda: _model_text(self.found, self.vehicle_name)),
             "diagnosis.html": page_file(
                 lambda: report_page(diagnosis_report(self.document, self.found.views), title=title)

@@ -89,7 +89,7 @@ class Health(Result):
 
     def files(self) -> Writers:
         """Return `doctor.json` and `doctor.txt`."""
-        return {"doctor.json": text_file(lambda: self.to_json() + "\n"), "doctor.txt": text_file(self.text)}
+        return {"doctor.json": self._json_file(), "doctor.txt": text_file(self.text)}
 
 
 def exit_code(found: Examination) -> ExitCode:

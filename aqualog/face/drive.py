@@ -1,4 +1,4 @@
-"""`aq.read`: the files of one drive, and the signals in them."""
+"""`aq.read` and `aq.convert`: the files of one drive, the signals in them, and these as one log."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.align.mapping import SignalMap
+from aqualog.align.mapping import SignalMap, values_read
 from aqualog.core.errors import AqualogError, ConfigError, LogError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, names_of, number_of
 from aqualog.face.cache import cache_of_user
-from aqualog.face.paths import expand, list_files
+from aqualog.face.listener import Progress, listener
+from aqualog.face.paths import expand, list_files, refuse_existing, write_whole
 from aqualog.face.result import PathLike, printable
 from aqualog.io.content import Seen, changed_files, state_of
 
@@ -26,7 +27,17 @@ if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
     from aqualog.align.load import LoadedLong
 
-__all__ = ["Drive", "DriveLike", "drive_of", "read", "sources_of", "vehicle_needed", "vehicle_of"]
+__all__ = [
+    "Drive",
+    "DriveLike",
+    "check_target",
+    "convert",
+    "drive_of",
+    "read",
+    "sources_of",
+    "vehicle_needed",
+    "vehicle_of",
+]
 
 Logs = PathLike | Iterable[PathLike]
 
@@ -81,7 +92,7 @@ class Drive:
         """
         if self.given is not None:
             return self.given
-        key = _reading(vehicle)
+        key = values_read(vehicle)
         if key not in self._loaded:
             from aqualog.align.load import load_signals
 
@@ -107,7 +118,7 @@ class Drive:
         ------
         LogError, SignalError, ConfigError
         """
-        key = _reading(vehicle)
+        key = values_read(vehicle)
         if self.given is not None or key in self._loaded:
             return self.load(vehicle)
         from aqualog.align.load import load_drive
@@ -160,8 +171,6 @@ class Drive:
         ConfigError
             If the suffix is not known, or the file exists and `force` is not given.
         """
-        from aqualog.face.convert import convert
-
         return convert(self, path, decimal_comma=decimal_comma, force=force)
 
     def __repr__(self) -> str:
@@ -242,6 +251,75 @@ def read(
     )
 
 
+def check_target(path: Path, *, decimal_comma: bool) -> str:
+    """Return the suffix of a log to be written.
+
+    Raises
+    ------
+    ConfigError
+        If no log has that suffix, or if decimal commas are asked of another format than CSV.
+    """
+    from aqualog.io.write_log import check_suffix
+
+    suffix = check_suffix(path)
+    if decimal_comma and suffix != ".csv":
+        raise ConfigError(f"decimal comma does not apply to {suffix}", where=str(path), expected="a .csv")
+    return suffix
+
+
+def convert(
+    drive: DriveLike,
+    path: PathLike,
+    vehicle: PathLike | Vehicle | None = None,
+    *,
+    decimal_comma: bool = False,
+    force: bool = False,
+    progress: Progress = None,
+) -> Path:
+    """Write the aligned signals of one drive as one log, in SI units and with canonical names.
+
+    Parameters
+    ----------
+    drive : Drive, Signals, str, Path or several
+        From `aq.read`, or files of ONE drive that need no signal map.
+    path : str or Path
+        .mf4, .mcap, .csv or .parquet.
+    vehicle : Vehicle, str or Path, optional
+        For wheel speeds in km/h, steering wheel angles and torques.
+    decimal_comma : bool
+        Semicolons and decimal commas in a CSV file.
+    force : bool
+        Overwrite a file that exists; a source never.
+
+    Raises
+    ------
+    LogError, SignalError, ConfigError
+
+    Examples
+    --------
+    >>> aq.convert(aq.read("drive.mf4", map="map.toml"), "drive.parquet")
+    """
+    target, hear, one = file_of(path, "path"), listener(progress), drive_of(drive)
+    suffix = check_target(target, decimal_comma=decimal_comma)
+    refuse_existing([target], force=force, sources=one.sources)
+    with one.reading():
+        signals = one.load(vehicle_of(vehicle, one), report=hear)
+        hear("writing")
+        import numpy as np
+
+        from aqualog.io.write_log import write_log
+        from aqualog.report.drive.document import signal_groups
+
+        t_ns = np.arange(signals.frame.height, dtype=np.int64) * signals.dt_ns
+        write_whole(
+            target,
+            lambda p: write_log(
+                p, t_ns, signal_groups(signals), suffix=suffix, start_ns=signals.start_ns, decimal_comma=decimal_comma
+            ),
+        )
+    return target
+
+
 def drive_of(drive: DriveLike) -> Drive:
     """Return the drive behind an argument: a drive, signals in memory, or files that need no map."""
     if isinstance(drive, Drive):
@@ -282,11 +360,6 @@ def _map_of(given: PathLike | SignalMap | None) -> SignalMap:
     from aqualog.config.signal_map import load_signal_map
 
     return load_signal_map(file_of(given, "map", "SignalMap"))
-
-
-def _reading(vehicle: Vehicle) -> tuple[float, ...]:
-    """What reading takes from a vehicle."""
-    return (vehicle.r_e_f, vehicle.r_e_r, vehicle.steering_ratio, vehicle.torque_gain)
 
 
 def _lines(drive: Drive) -> list[str]:

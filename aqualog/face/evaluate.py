@@ -8,10 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of, names_of
-from aqualog.face.campaign import Campaign, is_campaign, split
+from aqualog.face.campaign import Campaign
+from aqualog.face.campaign_store import is_campaign, split
 from aqualog.face.listener import Progress, listener
-from aqualog.face.paths import refuse_existing, write_text, write_whole
 from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ class Comparison(Result):
     def files(self) -> Writers:
         """Return `evaluation.json` and `evaluation.html`; `thresholds.toml` where thresholds were tuned."""
         files = {
-            "evaluation.json": text_file(lambda: self.to_json() + "\n"),
+            "evaluation.json": self._json_file(),
             "evaluation.html": page_file(self._page),
             "thresholds.toml": text_file(self._thresholds),
         }
@@ -115,9 +116,7 @@ class Comparison(Result):
         ------
         ConfigError
         """
-        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
-        write_whole(Path(path), page_file(self._page))
-        return Path(path)
+        return self._write_to(path, page_file(self._page), force=force)
 
     def write_thresholds(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the tuned thresholds, which `aq.detect` takes.
@@ -126,9 +125,7 @@ class Comparison(Result):
         ------
         ConfigError
         """
-        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
-        write_text(Path(path), self._thresholds())
-        return Path(path)
+        return self._write_to(path, text_file(self._thresholds), force=force)
 
     def _page(self) -> str:
         from aqualog.report.page import report_page
@@ -245,8 +242,14 @@ def inputs_of(
         None if p is None else file_of(p, n) for n, p in (("vehicle", vehicle), ("map", map), ("labels", labels))
     )
     databases = [file_of(p, "dbc") for p in names_of(dbc, "dbc")]
-    if is_campaign(names):
-        return campaign_inputs(Path(names[0]), car, map_file, databases, truth)
+    if isinstance(inputs, Campaign) or is_campaign(names):
+        beside: dict[str, object] = {"vehicle": car, "labels": truth}
+        beside |= {"map": map_file, "dbc": databases or None} if isinstance(inputs, Campaign) else {}
+        given = next((n for n, value in beside.items() if value is not None), None)
+        if given is not None:
+            raise ConfigError(f"{given} beside a campaign", where=names[0], expected="it in the campaign's runs")
+        found = inputs if isinstance(inputs, Campaign) else Campaign(names, map=map_file, dbc=databases)
+        return campaign_inputs(found.configured)
     return log_inputs(names, car, map_file, databases, truth)
 
 

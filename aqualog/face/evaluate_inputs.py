@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
+from aqualog.campaign.jobs import Configured
 from aqualog.campaign.records import Run, with_load
-from aqualog.config.campaign import load_campaign
+from aqualog.config.configured import files_of
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
-from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.drives import LogSource
 from aqualog.evaluate.labels import Label
 from aqualog.face.paths import expand, list_files
@@ -31,31 +31,14 @@ class Inputs:
     files: tuple[Path, ...]
 
 
-def campaign_inputs(
-    path: Path, vehicle: Path | None, map_file: Path | None, dbc: Sequence[Path], labels: Path | None
-) -> Inputs:
-    """Drives of a campaign; runs on the same log are one drive with several lanes.
-
-    Raises
-    ------
-    ConfigError
-        Also for options that the campaign itself answers.
-    """
-    for option, value in (("vehicle", vehicle), ("labels", labels)):
-        if value is not None:
-            raise ConfigError(f"{option} beside a campaign", where=str(path), expected="it in the campaign's runs")
-    campaign = load_campaign(path)
+def campaign_inputs(configured: Configured) -> Inputs:
+    """Drives of a campaign; runs on the same log are one drive with several lanes."""
+    campaign = configured.campaign
     of_log: dict[tuple[Path, ...], list[Run]] = {}
     for run in campaign.runs:
         of_log.setdefault(run.logs, []).append(run)
-    map_path = map_file or campaign.signals
-    signal_map = load_signal_map(map_path) if map_path else SignalMap()
-    vehicles = {p: load_vehicle(p) for p in dict.fromkeys(r.vehicle for r in campaign.runs)}
-    sources = tuple(_source(logs, runs, path.parent, vehicles, signal_map, dbc) for logs, runs in of_log.items())
-    tables = (p for p in (campaign.table, map_path) if p)
-    labelled = (p for r in campaign.runs if (p := r.labels))
-    files = (path, *tables, *dbc, *(p for logs in of_log for p in logs), *vehicles, *labelled)
-    return Inputs(campaign.name, sources, campaign.keys, files)
+    sources = tuple(_source(logs, runs, configured) for logs, runs in of_log.items())
+    return Inputs(campaign.name, sources, campaign.keys, files_of(configured))
 
 
 def log_inputs(
@@ -83,22 +66,15 @@ def log_inputs(
     return Inputs(name, sources, ("vehicle",), (*paths, *list_files(inputs), *dbc, *named))
 
 
-def _source(
-    logs: tuple[Path, ...],
-    runs: Sequence[Run],
-    base: Path,
-    vehicles: dict[Path, Vehicle],
-    signal_map: SignalMap,
-    dbc: Sequence[Path],
-) -> LogSource:
-    first = runs[0]
-    named = [load_labels(r.labels) for r in runs if r.labels is not None]
+def _source(logs: tuple[Path, ...], runs: Sequence[Run], configured: Configured) -> LogSource:
+    first, base = runs[0], configured.campaign.path.parent
+    named = [configured.labels[r.labels] for r in runs if r.labels is not None]
     return LogSource(
         name="; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs),
         paths=logs,
-        vehicle=with_load(vehicles[first.vehicle], first),
-        signal_map=signal_map,
-        dbc=tuple(dbc),
+        vehicle=with_load(configured.vehicles[first.vehicle], first),
+        signal_map=configured.signal_map,
+        dbc=configured.dbc,
         labels=tuple(dict.fromkeys(x for labels in named for x in labels)) if named else None,
         lanes=tuple(sorted({r.lane for r in runs if r.lane is not None})),
         groups=first.groups,

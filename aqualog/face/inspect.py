@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ExitCode
-from aqualog.face.arguments import file_of
 from aqualog.face.drive import DriveLike, drive_of
 from aqualog.face.listener import Progress, listener
-from aqualog.face.paths import refuse_existing, write_text
 from aqualog.face.result import PathLike, Result, Writers, text_file
 
 if TYPE_CHECKING:
@@ -97,20 +95,7 @@ class Contents(Result):
             lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {len(own)} channels, {clock}")
             if own:
                 rows = [_row(o, by_channel) for o in own]
-                header = (
-                    "channel",
-                    "unit",
-                    "samples",
-                    "Hz",
-                    "from s",
-                    "to s",
-                    "min",
-                    "max",
-                    "gaps",
-                    "faults",
-                    "signal?",
-                )
-                lines += [table(header, rows), ""]
+                lines += [table(_HEADER, rows), ""]
         lines += self._proposed()
         if self.notes:
             lines += ["", "notes:", *(f"  {cut(n, NOTE)}" for n in self.notes)]
@@ -149,7 +134,7 @@ class Contents(Result):
 
     def files(self) -> Writers:
         """Return `inspect.json` and the proposed `map.toml`."""
-        return {"inspect.json": text_file(lambda: self.to_json() + "\n"), "map.toml": text_file(self._map_text)}
+        return {"inspect.json": self._json_file(), "map.toml": text_file(self._map_text)}
 
     def write_map(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the proposed signal map: read it before you use it.
@@ -159,9 +144,7 @@ class Contents(Result):
         ConfigError
             If the file exists and `force` is not given.
         """
-        refuse_existing([file_of(path, "path")], force=force, sources=self.sources)
-        write_text(Path(path), self._map_text())
-        return Path(path)
+        return self._write_as("map.toml", path, force=force)
 
     def _map_text(self) -> str:
         from aqualog.config.signal_map import map_text

@@ -77,7 +77,7 @@ class Matrix(Result):
 
     def files(self) -> Writers:
         """Return `matrix.json` and `matrix.txt`."""
-        return {"matrix.json": text_file(lambda: self.to_json() + "\n"), "matrix.txt": text_file(self.text)}
+        return {"matrix.json": self._json_file(), "matrix.txt": text_file(self.text)}
 
 
 def matrix(path: PathLike) -> Matrix:

@@ -106,7 +106,7 @@ class BatchPlan(Result):
 
     def files(self) -> Writers:
         """Return `plan.json` and `plan.txt`."""
-        return {"plan.json": text_file(lambda: self.to_json() + "\n"), "plan.txt": text_file(self.text)}
+        return {"plan.json": self._json_file(), "plan.txt": text_file(self.text)}
 
 
 def plan(

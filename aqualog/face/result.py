@@ -96,10 +96,17 @@ class Result(ABC):
 
     def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
         """Write the file that `save` calls `name` to a path of the user's choice."""
+        return self._write_to(path, self.files()[name], force=force)
+
+    def _write_to(self, path: PathLike, write: Callable[[Path], None], *, force: bool) -> Path:
+        """Write a file of this result whole or not at all, neither over a source nor, without force, another file."""
         target = file_of(path, "path")
         refuse_existing([target], force=force, sources=self.sources)
-        write_whole(target, self.files()[name])
+        write_whole(target, write)
         return target
+
+    def _json_file(self) -> Callable[[Path], None]:
+        return text_file(lambda: self.to_json() + "\n")
 
     def __repr__(self) -> str:
         lines = self.headline().rstrip("\n").split("\n")

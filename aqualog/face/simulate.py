@@ -17,9 +17,8 @@ from aqualog.face.campaign import Campaign
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.progress import Progress as Counted
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -144,7 +143,7 @@ class Simulation(Result):
         """Return `simulation.json`, and the drive as an MDF log under the scenario's name."""
         return {
             f"{self.name}.mf4": lambda path: self._write(path, ".mf4"),
-            "simulation.json": text_file(lambda: self.to_json() + "\n"),
+            "simulation.json": self._json_file(),
         }
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
@@ -172,11 +171,8 @@ class Simulation(Result):
         """
         from aqualog.io.write_log import check_suffix
 
-        target = file_of(path, "path")
-        suffix = check_suffix(target)
-        refuse_existing([target], force=force, sources=self.sources)
-        write_whole(target, lambda p: self._write(p, suffix))
-        return target
+        suffix = check_suffix(file_of(path, "path"))
+        return self._write_to(path, lambda p: self._write(p, suffix), force=force)
 
     def _write(self, path: Path, suffix: str) -> None:
         from aqualog.model.log import write_simulation

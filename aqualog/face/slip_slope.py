@@ -125,7 +125,7 @@ class SlipSlope(Result):
         from aqualog.report.slope import slope_csv
 
         return {
-            "slip_slope.json": text_file(lambda: self.to_json() + "\n"),
+            "slip_slope.json": self._json_file(),
             "slip_slope.csv": text_file(lambda: slope_csv(self.slopes)),
             "slip_slope.html": page_file(lambda: report_page(self._report(), title=self.drive.title)),
         }

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.core.units import displayed_text, displayed_unit
 from aqualog.face.arguments import file_of
-from aqualog.face.campaign import Campaign, CampaignRuns
+from aqualog.face.campaign import Campaign
+from aqualog.face.campaign_runs import CampaignRuns
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.paths import refuse_existing, write_whole
 from aqualog.face.progress import Progress as Counted
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["FORMATS", "FUNCTIONS", "Figures", "Reproduction", "figure", "figures", "reproduce"]
 
 FORMATS = ("html", "csv", "png", "svg")
-FUNCTIONS = ("figure", "figures", "reproduce")
+FUNCTIONS = tuple(n for n in __all__ if n.islower())
 
 _ALL_ON_ONE = "figures.html"
 _WHOLE = 10_000  # characters: no sentence of a finding is longer
@@ -147,9 +148,14 @@ class Figures(Result):
         AqualogError
             For pictures without the extra `images`, or without Chromium.
         """
+        from aqualog.thesis.image import image_names
+
         out = file_of(folder, "folder")
+        suffixes = [s for s in ("png", "svg") if s in self.formats]
+        names = [*self.files(), *(n for f in self.made for s in suffixes for n in image_names(f, s))]
+        refuse_existing([out / n for n in names], force=force, sources=self.sources)
         with _pictures(self.formats) as pictures:
-            drawn = [p for f in self.made for p in _drawn(f, out, self.formats, pictures, force=force)]
+            drawn = [p for f in self.made for p in _drawn(f, out, self.formats, pictures)]
         return (*super().save(folder, force=force), *drawn)
 
 
@@ -307,7 +313,7 @@ def _make_all(
                 for name, write in Figures((found,), {}, formats).files().items():
                     write_whole(out / name, write)
                     written.append(out / name)
-                written += _drawn(found, out, formats, pictures, force=True)
+                written += _drawn(found, out, formats, pictures)
             hear.detail(f"figure {number}: {len(found.checks)} findings in {time.monotonic() - began:.1f} s")
     return tuple(made), not_made, written
 
@@ -326,7 +332,7 @@ def _pictures(formats: Sequence[str]) -> Iterator[Pictures | None]:
         yield pictures
 
 
-def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures | None, *, force: bool) -> list[Path]:
+def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures | None) -> list[Path]:
     """Write the pictures of a figure."""
     from aqualog.thesis.image import image_names
 
@@ -335,7 +341,6 @@ def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures 
         if pictures is None or suffix not in formats:
             continue
         names = image_names(found, suffix)
-        refuse_existing([out / n for n in names], force=force)
         for name, picture in zip(names, pictures.draw(found, suffix), strict=True):
             write_whole(out / name, partial(_put, picture))
             written.append(out / name)
@@ -434,7 +439,7 @@ class Reproduction(Result):
         return {
             **{f"{_TABLES}/{f.stem}.csv": text_file(partial(figure_csv, f)) for f in self.made.figures},
             _CLAIMS: text_file(partial(claims_csv, self.conclusions)),
-            _JSON: text_file(lambda: self.to_json() + "\n"),
+            _JSON: self._json_file(),
             _PAGE: text_file(page),
         }
 
