@@ -134,19 +134,9 @@ def diagnose(
     if outcome.verdict == "cannot_tell":
         tell("searching for a run that distinguishes the causes", 0.95)
         next_run = next_manoeuvre(evidence, one_per_name(found.candidates), found.noises, model)
-    reason = (
-        f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of the logged quantities does"
-    )
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=verdict_sentence(
-            outcome.verdict,
-            outcome.causes,
-            level=options.level,
-            reason=reason,
-            certain=outcome.certain,
-            seen=found.tests[0].p_value if found.tests[0].p_value <= options.level else None,
-        ),
+        sentence=_sentence(outcome, remainders, found, options),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=used,
@@ -165,6 +155,17 @@ def diagnose(
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
     )
+
+
+def _sentence(outcome: Outcome, remainders: tuple[Remainder, ...], found: Found, options: Options) -> str:
+    reason = (
+        f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of the logged quantities does"
+    )
+    p = found.tests[0].p_value
+    return verdict_sentence(
+        outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
+        seen=p if p <= options.level else None,
+    )  # fmt: skip
 
 
 def _gained(

@@ -3,7 +3,7 @@
 import pytest
 from test_drive import CAR, plain
 
-from aqualog.book.reference import effects_page
+from aqualog.book.reference.model import effects_page
 from aqualog.diagnose import day_to_day
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses
@@ -43,5 +43,5 @@ def test_a_new_row_is_named_in_words_and_report():
 
 
 def test_a_new_row_is_in_the_reference_and_can_stand_in_a_model():
-    assert "open_window" in effects_page.text()
+    assert "open_window" in effects_page()
     assert Model((Term(EFFECTS["open_window"], {"area": 0.05}),)).terms[0].effect is OPEN_WINDOW

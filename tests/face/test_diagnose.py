@@ -10,7 +10,7 @@ from report.diagnosis_case import cases, views_of
 
 import aqualog as aq
 from aqualog.core.vehicle import vehicle_toml
-from aqualog.diagnose import level
+from aqualog.diagnose import campaign as campaign_diagnosis
 from aqualog.diagnose import run as engine
 
 FILES = ("diagnosis.json", "model.toml", "diagnosis.html")
@@ -111,7 +111,7 @@ def test_a_campaign(folder, monkeypatch):
         calls.append((campaign.name, len(data.runs), seed, level, drawn))
         return replace(cases()["named"], drives=("c",))
 
-    monkeypatch.setattr(level, "diagnose_campaign", fake)
+    monkeypatch.setattr(campaign_diagnosis, "diagnose_campaign", fake)
     path = folder / "campaign.toml"
     shown = command("diagnose", path, "--seed", 3, "--json")[0]
     results = [aq.diagnose(given, seed=3) for given in (path, str(path), aq.Campaign(path), aq.Campaign(path).run())]
