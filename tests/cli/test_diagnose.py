@@ -193,7 +193,6 @@ def test_nothing_is_fitted_and_held_out(run, folder):
     ("args", "said"),
     [
         (["--surrogates", "9", "--no-bootstrap"], "--surrogates beside --no-bootstrap"),
-        (["-o", " "], "-o is empty"),
         (["-o", "a.parquet"], "is a source of this very run"),
         (["--page", "b.parquet", "--holdout", "b.parquet", "--force"], "is a source of this very run"),
         (["-o", "car.toml", "--force"], "is a source of this very run"),

@@ -166,7 +166,7 @@ def test_short_logs_are_one_line(folder, n):
 
 @pytest.mark.parametrize(
     ("out", "text"),
-    [("drive.csv", "is a file"), ("drive.csv/below/it", "below a file"), ("", "is empty"), (" ", "is empty")],
+    [("drive.csv", "is no folder"), ("drive.csv/below/it", "is no folder"), ("", "is empty"), (" ", "is empty")],
 )
 def test_folder_for_results_is_checked_first(folder, out, text):
     target = folder / out if out.strip() else out
