@@ -23,4 +23,4 @@ def real_logs() -> Path:
     return REAL_LOGS
 
 
-from headless import browser  # noqa: E402, F401 - a fixture, from a module on the path set above
+from tests.headless import browser  # noqa: E402, F401 - a fixture, from a module on the path set above

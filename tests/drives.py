@@ -1,10 +1,10 @@
 """Simulated drives as signals, for tests of features and detectors."""
 
 import polars as pl
-from small_model import Drive, Lane, simulate
 
 from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
+from tests.small_model import Drive, Lane, simulate
 
 CAR = Vehicle(name="test car", given=frozenset({"mass"}))
 FWD = Vehicle(name="fwd car", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from conftest import ROOT
 from typer.testing import CliRunner
 
 import aqualog
@@ -25,6 +24,7 @@ from aqualog.cli.main import app
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.records import Origin, Quality, Signals, TimeFaults
+from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")

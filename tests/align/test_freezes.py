@@ -203,7 +203,7 @@ def stop_and_go(name, is_standing):
 @pytest.mark.parametrize("is_standing", [True, False])
 @pytest.mark.parametrize("name", ["v_x", "omega_fl"])
 def test_a_torque_that_stays_while_the_car_stands(name, is_standing):
-    from test_windows import channel, same
+    from tests.align.test_windows import channel, same
 
     units = {"torque_r": "N*m", "v_x": "m/s"}
     channels = [channel(n, t * 1e-9, x, units.get(n, "rad/s")) for n, (t, x) in stop_and_go(name, is_standing).items()]
@@ -214,7 +214,7 @@ def test_a_torque_that_stays_while_the_car_stands(name, is_standing):
 @pytest.mark.parametrize("is_parked", [True, False])
 def test_a_speed_that_is_always_zero_is_no_car_that_stands(is_parked):
     """Unless no speed moves at all."""
-    from test_windows import channel, same
+    from tests.align.test_windows import channel, same
 
     signals = stop_and_go("v_x", False)
     for dead in ("v_x", "omega_rr") if is_parked else ("v_x",):

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from bench.compare import Row, line, measured
+from tests.bench.compare import Row, line, measured
 
 
 def test_results_that_differ_are_no_benchmark():

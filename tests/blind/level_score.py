@@ -6,11 +6,10 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from blind.level_world import CAR, CAR_AWD, Hidden, world
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from aqualog.diagnose.campaign import diagnose_campaign
+from tests.blind.level_world import CAR, CAR_AWD, Hidden, world
 
 BOTH = ("f", "r")
 CASES = {

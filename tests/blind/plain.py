@@ -10,12 +10,12 @@ from collections.abc import Mapping
 
 import numpy as np
 import polars as pl
-from blind.world.noise import coloured
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
+from tests.blind.world.noise import coloured
 
 __all__ = ["CAR", "EFFECTS", "drive"]
 

@@ -15,15 +15,15 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 # the folder of the tests, as in the tests themselves: compiled code of the world is kept under the name of its module
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from blind.metrics import naming, worth
-from blind.metrics.measure import Measure
-from blind.metrics.plan import PARTS, Sizes, plan
-from blind.metrics.rows import Row
-from blind.metrics.run import run
-from blind.metrics.store import Store
-from blind.metrics.table import curve_text, measures_text, rivals_text
+from tests.blind.metrics import naming, worth
+from tests.blind.metrics.measure import Measure
+from tests.blind.metrics.plan import PARTS, Sizes, plan
+from tests.blind.metrics.rows import Row
+from tests.blind.metrics.run import run
+from tests.blind.metrics.store import Store
+from tests.blind.metrics.table import curve_text, measures_text, rivals_text
 
 NEEDS: dict[int, tuple[str, ...]] = {
     1: ("null",), 2: ("named",), 3: ("named", "third"), 4: ("weak", "limit"), 5: ("named", "third"), 6: ("pairs",),
@@ -57,10 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sizes = _thinned(Sizes(), given.thin)
     jobs = plan(parts, sizes, given.seeds_from)
     if given.small:
-        from blind.metrics.small import small_jobs
+        from tests.blind.metrics.small import small_jobs
 
         jobs = small_jobs(given.seeds_from)
-    from blind.metrics.case import work
+    from tests.blind.metrics.case import work
 
     rows = run(jobs, Store(given.work), work, processes=given.jobs)
     figures = measured(rows, metrics)

@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from blind.metrics import naming, worth
-from blind.metrics.intervals import bootstrap, clopper_pearson
-from blind.metrics.plan import PARTS, Job, Sizes, plan
-from blind.metrics.rows import Fact, Row, Said, Second, row_from, row_text
-from blind.metrics.run import run
-from blind.metrics.store import Store
-from blind.metrics.table import measures_text, rivals_text
-from blind.world.cases import EXACT_PROGRAMMES, Spec
-from blind.world.noise import NOISES
+
+from tests.blind.metrics import naming, worth
+from tests.blind.metrics.intervals import bootstrap, clopper_pearson
+from tests.blind.metrics.plan import PARTS, Job, Sizes, plan
+from tests.blind.metrics.rows import Fact, Row, Said, Second, row_from, row_text
+from tests.blind.metrics.run import run
+from tests.blind.metrics.store import Store
+from tests.blind.metrics.table import measures_text, rivals_text
+from tests.blind.world.cases import EXACT_PROGRAMMES, Spec
+from tests.blind.world.noise import NOISES
 
 MASS = Fact("payload_mass", None, {"delta_mass": 160.0}, z=20.0, p_right=0.999)
 DRAG = Fact("aero_drag", None, {"delta_drag_area": 0.1}, z=12.0, p_right=0.99)

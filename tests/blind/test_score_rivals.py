@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from blind.rivals.columns import Residuals, named_columns, scales, stacked
-from blind.rivals.compare import heldout_share, measured
-from blind.rivals.select import SELECTORS
-from blind.rivals.sindy import polynomials, single
-from blind.world.vehicles import CARS
+
+from tests.blind.rivals.columns import Residuals, named_columns, scales, stacked
+from tests.blind.rivals.compare import heldout_share, measured
+from tests.blind.rivals.select import SELECTORS
+from tests.blind.rivals.sindy import polynomials, single
+from tests.blind.world.vehicles import CARS
 
 pytest.importorskip("sklearn", reason="needs the extra `blind`")
 pytest.importorskip("pysindy", reason="needs the extra `blind`")

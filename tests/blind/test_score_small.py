@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blind.metrics.run import run
-from blind.metrics.small import small_jobs
-from blind.metrics.store import Store
+
+from tests.blind.metrics.run import run
+from tests.blind.metrics.small import small_jobs
+from tests.blind.metrics.store import Store
 
 pytest.importorskip("sklearn", reason="needs the extra `blind`")
 pytest.importorskip("pysindy", reason="needs the extra `blind`")
@@ -14,7 +15,7 @@ pytest.importorskip("pysindy", reason="needs the extra `blind`")
 
 @pytest.fixture(scope="module")
 def rows():
-    from blind.metrics.case import work
+    from tests.blind.metrics.case import work
 
     made = run(small_jobs(), Store(None), work, processes=1, say=lambda _: None)
     assert not [r.error for r in made if r.error]

@@ -8,15 +8,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blind.world import cases
-from blind.world.cases import CARS, NOISES, POOLS, PROGRAMMES, UNKNOWN, Hidden, Spec, clean_pair, clean_rows, make_case
-from blind.world.effects import apply, scaled
-from blind.world.kernel import OUT
-from blind.world.noise import coloured
-from blind.world.pools import COMPOUNDS, SUITED, TRIPLES
-from blind.world.sensors import measure
-from blind.world.unknown import shape_of
-from blind.world.world import WHEELS, G, nominal_world
+
+from tests.blind.world import cases
+from tests.blind.world.cases import (
+    CARS,
+    NOISES,
+    POOLS,
+    PROGRAMMES,
+    UNKNOWN,
+    Hidden,
+    Spec,
+    clean_pair,
+    clean_rows,
+    make_case,
+)
+from tests.blind.world.effects import apply, scaled
+from tests.blind.world.kernel import OUT
+from tests.blind.world.noise import coloured
+from tests.blind.world.pools import COMPOUNDS, SUITED, TRIPLES
+from tests.blind.world.sensors import measure
+from tests.blind.world.unknown import shape_of
+from tests.blind.world.world import WHEELS, G, nominal_world
 
 SHORT = 60.0  # [s]
 FOLDER = Path(cases.__file__).parent

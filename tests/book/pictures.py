@@ -275,9 +275,8 @@ def water_law():
 def calibration():
     """Mass over torque gain from dry simulated drives, one, two, ... six of them together."""
     sys.path.insert(0, str(ROOT / "tests"))
-    from calibrate import dry_drives  # type: ignore[import-not-found,unused-ignore]
-
     from aqualog.calibrate.run import calibrate
+    from tests.calibrate import dry_drives  # type: ignore[import-not-found,unused-ignore]
 
     count = 6
     drives, true, gain = dry_drives.campaign(2001, count)

@@ -6,7 +6,6 @@ import re
 import tokenize
 
 import pytest
-from conftest import ROOT
 
 from aqualog.book.sources import (
     KINDS,
@@ -20,6 +19,7 @@ from aqualog.book.sources import (
 )
 from aqualog.book.topics import DOCS
 from aqualog.thesis.claims import claims
+from tests.conftest import ROOT
 
 PACKAGE = ROOT / "aqualog"
 HOME = DOCS / "sources.md"

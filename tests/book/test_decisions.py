@@ -3,9 +3,10 @@
 import ast
 import re
 
-import decisions
 import pytest
-from conftest import ROOT
+
+from tests.book import decisions
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize("package", decisions.pages())

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import polars as pl
 import pytest
-from conftest import ROOT
 from typer.testing import CliRunner
 
 from aqualog.book.documents import DOCUMENTS
@@ -13,6 +12,7 @@ from aqualog.book.documents.fields import number, obj, paths, rows, schema, text
 from aqualog.book.documents.tables import TABLES
 from aqualog.book.topics import DOCS
 from aqualog.cli.main import app
+from tests.conftest import ROOT
 
 jsonschema = pytest.importorskip("jsonschema")
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from urllib.parse import urlparse
 
 import pytest
-from conftest import ROOT
 
 from aqualog.book.site import build, configuration, navigation
 from aqualog.book.topics import DOCS, topics
 from aqualog.core.errors import AqualogError, ConfigError
+from tests.conftest import ROOT
 
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md"]
 

@@ -3,7 +3,6 @@
 import re
 
 import pytest
-from conftest import ROOT
 
 from aqualog.align import freezes, glitches
 from aqualog.calibrate import design, online
@@ -17,6 +16,7 @@ from aqualog.detect.thresholds import DEFAULT
 from aqualog.diagnose.run import Options
 from aqualog.model.tyre import TYRE_KEYS, TYRES
 from aqualog.physics.resistance import nominal_acceleration
+from tests.conftest import ROOT
 
 DOCS = ROOT / "aqualog" / "docs"
 ESTIMATORS = (

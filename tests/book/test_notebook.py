@@ -3,8 +3,9 @@
 import shutil
 
 import nbformat
-from conftest import ROOT
 from nbclient import NotebookClient
+
+from tests.conftest import ROOT
 
 NOTEBOOK = ROOT / "aqualog" / "docs" / "guide" / "notebook.ipynb"
 

@@ -1,8 +1,9 @@
 """Documents, messages and docstrings are plain English: no banned phrase, one spelling of a unit, short sentences."""
 
 import pytest
-from conftest import ROOT
-from words import CHECKS, Fault, faults, length, of_document, of_javascript, of_python, of_toml, sentences
+
+from tests.book.words import CHECKS, Fault, faults, length, of_document, of_javascript, of_python, of_toml, sentences
+from tests.conftest import ROOT
 
 PACKAGE = ROOT / "aqualog"
 AWAITED: frozenset[str] = frozenset()

@@ -1,7 +1,8 @@
 """The README is two screens, names every command, shows the commands that are checked, and leads into the book."""
 
 import pytest
-from conftest import ROOT
+
+from tests.conftest import ROOT
 
 DOCS = ROOT / "aqualog" / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -4,9 +4,9 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
-from calibrate.dry_drives import believed, campaign, truth
 
 from aqualog.calibrate.run import calibrate
+from tests.calibrate.dry_drives import believed, campaign, truth
 
 CASES = {
     "one drive, altitude": (1, True, ()),

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from calibrate.dry_drives import believed, campaign, car, one_drive, truth
 
 from aqualog.align.load import load_signals
 from aqualog.calibrate.design import prepare
@@ -17,6 +16,7 @@ from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.model.sensors import ESC, IDEAL
+from tests.calibrate.dry_drives import believed, campaign, car, one_drive, truth
 
 
 @pytest.fixture(scope="module")

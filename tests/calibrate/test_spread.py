@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from calibrate.test_balance import RHO, drives
 
 from aqualog.calibrate.derive import estimates
 from aqualog.calibrate.spread import (
@@ -16,6 +15,7 @@ from aqualog.calibrate.spread import (
     stratified,
     variance_ratio_chance,
 )  # fmt: skip
+from tests.calibrate.test_balance import RHO, drives
 
 
 @pytest.mark.parametrize(("ratio", "dof", "below"), [(3.708, 3, 10), (4.534, 4, 6), (2.214, 5, 1000.0), (161.4, 1, 1)])

@@ -1,4 +1,4 @@
-"""Commands that are interrupted at random moments: PYTHONPATH=tests python -m campaign.interrupted DIR [--times N].
+"""Commands that are interrupted at random moments: python -m tests.campaign.interrupted DIR [--times N].
 
 Each leaves either the whole result, the same as an undisturbed one, or none, nothing in the temporary folder, exit code
 130 and one line. Prints what each left; ends with an error if one left anything else.
@@ -17,10 +17,9 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from campaign.made import make_campaign, pass_of
-
 from aqualog.model.log import write_simulation
 from aqualog.model.simulate import simulate
+from tests.campaign.made import make_campaign, pass_of
 
 START = "from aqualog.cli.start import run; run()"
 COMMANDS = {

@@ -14,8 +14,9 @@ import zlib
 from pathlib import Path
 
 import polars as pl
-from damaged.logs import mf4
 from mcap.writer import CompressionType, Writer
+
+from tests.damaged.logs import mf4
 
 HOOK = '''
 """Readers that misbehave at logs named poison_KIND."""

@@ -1,4 +1,4 @@
-"""A long batch with poison in it, killed again and again: PYTHONPATH=tests python -m campaign.poisoned DIR [--logs N].
+"""A long batch with poison in it, killed again and again: python -m tests.campaign.poisoned DIR [--logs N].
 
 N short logs in four formats, one in a hundred of which breaks its reader or is no log. A batch that nobody disturbs
 stands beside one that is ended by SIGKILL, SIGINT and SIGTERM at random moments and begun again; with --cluster one more
@@ -25,14 +25,14 @@ from typing import NamedTuple
 
 import numpy as np
 import psutil
-from campaign.dask_here import cluster
-from campaign.made import pass_of
-from campaign.poison import HOOKED, HOSTILE_NAMES, hooked, real_poison
 
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
+from tests.campaign.dask_here import cluster
+from tests.campaign.made import pass_of
+from tests.campaign.poison import HOOKED, HOSTILE_NAMES, hooked, real_poison
 
 SUFFIXES = (".mf4", ".parquet", ".csv", ".mcap")
 HEAD = ("log", "tyre", "water_depth_mm", "pressure_front_bar", "pressure_rear_bar", "lane_start_s", "lane_end_s")

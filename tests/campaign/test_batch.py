@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from campaign.made import make_campaign
 from typer.testing import CliRunner
 
 from aqualog.align.load import load_signals
@@ -25,6 +24,7 @@ from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError, LogError
 from aqualog.guard.worker import Crashed
 from aqualog.model.programme import SEDAN
+from tests.campaign.made import make_campaign
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from campaign.dask_here import cluster, with_children
-from campaign.made import make_campaign
 from typer.testing import CliRunner
 
 import aqualog
@@ -29,6 +27,8 @@ from aqualog.cli.main import app
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.guard.limits import ReadLimits
 from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
+from tests.campaign.dask_here import cluster, with_children
+from tests.campaign.made import make_campaign
 
 
 @contextmanager

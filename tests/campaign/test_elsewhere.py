@@ -8,8 +8,6 @@ import time
 
 import polars as pl
 import pytest
-from campaign.dask_here import cluster, free_port, with_children
-from campaign.made import make_campaign
 from typer.testing import CliRunner
 
 from aqualog.campaign.records import Shard, part_of, shard_of
@@ -17,6 +15,8 @@ from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError
 from aqualog.guard.worker import Crashed
+from tests.campaign.dask_here import cluster, free_port, with_children
+from tests.campaign.made import make_campaign
 
 
 def run(*args):

@@ -8,7 +8,6 @@ import shutil
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from typer.testing import CliRunner
 
 from aqualog.align.load import load_signals
@@ -22,6 +21,7 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 from aqualog.io.write_mdf import CanMessage, write_can_mf4
+from tests.conftest import ROOT
 
 SAMPLE = ROOT / "sample_logs" / "lane_drive.mf4"
 CAR = ROOT / "sample_logs" / "vehicle.toml"

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign.made import make_campaign
 from typer.testing import CliRunner
 
 from aqualog.campaign.batch import run_batch
@@ -25,6 +24,7 @@ from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.content import Contents
+from tests.campaign.made import make_campaign
 
 
 @pytest.fixture(scope="module")

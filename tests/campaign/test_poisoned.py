@@ -4,8 +4,9 @@ import signal
 import sys
 
 import pytest
-from campaign.poison import hooked
-from campaign.poisoned import batch, disturbed, left_in, make, reasons, unlike
+
+from tests.campaign.poison import hooked
+from tests.campaign.poisoned import batch, disturbed, left_in, make, reasons, unlike
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")

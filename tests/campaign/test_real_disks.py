@@ -7,13 +7,13 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from campaign.made import make_campaign
 
 from aqualog.campaign import batch
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.errors import AqualogError
+from tests.campaign.made import make_campaign
 
 
 def mounts(*arguments):

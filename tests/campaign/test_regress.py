@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slope_coverage import World, made, study
 
 from aqualog.campaign import moments
 from aqualog.campaign.regress import Design, estimate
 from aqualog.core.moments import block_starts
+from tests.campaign.slope_coverage import World, made, study
 
 
 def line(mu, slip, run, step=None):

@@ -15,8 +15,6 @@ from pathlib import Path
 
 import fsspec
 import pytest
-from campaign.dask_here import cluster
-from campaign.made import make_campaign
 from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
 from typer.testing import CliRunner
@@ -27,6 +25,8 @@ from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store, place_of
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError, LogError
+from tests.campaign.dask_here import cluster
+from tests.campaign.made import make_campaign
 
 
 class Other(LocalFileSystem):

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from campaign.made import make_campaign
 from typer.testing import CliRunner
 
 from aqualog.campaign import batch, place
@@ -25,6 +24,7 @@ from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
 from aqualog.guard.pool import most_processes
 from aqualog.io.content import Contents
+from tests.campaign.made import make_campaign
 
 
 @pytest.fixture(scope="module")

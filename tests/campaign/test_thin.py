@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign.made import make_campaign
 
 from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.campaign import thin
@@ -17,6 +16,7 @@ from aqualog.detect.slip_slope.direct_inputs import smoothed
 from aqualog.detect.stream import detect_drive
 from aqualog.io.write_table import TableColumn, write_parquet
 from aqualog.model.programme import SEDAN
+from tests.campaign.made import make_campaign
 
 
 def drive(path, *, without=(), dt=0.01, seconds=40.0):

@@ -1,4 +1,4 @@
-"""A campaign of many short logs with five broken ones, killed half way: PYTHONPATH=tests python -m campaign.thousand DIR.
+"""A campaign of many short logs with five broken ones, killed half way: python -m tests.campaign.thousand DIR.
 
 Prints what each step did and how long it took; ends with an error if a step did not do what it must.
 """
@@ -10,12 +10,11 @@ import sys
 import time
 from pathlib import Path
 
-from campaign.made import pass_of
-
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
+from tests.campaign.made import pass_of
 
 SUFFIXES = (".mf4", ".parquet", ".csv", ".mcap")
 BROKEN = (100, 201, 302, 403, 504)  # of the logs: cut in half, empty, no table, cut in its head, zeros

@@ -1,6 +1,6 @@
 """A thousand short logs, five of them broken, on a dask scheduler with two workers, one of which is killed half way.
 
-PYTHONPATH=tests python -m campaign.thousand_on_cluster DIR [--count N]. Scheduler, workers and batch are processes of
+python -m tests.campaign.thousand_on_cluster DIR [--count N]. Scheduler, workers and batch are processes of
 their own. Ends with an error unless the store is that of a local batch of the same logs, file by file.
 """
 
@@ -12,8 +12,8 @@ import sys
 import time
 from pathlib import Path
 
-from campaign.dask_here import cluster, with_children
-from campaign.thousand import BROKEN, make
+from tests.campaign.dask_here import cluster, with_children
+from tests.campaign.thousand import BROKEN, make
 
 
 def start(campaign: Path, store: Path, *more: str) -> subprocess.Popen:

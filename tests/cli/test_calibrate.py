@@ -4,12 +4,12 @@ import json
 
 import pytest
 import typer
-from calibrate.dry_drives import believed, campaign
 from typer.testing import CliRunner
 
 from aqualog.cli.calibrate import calibrate
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.vehicle import vehicle_toml
+from tests.calibrate.dry_drives import believed, campaign
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(calibrate)

@@ -5,7 +5,6 @@ import os
 import shutil
 
 import pytest
-from conftest import ROOT
 from typer.testing import CliRunner
 
 from aqualog.align import load
@@ -13,6 +12,7 @@ from aqualog.align.load import load_drive
 from aqualog.cli.main import app
 from aqualog.io import open_log
 from aqualog.io.content import changed_files, state_of
+from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
 CAR = str(SAMPLES / "vehicle.toml")

@@ -9,7 +9,8 @@ import tomllib
 import numpy as np
 import polars as pl
 import pytest
-from conftest import ROOT
+
+from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
 CAR = str(SAMPLES / "vehicle.toml")

@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from test_commands import CAR, MF4, SAMPLES, one_error_line, run
 
 from aqualog.config.model import dump_model
 from aqualog.config.vehicle import load_vehicle
@@ -12,6 +11,7 @@ from aqualog.model.log import write_simulation
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
+from tests.cli.test_commands import CAR, MF4, SAMPLES, one_error_line, run
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from types import ModuleType
 import polars as pl
 import pytest
 import typer
-from report.diagnosis_case import cases, views_of
 from typer.testing import CliRunner
 
 from aqualog.cli.diagnose import diagnose
@@ -20,6 +19,7 @@ from aqualog.core.vehicle import Vehicle, vehicle_toml
 from aqualog.diagnose import run as engine
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
+from tests.report.diagnosis_case import cases, views_of
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command()(diagnose)

@@ -6,7 +6,8 @@ import subprocess
 import sys
 
 import pytest
-from evaluate.made import write_campaign
+
+from tests.evaluate.made import write_campaign
 
 CODE = """
 import typer

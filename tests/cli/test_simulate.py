@@ -11,8 +11,6 @@ import asammdf
 import numpy as np
 import polars as pl
 import pytest
-from conftest import ROOT
-from test_commands import one_error_line, run
 from typer.testing import CliRunner
 
 from aqualog.cli.console import Console
@@ -27,6 +25,8 @@ from aqualog.model.campaign import CampaignOutcome
 from aqualog.model.log import START_NS, _onto
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.simulate import simulate as simulated
+from tests.cli.test_commands import one_error_line, run
+from tests.conftest import ROOT
 
 CAR = ROOT / "sample_logs" / "vehicle.toml"
 FORMATS = ("mf4", "mcap", "csv", "parquet")

@@ -8,9 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from straight_drive import AWD, RWD, C, drive
 
 from aqualog.core.vehicle import vehicle_toml
+from tests.straight_drive import AWD, RWD, C, drive
 
 
 def run(*args):

@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
 import aqualog.core.compiled as compilation
 from aqualog.align.load import load_signals
@@ -16,6 +15,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.slip_slope import drop, history
 from aqualog.detect.stream import detect_drive
 from aqualog.features import smoothing, velocity
+from tests.conftest import ROOT
 
 LOADED = """
 import sys

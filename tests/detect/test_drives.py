@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from drives import AWD, CAR, FWD, drive, lane
-from small_model import Lane
 
 from aqualog.detect import minor_spin_down
 from aqualog.detect.stream import Settings, detect_drive
+from tests.drives import AWD, CAR, FWD, drive, lane
+from tests.small_model import Lane
 
 
 def events(detector=None, **kw):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drives import CAR
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
@@ -16,6 +15,7 @@ from aqualog.detect.joint_criteria import GATE, JOINT_CRITERIA, MAY_BE_WATER
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
 from aqualog.detect.settings import JointCusumParams, Settings
+from tests.drives import CAR
 
 DT = 0.01
 N = 200

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import polars as pl
 import pytest
-from drives import CAR, drive
 
 from aqualog.detect.stream import detect_drive
+from tests.drives import CAR, drive
 
 SPEEDS = {"speed_kmh": ((0.0, 70.0), (10, 110.0), (20, 70.0), (30, 120.0), (40, 80.0)), "duration_s": 40.0}
 CURVES = {"yaw_rate": ((0, 0), (6, 0), (8, 0.2), (14, -0.2), (20, 0.2), (30, -0.2), (40, 0))}

@@ -7,12 +7,12 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
-from drives import AWD, CAR, drive, lane
 
 from aqualog.detect.detector import Setup
 from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS, all_of, check_needs, running_order
 from aqualog.detect.stream import DriveStream
+from tests.conftest import ROOT
+from tests.drives import AWD, CAR, drive, lane
 
 OWN = all_of("effect", "joint")
 DT_NS = 10_000_000
@@ -160,7 +160,7 @@ code = code.replace("TIE_ROD, JOINT_CRITERIA", "TIE_ROD, LOUDNESS, JOINT_CRITERI
 registry = importlib.util.module_from_spec(importlib.util.spec_from_loader("aqualog.detect.registry", None))
 sys.modules["aqualog.detect.registry"] = registry
 exec(compile(code, str(path), "exec"), registry.__dict__)
-from drives import CAR, drive
+from tests.drives import CAR, drive
 from aqualog.book.reference.settings import thresholds_page as text
 from aqualog.config.thresholds import load_thresholds, thresholds_text
 from aqualog.detect.stream import Settings, detect_drive

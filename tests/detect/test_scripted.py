@@ -3,10 +3,10 @@
 import numpy as np
 import polars as pl
 import pytest
-from drives import CAR, FWD, as_signals, drive
-from small_model import Lane
 
 from aqualog.detect.stream import detect_drive
+from tests.drives import CAR, FWD, as_signals, drive
+from tests.small_model import Lane
 
 DT = 0.01
 WHEELS = ("fl", "fr", "rl", "rr")

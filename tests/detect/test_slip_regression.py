@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from straight_drive import AWD, FWD, RWD, C, drive
 
 from aqualog.core.errors import ConfigError, FitError, SignalError
 from aqualog.detect.slip_slope import stability as stab
@@ -18,6 +17,7 @@ from aqualog.detect.slip_slope.regression import fit_line, fit_trend, lag_of_sli
 from aqualog.detect.slip_slope.stability import block_labels, judge_stability, make_segments, percent
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
+from tests.straight_drive import AWD, FWD, RWD, C, drive
 
 OFFSET = 0.005
 

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import pytest
-from bench.ekf import OPEN, aqualog_slopes, disagreement, drive, numpy_slopes, python_slopes, textbook_update
 from numba import njit
 
 from aqualog.detect.slip_slope import ekf, estimator, observability
@@ -19,6 +18,7 @@ from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation
 from aqualog.physics import differential
+from tests.bench.ekf import OPEN, aqualog_slopes, disagreement, drive, numpy_slopes, python_slopes, textbook_update
 
 DT = 0.01
 ESTIMATING, FROZEN, BLIND, TOO_LARGE, SPINNING, INACTIVE = range(6)

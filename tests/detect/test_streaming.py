@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
-from drives import AWD, CAR, FWD, drive, lane
 
 from aqualog.detect import stream
 from aqualog.detect.stream import DriveStream, detect_drive
+from tests.drives import AWD, CAR, FWD, drive, lane
 
 DRIVES = {
     "rwd": (CAR, {"lanes": (lane(),), "speed_kmh": ((0.0, 104.0),)}),

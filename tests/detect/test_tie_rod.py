@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from drives import CAR
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Quality, Signals
@@ -15,6 +14,7 @@ from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import Thresholds
 from aqualog.physics.load import wheel_loads
 from aqualog.report.drive.document import result_groups
+from tests.drives import CAR
 
 DT, N = 0.01, 2000
 POLYNOMIAL = {"c0": (20.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,), "sigma": (40.0,)}

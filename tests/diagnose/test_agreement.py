@@ -1,11 +1,11 @@
 """Several drives: each is asked by itself, and predicted from the others."""
 
 import pytest
-from test_drive import CAR, NOISY, signals, term
 
 from aqualog.diagnose.agreement import widened
 from aqualog.diagnose.records import Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.run import Options, diagnose
+from tests.diagnose.test_drive import CAR, NOISY, signals, term
 
 OPTIONS = Options(surrogates=0, views=False, consequences=False)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from test_noise import first_order
-from test_subsets import ASKED, AT, bench_of, made, waves
 
 from aqualog.diagnose.any_effect import calibrate, gumbel_p, largest
+from tests.diagnose.test_noise import first_order
+from tests.diagnose.test_subsets import ASKED, AT, bench_of, made, waves
 
 DRAWN = 19
 

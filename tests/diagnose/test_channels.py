@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_drive import CAR, plain, signals, term
 
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step, channel_values, channels_of, contrasts
@@ -10,6 +9,7 @@ from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import residual
 from aqualog.model.term import Model
 from aqualog.physics.load import G
+from tests.diagnose.test_drive import CAR, plain, signals, term
 
 ALL = frozenset(
     {"a_x", "a_y", "yaw_rate", "v_x", "steer_angle", *(f"omega_{w}" for w in WHEELS), *(f"torque_{w}" for w in WHEELS)}

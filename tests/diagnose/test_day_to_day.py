@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from test_drive import CAR, NOISY, signals, term
 
 from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
@@ -16,6 +15,7 @@ from aqualog.diagnose.search import simulated
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, signals, term
 
 
 def one(name, where=None):

@@ -3,10 +3,10 @@
 import numpy as np
 import polars as pl
 import pytest
-from test_drive import CAR, changed, plain, signals, term
 
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import prepare
+from tests.diagnose.test_drive import CAR, changed, plain, signals, term
 
 
 def judged(change):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 
 from aqualog.diagnose import run
 from aqualog.diagnose.drive import prepare
@@ -13,6 +12,7 @@ from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.term import Model
+from tests.blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 
 HILLY = Spec("hilly", "gusts", (), 8, "compact_fwd", holdout=0)
 

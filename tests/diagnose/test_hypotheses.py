@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_drive import CAR, NOISY, changed, plain, signals, term
 
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
@@ -13,6 +12,7 @@ from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import setup_along
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
 
 def one(name, where=None, **fixed):

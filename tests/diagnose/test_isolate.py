@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from test_subsets import ASKED, AT, bench_of, gram, waves
 
 from aqualog.diagnose.isolate import confusions, limits, p_correct, reference_sizes, separation
+from tests.diagnose.test_subsets import ASKED, AT, bench_of, gram, waves
 
 THRESHOLD = 20.0
 ONES = np.ones(len(ASKED))

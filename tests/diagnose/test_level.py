@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blind.level_world import CAR, Hidden, campaign_of, world
 
 from aqualog.campaign.measure import measure
 from aqualog.campaign.records import Run, with_load
@@ -25,6 +24,7 @@ from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import wheel_loads
 from aqualog.physics.traction import traction_coefficient
+from tests.blind.level_world import CAR, Hidden, campaign_of, world
 
 CAR_FILE = Path("car.toml")
 

@@ -1,7 +1,6 @@
 """A new effect is one row: everything that asks about effects finds it there."""
 
 import pytest
-from test_drive import CAR, plain
 
 from aqualog.book.reference.model import effects_page
 from aqualog.diagnose import day_to_day
@@ -13,6 +12,7 @@ from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Check, DayToDay, DriveSearch, Effect, Model, Parameter, Term
 from aqualog.report.diagnosis.words import effect_title
+from tests.diagnose.test_drive import CAR, plain
 
 OPEN_WINDOW = Effect(
     "open_window", "drag area c_w A [m²]", "Open windows added {area:.2f} m² of drag area.", "0.02-0.05 (K)",

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_subsets import ASKED, AT, bench_of, waves
 
 from aqualog.diagnose.outcome import conclude
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Candidate
 from aqualog.model.term import Model
+from tests.diagnose.test_subsets import ASKED, AT, bench_of, waves
 
 S = waves(600, len(ASKED), seed=99) / np.array([h.parameter(h.free[0]).sigma for h in ASKED])[:, None, None]
 LEFT = np.random.default_rng(0).standard_normal((2, 600))
@@ -125,7 +125,7 @@ def test_a_small_member_beside_a_large_one_is_left_out():
 
 
 def test_a_value_is_judged_against_the_model_at_hand():
-    from test_drive import term
+    from tests.diagnose.test_drive import term
 
     known = Model((term("payload_mass", delta_mass=195.0),))
     assert conclude(BENCH, [candidate(payload_mass=200.0)], known, p_value=CLEAR).verdict == "no_effect"

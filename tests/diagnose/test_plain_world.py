@@ -1,12 +1,12 @@
 """Drives of a simulator whose tyres, transients and curves are of another form: no false names, the right sizes."""
 
 import pytest
-from blind import plain
 
 from aqualog.align.load import load_signals
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.diagnose.run import Options, diagnose
+from tests.blind import plain
 
 OPTIONS = Options(surrogates=9, views=False, consequences=False)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_drive import CAR, NOISY, signals, term
 
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
@@ -12,6 +11,7 @@ from aqualog.diagnose.search import simulated
 from aqualog.diagnose.subsets import SetFit, fit_set
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, signals, term
 
 
 def one(name, where=None):

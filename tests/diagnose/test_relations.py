@@ -1,11 +1,11 @@
 """Relations of three effects: which sets they make equal, and that a log that cannot part them says so."""
 
 import pytest
-from test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is a fixture
-from test_subsets import ASKED, AT
 
 from aqualog.diagnose import run
 from aqualog.diagnose.subsets import imitations
+from tests.diagnose.test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is a fixture
+from tests.diagnose.test_subsets import ASKED, AT
 
 BIAS, SLOPE, ROLLING = (AT[k] for k in ("accelerometer_bias@a_x", "road_grade", "rolling_resistance"))
 MASS = AT["payload_mass"]

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from test_drive import CAR, NOISY, changed, plain, signals, term
 
 from aqualog.core.errors import SignalError
 from aqualog.diagnose import run
@@ -13,6 +12,7 @@ from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
 FEW = ("payload_mass", "accelerometer_bias@a_x", "tyre_radius@fl", "signal_delay@v_x", "road_grade", "head_wind")
 QUICK = Options(level=0.01, surrogates=9, views=False, consequences=False)

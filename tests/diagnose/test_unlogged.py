@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_drive import CAR, changed, plain, signals
 
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
@@ -12,6 +11,7 @@ from aqualog.diagnose.unlogged import brakes_unlogged, needed_torque, roll_out
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Steering
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, changed, plain, signals
 
 TORQUES = [f"torque_{w}" for w in WHEELS]
 DT = 0.01

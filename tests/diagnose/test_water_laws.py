@@ -3,8 +3,6 @@
 from functools import cache
 
 import numpy as np
-from test_drive import CAR, NOISY, signals, term
-from test_floating import wet
 
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import gram_of, noises_after, without_deviations
@@ -14,6 +12,8 @@ from aqualog.diagnose.search import _of_water, simulated
 from aqualog.diagnose.subsets import gains_on_top, supported
 from aqualog.diagnose.tolerances import WATER_TOLERANCES
 from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, signals, term
+from tests.diagnose.test_floating import wet
 
 
 def test_the_laws_of_water_are_asked_about_on_water_alone():

@@ -5,7 +5,6 @@ import re
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
 from aqualog.align.freezes import longest_stop
 from aqualog.align.load import load_signals
@@ -17,6 +16,7 @@ from aqualog.doctor.examine import examine
 from aqualog.doctor.findings import Examination, FileState, Finding
 from aqualog.face.doctor import exit_code
 from aqualog.io.write_mdf import MdfGroup, write_mf4
+from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
 CAR = load_vehicle(SAMPLES / "vehicle.toml")

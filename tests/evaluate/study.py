@@ -1,8 +1,8 @@
 """Detectors and rivals over simulated situations: recall, false alarms, the matrix of C78.
 
-    PYTHONPATH=tests python -m evaluate.study --hours 100 --first 1000 --jobs 2 --rivals --out study
-    PYTHONPATH=tests python -m evaluate.study --pool tuning --hours 10 --first 1 --roc --rivals --tune t.toml --out tuning
-    PYTHONPATH=tests python -m evaluate.study --hours 100 --first 1000 --rivals --thresholds t.toml --out tuned
+    python -m tests.evaluate.study --hours 100 --first 1000 --jobs 2 --rivals --out study
+    python -m tests.evaluate.study --pool tuning --hours 10 --first 1 --roc --rivals --tune t.toml --out tuning
+    python -m tests.evaluate.study --hours 100 --first 1000 --rivals --thresholds t.toml --out tuned
 
 A chunk is one drive of every situation with one seed; it is one file in the folder, and the same command goes on where
 it was broken off. A chunk of other code, thresholds or options is made again. `--tune` chooses from the curves of the
@@ -22,11 +22,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 import numpy as np
-from evaluate.rods import with_tie_rods
 
 import aqualog
 from aqualog.core.errors import AqualogError
 from aqualog.core.notation import WHEELS
+from tests.evaluate.rods import with_tie_rods
 
 SOURCES = ("physics", "features", "calibrate", "detect", "rivals", "model", "evaluate")
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from evaluate.made import FWD, scenario
 
 from aqualog.evaluate.drives import LogSource, labels_in
 from aqualog.evaluate.labels import Label, Labels, after, joined, overlaps, until, without
 from aqualog.evaluate.truth import spans_of, truth_labels
 from aqualog.model.log import as_signals, write_simulation
 from aqualog.model.simulate import simulate
+from tests.evaluate.made import FWD, scenario
 
 T = np.arange(0.0, 20.0, 0.01)
 

@@ -4,7 +4,6 @@ from collections import Counter
 from dataclasses import replace
 
 import pytest
-from evaluate.made import FWD, RWD, scenario
 
 from aqualog.config.thresholds import load_thresholds, thresholds_text
 from aqualog.core.errors import ConfigError, LogError
@@ -22,6 +21,7 @@ from aqualog.evaluate.split import split_runs
 from aqualog.evaluate.tune import choose
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
+from tests.evaluate.made import FWD, RWD, scenario
 
 
 def point(factor, found, alarms, detector="spin_down", hours=100.0):

@@ -3,9 +3,9 @@
 import numpy as np
 import polars as pl
 import pytest
-from both_ways import check_saved, check_shown, command
 
 import aqualog as aq
+from tests.both_ways import check_saved, check_shown, command
 
 LATE = 0.35
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from both_ways import check_result, command
-from calibrate.dry_drives import believed, campaign
 
 import aqualog as aq
 from aqualog.core.vehicle import vehicle_toml
+from tests.both_ways import check_result, command
+from tests.calibrate.dry_drives import believed, campaign
 
 FILES = ("calibration.json", "calibrated.toml", "calibration.html")
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import polars as pl
 import pytest
-from both_ways import check_shown, command
-from report.diagnosis_case import cases, views_of
 
 import aqualog as aq
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.diagnose import campaign as campaign_diagnosis
 from aqualog.diagnose import run as engine
+from tests.both_ways import check_shown, command
+from tests.report.diagnosis_case import cases, views_of
 
 FILES = ("diagnosis.json", "model.toml", "diagnosis.html")
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from both_ways import check_saved, check_shown, command
-from campaign.made import make_campaign
-from conftest import ROOT
 
 import aqualog as aq
+from tests.both_ways import check_saved, check_shown, command
+from tests.campaign.made import make_campaign
+from tests.conftest import ROOT
 
 LOG, CAR = ROOT / "sample_logs" / "lane_drive.mf4", ROOT / "sample_logs" / "vehicle.toml"
 DETECTED = ("events.json", "signals.parquet", "report.html")

@@ -4,14 +4,14 @@ import json
 import os
 
 import pytest
-from both_ways import check_shown, command
-from conftest import ROOT
 
 import aqualog as aq
 from aqualog.config.scenario import load_scenario
 from aqualog.face.simulate import simulate_campaign
 from aqualog.model import campaign as programmes
 from aqualog.model.campaign import CampaignOutcome
+from tests.both_ways import check_shown, command
+from tests.conftest import ROOT
 
 CAR = ROOT / "sample_logs" / "vehicle.toml"
 SCENARIO = f"""vehicle = "{CAR}"

@@ -2,11 +2,11 @@
 
 import polars as pl
 import pytest
-from both_ways import check_result, check_shown, command
-from straight_drive import AWD, RWD, C, drive
 
 import aqualog as aq
 from aqualog.core.vehicle import vehicle_toml
+from tests.both_ways import check_result, check_shown, command
+from tests.straight_drive import AWD, RWD, C, drive
 
 FILES = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from thesis.passes import SEDAN
 
 from aqualog.config.model import dump_model, load_model
 from aqualog.core.errors import ConfigError
@@ -13,6 +12,7 @@ from aqualog.model.empirical import EMPIRICAL
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.term import Model, Term
+from tests.thesis.passes import SEDAN
 
 HUMP = ((15.0, 0.0), (20.0, 400.0), (25.0, 0.0))
 HILL = ((0.0, 0.0), (60.0, 0.04), (120.0, 0.0))

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from thesis.passes import SEDAN, resistance, slip_and_traction
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
@@ -18,6 +17,7 @@ from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G, wheel_loads
+from tests.thesis.passes import SEDAN, resistance, slip_and_traction
 
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
 AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"mass"}))

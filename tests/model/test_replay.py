@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from thesis.passes import SEDAN
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
@@ -13,6 +12,7 @@ from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G
+from tests.thesis.passes import SEDAN
 
 PLANT = build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"])
 

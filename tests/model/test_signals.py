@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from thesis.passes import SEDAN
 
 from aqualog.align.load import load_signals
 from aqualog.detect.stream import detect_drive
@@ -11,6 +10,7 @@ from aqualog.model.log import as_signals, write_simulation
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, IDEAL
 from aqualog.model.simulate import simulate
+from tests.thesis.passes import SEDAN
 
 LANE = Lane(3.0, 5.0, depth_left=1e-3, depth_right=1.3e-3)
 

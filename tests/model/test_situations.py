@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from thesis.passes import SEDAN
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
@@ -19,6 +18,7 @@ from aqualog.model.simulate import simulate
 from aqualog.model.situations import SCORING_POOL, SITUATIONS, TUNING_POOL, draw
 from aqualog.model.term import Model, Term
 from aqualog.physics.load import G
+from tests.thesis.passes import SEDAN
 
 SLOW = 25.0  # [m/s]
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from real.holdout import HELD_OUT, hold_out, plant_of_trips
+
+from tests.real.holdout import HELD_OUT, hold_out, plant_of_trips
 
 pytestmark = pytest.mark.real
 

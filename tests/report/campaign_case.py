@@ -3,8 +3,6 @@
 import csv
 from functools import partial
 
-from campaign.made import pass_of
-
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
@@ -13,6 +11,7 @@ from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.simulate import simulate
+from tests.campaign.made import pass_of
 
 SCRIPT = "</script><script>alert(1)</script>"
 IMAGE = '"><img src=x onerror=alert(2)>'

@@ -3,10 +3,7 @@
 import json
 from dataclasses import replace
 
-import fake_result as fake
 import numpy as np
-from diagnosis_case import views_of
-from test_diagnosis_document import document_of
 
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
 from aqualog.campaign.bins import plan
@@ -33,6 +30,9 @@ from aqualog.thesis.claims import DIFFERENCE, VERDICTS, Check, claims
 from aqualog.thesis.page import render_figures, render_reproduction
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 from aqualog.thesis.run import Made, conclude
+from tests.report import fake_result as fake
+from tests.report.diagnosis_case import views_of
+from tests.report.test_diagnosis_document import document_of
 
 NAMES = {
     "script": "</script><script>alert(1)</script>",

@@ -4,13 +4,13 @@ import re
 import time
 from dataclasses import replace
 
-import fake_result as fake
 import pytest
-from headless import PATIENCE, click, requests, severe, wait_for
 
 from aqualog.report.drive.page import drive_page
 from aqualog.report.offline import write_page
 from aqualog.report.theme import EVENT_SHADE, FULL_SHADE
+from tests.headless import PATIENCE, click, requests, severe, wait_for
+from tests.report import fake_result as fake
 
 pytestmark = pytest.mark.browser
 

@@ -1,12 +1,12 @@
 """The report of a campaign in headless Chromium, from a disk and without a network: filters act on all, links work."""
 
 import pytest
-from campaign_case import load_case, make_case
-from headless import click, requests, severe, wait_for
 
 from aqualog.campaign.bins import plan
 from aqualog.report.campaign.findings import find
 from aqualog.report.campaign.folder import write_report
+from tests.headless import click, requests, severe, wait_for
+from tests.report.campaign_case import load_case, make_case
 
 pytestmark = pytest.mark.browser
 

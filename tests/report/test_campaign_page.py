@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
-from campaign_case import FORMULA, IMAGE, LONG, SCRIPT, load_case, make_case
 from typer.testing import CliRunner
 
 from aqualog.campaign.bins import plan
@@ -26,6 +25,7 @@ from aqualog.report.campaign.quality import MOST_KINDS, problems_of
 from aqualog.report.campaign.run_page import command_of, run_page
 from aqualog.report.campaign.runs import facts_of
 from aqualog.report.wording import cut
+from tests.report.campaign_case import FORMULA, IMAGE, LONG, SCRIPT, load_case, make_case
 
 SECTIONS = ("verdict", "quality", "filters", "answers-section", "matrix-section", "slopes-section",
             "resistance-section", "full-section", "detections-section", "runs-section", "made-section")  # fmt: skip

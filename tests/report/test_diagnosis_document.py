@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, cases, numbers_in
 
 from aqualog.diagnose.records import Estimate
 from aqualog.report.diagnosis.document import diagnosis_document
@@ -15,6 +14,7 @@ from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.words import effect_title, limit_sentences, sentences
 from aqualog.report.numbers import interval_text, measured, ordinary, percent, short
 from aqualog.report.text import report_text
+from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, cases, numbers_in
 
 VERDICTS = list(cases())
 

@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_case import HOSTILE, cases, view, views_of
-from test_diagnosis_document import VERDICTS, document_of, round_trip
 
 from aqualog.report.diagnosis.figures import gain_bars, isolability, remainder
 from aqualog.report.diagnosis.sections import diagnosis_report
@@ -16,6 +14,8 @@ from aqualog.report.diagnosis.views import binned, view_data
 from aqualog.report.diagnosis.words import by_sharpness, sentences
 from aqualog.report.offline import write_page
 from aqualog.report.page import report_page
+from tests.report.diagnosis_case import HOSTILE, cases, view, views_of
+from tests.report.test_diagnosis_document import VERDICTS, document_of, round_trip
 
 
 def render_page(document, views, title):

@@ -6,10 +6,10 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from headless import requests, severe, wait_for
-from hostile_names import NAMES, PAGES
 
 from aqualog.report.offline import plotly_js
+from tests.headless import requests, severe, wait_for
+from tests.report.hostile_names import NAMES, PAGES
 
 MOST = 1_500_000  # characters by which names make a page longer, whatever they are
 TEXT_CONTENT = {"eventful drive", "campaign", "run"}  # whose script puts names in as text, and as text for plotly

@@ -8,7 +8,6 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-import fake_result as fake
 import numpy as np
 import plotly.graph_objects as go
 import polars as pl
@@ -20,6 +19,7 @@ from aqualog.report.drive.page import FIRST_EVENTS, MOST_ROWS, drive_page
 from aqualog.report.drive.tables import event_rows
 from aqualog.report.offline import write_page
 from aqualog.report.reduce import POINTS
+from tests.report import fake_result as fake
 
 TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
 

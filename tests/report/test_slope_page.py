@@ -5,13 +5,13 @@ import re
 from dataclasses import replace
 
 import pytest
-from headless import requests, severe, wait_for
-from straight_drive import AWD, RWD, drive
 
 from aqualog.detect.slip_slope.direct import slip_slopes
 from aqualog.report.offline import write_page
 from aqualog.report.page import report_fragment, report_page
 from aqualog.report.slope import slope_report
+from tests.headless import requests, severe, wait_for
+from tests.straight_drive import AWD, RWD, drive
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
 

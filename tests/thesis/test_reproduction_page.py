@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from headless import severe, wait_for
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
@@ -16,6 +15,7 @@ from aqualog.thesis.export import claims_csv, claims_document, counts_of
 from aqualog.thesis.page import render_reproduction
 from aqualog.thesis.record import Axis, Figure, Line, Panel
 from aqualog.thesis.run import Made, conclude
+from tests.headless import severe, wait_for
 
 HOSTILE = "</script><img src=x onerror=\"document.body.dataset.hit='1'\">"
 

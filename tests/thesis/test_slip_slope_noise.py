@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from slip_slope_noise import CAR, EXCITATION, believed_car, on_grid, outcome
 
 from aqualog.detect.stream import DriveStream
 from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
+from tests.thesis.slip_slope_noise import CAR, EXCITATION, believed_car, on_grid, outcome
 
 SEEDS = range(300, 308)
 DRIFT = 0.003 / 600.0  # [1/s] 0.3 % in ten minutes

@@ -10,20 +10,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from blind.metrics import forecast, gain
-from blind.metrics.detector import consequence
-from blind.metrics.plan import Job
-from blind.metrics.rows import Fact, Row, Said
-from blind.metrics.second import second
-from blind.rivals.columns import Residuals
-from blind.rivals.compare import heldout_share, measured
-from blind.world.cases import Case, Hidden, Spec, clean_pair, make_case, truth
-from blind.world.vehicles import CARS
 
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.records import Cause, Diagnosis
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
+from tests.blind.metrics import forecast, gain
+from tests.blind.metrics.detector import consequence
+from tests.blind.metrics.plan import Job
+from tests.blind.metrics.rows import Fact, Row, Said
+from tests.blind.metrics.second import second
+from tests.blind.rivals.columns import Residuals
+from tests.blind.rivals.compare import heldout_share, measured
+from tests.blind.world.cases import Case, Hidden, Spec, clean_pair, make_case, truth
+from tests.blind.world.vehicles import CARS
 
 __all__ = ["LEVEL", "SEED", "work"]
 

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from blind.metrics.engine import Drive, Noise, noise_of, prepare, residual, shapes, unit_innovations
 
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.records import Diagnosis
 from aqualog.model.term import Model
+from tests.blind.metrics.engine import Drive, Noise, noise_of, prepare, residual, shapes, unit_innovations
 
 __all__ = [
     "Log",

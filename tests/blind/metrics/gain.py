@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from blind.metrics.engine import residual
-from blind.metrics.forecast import Log, white
-from blind.metrics.rows import Fact
 
 from aqualog.core.errors import ConfigError
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
+from tests.blind.metrics.engine import residual
+from tests.blind.metrics.forecast import Log, white
+from tests.blind.metrics.rows import Fact
 
 __all__ = ["function_error", "log_score", "true_model", "worse"]
 

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from blind.metrics.intervals import bootstrap, clopper_pearson
-from blind.metrics.rows import Row
+
+from tests.blind.metrics.intervals import bootstrap, clopper_pearson
+from tests.blind.metrics.rows import Row
 
 __all__ = ["Measure", "by", "quantity", "right_first", "right_or_listed", "share"]
 

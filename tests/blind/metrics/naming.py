@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from blind.metrics.intervals import bootstrap
-from blind.metrics.measure import Measure, by, right_first, right_or_listed, share
-from blind.metrics.rows import Row
 
 from aqualog.model.effects import EFFECTS
+from tests.blind.metrics.intervals import bootstrap
+from tests.blind.metrics.measure import Measure, by, right_first, right_or_listed, share
+from tests.blind.metrics.rows import Row
 
 __all__ = [
     "confounds", "coverage", "false_discovery", "forecasts", "honesty", "naming", "risk_coverage", "weak", "wrong_names",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from blind.world.cases import EXACT_PROGRAMMES, Hidden, Spec
-from blind.world.effects import UNKNOWN as NOT_IN_LIBRARY
-from blind.world.noise import NOISES
-from blind.world.pools import COMPOUNDS, POOLS, SUITED
-from blind.world.vehicles import CARS
+from tests.blind.world.cases import EXACT_PROGRAMMES, Hidden, Spec
+from tests.blind.world.effects import UNKNOWN as NOT_IN_LIBRARY
+from tests.blind.world.noise import NOISES
+from tests.blind.world.pools import COMPOUNDS, POOLS, SUITED
+from tests.blind.world.vehicles import CARS
 
 __all__ = ["KNOWN", "PARTS", "TWINS", "Job", "Sizes", "plan"]
 

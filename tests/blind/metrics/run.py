@@ -6,13 +6,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
-from blind.metrics.plan import Job
-from blind.metrics.rows import Row
-from blind.metrics.store import Store
-
 from aqualog.face.progress import lasting
 from aqualog.guard.pool import work_on
 from aqualog.guard.worker import Crashed
+from tests.blind.metrics.plan import Job
+from tests.blind.metrics.rows import Row
+from tests.blind.metrics.store import Store
 
 __all__ = ["run"]
 

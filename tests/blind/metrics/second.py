@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from blind.metrics.plan import Job
-from blind.metrics.rows import Second
-from blind.world.cases import Case, Spec, make_case
-
 from aqualog.diagnose.records import Diagnosis
+from tests.blind.metrics.plan import Job
+from tests.blind.metrics.rows import Second
+from tests.blind.world.cases import Case, Spec, make_case
 
 __all__ = ["RUNS", "second"]
 
@@ -39,6 +38,6 @@ def second(job: Job, spec: Spec, case: Case, found: Diagnosis, diagnosed: Callab
     run = make_case(replace(spec, holdout=0, seed=spec.seed + 200_000, **RUNS[name]))  # type: ignore[arg-type]
     both = Case(case.spec, case.vehicle, (*case.drives, ("second", run.drives[0][1])), case.holdout)
     d = diagnosed(both)
-    from blind.metrics.case import said_of
+    from tests.blind.metrics.case import said_of
 
     return Second(name, job.can, d.verdict, tuple(said_of(d.causes)))

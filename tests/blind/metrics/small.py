@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from blind.metrics.plan import Job
-from blind.world.cases import Hidden, Spec
+from tests.blind.metrics.plan import Job
+from tests.blind.world.cases import Hidden, Spec
 
 __all__ = ["small_jobs"]
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from blind.metrics.rows import Row, row_from, row_text
+from tests.blind.metrics.rows import Row, row_from, row_text
 
 __all__ = ["Store"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from blind.metrics.measure import Measure, quantity, share
-from blind.metrics.rows import Row
+from tests.blind.metrics.measure import Measure, quantity, share
+from tests.blind.metrics.rows import Row
 
 __all__ = ["curve_text", "measures_text", "rivals_measures", "rivals_text"]
 

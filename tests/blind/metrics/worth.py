@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from blind.metrics.measure import Measure, by, quantity, share
-from blind.metrics.rows import Row
+
+from tests.blind.metrics.measure import Measure, by, quantity, share
+from tests.blind.metrics.rows import Row
 
 __all__ = ["compounds", "detectors", "gains", "manoeuvres", "speed", "unknown"]
 

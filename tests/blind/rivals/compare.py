@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from blind.rivals.columns import TWINS, Residuals, named_columns, scales, stacked
-from blind.rivals.select import SELECTORS, Finding
-from blind.rivals.sindy import MEANINGS, THRESHOLDS, ensemble, polynomials, single
 
 from aqualog.core.vehicle import Vehicle
+from tests.blind.rivals.columns import TWINS, Residuals, named_columns, scales, stacked
+from tests.blind.rivals.select import SELECTORS, Finding
+from tests.blind.rivals.sindy import MEANINGS, THRESHOLDS, ensemble, polynomials, single
 
 __all__ = ["METHODS", "heldout_share", "measured"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from blind.rivals.columns import Residuals
-from blind.rivals.select import Finding
 
 from aqualog.core.vehicle import Vehicle
+from tests.blind.rivals.columns import Residuals
+from tests.blind.rivals.select import Finding
 
 __all__ = ["MEANINGS", "THRESHOLDS", "ensemble", "polynomials", "single"]
 

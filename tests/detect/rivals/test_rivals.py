@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from drives import AWD, CAR, FWD, drive, lane
-from straight_drive import RWD
-from straight_drive import drive as straight
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import RIVALS
 from aqualog.detect.rivals.run import run_rivals
+from tests.drives import AWD, CAR, FWD, drive, lane
+from tests.straight_drive import RWD
+from tests.straight_drive import drive as straight
 
 KNOWN = frozenset({"mass", "l_f", "l_r", "tyre.slip_slope_f", "tyre.slip_slope_r"})
 NAMES = tuple(RIVALS)
@@ -106,7 +106,7 @@ def test_silent_on_the_dry(vehicle):
 
 
 def test_a_bump_under_both_axles_is_no_pattern():
-    from small_model import Lane
+    from tests.small_model import Lane
 
     rough = (Lane(15.0, 50.0, roughness=60.0),)
     result = run_rivals(dry_drive(lanes=rough), CAR, names=["front_rear_pattern"])
