@@ -135,7 +135,7 @@ class _Walk(Walk):
         return found
 
     def _text(self, at: int) -> str:
-        """The text at a place; empty where there is none."""
+        """The text at a place; empty without one."""
         if not at or at + 4 > self._size or self._data[at : at + 2] != b"TX":
             return ""
         raw = bytes(self._data[at + 4 : at + self._numbers("<H", at + 2)[0]])
