@@ -118,7 +118,7 @@ def test_logs_with_a_labels_file(folder):
     result = run(folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels, "-v")
     assert result.returncode == 0, result.stderr
     assert "puddle of mud enter the confusion table only" in result.stderr
-    row = next(line for line in result.stdout.splitlines() if line.startswith("spin_down"))
+    row = next(line for line in result.stdout.splitlines() if line.startswith("spin down"))
     assert "1/1 (100 %)" in row
     shifted = folder / "shifted.csv"
     shifted.write_text("start_s,end_s,effect,wheel\n10.5,11.5,full,fl\n")
