@@ -117,7 +117,8 @@ def _share(name: str) -> None:
     folder, function = sys.modules.get(f"aqualog.{name}"), globals().get(name)
     if folder is not None and function is not None:
         own = {n: m for n, m in vars(folder).items() if getattr(m, "__name__", "") == f"aqualog.{name}.{n}"}
-        vars(function).update({n: m for n, m in own.items() if isinstance(m, ModuleType)})
+        kept = vars(function)  # of `thesis`, the face's module: its own functions go before modules of the folder
+        kept.update({n: m for n, m in own.items() if isinstance(m, ModuleType) and n not in kept})
 
 
 sys.modules[__name__].__class__ = _Package

@@ -94,3 +94,8 @@ def test_records_read_themselves(tmp_path):
 
 def test_types_are_seen_by_a_checker():
     assert typing.get_type_hints(aq.Vehicle.read)["return"] is aq.Vehicle
+
+
+def test_functions_of_the_thesis_go_before_modules_of_its_folder():
+    code = "import aqualog as aq, types; aq.thesis; import aqualog.thesis.figures; assert isinstance(aq.thesis.figures, types.FunctionType)"
+    subprocess.run([sys.executable, "-c", code], check=True)
