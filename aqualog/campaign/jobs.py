@@ -33,7 +33,10 @@ _BEHIND = (
 
 @dataclass(frozen=True, slots=True)
 class Configured:
-    """A campaign with the content of its files: vehicles and labels by path, signal map, databases, settings."""
+    """A campaign with the content of its files: vehicles and labels by path, signal map, databases, settings.
+
+    `beside` are files given beside the campaign's own: a map in place of its map, thresholds.
+    """
 
     campaign: Campaign
     vehicles: Mapping[Path, Vehicle]
@@ -41,6 +44,7 @@ class Configured:
     signal_map: SignalMap = field(default_factory=SignalMap)
     dbc: tuple[Path, ...] = ()
     settings: Settings = field(default_factory=Settings)
+    beside: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,7 @@ def _configured(
         signal_map,
         tuple(dbc),
         settings,
+        tuple(p for p in (map_file, thresholds) if p),
     )
 
 
@@ -69,8 +70,8 @@ def files_of(configured: Configured) -> tuple[Path, ...]:
     campaign = configured.campaign
     maps = (p for p in (campaign.table, campaign.signals) if p)
     logs = (p for r in campaign.runs for p in r.logs)
-    named = dict.fromkeys([campaign.path, *maps, *configured.vehicles, *configured.labels, *configured.dbc, *logs])
-    return tuple(named)
+    given = (*configured.labels, *configured.dbc, *configured.beside)
+    return tuple(dict.fromkeys([campaign.path, *maps, *configured.vehicles, *given, *logs]))
 
 
 def configure_logs(
