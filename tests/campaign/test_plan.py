@@ -214,7 +214,7 @@ def test_a_sample_in_which_was_compiled_is_measured_again(kept, times, monkeypat
     states, measured, heard = iter(kept), [], []
     monkeypatch.setattr("aqualog.campaign.batch_cost.kept_code", lambda: frozenset(next(states)))
     monkeypatch.setattr(
-        "aqualog.campaign.batch_cost._tried_once", lambda *given: measured.append(given) or len(measured)
+        "aqualog.campaign.batch_cost._measured_once", lambda *given: measured.append(given) or len(measured)
     )
     assert measure_cost(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
     assert heard == [1] * (times - 1)
