@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import marshal
+import json
 import mmap
 import struct
 import zlib
@@ -29,9 +29,9 @@ class StatePage:
 
     def write(self, state: ReadingState) -> None:
         """Replace the state; files that do not fit on the page are left out."""
-        data = marshal.dumps(tuple(state))
+        data = json.dumps(state).encode()  # file names of any bytes: what is no text is escaped
         if len(data) > _SIZE - _HEAD.size:
-            data = marshal.dumps(tuple(state._replace(log=state.log[:4096], temporary=())))
+            data = json.dumps(state._replace(log=state.log[:4096], temporary=())).encode()
         self._page[_HEAD.size : _HEAD.size + len(data)] = data
         self._page[: _HEAD.size] = _HEAD.pack(self.is_finished, len(data), zlib.crc32(data))
 
@@ -49,5 +49,6 @@ class StatePage:
         _, length, checksum = _HEAD.unpack(self._page[: _HEAD.size])
         data = self._page[_HEAD.size : _HEAD.size + length] if length <= _SIZE - _HEAD.size else b""
         if data and zlib.crc32(data) == checksum:
-            self._last = ReadingState(*marshal.loads(data))
+            log, seconds, size, step, temporary = json.loads(data)
+            self._last = ReadingState(log, seconds, size, step, tuple(temporary))
         return self._last
