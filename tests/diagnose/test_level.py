@@ -137,10 +137,9 @@ def test_track_clearing_is_named_with_its_size(cleared):
     assert again.significance == found.significance
 
 
-@pytest.mark.nightly
 def test_nothing_hidden_is_told_as_nothing():
     data = simulated(Model(), 6)
-    found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=120)
+    found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=39)
     assert found.verdict == "no_effect", found.sentence
     assert found.causes == ()
     shown = {(x.effect, x.where): x.size for x in found.limits}
