@@ -27,8 +27,8 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.records import Signals
 from aqualog.core.user_folders import user_cache
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.content import Contents, Seen, change_since, hash_of, sources_stamp
-from aqualog.io.whole import write_text, write_whole
+from aqualog.io.atomic_write import write_text, write_whole
+from aqualog.io.fingerprint import Contents, Seen, change_since, hash_of, sources_stamp
 
 __all__ = ["Kept", "Key", "SignalCache", "cache_folder", "cache_limit"]
 

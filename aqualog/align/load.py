@@ -13,8 +13,8 @@ from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
 from aqualog.core.errors import SignalError
 from aqualog.core.records import ChannelInfo, FileFaults, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.base import Part, ReadOptions
 from aqualog.io.open_log import DriveLog
+from aqualog.io.reader import Part, ReadOptions
 
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache

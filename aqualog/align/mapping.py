@@ -11,7 +11,7 @@ from aqualog.core.errors import SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import ChannelInfo
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.csv_format import CsvFormat
+from aqualog.io.reader import CsvFormat
 
 __all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve", "values_read"]
 

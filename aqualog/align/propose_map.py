@@ -17,8 +17,8 @@ from aqualog.core.errors import AqualogError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import ChannelInfo
 from aqualog.core.units import is_unit
-from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
+from aqualog.io.reader import ReadOptions
 
 __all__ = ["LogFile", "MapProposal", "measures_wheels", "propose_signals"]
 

@@ -20,7 +20,7 @@ from aqualog.align.table import Found, Plan, cleaners_of, plan_drive
 from aqualog.align.timebase import DAY_NS
 from aqualog.core.records import Channel, ChannelInfo, FloatArray, Signals, TimeArray, TimeFaults
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.base import Part
+from aqualog.io.reader import Part
 
 __all__ = ["LongDrive", "NotInPiecesError", "Parts", "long_drive"]
 

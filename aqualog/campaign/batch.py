@@ -26,7 +26,7 @@ from aqualog.detect.stream import Settings
 from aqualog.guard.limits import VARIABLES, limits_from, size_of
 from aqualog.guard.pool import WorkOn, work_on
 from aqualog.guard.worker import NO_LIMITS, Crashed, Limits
-from aqualog.io.content import Contents, Seen, change_since
+from aqualog.io.fingerprint import Contents, Seen, change_since
 
 __all__ = ["BatchOutcome", "Compared", "Fault", "compared", "measure_one", "run_batch"]
 

@@ -13,7 +13,7 @@ from aqualog.campaign.jobs import code_stamp
 from aqualog.campaign.place import is_url
 from aqualog.campaign.store import place_of
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.io.whole import write_text
+from aqualog.io.atomic_write import write_text
 
 __all__ = ["Asked", "Stamp", "asked_of", "own_stamp", "unlike"]
 

@@ -12,7 +12,7 @@ from aqualog.core.errors import AqualogError
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
 from aqualog.evaluate.labels import Label
-from aqualog.io.content import Contents, Seen, hash_of, sources_stamp
+from aqualog.io.fingerprint import Contents, Seen, hash_of, sources_stamp
 
 __all__ = ["Configured", "Job", "code_stamp", "name_of", "plan_jobs", "result_key"]
 

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from aqualog.core.errors import ConfigError
-from aqualog.io.whole import only_here, write_whole
+from aqualog.io.atomic_write import only_here, write_whole
 
 __all__ = ["Address", "Folder", "Place", "address_of", "is_of_process", "is_orphan", "is_url", "temporary_name"]
 
@@ -49,7 +49,7 @@ class Place(ABC):
         """Create it and folders in it where they are missing."""
 
     def held(self, lock: str, *, together: bool = False) -> AbstractContextManager[None]:
-        """Keep others out by a lock file, as `aqualog.io.whole.only_here`, where locks exist."""
+        """Keep others out by a lock file, as `aqualog.io.atomic_write.only_here`, where locks exist."""
         return nullcontext()
 
     @abstractmethod
@@ -214,5 +214,5 @@ def temporary_name(name: str) -> str:
 
 
 def is_orphan(name: str) -> bool:
-    """Whether a file has such a temporary name, as `aqualog.io.whole.write_whole` also gives."""
+    """Whether a file has such a temporary name, as `aqualog.io.atomic_write.write_whole` also gives."""
     return _ORPHAN.fullmatch(name) is not None

@@ -18,8 +18,8 @@ from aqualog.campaign.store import Store
 from aqualog.core.errors import LogError
 from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
-from aqualog.io.content import Remembered
-from aqualog.io.sniff import sniff
+from aqualog.io.fingerprint import Remembered
+from aqualog.io.open_log import sniff
 
 __all__ = ["Estimate", "Plan", "Work", "Worker", "choose", "foretell", "makespan", "shards_within", "work_of"]
 

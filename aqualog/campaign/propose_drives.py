@@ -18,9 +18,8 @@ from aqualog.align.propose_map import LogFile
 from aqualog.campaign.records import GROUP_NAMES
 from aqualog.campaign.store import MARK
 from aqualog.core.errors import AqualogError
-from aqualog.io.base import ReadOptions
-from aqualog.io.open_log import open_log
-from aqualog.io.sniff import sniff
+from aqualog.io.open_log import open_log, sniff
+from aqualog.io.reader import ReadOptions
 
 __all__ = [
     "Drive", "Found", "broken_logs", "drive_name", "group_drives", "is_run_table", "kinds_of", "scan", "tokens",

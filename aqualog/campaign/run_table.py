@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.core.errors import ConfigError
-from aqualog.io.small_file import read_small
+from aqualog.io.user_file import read_small
 
 __all__ = ["RunTable", "as_point", "decimal_sign", "read_table"]
 

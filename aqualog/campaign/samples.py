@@ -17,7 +17,7 @@ from aqualog.core.errors import AqualogError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import AQUAPLANING, Label, Span
-from aqualog.io.content import Contents
+from aqualog.io.fingerprint import Contents
 
 __all__ = ["SETTLING_S", "CampaignData", "RunInfo", "RunSamples", "load_results"]
 

@@ -94,7 +94,7 @@ class Run:
         from aqualog.core.vehicle import Vehicle
         from aqualog.face.drive import Drive
         from aqualog.face.paths import expand, list_files, refuse_existing
-        from aqualog.io.content import state_of
+        from aqualog.io.fingerprint import state_of
 
         paths = expand(self.logs)
         before = state_of(paths)

@@ -257,7 +257,7 @@ def _logs(table: Table, base: Path) -> tuple[Path, ...]:
 def _no_log(path: Path, name: str) -> str:
     """Say why a name cannot be that of a log; empty if it can, whether or not the file exists."""
     if os.path.isdir(path):  # noqa: PTH112 - a path that is too long is no fault of the system
-        from aqualog.io.sniff import sniff
+        from aqualog.io.open_log import sniff
 
         try:
             sniff(path)

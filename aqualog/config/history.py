@@ -11,7 +11,7 @@ from pathlib import Path
 from aqualog.config.reader import DEEPEST
 from aqualog.core.errors import ConfigError
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
-from aqualog.io.whole import write_text
+from aqualog.io.atomic_write import write_text
 
 __all__ = ["check_history_file", "load_history", "save_history", "update_history"]
 

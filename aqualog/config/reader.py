@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from aqualog.core.errors import ConfigError
-from aqualog.io.small_file import read_small
+from aqualog.io.user_file import read_small
 
 __all__ = ["DEEPEST", "Faults", "Key", "Row", "Table", "is_number", "is_real", "quoted", "read", "read_csv", "tried"]
 

@@ -10,7 +10,7 @@ from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.config.reader import Key, Table, is_number, read
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.units import is_unit, parse_unit
-from aqualog.io.csv_format import CsvFormat, format_fault
+from aqualog.io.reader import CsvFormat, format_fault
 
 __all__ = ["MAP_KEYS", "load_signal_map", "map_text"]
 

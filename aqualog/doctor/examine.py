@@ -19,10 +19,10 @@ from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
 from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
 from aqualog.doctor.findings import Examination, FileState, Finding
-from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import drift_note
-from aqualog.io.content import changed_files, state_of
+from aqualog.io.fingerprint import changed_files, state_of
 from aqualog.io.open_log import open_log, read_readable
+from aqualog.io.reader import ReadOptions
 
 __all__ = ["examine"]
 

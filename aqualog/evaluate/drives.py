@@ -18,8 +18,8 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect.settings import JointCusumParams
 from aqualog.evaluate.labels import Label, Labels, Span, after, until
 from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
-from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
+from aqualog.io.reader import ReadOptions
 
 __all__ = ["Drive", "LogSource", "MadeSource", "Source", "labels_in"]
 

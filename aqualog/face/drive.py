@@ -18,7 +18,7 @@ from aqualog.face.cache import cache_of_user
 from aqualog.face.listener import Progress, listener
 from aqualog.face.paths import expand, list_files, refuse_existing, write_whole
 from aqualog.face.result import PathLike, printable
-from aqualog.io.content import Seen, changed_files, state_of
+from aqualog.io.fingerprint import Seen, changed_files, state_of
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -16,7 +16,7 @@ from aqualog.face.drive import Drive, DriveLike, drive_of
 from aqualog.face.listener import Listener
 from aqualog.face.paths import expand, list_files
 from aqualog.face.result import PathLike
-from aqualog.io.content import state_of
+from aqualog.io.fingerprint import state_of
 
 __all__ = [
     "DrivesLike",

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.face.arguments import check_name
-from aqualog.io import whole
-from aqualog.io.sniff import sniff
+from aqualog.io import atomic_write
+from aqualog.io.open_log import sniff
 
 __all__ = ["expand", "list_files", "refuse_existing", "write_text", "write_whole", "writing"]
 
@@ -138,7 +138,7 @@ def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Pat
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Write a file whole or not at all, see `aqualog.io.whole.write_whole`.
+    """Write a file whole or not at all, see `aqualog.io.atomic_write.write_whole`.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
         If it cannot be written.
     """
     with writing(path):
-        whole.write_whole(path, write)
+        atomic_write.write_whole(path, write)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -158,7 +158,7 @@ def write_text(path: Path, text: str) -> None:
         If it cannot be written.
     """
     with writing(path):
-        whole.write_text(path, text)
+        atomic_write.write_text(path, text)
 
 
 @contextmanager

@@ -146,7 +146,7 @@ def propose(
     )
     from aqualog.campaign.propose_files import labels_of, relative
     from aqualog.campaign.propose_names import read_names
-    from aqualog.io.base import ReadOptions
+    from aqualog.io.reader import ReadOptions
 
     way = relative(place, target.parent)
     if ";" in way or not way.isprintable():

@@ -12,7 +12,7 @@ from aqualog.align.windows import NotInPiecesError, long_drive
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import Channel, ChannelInfo
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.base import part_of
+from aqualog.io.reader import part_of
 
 CAR = Vehicle()
 S = 1_000_000_000

@@ -39,8 +39,8 @@ def made_mf4(path: Path, *, records: int, channels: int, compression: int) -> Pa
 
 def read_by_aqualog(path: Path, names: list[str]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Time stamps and values of channels, by the reader of the package."""
-    from aqualog.io.base import ReadOptions
     from aqualog.io.mdf.reader import MdfReader
+    from aqualog.io.reader import ReadOptions
 
     with MdfReader(path, ReadOptions()) as reader:
         wanted = {c.name: c for c in reader.channels()}
@@ -167,7 +167,7 @@ def csv_rows(folder: Path, scale: Scale) -> list[Row]:
     np.savetxt(path, columns, delimiter=",", header=",".join(["t", *names]), comments="", fmt="%.6f")
 
     def ours() -> list[np.ndarray]:
-        from aqualog.io.base import ReadOptions
+        from aqualog.io.reader import ReadOptions
         from aqualog.io.tables.csv import CsvReader
 
         with CsvReader(path, ReadOptions()) as reader:

@@ -23,7 +23,7 @@ from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.content import Contents
+from aqualog.io.fingerprint import Contents
 from tests.campaign.made import make_campaign
 
 

@@ -23,7 +23,7 @@ from aqualog.cli.main import app
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
 from aqualog.guard.pool import most_processes
-from aqualog.io.content import Contents
+from aqualog.io.fingerprint import Contents
 from tests.campaign.made import make_campaign
 
 

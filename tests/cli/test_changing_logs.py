@@ -11,7 +11,7 @@ from aqualog.align import load
 from aqualog.align.load import load_drive
 from aqualog.cli.main import app
 from aqualog.io import open_log
-from aqualog.io.content import changed_files, state_of
+from aqualog.io.fingerprint import changed_files, state_of
 from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"

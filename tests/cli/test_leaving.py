@@ -135,7 +135,7 @@ def test_a_reader_that_has_gone_is_no_error(count):
 
 
 def killed_while_writing(path):
-    code = "import os, sys; from pathlib import Path; from aqualog.io.whole import write_whole\n"
+    code = "import os, sys; from pathlib import Path; from aqualog.io.atomic_write import write_whole\n"
     subprocess.run([sys.executable, "-c", f"{code}write_whole(Path(sys.argv[1]), lambda p: os._exit(9))", path])
 
 

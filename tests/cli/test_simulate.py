@@ -18,8 +18,8 @@ from aqualog.cli.main import app
 from aqualog.config.scenario import load_scenario
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import SYMBOLS
-from aqualog.io.base import ReadOptions
 from aqualog.io.open_log import DriveLog
+from aqualog.io.reader import ReadOptions
 from aqualog.model import campaign as programmes
 from aqualog.model.campaign import CampaignOutcome
 from aqualog.model.log import START_NS, _onto

@@ -7,7 +7,7 @@ from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.align.mapping import map_text as map_key
 from aqualog.config.signal_map import load_signal_map, map_text
 from aqualog.core.errors import ConfigError
-from aqualog.io.csv_format import CsvFormat, format_of
+from aqualog.io.reader import CsvFormat, format_of
 
 
 def write(tmp_path, text, name="x.toml"):

@@ -11,12 +11,12 @@ import numpy as np
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, FileFaults
-from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import columns as mdf_columns
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
+from aqualog.io.reader import ReadOptions
 from aqualog.io.tables import csv_rows, parquet
 from aqualog.io.tables import csv_text as text_file
 

@@ -11,9 +11,9 @@ from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
 from aqualog.core.vehicle import Vehicle
 from aqualog.doctor.examine import examine
-from aqualog.io.base import ReadOptions
 from aqualog.io.clock_drift import DriftWatch
 from aqualog.io.open_log import open_log
+from aqualog.io.reader import ReadOptions
 from aqualog.io.tables import csv_rows, parquet
 from aqualog.io.tables import csv_text as text_file
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, ChannelInfo, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.base import OpenFile
 from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf.conversion import converted, physical
 from aqualog.io.mdf.records import Group
@@ -25,6 +24,7 @@ from aqualog.io.mdf.sorting import Kind, sorted_groups
 from aqualog.io.mdf.walk import Survey, mapped
 from aqualog.io.mdf.walk3 import survey3
 from aqualog.io.mdf.walk4 import survey4
+from aqualog.io.reader import OpenFile
 
 __all__ = ["Columns", "GroupReader"]
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, TimeArray
-from aqualog.io.base import FaultLog, Part, ReadOptions, one_piece, part_of
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, selected
 from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf import frames as can
@@ -23,6 +22,7 @@ from aqualog.io.mdf.groups import Columns, GroupReader
 from aqualog.io.mdf.records import Channel as MdfChannel
 from aqualog.io.mdf.records import Group
 from aqualog.io.mdf.walk import Survey, short
+from aqualog.io.reader import FaultLog, Part, ReadOptions, one_piece, part_of
 
 __all__ = ["MdfReader"]
 

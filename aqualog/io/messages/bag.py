@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import BinaryIO, Literal
 
 from aqualog.core.errors import LogError
+from aqualog.io.decompress import LONGEST, Allowance, DamagedError, unpack
 from aqualog.io.messages.batches import Message, batched, first_of_each
 from aqualog.io.messages.codecs import UndecodableError, codec_for
 from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
 from aqualog.io.messages.walk import ChunkSource, RecordWalk
-from aqualog.io.unpack import LONGEST, Allowance, DamagedError, unpack
 
 __all__ = ["CHUNK", "INDEX", "MAGIC", "BagSource", "BagWalk", "kind_of"]
 

@@ -17,10 +17,10 @@ import zstandard
 from rosbags.typesys import Stores
 
 from aqualog.core.errors import LogError
+from aqualog.io.decompress import Allowance, DamagedError, unpack
 from aqualog.io.messages.batches import Batch, Message, batched
 from aqualog.io.messages.codecs import UndecodableError, codec_for
 from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
-from aqualog.io.unpack import Allowance, DamagedError, unpack
 
 __all__ = ["Db3Source", "release_of"]
 

@@ -25,14 +25,14 @@ from mcap.records import Schema as SchemaRecord
 from mcap.summary import Summary
 
 from aqualog.core.errors import LogError
-from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.decompress import LONGEST, Allowance, DamagedError, unpack
 from aqualog.io.messages.batches import Batch, Message, batched, first_of_each
 from aqualog.io.messages.codecs import UndecodableError, codec_for
 from aqualog.io.messages.mcap_records import HEAD, MAGIC, McapWalk, scanned
 from aqualog.io.messages.reader import MessageReader
 from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
 from aqualog.io.messages.walk import ChunkSource
-from aqualog.io.unpack import LONGEST, Allowance, DamagedError, unpack
+from aqualog.io.reader import FaultLog, ReadOptions
 
 __all__ = ["McapReader", "McapSource"]
 

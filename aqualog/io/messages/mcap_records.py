@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from mcap.opcode import Opcode
 
+from aqualog.io.decompress import LONGEST
 from aqualog.io.messages.batches import Batch, rows_of
 from aqualog.io.messages.walk import RecordWalk
-from aqualog.io.unpack import LONGEST
 
 __all__ = ["HEAD", "MAGIC", "McapWalk", "Scan", "scanned"]
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults
-from aqualog.io.base import FaultLog, OpenFile, Part, part_of
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.messages.batches import Batch
 from aqualog.io.messages.codecs import Leaf, brief
 from aqualog.io.messages.streams import Sink, Stream, sinks_of, taker_of
+from aqualog.io.reader import FaultLog, OpenFile, Part, part_of
 
 __all__ = ["MessageReader", "Source"]
 

@@ -19,13 +19,13 @@ import zstandard
 from rosbags.typesys import Stores
 
 from aqualog.core.errors import LogError
-from aqualog.io.base import FaultLog, ReadOptions
+from aqualog.io.decompress import FREE, RATIO
 from aqualog.io.messages.bag import MAGIC as BAG_MAGIC
 from aqualog.io.messages.bag import BagSource
 from aqualog.io.messages.db3 import Db3Source, release_of
 from aqualog.io.messages.mcap import McapSource
 from aqualog.io.messages.reader import MessageReader, Source
-from aqualog.io.unpack import FREE, RATIO
+from aqualog.io.reader import FaultLog, ReadOptions
 
 __all__ = ["RosReader"]
 

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, Generic, Literal, TypeVar
 
+from aqualog.io.decompress import Allowance
 from aqualog.io.messages.batches import Batch, Message, batched, counted, first_of_each
 from aqualog.io.messages.streams import SAMPLES
-from aqualog.io.unpack import Allowance
 
 __all__ = ["ChunkSource", "RecordWalk"]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aqualog.core.errors import ConfigError, LogError
 from aqualog.core.records import BoolArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
-from aqualog.io.base import ReadOptions
+from aqualog.io.reader import ReadOptions
 
 __all__ = [
     "Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "judged_unit", "no_unit_note",

@@ -12,9 +12,8 @@ import polars as pl
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, FloatArray
-from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.csv_format import csv_hint, format_of
+from aqualog.io.reader import OpenFile, Part, ReadOptions, csv_hint, format_of, one_piece, part_of
 from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,

@@ -16,7 +16,7 @@ from typing import Literal
 
 from aqualog.core.errors import LogError
 from aqualog.core.units import is_unit
-from aqualog.io.csv_format import CsvFormat, csv_hint
+from aqualog.io.reader import CsvFormat, csv_hint
 from aqualog.io.tables.columns import split_unit, unique_names
 from aqualog.io.tables.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
 from aqualog.io.tables.csv_text import TextFile

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from aqualog.core.errors import LogError
 from aqualog.core.units import is_unit
-from aqualog.io.csv_format import csv_hint
+from aqualog.io.reader import csv_hint
 from aqualog.io.tables.columns import split_unit
 
 __all__ = ["LARGE", "LONGEST_LINE", "LogText", "TextFile", "check_lines", "open_text", "read_text"]

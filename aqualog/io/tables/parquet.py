@@ -18,8 +18,8 @@ import polars as pl
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FloatArray, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.base import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.clock_drift import DriftWatch, drift_note
+from aqualog.io.reader import OpenFile, Part, ReadOptions, one_piece, part_of
 from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,

@@ -11,7 +11,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
-from aqualog.io.base import FaultLog
+from aqualog.io.reader import FaultLog
 from aqualog.io.tables.parquet_pages import Group, Index, MalformedError, is_of, page_fault, read_index
 
 __all__ = ["SoundRows", "reason_of"]

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.io.unpack import MAX_UNPACKED
+from aqualog.io.decompress import MAX_UNPACKED
 
 __all__ = [
     "Bounds", "Chunk", "Group", "Index", "MalformedError", "Struct", "decode", "is_of", "page_fault", "read_index",

@@ -16,7 +16,7 @@ from aqualog.campaign.bins import Group
 from aqualog.campaign.samples import CampaignData
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
-from aqualog.io.whole import write_text
+from aqualog.io.atomic_write import write_text
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import file_name
 from aqualog.report.campaign.page import campaign_page

@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from aqualog.core.records import FileFaults
-from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import columns
 from aqualog.io.mdf.columns import raw_columns
 from aqualog.io.mdf.reader import MdfReader
+from aqualog.io.reader import ReadOptions
 from tests.io.mdf import mdf_bytes
 from tests.io.mdf.mdf_bytes import FLOAT, FLOAT_BIG, SIGNED, SIGNED_BIG, UNSIGNED, UNSIGNED_BIG, Bits, Group, Layout
 

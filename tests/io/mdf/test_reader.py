@@ -21,10 +21,10 @@ from aqualog.align.mapping import SignalMap
 from aqualog.core.errors import ConfigError, LogError, SignalError
 from aqualog.core.records import Channel, FileFaults
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.base import ReadOptions
 from aqualog.io.mdf.conversion import Formula
 from aqualog.io.mdf.frames import _variable
 from aqualog.io.mdf.reader import MdfReader
+from aqualog.io.reader import ReadOptions
 from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real_logs"

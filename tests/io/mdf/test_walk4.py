@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.core.errors import LogError
-from aqualog.io.base import ReadOptions
 from aqualog.io.mdf import columns, describe4, groups, reader, walk4
 from aqualog.io.mdf.reader import MdfReader
+from aqualog.io.reader import ReadOptions
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
 from tests.mdf_by_hand import Blocks, describe, records, streamed, unsorted
 

@@ -17,10 +17,10 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from aqualog.io.base import ReadOptions
 from aqualog.io.messages import batches, codecs, mcap, streams
 from aqualog.io.messages.mcap_records import scanned
 from aqualog.io.open_log import open_log
+from aqualog.io.reader import ReadOptions
 
 T0 = 1_700_000_000 * 10**9
 STEP = 10**7

@@ -25,11 +25,11 @@ from aqualog.align.mapping import Entry, SignalMap
 from aqualog.core.errors import LogError, SignalError
 from aqualog.core.records import Channel
 from aqualog.core.vehicle import Vehicle
-from aqualog.io.base import ReadOptions
+from aqualog.io.decompress import FREE, Allowance, DamagedError
 from aqualog.io.messages import mcap_records
 from aqualog.io.messages.mcap import McapReader, McapSource
 from aqualog.io.messages.mcap_records import scanned
-from aqualog.io.unpack import FREE, Allowance, DamagedError
+from aqualog.io.reader import ReadOptions
 from aqualog.io.write_mcap import McapTopic, write_mcap
 
 LONGEST = 1 << 24

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from aqualog.io.base import ReadOptions
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
+from aqualog.io.reader import ReadOptions
 
 LANE = Path(__file__).parents[3] / "sample_logs" / "lane_drive.mcap"
 SCHEMA = b"std_msgs/Header header\nfloat64 x\nfloat32[3] y\n" + b"=" * 80 + (

@@ -18,9 +18,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel
-from aqualog.io.base import ReadOptions
 from aqualog.io.messages.bag import CHUNK, INDEX, MAGIC, BagWalk, kind_of
 from aqualog.io.messages.ros import RosReader
+from aqualog.io.reader import ReadOptions
 
 T0 = 1_700_000_000 * 10**9
 STEP = 10**7

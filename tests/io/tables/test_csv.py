@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from aqualog.align.mapping import SignalMap, resolve
 from aqualog.core.errors import ConfigError, LogError, SignalError
-from aqualog.io.base import ReadOptions
-from aqualog.io.csv_format import CsvFormat
 from aqualog.io.open_log import open_log
+from aqualog.io.reader import CsvFormat, ReadOptions
 from aqualog.io.tables import csv_text as text_file
 from aqualog.io.tables.columns import split_unit, unique_names
 from aqualog.io.tables.csv import CsvReader

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.io.base import ReadOptions
+from aqualog.io.reader import ReadOptions
 from aqualog.io.tables import csv_rows
 from aqualog.io.tables import csv_text as text_file
 from aqualog.io.tables.csv import CsvReader

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import LogError
-from aqualog.io.base import ReadOptions
+from aqualog.io.reader import ReadOptions
 from aqualog.io.tables import parquet
 from aqualog.io.tables.parquet import ParquetReader, field_metadata
 from aqualog.io.write_table import TableColumn, write_parquet

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import LogError
-from aqualog.io.base import ReadOptions
+from aqualog.io.reader import ReadOptions
 from aqualog.io.tables import parquet
 from aqualog.io.tables.parquet import ParquetReader
 from aqualog.io.tables.parquet_pages import MalformedError, decode, page_fault, read_index

@@ -10,7 +10,7 @@ from aqualog.config.labels import load_labels
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError, LogError
 from aqualog.io.can import load_dbc
-from aqualog.io.small_file import read_small
+from aqualog.io.user_file import read_small
 
 LOADERS = {
     "toml": load_vehicle, "labels": load_labels, "runs": lambda p: read_table(p, key="log"),
