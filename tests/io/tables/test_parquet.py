@@ -83,6 +83,15 @@ def test_a_schema_that_is_garbage_has_no_units(text):
     assert field_metadata(text, "unit") == {}
 
 
+def test_the_last_row_of_a_time_without_unit_does_not_cost_a_decoding_for_each_row(stored, monkeypatch):
+    calls = []
+    scan = pl.scan_parquet
+    monkeypatch.setattr(pl, "scan_parquet", lambda *a, **k: calls.append(a) or scan(*a, **k))
+    channels, _ = read(stored({"t": np.arange(500) * 0.01, "v": np.arange(500.0)}))
+    assert channels["v"].values.size == 500
+    assert len(calls) < 20
+
+
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])
 @pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
 def test_datetimes(stored, unit, zone):
