@@ -1,35 +1,19 @@
-"""The commands as a user calls them, in processes of their own."""
+"""What the commands print, write and refuse."""
 
 import json
 import os
-import subprocess
-import sys
 import tomllib
 
 import numpy as np
 import polars as pl
 import pytest
 
+from tests.commands import one_error_line, run
 from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
 CAR = str(SAMPLES / "vehicle.toml")
 MF4 = str(SAMPLES / "lane_drive.mf4")
-
-
-def run(*args, cwd=None, env=None):
-    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200", **(env or {})}
-    return subprocess.run(
-        [sys.executable, "-m", "aqualog", *map(str, args)], capture_output=True, text=True, cwd=cwd, env=environment,
-        check=False,
-    )  # fmt: skip
-
-
-def one_error_line(result):
-    lines = [line for line in result.stderr.splitlines() if line.startswith("error:")]
-    assert len(lines) == 1, result.stderr
-    assert "Traceback" not in result.stderr
-    return lines[0]
 
 
 def test_table_of_events():
@@ -227,15 +211,6 @@ def test_hostile_names_do_not_reach_the_terminal_raw(tmp_path):
     result = run("inspect", path)
     assert "\x1b" not in result.stdout
     assert "[bold]x" in result.stdout
-
-
-def test_every_command_has_help_with_examples():
-    listed = run("--help").stdout
-    for command in ("detect", "inspect", "convert", "align"):
-        assert command in listed
-        text = run(command, "--help").stdout
-        assert "Examples:" in text
-        assert f"aqualog {command}" in text
 
 
 def test_align_command(tmp_path):

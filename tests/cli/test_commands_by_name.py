@@ -34,13 +34,32 @@ def test_an_unknown_name_is_told_with_the_nearest():
     assert "Did you mean 'detect'?" in wrong.stderr
 
 
-def test_listing_imports_no_command():
-    code = (
-        "import sys; sys.argv = ['aqualog', '--help']\nfrom aqualog.cli.main import run\ntry:\n    run()\n"
-        "except SystemExit:\n    print('LOADED', *(m for m in sys.modules if m.startswith('aqualog.cli.')))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split("LOADED")[1].split()) == {f"aqualog.cli.{m}" for m in ("main", "commands", "start")}
+HELP_OF_ALL = """
+import sys
+from aqualog.cli.main import app
+def show(*args):
+    try:
+        app([*args, "--help"])
+    except SystemExit:
+        print("LOADED", *sys.modules)
+show()
+for name in sys.argv[1:]:
+    show(name)
+"""
+
+
+def test_help_has_examples_and_loads_nothing_heavy():
+    done = subprocess.run([sys.executable, "-c", HELP_OF_ALL, *COMMANDS], capture_output=True, text=True, check=True)
+    first, *others = re.split(r"^LOADED (.*)\n", done.stdout, flags=re.MULTILINE)[:-1]
+    loaded = others.pop(0).split()
+    assert "Commands:" in first
+    assert {m for m in loaded if m.startswith("aqualog.cli.")} == {
+        f"aqualog.cli.{m}" for m in ("main", "commands", "start")
+    }
+    for name, text in zip(COMMANDS, others[::2], strict=True):
+        assert name == "campaign" or f"aqualog {name}" in text.split("Examples:")[1], name
+    heavy = {"numpy", "polars", "numba", "plotly", "jinja2", "scipy", "asammdf", "mcap"}
+    assert not heavy & set(others[-1].split())
 
 
 def test_modules_are_not_looked_through_for_garbage_at_the_end():

@@ -11,7 +11,8 @@ from aqualog.model.log import write_simulation
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
-from tests.cli.test_commands import CAR, MF4, SAMPLES, one_error_line, run
+from tests.cli.test_commands import CAR, MF4, SAMPLES
+from tests.commands import one_error_line, run
 
 
 @pytest.fixture(scope="module")

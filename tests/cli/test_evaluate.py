@@ -1,33 +1,16 @@
 """`aqualog evaluate` as a user calls it."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
+from tests import commands
+from tests.commands import error_lines
 from tests.evaluate.made import write_campaign
-
-CODE = """
-import typer
-from aqualog.cli.evaluate import evaluate
-app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-app.command()(evaluate)
-app(prog_name="aqualog evaluate")
-"""
 
 
 def run(*args):
-    return subprocess.run(
-        [sys.executable, "-c", CODE, *map(str, args)], capture_output=True, text=True, check=False,
-        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
-    )  # fmt: skip
-
-
-def errors(result):
-    assert "Traceback" not in result.stderr
-    return [line for line in result.stderr.splitlines() if line.startswith("error:")]
+    return commands.run("evaluate", *args)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +30,7 @@ def whole(folder):
 def test_a_broken_log_is_told_and_the_others_are_evaluated(whole):
     result, _ = whole
     assert result.returncode == 3, result.stderr
-    lines = errors(result)
+    lines = error_lines(result)
     assert len(lines) == 1
     assert "broken.mf4" in lines[0]
 
@@ -106,7 +89,7 @@ def test_tuning_writes_thresholds_that_can_be_used(folder):
     assert "[thresholds]" in target.read_text()
     again = run(folder / "campaign.toml", "--tune", target)
     assert again.returncode == 2
-    assert "--force" in errors(again)[0]
+    assert "--force" in error_lines(again)[0]
     used = run(folder / "campaign.toml", "--thresholds", target, "--json")
     assert used.returncode == 3
     assert json.loads(used.stdout)["thresholds"] == json.loads(result.stdout)["thresholds"]
@@ -134,7 +117,7 @@ def test_a_label_after_the_end_of_the_log_is_told_and_left_out(folder):
     args = (folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels)
     result = run(*args, "--json")
     assert result.returncode == 3, result.stderr
-    assert "2 labels begin after the log's end at 12 s, at 40 s; left out" in errors(result)[0]
+    assert "2 labels begin after the log's end at 12 s, at 40 s; left out" in error_lines(result)[0]
     joint = json.loads(result.stdout)["detectors"]["joint_criteria"]
     assert joint["full"]["episodes"] == joint["partial"]["episodes"] == 1
     assert "labels are cut where the log ends, at 12 s" in run(*args, "-v").stderr
@@ -173,17 +156,7 @@ def test_what_cannot_be_done_is_one_line(folder, args, code, text):
     (folder / "one.csv").write_text("start_s,end_s,effect,wheel\n1,2,water,\n")
     result = run(*(folder / a if "." in a else a for a in args))
     assert result.returncode == code, result.stderr
-    lines = errors(result)
+    lines = error_lines(result)
     assert len(lines) == 1
     assert text in lines[0]
     assert result.stdout == ""
-
-
-def test_help_loads_nothing_heavy():
-    code = CODE.replace(
-        'app(prog_name="aqualog evaluate")',
-        "import sys\ntry:\n    app(['--help'])\nexcept SystemExit:\n    print('LOADED', *sys.modules)",
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert "aqualog evaluate campaign.toml --tune thresholds.toml" in out
-    assert not {"numpy", "polars", "numba", "plotly", "jinja2"} & set(out.split("LOADED")[-1].split())

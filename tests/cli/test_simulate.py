@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -25,7 +23,7 @@ from aqualog.model.campaign import CampaignOutcome
 from aqualog.model.log import START_NS, _onto
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.simulate import simulate as simulated
-from tests.cli.test_commands import one_error_line, run
+from tests.commands import one_error_line, run
 from tests.conftest import ROOT
 
 CAR = ROOT / "sample_logs" / "vehicle.toml"
@@ -373,16 +371,6 @@ def test_a_scenario_named_campaign(tmp_path):
     result = run("simulate", "./campaign", "-o", "x.csv", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "./campaign" in one_error_line(run("simulate", "campaign", "-o", "y.csv", cwd=tmp_path))
-
-
-def test_help_has_examples_and_imports_nothing_heavy():
-    code = "import sys; sys.argv = ['aqualog', 'simulate', '--help']\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"
-    text, loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split("LOADED")
-    assert "Examples:" in text
-    assert "aqualog simulate scenario.toml -o drive.mf4" in text
-    assert not {"numpy", "numba", "polars", "asammdf", "mcap"} & set(loaded.split())
 
 
 def test_the_vehicle_file_is_not_written_over(tmp_path):

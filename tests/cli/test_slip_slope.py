@@ -3,28 +3,17 @@
 import csv
 import io
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
 from aqualog.core.vehicle import vehicle_toml
+from tests import commands
+from tests.commands import one_error_line
 from tests.straight_drive import AWD, RWD, C, drive
 
 
 def run(*args):
-    return subprocess.run(
-        [sys.executable, "-m", "aqualog", "slip-slope", *map(str, args)], capture_output=True, text=True, check=False,
-        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
-    )  # fmt: skip
-
-
-def one_error_line(result):
-    lines = [line for line in result.stderr.splitlines() if line.startswith("error:")]
-    assert len(lines) == 1, result.stderr
-    assert "Traceback" not in result.stderr
-    return lines[0]
+    return commands.run("slip-slope", *args)
 
 
 @pytest.fixture(scope="module")
@@ -181,14 +170,3 @@ def test_vehicle_must_be_given(folder):
     result = run(folder / "drive.csv")
     assert result.returncode == 2
     assert "--vehicle" in one_error_line(result)
-
-
-def test_help_has_examples_and_loads_nothing_heavy():
-    assert "aqualog slip-slope drive.mf4 --vehicle car.toml" in run("--help").stdout
-    code = (
-        "import sys; sys.argv = ['aqualog', 'slip-slope', '--help']\nfrom aqualog.cli.main import run\n"
-        "try:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    loaded = out.split("LOADED")[-1].split()
-    assert not {"numpy", "polars", "numba", "plotly", "jinja2", "scipy"} & set(loaded)
