@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -18,6 +19,9 @@ from numba.core.runtime import rtsys
 from aqualog.core.user_folders import code_folder
 
 __all__ = ["compiled", "inlined", "kept_code", "part"]
+
+_PATIENCE_S = 120.0  # the longest compilation takes a quarter of it on a slow machine
+_LOOK_S = 0.05
 
 _inlined: dict[FunctionType, Any] = {}
 
@@ -42,6 +46,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     finally:
         config.CACHE_DIR = own
     _load_lightly(dispatcher)
+    _compile_in_turn(dispatcher)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
         assert isinstance(function, FunctionType)
@@ -102,6 +107,71 @@ def _load_lightly(dispatcher: Any) -> None:
             return kept._load_overload(signature, target)
 
     kept.load_overload = load
+
+
+class _Turn:
+    """The right to compile one function, which one process of this machine has at a time.
+
+    A process that ends gives it back; one that keeps it for too long is not waited for.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: int | None = None
+
+    def take(self) -> None:
+        """Wait until no other process compiles the function; where files cannot be locked, nobody waits."""
+        try:
+            import fcntl
+
+            if self._file is None:
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        except (ImportError, OSError):
+            return
+        patience = time.monotonic() + _PATIENCE_S
+        while time.monotonic() < patience:
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            except BlockingIOError:
+                time.sleep(_LOOK_S)
+            except OSError:
+                return
+
+    def give(self) -> None:
+        """Let the next process compile, or find what was kept."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+
+def _compile_in_turn(dispatcher: Any) -> None:
+    """Compile a function in one process while others that need it wait for its kept code.
+
+    The workers of a batch begin together: each would compile the same for many seconds.
+    """
+    kept: Any = getattr(dispatcher, "_cache", None)
+    if not all(hasattr(kept, n) for n in ("load_overload", "save_overload", "_cache_path", "_impl")):
+        return  # numba's own attributes: without them, each process compiles
+    turn = _Turn(Path(kept._cache_path) / f"{kept._impl.filename_base}.turn")
+    load_kept, keep = kept.load_overload, kept.save_overload
+
+    def load(signature: Any, target: Any) -> Any:
+        found = load_kept(signature, target)
+        if found is None:
+            turn.take()
+            found = load_kept(signature, target)
+            if found is not None:
+                turn.give()
+        return found
+
+    def save(signature: Any, compiled_code: Any) -> None:
+        try:
+            keep(signature, compiled_code)
+        finally:
+            turn.give()
+
+    kept.load_overload, kept.save_overload = load, save
 
 
 @cache

@@ -58,6 +58,54 @@ def test_kept_code_is_loaded_without_what_compiles():
     assert done.stdout.splitlines() == [f"False {y.tolist()}", str(y.tolist())]
 
 
+SLOW = """
+import sys, time
+import aqualog.core.compiled as compilation
+from numba.core import event
+class Told(event.Listener):
+    def on_start(self, event):
+        if str(event.data["dispatcher"]).find("once") >= 0:
+            print("compiles", flush=True)
+            time.sleep(1.0)
+    def on_end(self, event):
+        pass
+event.register("numba:compile", Told())
+from made_once import once
+sys.stdin.readline()
+print(once(3.0), once._cache._cache_path)
+"""
+ONCE = """
+from aqualog.core.compiled import compiled
+
+
+@compiled
+def once(x):
+    return x + 1.0
+"""
+
+
+def test_processes_that_begin_together_compile_once(tmp_path):
+    (tmp_path / "made_once.py").write_text(ONCE)
+    env = {
+        **os.environ,
+        "PYTHONPATH": f"{tmp_path}:{ROOT}",
+        "XDG_CACHE_HOME": str(tmp_path / "kept"),
+        "NUMBA_CACHE_DIR": "",
+    }
+    others = [
+        subprocess.Popen(
+            [sys.executable, "-c", SLOW], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env
+        )
+        for _ in range(2)
+    ]
+    for process in others:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    told = [process.communicate(timeout=60)[0] for process in others]
+    assert all("4.0 " in t for t in told)
+    assert sum("compiles" in t for t in told) == 1
+
+
 CALLER = """
 from aqualog.core.compiled import compiled
 from made_here.two import called
