@@ -16,9 +16,14 @@ PLAIN = {"NO_COLOR": "1", "COLUMNS": "200"}
 class Done(NamedTuple):
     """How a command ended, and what it printed."""
 
-    returncode: int
+    exit_code: int
     stdout: str
     stderr: str
+
+    @property
+    def output(self):
+        """Both streams."""
+        return self.stdout + self.stderr
 
 
 def run(*args, cwd=None, env=None):

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.align.load import load_signals
 from aqualog.campaign import batch
@@ -19,12 +18,12 @@ from aqualog.campaign.measure import measure
 from aqualog.campaign.records import Run, with_load
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import Store
-from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError, LogError
 from aqualog.guard.worker import Crashed
 from aqualog.model.programme import SEDAN
 from tests.campaign.made import make_campaign
+from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +39,6 @@ def made(tmp_path_factory):
 def own(tmp_path):
     """A campaign of one's own to spoil, three logs."""
     return make_campaign(tmp_path, speeds=(80, 90, 100), repeats=1)
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 # --- the samples ------------------------------------------------------------------------------------------------------

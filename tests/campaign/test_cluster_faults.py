@@ -29,6 +29,7 @@ from aqualog.guard.limits import ReadLimits
 from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
 from tests.campaign.dask_here import cluster, with_children
 from tests.campaign.made import make_campaign
+from tests.commands import run
 
 
 @contextmanager
@@ -241,10 +242,10 @@ def test_a_scheduler_that_is_lost_half_way(tmp_path):
     states = json.loads((store / "manifest.json").read_text())["states"]
     assert states["done"] >= 8
     assert not list(store.rglob(".seen-*"))
-    again = CliRunner().invoke(app, ["batch", str(campaign), "-o", str(store), "--json"])
+    again = run("batch", campaign, "-o", store, "--json")
     assert again.exit_code == 0
     assert json.loads(again.stdout)["kept"] == len(done)
-    assert CliRunner().invoke(app, ["batch", str(campaign), "-o", str(plain)]).exit_code == 0
+    assert run("batch", campaign, "-o", plain).exit_code == 0
     for path in (*(plain / "samples").iterdir(), plain / "runs.parquet", plain / "events.parquet"):
         assert (store / path.relative_to(plain)).read_bytes() == path.read_bytes()
 

@@ -8,19 +8,14 @@ import time
 
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.campaign.records import Shard, part_of, shard_of
-from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError
 from aqualog.guard.worker import Crashed
 from tests.campaign.dask_here import cluster, free_port, with_children
 from tests.campaign.made import make_campaign
-
-
-def run(*args):
-    return CliRunner().invoke(app, [str(a) for a in args])
+from tests.commands import run
 
 
 def samples_of(store):

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.campaign.logs import log_states, missing_lines
 from aqualog.campaign.matrix import campaign_matrix
 from aqualog.campaign.records import Campaign, Run
-from aqualog.cli.main import app
+from tests.commands import run
 
 
 def campaign(*rows, vehicle="car.toml"):
@@ -147,7 +146,7 @@ def folder(tmp_path):
 def test_the_command_shows_the_matrix(folder):
     for name in ("a00", *(f"a1.3{i}" for i in range(5)), *(f"b0{i}" for i in range(3))):
         (folder / f"{name}.mf4").write_bytes(b"x" * 1000)
-    out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml")])
+    out = run("inspect", folder / "campaign.toml")
     assert out.exit_code == 0, out.output
     for part in (
         "wet: 9 runs in 3 configurations", "all there, 0.0 MB", "car, rwd, 1500 kg", "same in all runs: vehicle = car",
@@ -155,7 +154,7 @@ def test_the_command_shows_the_matrix(folder):
         "5 of 9 runs without lane times", "    b, 1.3\n", "car.toml does not give drivetrain, l_f, l_r, wheels.r_e_f",
     ):  # fmt: skip
         assert part in out.output, out.output
-    document = json.loads(CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml"), "--json"]).stdout)
+    document = json.loads(run("inspect", folder / "campaign.toml", "--json").stdout)
     assert [c["interval"] for c in document["configurations"]] == ["none", "usable", "wide"]
     assert document["gaps"] == [{"values": {"tyre": "b", "water_depth_mm": "1.3"}, "beside": 2}]
     assert document["logs"] == {"files": 9, "bytes": 9000, "missing": []}
@@ -163,22 +162,22 @@ def test_the_command_shows_the_matrix(folder):
 
 def test_the_command_tells_missing_logs_by_its_code(folder):
     path = str(folder / "campaign.toml")
-    assert CliRunner().invoke(app, ["inspect", path]).exit_code == 4
+    assert run("inspect", path).exit_code == 4
     (folder / "a00.mf4").write_bytes(b"x")
-    out = CliRunner().invoke(app, ["inspect", path])
+    out = run("inspect", path)
     assert out.exit_code == 3
     assert "1 of 9 logs there" in out.output
     assert "runs.csv: line 3: no such log" in out.output
-    assert CliRunner().invoke(app, ["inspect", path, "other.mf4"]).exit_code == 2
-    assert CliRunner().invoke(app, ["inspect", path, "--write-map", "m.toml"]).exit_code == 2
-    assert CliRunner().invoke(app, ["inspect", str(folder / "gone.toml")]).exit_code == 2
+    assert run("inspect", path, "other.mf4").exit_code == 2
+    assert run("inspect", path, "--write-map", "m.toml").exit_code == 2
+    assert run("inspect", folder / "gone.toml").exit_code == 2
 
 
 def test_thousands_of_runs_take_a_second_or_two(folder):
     rows = [f"{i}.mf4,t{i % 9},{i % 7},{60 + i % 70}" for i in range(5000)]
     (folder / "runs.csv").write_text("\n".join(["log,tyre,water_depth_mm,x_speed_kmh", *rows]) + "\n")
     began = time.process_time()
-    out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml"), "--json"])
+    out = run("inspect", folder / "campaign.toml", "--json")
     assert len(json.loads(out.stdout)["configurations"]) == 63
     assert time.process_time() - began < 5.0
 
@@ -193,7 +192,7 @@ def test_what_a_batch_has_measured_is_used(folder):
     pl.DataFrame(rows("failed", "b00.mf4: is cut", 20.0)).write_parquet(store / "runs.parquet")
     (folder / "runs.csv").write_text("log,tyre,lane_start_s,lane_end_s\na00.mf4,a,5,25\nb00.mf4,b,5,25\n")
     (folder / "a00.mf4").write_bytes(b"x")
-    out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml")]).output
+    out = run("inspect", folder / "campaign.toml").output
     for part in (
         "measured by a batch: 1 of 2 runs", "60 82.5", "not measured: b00.mf4: is cut",
         "runs.csv: line 2: lane_end_s = 25 is after the log's end at 20.0 s",
@@ -201,6 +200,6 @@ def test_what_a_batch_has_measured_is_used(folder):
         assert part in out, out
     assert "line 3: lane_end_s" not in out
     (store / "runs.parquet").write_bytes(b"junk")
-    out = CliRunner().invoke(app, ["inspect", str(folder / "campaign.toml")])
+    out = run("inspect", folder / "campaign.toml")
     assert out.exit_code == 2
     assert "is not a table of runs" in out.output

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.batch_cost import BatchCost, LogCost, measure_cost
@@ -19,12 +18,12 @@ from aqualog.campaign.jobs import Job
 from aqualog.campaign.plan import Work, choose, foretell, makespan, shards_within, work_of
 from aqualog.campaign.records import Campaign, Run, Shard, part_of
 from aqualog.campaign.store import Store
-from aqualog.cli.main import app
 from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.fingerprint import Contents
 from tests.campaign.made import make_campaign
+from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -151,10 +150,6 @@ def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, mon
 
 
 # --- the command --------------------------------------------------------------------------------------------------------
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 def test_a_batch_takes_what_was_foretold(campaign, tmp_path):

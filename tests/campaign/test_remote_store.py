@@ -17,16 +17,15 @@ import fsspec
 import pytest
 from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
-from typer.testing import CliRunner
 
 from aqualog.campaign.cluster_worker import asked_of, unlike
 from aqualog.campaign.place import Folder, address_of
 from aqualog.campaign.place_remote import Remote
 from aqualog.campaign.store import Store, place_of
-from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError, LogError
 from tests.campaign.dask_here import cluster
 from tests.campaign.made import make_campaign
+from tests.commands import run
 
 
 class Other(LocalFileSystem):
@@ -88,10 +87,6 @@ def url(request, tmp_path):
 @pytest.fixture(autouse=True)
 def steady():
     Shaky.fails = ""
-
-
-def run(*args):
-    return CliRunner().invoke(app, [str(a) for a in args])
 
 
 def files_of(address):

@@ -12,19 +12,18 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.campaign import batch, place
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.jobs import _BEHIND, code_stamp
 from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import MARK, Store
-from aqualog.cli.main import app
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
 from aqualog.guard.pool import most_processes
 from aqualog.io.fingerprint import Contents
 from tests.campaign.made import make_campaign
+from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +46,6 @@ def bare(own):
     """A copy without a store."""
     shutil.rmtree(own / "campaign.store")
     return own
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 def store_in(folder):
@@ -478,13 +473,13 @@ def test_lists_of_thousands_of_levels_are_no_json(own):
 def test_a_pipe_in_a_store_is_not_waited_for(own):
     (own / "campaign.store" / "contents.json").unlink()
     os.mkfifo(own / "campaign.store" / "contents.json")
-    result = CliRunner().invoke(app, ["batch", str(own / "campaign.toml"), "--progress", "off"])
+    result = run("batch", own / "campaign.toml", "--progress", "off")
     assert result.exit_code == 2
     assert "contents.json: is a device or a pipe" in result.stderr
 
 
 @pytest.mark.parametrize("seconds", ["inf", "1e308", "nan"])
 def test_limits_that_no_clock_has_are_refused(own, seconds):
-    result = CliRunner().invoke(app, ["batch", str(own / "campaign.toml"), "--limit-s", seconds])
+    result = run("batch", own / "campaign.toml", "--limit-s", seconds)
     assert result.exit_code == 2
     assert "Invalid value for '--limit-s'" in result.stderr

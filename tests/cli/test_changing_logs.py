@@ -5,13 +5,12 @@ import os
 import shutil
 
 import pytest
-from typer.testing import CliRunner
 
 from aqualog.align import load
 from aqualog.align.load import load_drive
-from aqualog.cli.main import app
 from aqualog.io import open_log
 from aqualog.io.fingerprint import changed_files, state_of
+from tests.commands import run
 from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
@@ -52,10 +51,6 @@ def changing(monkeypatch, log, act, method="read"):
         return found
 
     monkeypatch.setattr(open_log.DriveLog, method, reads)
-
-
-def run(*args):
-    return CliRunner().invoke(app, [str(a) for a in args])
 
 
 @pytest.mark.parametrize(

@@ -18,14 +18,14 @@ MF4 = str(SAMPLES / "lane_drive.mf4")
 
 def test_table_of_events():
     result = run("detect", MF4, "--vehicle", CAR)
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "minor_spin_down" in result.stdout
     assert "not judged" in result.stdout
 
 
 def test_json_of_the_contract():
     result = run("detect", MF4, "--vehicle", CAR, "--json")
-    assert result.returncode == 0
+    assert result.exit_code == 0
     document = json.loads(result.stdout, parse_constant=lambda c: pytest.fail(f"{c} is no JSON"))
     assert document["schema_version"] == 1
     assert document["sample_rate_hz"] == 100.0
@@ -42,24 +42,24 @@ def test_json_of_the_contract():
 
 def test_results_folder_and_refusal_to_overwrite(tmp_path):
     out = tmp_path / "out"
-    assert run("detect", MF4, "--vehicle", CAR, "-o", out).returncode == 0
+    assert run("detect", MF4, "--vehicle", CAR, "-o", out).exit_code == 0
     assert sorted(p.name for p in out.iterdir()) == ["events.json", "report.html", "signals.parquet"]
     assert json.loads((out / "events.json").read_text())["events"]
     frame = pl.read_parquet(out / "signals.parquet")
     assert {"t", "omega_fl", "minor_spin_down_fr", "minor_spin_down_fr_bit"} <= set(frame.columns)
     again = run("detect", MF4, "--vehicle", CAR, "-o", out)
-    assert again.returncode == 2
+    assert again.exit_code == 2
     assert "--force" in one_error_line(again)
-    assert run("detect", MF4, "--vehicle", CAR, "-o", out, "--force").returncode == 0
+    assert run("detect", MF4, "--vehicle", CAR, "-o", out, "--force").exit_code == 0
 
 
 @pytest.mark.parametrize("suffix", [".mf4", ".mcap", ".csv", ".parquet"])
 def test_written_log_gives_the_same_events_again(tmp_path, suffix):
     path = tmp_path / f"again{suffix}"
     first = run("detect", MF4, "--vehicle", CAR, "--write", path, "--json")
-    assert first.returncode == 0, first.stderr
+    assert first.exit_code == 0, first.stderr
     second = run("detect", path, "--vehicle", CAR, "--json")
-    assert second.returncode == 0, second.stderr
+    assert second.exit_code == 0, second.stderr
     a, b = (json.loads(r.stdout)["events"] for r in (first, second))
     assert [(e["detector"], e["wheel"]) for e in a] == [(e["detector"], e["wheel"]) for e in b]
     assert [e["start_s"] for e in a] == pytest.approx([e["start_s"] for e in b], abs=0.0101)
@@ -82,7 +82,7 @@ def test_convert(tmp_path, suffix):
     path = tmp_path / f"c{suffix}"
     source = SAMPLES / "lane_drive.csv"
     made = run("convert", source, "--signals", SAMPLES / "map_csv.toml", "--vehicle", CAR, "-o", path)
-    assert made.returncode == 0, made.stderr
+    assert made.exit_code == 0, made.stderr
     seen = json.loads(run("inspect", path, "--json").stdout)
     assert {"omega_fl", "torque_rr", "steer_angle"} <= {c["name"] for c in seen["channels"]}
     assert seen["proposed"]["omega_fl"]["reason"] == "its canonical name"
@@ -95,24 +95,24 @@ def test_convert_tells_of_the_radius_that_nobody_gave(tmp_path):
     rows = "\n".join(f"{0.01 * k:.2f},{80.0 + 0.01 * k:.2f},{250.0 + 0.01 * k:.2f}" for k in range(300))
     (tmp_path / "d.csv").write_text(f"t [s],omega_fl [km/h],omega_fr [rad/s]\n{rows}\n")
     told = run("convert", tmp_path / "d.csv", "-o", tmp_path / "a.csv")
-    assert told.returncode == 0, told.stderr
+    assert told.exit_code == 0, told.stderr
     assert "became rad/s with a default car's radius of 0.317 m" in told.stderr
     named = run("convert", tmp_path / "d.csv", "-o", tmp_path / "b.csv", "--vehicle", CAR)
-    assert named.returncode == 0, named.stderr
+    assert named.exit_code == 0, named.stderr
     assert "default car" not in named.stderr
 
 
 def test_convert_with_decimal_comma(tmp_path):
     path = tmp_path / "c.csv"
-    assert run("convert", MF4, "-o", path, "--decimal-comma").returncode == 0
+    assert run("convert", MF4, "-o", path, "--decimal-comma").exit_code == 0
     assert ";" in path.read_text(encoding="utf-8").splitlines()[0]
-    assert run("detect", path, "--vehicle", CAR).returncode == 0
+    assert run("detect", path, "--vehicle", CAR).exit_code == 0
 
 
 def test_inspect_proposes_a_map_that_works(tmp_path):
     german = SAMPLES / "lane_drive.csv"
     made = run("inspect", german, "--write-map", tmp_path / "map.toml")
-    assert made.returncode == 0, made.stderr
+    assert made.exit_code == 0, made.stderr
     text = (tmp_path / "map.toml").read_text()
     for symbol in ("omega_fl", "omega_rr", "a_x", "yaw_rate", "steering_wheel_angle", "v_x", "torque_r"):
         assert symbol in text
@@ -121,7 +121,7 @@ def test_inspect_proposes_a_map_that_works(tmp_path):
 
 
 def test_gate(tmp_path):
-    assert run("detect", MF4, "--vehicle", CAR, "--fail-on-event").returncode == 5
+    assert run("detect", MF4, "--vehicle", CAR, "--fail-on-event").exit_code == 5
 
 
 def test_missing_signals_end_with_4_and_one_line(tmp_path):
@@ -129,7 +129,7 @@ def test_missing_signals_end_with_4_and_one_line(tmp_path):
     t = np.arange(100) * 0.1
     pl.DataFrame({"t [s]": t, "latitude [deg]": 48 + t * 1e-4}).write_csv(path)
     result = run("detect", path)
-    assert result.returncode == 4
+    assert result.exit_code == 4
     assert "omega_fl" in one_error_line(result)
 
 
@@ -137,21 +137,21 @@ def test_usage_and_configuration_errors(tmp_path):
     bad = tmp_path / "car.toml"
     bad.write_text("mas = 1\n")
     result = run("detect", MF4, "--vehicle", bad)
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert '"mass"' in one_error_line(result)
-    assert run("detect", MF4, "--vehicle", tmp_path / "none.toml").returncode == 2
-    assert run("detect", MF4, "--no-such-option").returncode == 2
-    assert run("detect", "nothing*.mf4", cwd=tmp_path).returncode == 2
-    assert run("convert", MF4, "-o", tmp_path / "x.xls").returncode == 2
-    assert run("detect", MF4, "--progress", "loud").returncode == 2
+    assert run("detect", MF4, "--vehicle", tmp_path / "none.toml").exit_code == 2
+    assert run("detect", MF4, "--no-such-option").exit_code == 2
+    assert run("detect", "nothing*.mf4", cwd=tmp_path).exit_code == 2
+    assert run("convert", MF4, "-o", tmp_path / "x.xls").exit_code == 2
+    assert run("detect", MF4, "--progress", "loud").exit_code == 2
 
 
 def test_unreadable_logs(tmp_path):
-    assert run("detect", tmp_path / "none.mf4").returncode == 1
+    assert run("detect", tmp_path / "none.mf4").exit_code == 1
     junk = tmp_path / "junk.mf4"
     junk.write_bytes(bytes(range(256)) * 10)
     result = run("detect", junk)
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert "unknown format" in one_error_line(result)
     (tmp_path / "empty.csv").write_bytes(b"")
     assert "empty" in one_error_line(run("detect", tmp_path / "empty.csv"))
@@ -161,7 +161,7 @@ def test_damaged_log_ends_with_3(tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes((SAMPLES / "lane_drive.mcap").read_bytes()[:300_000])
     result = run("detect", cut, "--vehicle", CAR, "--signals", SAMPLES / "map_mcap.toml", "--json")
-    assert result.returncode == 3, result.stderr
+    assert result.exit_code == 3, result.stderr
     assert json.loads(result.stdout)["quality"]["truncated"] is True
 
 
@@ -178,18 +178,18 @@ def test_sources_are_never_touched(tmp_path):
 
 def test_two_files_with_the_same_signal_are_refused():
     result = run("detect", MF4, SAMPLES / "lane_drive.parquet", "--vehicle", CAR)
-    assert result.returncode == 4
+    assert result.exit_code == 4
     assert "several channels" in one_error_line(result)
 
 
 def test_list_file_and_folder(tmp_path):
     (tmp_path / "list.txt").write_text(f"# one drive\n{MF4}\n")
-    assert run("detect", f"@{tmp_path / 'list.txt'}", "--vehicle", CAR).returncode == 0
+    assert run("detect", f"@{tmp_path / 'list.txt'}", "--vehicle", CAR).exit_code == 0
     folder = tmp_path / "logs"
     folder.mkdir()
     (folder / "a.mf4").write_bytes((SAMPLES / "lane_drive.mf4").read_bytes())
     (folder / "notes.txt").write_text("nothing")
-    assert run("detect", folder, "--vehicle", CAR).returncode == 0
+    assert run("detect", folder, "--vehicle", CAR).exit_code == 0
 
 
 def test_results_are_whole_or_not_at_all(tmp_path):
@@ -200,7 +200,7 @@ def test_results_are_whole_or_not_at_all(tmp_path):
     target.parent.chmod(0o700)
     if os.geteuid() == 0:
         pytest.skip("root may write anywhere")
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert not list(target.parent.iterdir())
 
 
@@ -222,7 +222,7 @@ def test_align_command(tmp_path):
     at = np.interp(late - 0.25, t, v) * 1.01
     pl.DataFrame({"t [s]": late, "speed [m/s]": at + 0.05 * rng.normal(size=late.size)}).write_csv(tmp_path / "b.csv")
     result = run("align", tmp_path / "a.csv", tmp_path / "b.csv", "--json", "--write-map", tmp_path / "map.toml")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     source = json.loads(result.stdout)["sources"][0]
     assert source["offset_s"] == pytest.approx(0.25, abs=0.02)
     assert source["offset_ci95"][0] < 0.25 < source["offset_ci95"][1]
@@ -238,7 +238,7 @@ def test_align_refuses_what_does_not_match(tmp_path):
         walk = 20 + np.cumsum(rng.normal(0, 0.1, t.size))
         pl.DataFrame({"t [s]": t, "speed [m/s]": walk}).write_csv(tmp_path / f"{name}.csv")
     result = run("align", tmp_path / "a.csv", tmp_path / "b.csv")
-    assert result.returncode == 4
+    assert result.exit_code == 4
     assert "refused" in result.stdout
 
 
@@ -248,7 +248,7 @@ def test_time_column_of_the_map(tmp_path):
     frame.write_csv(tmp_path / "x.csv")
     (tmp_path / "m.toml").write_text('[time]\nchannel = "clk"\nunit = "ms"\n[signals]\nomega_fl = "w"\n')
     result = run("detect", tmp_path / "x.csv", "--signals", tmp_path / "m.toml", "--json")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["duration_s"] == pytest.approx(5.0)
 
 
@@ -257,15 +257,15 @@ def test_a_source_is_never_the_target(tmp_path, extra):
     source = tmp_path / "drive.mf4"
     source.write_bytes((SAMPLES / "lane_drive.mf4").read_bytes())
     before = source.read_bytes()
-    assert run("detect", source, "--vehicle", CAR, "--write", source, *extra).returncode == 2
-    assert run("convert", source, "-o", source, *extra).returncode == 2
+    assert run("detect", source, "--vehicle", CAR, "--write", source, *extra).exit_code == 2
+    assert run("convert", source, "-o", source, *extra).exit_code == 2
     assert source.read_bytes() == before
 
 
 def test_list_that_names_itself(tmp_path):
     (tmp_path / "l.txt").write_text("@l.txt\n")
     result = run("detect", f"@{tmp_path / 'l.txt'}")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     one_error_line(result)
 
 
@@ -273,13 +273,13 @@ def test_names_that_look_like_patterns(tmp_path):
     for name in ("a[b.parquet", "drive[1].parquet"):
         path = tmp_path / name
         path.write_bytes((SAMPLES / "lane_drive.parquet").read_bytes())
-        assert run("detect", path, "--vehicle", CAR).returncode == 0
+        assert run("detect", path, "--vehicle", CAR).exit_code == 0
 
 
 def test_a_pipe_is_no_log(tmp_path):
     os.mkfifo(tmp_path / "p.mf4")
     result = run("detect", tmp_path / "p.mf4")
-    assert result.returncode == 1
+    assert result.exit_code == 1
     assert "no regular file" in one_error_line(result)
 
 
@@ -289,5 +289,5 @@ def test_wrong_time_scale_is_refused(tmp_path):
         {"t [s]": t * 10.0, **{f"omega_{w} [rad/s]": 90.0 + 0 * t for w in ("fl", "fr", "rl", "rr")}}
     ).write_csv(tmp_path / "slow.csv")
     result = run("detect", tmp_path / "slow.csv")
-    assert result.returncode == 4
+    assert result.exit_code == 4
     assert "Hz" in one_error_line(result)

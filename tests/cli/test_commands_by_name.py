@@ -7,10 +7,9 @@ import sys
 
 import pytest
 import typer
-from typer.testing import CliRunner
 
 from aqualog.cli.commands import COMMANDS
-from aqualog.cli.main import app
+from tests.commands import run
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -18,18 +17,18 @@ def test_the_line_of_a_command_is_its_own(name):
     target = COMMANDS[name].load(name)
     help_text = target.info.help if isinstance(target, typer.Typer) else inspect.getdoc(target)
     assert " ".join(help_text.split("\n\n")[0].split()) == COMMANDS[name].line
-    shown = CliRunner().invoke(app, [name, "--help"])
+    shown = run(name, "--help")
     assert shown.exit_code == 0
     assert f" {name} [OPTIONS]" in shown.stdout
 
 
 def test_all_are_listed_in_their_order():
-    text = CliRunner().invoke(app, ["--help"]).stdout
+    text = run("--help").stdout
     assert re.findall(r"^  ([a-z-]+)  ", text.split("Commands:")[1], re.MULTILINE) == list(COMMANDS)
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
-    wrong = CliRunner().invoke(app, ["detekt"])
+    wrong = run("detekt")
     assert wrong.exit_code == 2
     assert "Did you mean 'detect'?" in wrong.stderr
 

@@ -30,7 +30,7 @@ def loaded_car(tmp_path_factory):
 
 def events(*args):
     result = run("detect", *args, "--vehicle", CAR, "--json")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
 
 
@@ -54,7 +54,7 @@ def test_an_empty_model_changes_nothing(tmp_path):
 def test_what_the_detectors_do_not_use_is_told(tmp_path):
     (tmp_path / "model.toml").write_text('[[term]]\neffect = "tone_ring"\namplitude = 0.004\n')
     result = run("detect", MF4, "--vehicle", CAR, "--model", tmp_path / "model.toml", "-o", tmp_path / "out")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "tone_ring: no detector uses this quantity" in result.stderr
     document = json.loads((tmp_path / "out" / "events.json").read_text())
     assert any("tone_ring" in n for n in document["quality"]["notes"])
@@ -64,14 +64,14 @@ def test_what_the_detectors_do_not_use_is_told(tmp_path):
 def test_faults_of_the_model_file(tmp_path):
     (tmp_path / "model.toml").write_text('[[term]]\neffect = "payload"\n')
     result = run("detect", MF4, "--vehicle", CAR, "--model", tmp_path / "model.toml")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert "payload_mass" in one_error_line(result)
-    assert run("detect", MF4, "--model", tmp_path / "none.toml").returncode == 2
+    assert run("detect", MF4, "--model", tmp_path / "none.toml").exit_code == 2
 
 
 def test_the_model_file_is_not_overwritten(tmp_path):
     path = tmp_path / "model.csv"
     path.write_text("")
     result = run("detect", MF4, "--vehicle", CAR, "--model", path, "--write", path, "--force")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert path.read_text() == ""

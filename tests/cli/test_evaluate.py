@@ -29,7 +29,7 @@ def whole(folder):
 
 def test_a_broken_log_is_told_and_the_others_are_evaluated(whole):
     result, _ = whole
-    assert result.returncode == 3, result.stderr
+    assert result.exit_code == 3, result.stderr
     lines = error_lines(result)
     assert len(lines) == 1
     assert "broken.mf4" in lines[0]
@@ -81,17 +81,17 @@ def test_page_needs_no_network(whole):
 def test_tuning_writes_thresholds_that_can_be_used(folder):
     target = folder / "tuned.toml"
     result = run(folder / "campaign.toml", "--tune", target, "--json")
-    assert result.returncode == 3, result.stderr
+    assert result.exit_code == 3, result.stderr
     tuning = json.loads(result.stdout)["tuning"]
     assert not set(tuning["tuned_on"]) & set(tuning["reported_on"])
     assert {r["name"] for r in json.loads(result.stdout)["runs"]} == set(tuning["reported_on"])
     assert "no vehicle and no tyre is in both parts" in tuning["rule"]
     assert "[thresholds]" in target.read_text()
     again = run(folder / "campaign.toml", "--tune", target)
-    assert again.returncode == 2
+    assert again.exit_code == 2
     assert "--force" in error_lines(again)[0]
     used = run(folder / "campaign.toml", "--thresholds", target, "--json")
-    assert used.returncode == 3
+    assert used.exit_code == 3
     assert json.loads(used.stdout)["thresholds"] == json.loads(result.stdout)["thresholds"]
 
 
@@ -99,7 +99,7 @@ def test_logs_with_a_labels_file(folder):
     labels = folder / "labels.csv"
     labels.write_text("start_s,end_s,effect,wheel\n5.0,9.0,water,\n5.2,8.5,full,fl\n10,11,puddle of mud,\n")
     result = run(folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels, "-v")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "puddle of mud enter the confusion table only" in result.stderr
     row = next(line for line in result.stdout.splitlines() if line.startswith("spin down"))
     assert "1/1 (100 %)" in row
@@ -116,7 +116,7 @@ def test_a_label_after_the_end_of_the_log_is_told_and_left_out(folder):
     labels.write_text("start_s,end_s,effect,wheel\n5.2,8.5,full,fl\n40,50,full,fl\n60,61,water,\n11,20,snow,\n")
     args = (folder / "deep.mf4", "--vehicle", folder / "rwd.toml", "--labels", labels)
     result = run(*args, "--json")
-    assert result.returncode == 3, result.stderr
+    assert result.exit_code == 3, result.stderr
     assert "2 labels begin after the log's end at 12 s, at 40 s; left out" in error_lines(result)[0]
     joint = json.loads(result.stdout)["detectors"]["joint_criteria"]
     assert joint["full"]["episodes"] == joint["partial"]["episodes"] == 1
@@ -133,7 +133,7 @@ def test_logs_without_water_share_an_empty_labels_file(folder):
         folder / "dry.csv.labels",
         "--json",
     )
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     rate = json.loads(result.stdout)["detectors"]["joint_criteria"]["false_alarms"]
     assert rate["hours"] * 3600 == pytest.approx(24.0, abs=0.1)
 
@@ -155,7 +155,7 @@ def test_logs_without_water_share_an_empty_labels_file(folder):
 def test_what_cannot_be_done_is_one_line(folder, args, code, text):
     (folder / "one.csv").write_text("start_s,end_s,effect,wheel\n1,2,water,\n")
     result = run(*(folder / a if "." in a else a for a in args))
-    assert result.returncode == code, result.stderr
+    assert result.exit_code == code, result.stderr
     lines = error_lines(result)
     assert len(lines) == 1
     assert text in lines[0]

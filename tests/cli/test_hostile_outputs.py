@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.report.campaign.folder import safe_cell
+from tests import commands
 
 CAR = Path(__file__).resolve().parents[2] / "sample_logs" / "vehicle.toml"
 LONG = "y" * 1_000_000
@@ -80,12 +81,11 @@ MAKERS = {".mf4": mf4, ".csv": table, ".mcap": mcap}
 
 def run(*arguments):
     """Exit code and what is printed, with what is wrong with it."""
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    done = commands.run(*arguments)
     for text in (done.stdout, done.stderr):
         assert not OBEYED.search(text)
         assert not re.search(r"^error: no such log", text, re.MULTILINE)
-    return done.exit_code, done.stdout, done.stderr
+    return done
 
 
 def same_folder(folder, before):

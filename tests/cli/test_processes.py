@@ -60,7 +60,7 @@ def test_every_command_is_called():
 def test_a_command_ends_with_its_exit_code(folder, name):
     args, code, said = CALLS[name]
     result = run_process(name, *args, cwd=folder, env={"AQUALOG_CACHE": str(folder / "kept")})
-    assert result.returncode == code, result
+    assert result.exit_code == code, result
     assert said in result.stdout + result.stderr
     assert "Traceback" not in result.stderr
     assert sum(line.startswith("error:") for line in result.stderr.splitlines()) == (code in (2, 4))

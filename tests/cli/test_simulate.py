@@ -46,7 +46,7 @@ def folder(tmp_path_factory):
     (place / "wet.toml").write_text(SCENARIO)
     for suffix in FORMATS:
         result = run("simulate", place / "wet.toml", "-o", place / f"wet.{suffix}")
-        assert result.returncode == 0, result.stderr
+        assert result.exit_code == 0, result.stderr
     return place
 
 
@@ -138,16 +138,16 @@ def test_units_meaning_and_comment(folder):
 def test_the_same_seed_gives_the_same_bytes_and_another_one_does_not(folder, tmp_path, suffix):
     before = (folder / f"wet.{suffix}").read_bytes()
     for name, extra in (("again", []), ("one", ["--seed", 1])):
-        assert run("simulate", folder / "wet.toml", "-o", tmp_path / f"{name}.{suffix}", *extra).returncode == 0
+        assert run("simulate", folder / "wet.toml", "-o", tmp_path / f"{name}.{suffix}", *extra).exit_code == 0
         assert (tmp_path / f"{name}.{suffix}").read_bytes() == before
-    assert run("simulate", folder / "wet.toml", "-o", tmp_path / f"two.{suffix}", "--seed", 2).returncode == 0
+    assert run("simulate", folder / "wet.toml", "-o", tmp_path / f"two.{suffix}", "--seed", 2).exit_code == 0
     old, new = channels(folder / f"wet.{suffix}"), channels(tmp_path / f"two.{suffix}")
     assert not np.array_equal(old["omega_fl"].values, new["omega_fl"].values)
     assert not np.array_equal(old["true_contact_fl"].values, new["true_contact_fl"].values)
 
 
 def test_seed_of_the_file(folder, tmp_path):
-    assert run("simulate", folder / "wet.toml", "-o", tmp_path / "zero.csv", "--seed", 0).returncode == 0
+    assert run("simulate", folder / "wet.toml", "-o", tmp_path / "zero.csv", "--seed", 0).exit_code == 0
     assert (tmp_path / "zero.csv").read_bytes() != (folder / "wet.csv").read_bytes()
     (tmp_path / "s.toml").write_text("seed = 5\n" + SCENARIO)
     run("simulate", tmp_path / "s.toml", "-o", tmp_path / "a.csv")
@@ -182,7 +182,7 @@ def test_without_json_stdout_is_empty_and_quiet_is_quiet(folder, tmp_path):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_detect_reads_such_logs_without_a_map(folder, expected, suffix):
     result = run("detect", folder / f"wet.{suffix}", "--vehicle", CAR, "--json")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "true_" not in result.stdout + result.stderr
     document = json.loads(result.stdout)
     assert set(document["signals"]) == {n for g in expected for n in g.columns if not n.startswith("true_")}
@@ -211,10 +211,10 @@ def test_nothing_is_overwritten_without_force(folder, tmp_path):
     target = tmp_path / "x.csv"
     target.write_text("mine")
     result = run("simulate", folder / "wet.toml", "-o", target)
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert "--force" in one_error_line(result)
     assert target.read_text() == "mine"
-    assert run("simulate", folder / "wet.toml", "-o", target, "--force").returncode == 0
+    assert run("simulate", folder / "wet.toml", "-o", target, "--force").exit_code == 0
     assert target.read_bytes() == (folder / "wet.csv").read_bytes()
 
 
@@ -223,14 +223,14 @@ def test_a_source_is_never_the_target(tmp_path):
         (tmp_path / name).write_text(SCENARIO if name == "scenario.csv" else "")
         extra = ["--model", tmp_path / name] if name == "model.csv" else []
         result = run("simulate", tmp_path / "scenario.csv", *extra, "-o", tmp_path / name, "--force")
-        assert result.returncode == 2
+        assert result.exit_code == 2
         assert "source" in one_error_line(result)
     assert (tmp_path / "scenario.csv").read_text() == SCENARIO
 
 
 def test_a_wrong_suffix_is_refused_before_anything_is_read(tmp_path):
     result = run("simulate", tmp_path / "none.toml", "-o", tmp_path / "x.xls")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert ".mf4 .mcap .csv .parquet" in one_error_line(result)
 
 
@@ -240,19 +240,19 @@ def test_usage_and_configuration_errors(folder, tmp_path):
     bad = tmp_path / "bad.toml"
     bad.write_text(SCENARIO.replace("speed_kmh", "sped_kmh").replace("water_depth_mm = 1.3", "water_depth_mm = 130"))
     result = run("simulate", bad, "-o", out)
-    assert result.returncode == 2
+    assert result.exit_code == 2
     for part in ("line 2", '"speed_kmh"', "line 8", "water_depth_mm = 130"):
         assert part in one_error_line(result)
     model = tmp_path / "model.toml"
     model.write_text('[[term]]\neffect = "hed_wind"\n')
     result = run("simulate", good, "-o", out, "--model", model)
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert '"head_wind"' in one_error_line(result)
-    assert run("simulate", tmp_path / "none.toml", "-o", out).returncode == 2
-    assert run("simulate", good).returncode == 2
-    assert run("simulate", "-o", out).returncode == 2
-    assert run("simulate", good, "-o", out, "--seed", -1).returncode == 2
-    assert run("simulate", good, "-o", out, "--progress", "loud").returncode == 2
+    assert run("simulate", tmp_path / "none.toml", "-o", out).exit_code == 2
+    assert run("simulate", good).exit_code == 2
+    assert run("simulate", "-o", out).exit_code == 2
+    assert run("simulate", good, "-o", out, "--seed", -1).exit_code == 2
+    assert run("simulate", good, "-o", out, "--progress", "loud").exit_code == 2
     assert "one at a time" in one_error_line(run("simulate", good, bad, "-o", out))
     assert "--jobs" in one_error_line(run("simulate", good, "-o", out, "--jobs", 2))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.toml", "model.toml"]
@@ -261,7 +261,7 @@ def test_usage_and_configuration_errors(folder, tmp_path):
 def test_a_log_that_cannot_be_written_leaves_nothing(folder, tmp_path):
     (tmp_path / "file").write_text("")
     result = run("simulate", folder / "wet.toml", "-o", tmp_path / "file" / "x.csv")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     one_error_line(result)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
@@ -279,13 +279,12 @@ def test_a_writer_that_fails_leaves_the_old_log(folder, tmp_path, monkeypatch):
 def test_model(folder, tmp_path):
     (tmp_path / "none.toml").write_text("")
     assert (
-        run("simulate", folder / "wet.toml", "-o", tmp_path / "n.csv", "--model", tmp_path / "none.toml").returncode
-        == 0
+        run("simulate", folder / "wet.toml", "-o", tmp_path / "n.csv", "--model", tmp_path / "none.toml").exit_code == 0
     )
     assert (tmp_path / "n.csv").read_bytes() == (folder / "wet.csv").read_bytes()
     (tmp_path / "heavy.toml").write_text('[[term]]\neffect = "payload_mass"\ndelta_mass = 300\n')
     result = run("simulate", folder / "wet.toml", "-o", tmp_path / "h.mf4", "--model", tmp_path / "heavy.toml")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     old, new = channels(folder / "wet.mf4"), channels(tmp_path / "h.mf4")
     before, after = (sum(c[f"true_load_{w}"].values[0] for w in ("fl", "fr", "rl", "rr")) for c in (old, new))
     assert after - before == pytest.approx(300 * 9.81, rel=0.01)
@@ -299,7 +298,7 @@ def test_shortest_drives(tmp_path, duration, rate):
     (tmp_path / "s.toml").write_text(text.replace("sample_rate_hz = 100", f"sample_rate_hz = {rate}"))
     for suffix in ("csv", "mf4"):
         result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / f"x.{suffix}")
-        assert result.returncode == 0, result.stderr
+        assert result.exit_code == 0, result.stderr
     assert pl.read_csv(tmp_path / "x.csv").height == max(round(duration * rate), 2)
 
 
@@ -308,7 +307,7 @@ def test_a_lane_after_the_drive_is_told(tmp_path):
         SCENARIO.replace("start_s = 0.8", "start_s = 5").replace("end_s = 2.0", "end_s = 9")
     )
     result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "x.csv")
-    assert result.returncode == 0
+    assert result.exit_code == 0
     assert "begins after the drive" in result.stderr
 
 
@@ -369,7 +368,7 @@ def test_usage_of_campaigns(campaign, tmp_path):
 def test_a_scenario_named_campaign(tmp_path):
     (tmp_path / "campaign").write_text(SCENARIO)
     result = run("simulate", "./campaign", "-o", "x.csv", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "./campaign" in one_error_line(run("simulate", "campaign", "-o", "y.csv", cwd=tmp_path))
 
 
@@ -378,12 +377,12 @@ def test_the_vehicle_file_is_not_written_over(tmp_path):
     car.write_bytes(CAR.read_bytes())
     (tmp_path / "s.toml").write_text('vehicle = "car.csv"\nspeed_kmh = 80.0\nduration_s = 1.0\n')
     result = run("simulate", tmp_path / "s.toml", "--force", "-o", car)
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert "source" in one_error_line(result)
     assert car.read_bytes() == CAR.read_bytes()
 
 
 def test_a_campaign_is_no_log(tmp_path):
     result = run("simulate", "campaign", "thesis", "-o", tmp_path / "c.mf4")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert not (tmp_path / "c.mf4").exists()

@@ -40,7 +40,7 @@ def written(folder):
 
 def test_table_tells_slopes_and_stability(written):
     result, _ = written
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     row = next(line.split() for line in result.stdout.splitlines() if line.startswith("RL "))
     assert float(row[1]) == pytest.approx(C, rel=0.03)
     assert float(row[2]) <= C <= float(row[4])
@@ -70,7 +70,7 @@ def test_results_say_the_same(written):
 
 def test_json_is_one_document(folder, written):
     result = run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "--json")
-    assert result.returncode == 0
+    assert result.exit_code == 0
     assert (
         json.loads(result.stdout)["slip_slope"]
         == json.loads((written[1] / "slip_slope.json").read_text())["slip_slope"]
@@ -79,21 +79,21 @@ def test_json_is_one_document(folder, written):
 
 def test_results_are_not_overwritten(folder, written):
     again = run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", written[1])
-    assert again.returncode == 2
+    assert again.exit_code == 2
     assert "--force" in one_error_line(again)
-    assert run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", written[1], "--force").returncode == 0
+    assert run(folder / "drive.csv", "--vehicle", folder / "rwd.toml", "-o", written[1], "--force").exit_code == 0
 
 
 def test_accelerometer_is_taken_and_said(folder):
     result = run(folder / "no_torque.csv", "--vehicle", folder / "rwd.toml", "--json")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["traction"] == "accelerometer"
     assert "accelerometer" in result.stderr
 
 
 def test_all_wheel_drive_without_velocity(folder):
     result = run(folder / "awd.csv", "--vehicle", folder / "awd.toml", "--json")
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     document = json.loads(result.stdout)
     assert document["method"] == "differential"
     assert document["slip_slope"] == []
@@ -115,7 +115,7 @@ def test_all_wheel_drive_without_velocity(folder):
 )
 def test_what_cannot_be_done_is_one_line(folder, log, options, code, text):
     result = run(folder / log, "--vehicle", folder / "rwd.toml", *options, "-o", folder / "nothing")
-    assert result.returncode == code, result.stderr
+    assert result.exit_code == code, result.stderr
     assert text in one_error_line(result)
     assert result.stdout == ""
     assert not (folder / "nothing").exists()
@@ -124,7 +124,7 @@ def test_what_cannot_be_done_is_one_line(folder, log, options, code, text):
 def test_delay_of_the_velocity_is_told(folder):
     out = folder / "late_out"
     result = run(folder / "late.csv", "--vehicle", folder / "awd.toml", "-o", out)
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     assert "FL: v_x is late by +0.1" in result.stdout
     place = json.loads((out / "slip_slope.json").read_text())["slip_slope"][0]
     assert place["delay_s"] == pytest.approx(0.1, abs=0.005)
@@ -134,7 +134,7 @@ def test_delay_of_the_velocity_is_told(folder):
     given = run(folder / "one_speed.csv", "--vehicle", folder / "awd.toml", "--delay", "0.1", "--json")
     assert json.loads(given.stdout)["slip_slope"][0]["slope"] == pytest.approx(C, rel=0.05)
     refused = run(folder / "one_speed.csv", "--vehicle", folder / "awd.toml")
-    assert refused.returncode == 4
+    assert refused.exit_code == 4
     assert "delay of v_x cannot be distinguished" in one_error_line(refused)
 
 
@@ -149,7 +149,7 @@ def test_no_figure_per_hour_of_a_short_session(written):
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_short_logs_are_one_line(folder, n):
     result = run(folder / f"short{n}.csv", "--vehicle", folder / "rwd.toml")
-    assert result.returncode == 4, result.stderr
+    assert result.exit_code == 4, result.stderr
     one_error_line(result)
 
 
@@ -161,12 +161,12 @@ def test_folder_for_results_is_checked_first(folder, out, text):
     target = folder / out if out.strip() else out
     for force in ((), ("--force",)):
         result = run(folder / "even.csv", "--vehicle", folder / "rwd.toml", "-o", target, *force)
-        assert result.returncode == 2, result.stderr
+        assert result.exit_code == 2, result.stderr
         assert text in one_error_line(result)
     assert (folder / "drive.csv").is_file()
 
 
 def test_vehicle_must_be_given(folder):
     result = run(folder / "drive.csv")
-    assert result.returncode == 2
+    assert result.exit_code == 2
     assert "--vehicle" in one_error_line(result)

@@ -9,6 +9,7 @@ from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.face import paths as files
 from aqualog.face.paths import expand, refuse_existing
+from tests.commands import run
 
 LABELS = "start_s,end_s,effect,wheel\n"
 
@@ -28,7 +29,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def refused(args, said):
-    result = CliRunner().invoke(app, [*args, "--force"])
+    result = run(*args, "--force")
     assert result.exit_code == 2, result.stderr
     assert result.stderr.count("error:") == 1
     assert said in result.stderr
@@ -126,7 +127,7 @@ def test_an_empty_result_is_not_the_folder_one_is_in(folder, args, named):
 
 
 def test_an_empty_text_is_no_name(folder):
-    result = CliRunner().invoke(app, ["detect", "a.csv", "--configuration", "", "--vehicle", "none.toml"])
+    result = run("detect", "a.csv", "--configuration", "", "--vehicle", "none.toml")
     assert "none.toml: vehicle file not found" in result.stderr
 
 
