@@ -27,7 +27,7 @@ def whole(tmp_path_factory):
     """A campaign of twelve runs and the store of a plain batch."""
     folder = tmp_path_factory.mktemp("whole")
     campaign = make_campaign(folder, speeds=(70, 80, 90, 100), repeats=3)
-    assert run("batch", campaign, "-o", folder / "plain").exit_code == 0
+    assert run("batch", campaign, "-o", folder / "plain", "--jobs", 1).exit_code == 0
     return campaign, folder / "plain"
 
 
@@ -102,7 +102,8 @@ def test_a_worker_that_is_killed_half_way_leaves_no_trace(tmp_path):
     assert pl.read_parquet(store / "runs.parquet").equals(pl.read_parquet(tmp_path / "plain" / "runs.parquet"))
 
 
-def test_no_scheduler_is_a_clear_error(whole, tmp_path):
+def test_no_scheduler_is_a_clear_error(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr("aqualog.campaign.cluster._ANSWER_S", 1.0)
     for address in (f"tcp://127.0.0.1:{free_port()}", "nonsense", "http://x"):
         result = run("batch", whole[0], "-o", tmp_path / "s", "--cluster", address)
         assert result.exit_code == 2
