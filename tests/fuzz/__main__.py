@@ -28,7 +28,7 @@ EXAMPLES = """examples:
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 1 if something was found, 2 if it could not run."""
     targets = all_targets()
-    about = "\n".join(f"  {name:<11} {make().about}" for name, make in targets.items())
+    about = "\n".join(f"  {name:<11} {target.about}" for name, target in targets.items())
     options = argparse.ArgumentParser(
         prog="python -m tests.fuzz", description=f"{__doc__}\ntargets:\n{about}", epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> int:
             case = case_of(asked.case)
         except (ValueError, KeyError, TypeError, IndexError):
             options.error(f"--case {asked.case[:40]!r} is no line of a corpus")
-        return _again(targets[asked.target](), case, debug=asked.debug)
+        return _again(targets[asked.target], case, debug=asked.debug)
     if asked.guided and importlib.util.find_spec("atheris") is None:
         print("--guided needs atheris, which is not installed. Try: pip install -e '.[fuzz]'", file=sys.stderr)
         return 2
@@ -56,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name in targets if asked.target == "all" else [asked.target]:
         begin = time.monotonic()
         total = watched(
-            name, asked.seconds, seed, guided=asked.guided, may_end=targets[name]().may_end,
+            name, asked.seconds, seed, guided=asked.guided, may_end=targets[name].may_end,
             tell=lambda line: print(line, flush=True),
         )  # fmt: skip
         wrong += total["wrong"]

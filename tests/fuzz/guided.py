@@ -36,7 +36,7 @@ def by_coverage(name: str, seconds: float, seed: int, journal: Path) -> None:
     with atheris.instrument_imports(include=["aqualog"], exclude=not_led_by()):
         from tests.fuzz.registry import all_targets
 
-        target = all_targets()[name]()
+        target = all_targets()[name]
     from tests.fuzz.turn import judged, limited
     from tests.fuzz.work import Journal, Told, warmed
 

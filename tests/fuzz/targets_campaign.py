@@ -9,7 +9,7 @@ from aqualog.campaign.records import with_load
 from aqualog.config.campaign import read_campaign
 from aqualog.config.configured import configure, files_of
 from aqualog.core.errors import ConfigError
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 from tests.fuzz.settings_files import LOG, check_error, check_finite, folder_with, loaded
 
 _SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
@@ -99,11 +99,5 @@ def run_table(data: bytes) -> None:
     _worked_with(_NAMED, data)
 
 
-@target("campaign")
-def campaign_target() -> Target:
-    return Target("campaign files, and their test matrix", campaigns, campaign, is_text=True)
-
-
-@target("runs")
-def runs_target() -> Target:
-    return Target("tables of runs of a campaign", runs, run_table, is_text=True)
+add("campaign", Target("campaign files, and their test matrix", campaigns, campaign, is_text=True))
+add("runs", Target("tables of runs of a campaign", runs, run_table, is_text=True))

@@ -20,7 +20,7 @@ from aqualog.detect.registry import RIVALS
 from aqualog.detect.slip_slope.history import History, Period, history_to_json, reference
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 from tests.fuzz.settings_files import LOG, NAMES, check_error, check_finite, drive, folder_with, loaded
 
 _SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
@@ -189,26 +189,8 @@ def history(data: bytes) -> None:
         (folder / "h.json").unlink()
 
 
-@target("map")
-def map_target() -> Target:
-    return Target("signal maps, and a log read with them", maps, signal_map, is_text=True)
-
-
-@target("vehicle")
-def vehicle_target() -> Target:
-    return Target("vehicle files, and the detectors with them", vehicles, vehicle, is_text=True)
-
-
-@target("thresholds")
-def thresholds_target() -> Target:
-    return Target("thresholds files, and the detectors with them", thresholds, threshold, is_text=True)
-
-
-@target("labels")
-def labels_target() -> Target:
-    return Target("labels files", labels, label, is_text=True)
-
-
-@target("history")
-def history_target() -> Target:
-    return Target("histories of the slip slope", histories, history, is_text=True)
+add("map", Target("signal maps, and a log read with them", maps, signal_map, is_text=True))
+add("vehicle", Target("vehicle files, and the detectors with them", vehicles, vehicle, is_text=True))
+add("thresholds", Target("thresholds files, and the detectors with them", thresholds, threshold, is_text=True))
+add("labels", Target("labels files", labels, label, is_text=True))
+add("history", Target("histories of the slip slope", histories, history, is_text=True))

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from tests.fuzz.readers import outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 
 @cache
@@ -34,6 +34,4 @@ def one(data: bytes) -> None:
         assert not np.isinf(c.values).any(), f"{c.info.path} is infinite"
 
 
-@target("csv")
-def csv() -> Target:
-    return Target("CSV", seeds, one, is_text=True)
+add("csv", Target("CSV", seeds, one, is_text=True))

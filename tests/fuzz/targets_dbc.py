@@ -6,7 +6,7 @@ from pathlib import Path
 
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
 from tests.fuzz.readers import outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 _DBC = b"""VERSION ""
 
@@ -57,6 +57,4 @@ def one(data: bytes) -> None:
     outcome(frames(), "a.mf4", dbc=data, named="a.")
 
 
-@target("dbc")
-def dbc() -> Target:
-    return Target("databases of CAN messages (DBC)", seeds, one, is_text=True)
+add("dbc", Target("databases of CAN messages (DBC)", seeds, one, is_text=True))

@@ -8,7 +8,7 @@ from io import BytesIO
 from mcap.writer import CompressionType, Writer
 
 from tests.fuzz.readers import T0_NS, check_samples, outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 _SCHEMA = {"type": "object", "properties": {"v": {"type": "number", "unit": "km/h"}}}
 _STATE = b"float64 v\nfloat64[3] more\n"
@@ -50,6 +50,4 @@ def known(seed: str, damages: tuple, data: bytes) -> None:
     check_samples(outcome(data, "a.mcap").channels, lambda v: T0_NS + v * 10**7)
 
 
-@target("mcap")
-def mcap() -> Target:
-    return Target("MCAP, JSON and ROS 2 messages", seeds, one, known)
+add("mcap", Target("MCAP, JSON and ROS 2 messages", seeds, one, known))

@@ -19,7 +19,7 @@ from asammdf.blocks.conversion_utils import from_dict
 from aqualog.io.write_mdf import CanFrames, write_frames_mf4
 from tests import mdf_by_hand
 from tests.fuzz.readers import Outcome, outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 T = np.arange(120) * 0.01
 
@@ -157,11 +157,5 @@ def check_recorded(whole: Outcome, found: Outcome) -> None:
     assert told or not is_less, "something is missing and nothing is told"
 
 
-@target("mdf")
-def mdf() -> Target:
-    return Target("MDF 4", version_4, one, known)
-
-
-@target("mdf3")
-def mdf3() -> Target:
-    return Target("MDF 3", version_3, one, known)
+add("mdf", Target("MDF 4", version_4, one, known))
+add("mdf3", Target("MDF 3", version_3, one, known))

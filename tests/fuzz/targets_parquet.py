@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from tests.fuzz.readers import outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 
 @cache
@@ -38,6 +38,4 @@ def one(data: bytes) -> None:
         assert not np.isinf(c.values).any(), f"{c.info.path} is infinite"
 
 
-@target("parquet")
-def parquet() -> Target:
-    return Target("Parquet", seeds, one, may_end=True)
+add("parquet", Target("Parquet", seeds, one, may_end=True))

@@ -10,7 +10,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
 from tests.fuzz.readers import T0_NS, check_samples, outcome
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 
 _WRITERS = {"plain": None, "bz2": Writer.CompressionFormat.BZ2, "lz4": Writer.CompressionFormat.LZ4}
 
@@ -74,11 +74,5 @@ def base(data: bytes) -> None:
     outcome(data, "a.db3")
 
 
-@target("bag")
-def bag_target() -> Target:
-    return Target("ROS 1 bags", bags, bag, known_bag)
-
-
-@target("db3")
-def db3_target() -> Target:
-    return Target("ROS 2 sqlite files", bases, base)
+add("bag", Target("ROS 1 bags", bags, bag, known_bag))
+add("db3", Target("ROS 2 sqlite files", bases, base))

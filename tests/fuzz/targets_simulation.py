@@ -13,7 +13,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model
-from tests.fuzz.registry import Target, target
+from tests.fuzz.registry import Target, add
 from tests.fuzz.settings_files import check_error, folder_with, loaded
 
 _SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
@@ -145,11 +145,5 @@ def scenario(data: bytes) -> None:
         _simulated(replace(found, duration_s=min(found.duration_s, _SHORT_S)), Model())
 
 
-@target("model")
-def model_target() -> Target:
-    return Target("model files, and a simulation with them", models, model, is_text=True)
-
-
-@target("scenario")
-def scenario_target() -> Target:
-    return Target("scenario files, and their simulation", scenarios, scenario, is_text=True)
+add("model", Target("model files, and a simulation with them", models, model, is_text=True))
+add("scenario", Target("scenario files, and their simulation", scenarios, scenario, is_text=True))

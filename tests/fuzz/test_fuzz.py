@@ -27,7 +27,7 @@ FRESH = {"mdf": 12, "mdf3": 8, "mcap": 12, "bag": 12, "db3": 8, "csv": 16, "parq
 
 def judged(name: str, case: Case) -> str | None:
     """As the fuzzer judges; the time that a case may take is of the processor."""
-    target = TARGETS[name]()
+    target = TARGETS[name]
     begin = time.process_time()
     data = case.content(target)
     if case.seed and target.known is not None:
@@ -58,7 +58,7 @@ def strict(monkeypatch):
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_sound_files_are_read_whole(name, strict):
-    for seed in TARGETS[name]().seeds():
+    for seed in TARGETS[name].seeds():
         assert judged(name, Case(seed)) is None
 
 
@@ -67,9 +67,9 @@ def test_what_has_been_found_before(name, case):
     assert judged(name, case) is None
 
 
-@pytest.mark.parametrize("name", [n for n in TARGETS if not TARGETS[n]().may_end])
+@pytest.mark.parametrize("name", [n for n in TARGETS if not TARGETS[n].may_end])
 def test_damage_drawn_by_chance(name, capfd):
-    target, rng = TARGETS[name](), np.random.default_rng(20261123)
+    target, rng = TARGETS[name], np.random.default_rng(20261123)
     seeds = target.seeds()
     for k in range(FRESH.get(name, 10)):
         seed = sorted(seeds)[k % len(seeds)]
@@ -101,7 +101,7 @@ def test_damages_are_what_they_say():
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_a_case_is_the_same_after_it_was_written_down(name):
-    target, rng = TARGETS[name](), np.random.default_rng(4)
+    target, rng = TARGETS[name], np.random.default_rng(4)
     for seed, data in target.seeds().items():
         case = Case(seed, drawn(rng, data, is_text=target.is_text))
         assert case_of(case.line() + "  # a remark").content(target) == case.content(target)
@@ -138,7 +138,7 @@ def test_an_error_of_another_kind_or_form_is_seen(error, monkeypatch):
 
 def test_values_that_were_not_recorded_are_seen(monkeypatch):
     data = mcap_seeds()["zstd"]
-    target = TARGETS["mcap"]()
+    target = TARGETS["mcap"]
     target.known("zstd", (), data)
     whole = readers._whole
 
@@ -175,7 +175,7 @@ def test_a_silent_loss_of_an_mdf_file_is_seen():
 )  # fmt: skip
 def test_a_settings_file_that_ends_in_another_error_is_seen(name, where, wrong, monkeypatch):
     monkeypatch.setattr(targets_config, where, mock.Mock(side_effect=wrong))
-    target = TARGETS[name]()
+    target = TARGETS[name]
     with pytest.raises((AssertionError, ValueError, KeyError, TypeError, RecursionError)):
         target.one(next(iter(target.seeds().values())))
 

@@ -103,7 +103,7 @@ def main() -> None:
     else:
         from tests.fuzz.registry import all_targets
 
-        by_chance(all_targets()[name](), name, seconds, seed, journal)
+        by_chance(all_targets()[name], name, seconds, seed, journal)
 
 
 if __name__ == "__main__":
