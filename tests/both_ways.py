@@ -5,15 +5,14 @@ import json
 import plotly.graph_objects as go
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
-from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
+from tests.commands import run
 
 
 def command(*args, code=0):
     """What the command prints, and its notes."""
-    done = CliRunner().invoke(app, [str(a) for a in args])
+    done = run(*args)
     assert done.exit_code == code, done.stderr
     return done.stdout, done.stderr
 

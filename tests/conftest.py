@@ -23,4 +23,18 @@ def real_logs() -> Path:
     return REAL_LOGS
 
 
+@pytest.fixture(scope="session")
+def dry_folder(tmp_path_factory) -> Path:
+    """Two dry drives `a.parquet` and `b.parquet`, and `car.toml`, the vehicle file before a calibration; read only."""
+    from aqualog.core.vehicle import vehicle_toml
+    from tests.calibrate.dry_drives import believed, campaign
+
+    path = tmp_path_factory.mktemp("dry")
+    signals, true, _ = campaign(41, 2, seconds=260.0, rate=50.0)
+    for name, s in zip("ab", signals, strict=True):
+        s.frame.select(c for c in s.frame.columns if not c.startswith("true_")).write_parquet(path / f"{name}.parquet")
+    (path / "car.toml").write_text(vehicle_toml(believed(true)), encoding="utf-8")
+    return path
+
+
 from tests.headless import browser  # noqa: E402, F401 - a fixture, from a module on the path set above

@@ -6,55 +6,21 @@ import sys
 from dataclasses import replace
 from types import ModuleType
 
-import polars as pl
 import pytest
-import typer
-from typer.testing import CliRunner
 
-from aqualog.cli.diagnose import diagnose
-from aqualog.cli.main import app as whole
 from aqualog.config.model import load_model
 from aqualog.core.errors import SignalError
-from aqualog.core.vehicle import Vehicle, vehicle_toml
 from aqualog.diagnose import run as engine
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
-from tests.report.diagnosis_case import cases, views_of
-
-app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-app.command()(diagnose)
+from tests import commands
+from tests.diagnose.stand_in import Engine, write_drives
+from tests.report.diagnosis_case import cases
 
 
 @pytest.fixture
 def folder(tmp_path):
-    n = 200
-    frame = pl.DataFrame(
-        {"t": [i / 10 for i in range(n)], "v_x": [20.0] * n, "a_x": [0.0] * n}
-        | {f"omega_{w}": [63.0] * n for w in ("fl", "fr", "rl", "rr")}
-    )
-    for name in "abc":
-        frame.write_parquet(tmp_path / f"{name}.parquet")
-    (tmp_path / "car.toml").write_text(vehicle_toml(Vehicle(name="car")), encoding="utf-8")
-    return tmp_path
-
-
-class Engine:
-    """Stands for the engine: keeps what it was asked, answers with the diagnosis of a verdict."""
-
-    def __init__(self):
-        self.verdict = "named"
-        self.asked = []
-        self.faults = {}
-
-    def __call__(self, drives, vehicle, *, model=None, holdout=(), options=None, progress=None):
-        self.asked.append(([n for n, _ in drives], [n for n, _ in holdout], vehicle, model, options))
-        for name, fault in self.faults.items():
-            if name in (None, *(n for n, _ in drives)):
-                raise fault
-        for i in range(101):
-            progress("searching", i / 100)
-        d = replace(cases()[self.verdict], drives=tuple(n for n, _ in drives))
-        return replace(d, views=views_of(self.verdict) if options.views else ())
+    return write_drives(tmp_path)
 
 
 @pytest.fixture
@@ -64,8 +30,7 @@ def run(folder, monkeypatch):
 
     def call(*args, vehicle=True):
         given = ["--vehicle", folder / "car.toml"] if vehicle else []
-        result = CliRunner().invoke(app, [str(a) for a in [*args, *given]])
-        return result.exit_code, result.stdout, result.stderr
+        return commands.run("diagnose", *args, *given)
 
     call.engine = made
     return call
@@ -249,9 +214,6 @@ def test_a_name_with_a_line_in_it_is_no_line_of_the_model(run, folder):
 
 
 def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
-    (folder / "campaign.toml").write_text(
-        'name = "c"\nvehicle = "car.toml"\n[[run]]\nlog = "a.parquet"\nwater_depth_mm = 1.3\n', encoding="utf-8"
-    )
     asked = []
 
     def fake(campaign, data, *, seed, level, model, progress, **drawn):
@@ -280,7 +242,7 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
 
 
 def test_help_of_the_whole_command():
-    text = CliRunner().invoke(whole, ["diagnose", "--help"]).stdout
+    text = commands.run("diagnose", "--help").stdout
     assert "default car" not in text
     for part in ("--holdout", "--no-bootstrap", "cannot_tell", "aqualog diagnose drive.mf4 --vehicle car.toml"):
         assert part in text

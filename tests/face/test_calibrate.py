@@ -5,30 +5,18 @@ from dataclasses import replace
 import pytest
 
 import aqualog as aq
-from aqualog.core.vehicle import vehicle_toml
 from tests.both_ways import check_result, command
-from tests.calibrate.dry_drives import believed, campaign
 
 FILES = ("calibration.json", "calibrated.toml", "calibration.html")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    path = tmp_path_factory.mktemp("drives")
-    signals, true, _ = campaign(41, 2, seconds=260.0, rate=50.0)
-    for name, s in zip("ab", signals, strict=True):
-        s.frame.select(c for c in s.frame.columns if not c.startswith("true_")).write_parquet(path / f"{name}.parquet")
-    (path / "car.toml").write_text(vehicle_toml(believed(true)), encoding="utf-8")
-    return path
+def result(dry_folder):
+    return aq.calibrate([dry_folder / "a.parquet", aq.read(dry_folder / "b.parquet")], dry_folder / "car.toml")
 
 
-@pytest.fixture(scope="module")
-def result(folder):
-    return aq.calibrate([folder / "a.parquet", aq.read(folder / "b.parquet")], folder / "car.toml")
-
-
-def test_face_and_command_agree(folder, result, tmp_path):
-    logs, car = (folder / "a.parquet", folder / "b.parquet"), folder / "car.toml"
+def test_face_and_command_agree(dry_folder, result, tmp_path):
+    logs, car = (dry_folder / "a.parquet", dry_folder / "b.parquet"), dry_folder / "car.toml"
     check_result(result, tmp_path / "face", "calibrate", *logs, "--vehicle", car, files=FILES)
     out, page = tmp_path / "out.toml", tmp_path / "page.html"
     command("calibrate", *logs, "--vehicle", car, "-o", out, "--page", page)
@@ -42,12 +30,12 @@ def test_face_and_command_agree(folder, result, tmp_path):
         result.write_vehicle(car, force=True)
 
 
-def test_the_calibrated_vehicle_is_that_of_the_file(folder, result, tmp_path):
+def test_the_calibrated_vehicle_is_that_of_the_file(dry_folder, result, tmp_path):
     read = aq.Vehicle.read(result.write_vehicle(tmp_path / "car.toml"))
     assert result.vehicle.mass != result.before.mass
     assert replace(read, given=frozenset(), spread={}) == replace(result.vehicle, given=frozenset(), spread={})
     assert dict(read.spread) == pytest.approx(dict(result.vehicle.spread))
-    assert aq.detect(folder / "a.parquet", result.vehicle).vehicle == result.vehicle
+    assert aq.detect(dry_folder / "a.parquet", result.vehicle).vehicle == result.vehicle
 
 
 def test_tables(result):
@@ -58,26 +46,26 @@ def test_tables(result):
     assert tables["residuals"].columns == ["drive", "v", "force", "before", "after"]
 
 
-def test_what_is_known_and_what_cannot_be_read(folder, tmp_path):
+def test_what_is_known_and_what_cannot_be_read(dry_folder, tmp_path):
     (tmp_path / "broken.mf4").write_bytes(b"MDF     4.10" + b"\0" * 90)
     heard = []
-    logs = [tmp_path / "broken.mf4", folder / "a.parquet", folder / "b.parquet"]
-    result = aq.calibrate(logs, str(folder / "car.toml"), fix={"mass": 1500.0}, progress=heard.append)
+    logs = [tmp_path / "broken.mf4", dry_folder / "a.parquet", dry_folder / "b.parquet"]
+    result = aq.calibrate(logs, str(dry_folder / "car.toml"), fix={"mass": 1500.0}, progress=heard.append)
     assert result.has_loss
     assert any(h.startswith("error: broken.mf4") for h in heard)
     assert [d.label for d in result.drives] == ["a.parquet", "b.parquet"]
-    args = ("calibrate", *logs, "--vehicle", folder / "car.toml", "--fix", "mass=1500", "--json")
+    args = ("calibrate", *logs, "--vehicle", dry_folder / "car.toml", "--fix", "mass=1500", "--json")
     assert result.to_json() + "\n" == command(*args, code=3)[0]
     with pytest.raises(aq.AqualogError, match=r"no drive can be used: .*broken\.mf4"):
-        aq.calibrate(logs[:1], folder / "car.toml")
+        aq.calibrate(logs[:1], dry_folder / "car.toml")
     with pytest.raises(aq.AqualogError, match="not known"):
-        aq.calibrate(logs, folder / "car.toml", fix={"wheel": 1.0})
+        aq.calibrate(logs, dry_folder / "car.toml", fix={"wheel": 1.0})
     with pytest.raises(aq.AqualogError, match="no vehicle"):
         aq.calibrate(logs)
 
 
-def test_signals_in_memory(folder, result):
-    signals = [aq.read(folder / f"{n}.parquet").signals for n in "ab"]
+def test_signals_in_memory(dry_folder, result):
+    signals = [aq.read(dry_folder / f"{n}.parquet").signals for n in "ab"]
     again = aq.calibrate(signals, result.before)
     assert again.found.get("mass").value == result.found.get("mass").value
     assert [d["name"] for d in again.document["drives"]] == ["a.parquet", "b.parquet"]
