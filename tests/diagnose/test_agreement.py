@@ -5,24 +5,26 @@ import pytest
 from aqualog.diagnose.agreement import widened
 from aqualog.diagnose.records import Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.run import Options, diagnose
-from tests.diagnose.test_drive import CAR, NOISY, signals, term
+from tests.diagnose.test_drive import CAR, term
+from tests.diagnose.test_run import few, noisy  # noqa: F401 - `few` is a fixture
 
 OPTIONS = Options(surrogates=0, views=False, consequences=False)
 
 
 def drives(*loads):
     return [
-        (f"drive {i}", signals(*((term("payload_mass", delta_mass=x),) if x else ()), sensors=NOISY, seed=3 + i))
+        (f"drive {i}", noisy(*((term("payload_mass", delta_mass=x),) if x else ()), seed=3 + i))
         for i, x in enumerate(loads)
     ]
 
 
-@pytest.fixture(scope="module")
-def alike():
-    return diagnose(drives(250.0, 250.0), CAR, options=OPTIONS)
+def width(d):
+    e = next(iter(d.causes[0].parameters.values()))
+    return e.high - e.low
 
 
-def test_drives_with_the_same_load_agree_and_foretell_each_other(alike):
+def test_drives_with_the_same_load_agree_and_those_with_different_ones_have_a_wide_interval():
+    alike = diagnose(drives(250.0, 250.0), CAR, options=OPTIONS)
     (found,) = alike.agreement
     assert found.key == "payload_mass"
     assert found.holds
@@ -33,17 +35,10 @@ def test_drives_with_the_same_load_agree_and_foretell_each_other(alike):
     a, b = found.drives
     assert (a.others, b.others) == pytest.approx((b.alone.value, a.alone.value), rel=0.02)
 
-
-def test_a_load_that_one_drive_has_is_told_and_makes_the_interval_wide(alike):
     unlike = diagnose(drives(260.0, 140.0), CAR, options=OPTIONS)
     found = next(a for a in unlike.agreement if a.key.startswith("payload_mass"))
     assert found.p_value < 1e-6
     assert not found.holds
-
-    def width(d):
-        e = next(iter(d.causes[0].parameters.values()))
-        return e.high - e.low
-
     assert width(unlike) > 3.0 * width(alike)
     assert f"{next(iter(unlike.causes[0].parameters.values())).high:.3g} kg" in unlike.sentence
 
