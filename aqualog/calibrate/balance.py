@@ -1,4 +1,4 @@
-"""Estimate the dry balance of forces by regression over the windows of one or more drives."""
+"""The dry balance of forces of one or more drives by regression, and the offset of each accelerometer."""
 
 from __future__ import annotations
 
@@ -8,13 +8,58 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.calibrate.design import Windows
-from aqualog.calibrate.offset import Offset
+from aqualog.calibrate.design import Drive, Windows
 from aqualog.core.errors import FitError
 from aqualog.core.records import FloatArray
 from aqualog.physics.load import G
 
-__all__ = ["Balance", "Sample", "fit_balance", "residual"]
+__all__ = ["ALTITUDE_SD", "CLIMB_SD", "Balance", "Offset", "Sample", "energy_offset", "fit_balance", "residual"]
+
+CLIMB_SD = 20.0  # [m] net climb of a drive whose height is not known (K: drives end near where they began)
+ALTITUDE_SD = 4.0  # [m] error of a height, GNSS or map, at each end of a drive (K)
+V_STOPPED = 0.5  # [m/s]
+
+
+class Offset(NamedTuple):
+    """`value` [m/s²] at the time `t` [s] of the drive, `sd` by the height; `has_height`; way [m]."""
+
+    value: float
+    sd: float
+    t: float
+    has_height: bool
+    way: float
+
+
+def energy_offset(drive: Drive) -> Offset:
+    """Estimate the offset of the accelerometer over one drive.
+
+    b = (int v a_x dt - Delta(v² / 2) - g Delta h) / way. Along the way the specific force lifts and accelerates the
+    car, whatever grade, brake, torque or wind acts (E2). Only the heights at both ends count. Without an altitude
+    Delta h is 0 ± 20 m. The value is that of an evenly drifting offset at the mean time of the way, int v t dt / way.
+
+    Gaps in a_x or v are left out with the energy and height gained within them. The result is NaN, with an infinite sd,
+    where the drive is shorter than 500 m.
+    """
+    v, a, dt = drive.v, drive.a_x, drive.dt
+    good = np.isfinite(v + a)
+    height = drive.altitude
+    if height is not None:
+        good &= np.isfinite(height)
+    pair = good[1:] & good[:-1] & (v[1:] + v[:-1] > 2.0 * V_STOPPED)
+    mean_v = 0.5 * (v[1:] + v[:-1])[pair]
+    way = float(mean_v.sum() * dt)
+    if way < 500.0:
+        return Offset(math.nan, math.inf, math.nan, height is not None, way)
+    work = float((mean_v * 0.5 * (a[1:] + a[:-1])[pair]).sum() * dt)
+    kinetic = float((0.5 * (v[1:] ** 2 - v[:-1] ** 2))[pair].sum())
+    t = np.arange(v.size) * dt
+    middle = float((mean_v * t[1:][pair]).sum() * dt) / way
+    climb, sd = 0.0, CLIMB_SD
+    if height is not None:
+        climb = float((height[1:] - height[:-1])[pair].sum())
+        sd = ALTITUDE_SD * math.sqrt(2.0)
+    return Offset((work - kinetic - G * climb) / way, G * sd / way, middle, height is not None, way)
+
 
 LEAST_WINDOWS = 20
 
@@ -79,7 +124,14 @@ def fit_balance(samples: Sequence[Sample], fixed: Mapping[str, float]) -> Balanc
     for j, s in enumerate(samples):
         rest = s.windows.a_x - inverse_mass * s.windows.force + kappa * s.windows.drag
         drifts[j], levels[j] = _line(s, rest)
-    return Balance(inverse_mass, kappa, levels, drifts, _rolling(samples, levels), condition)
+    rolling = math.nan  # mean of (b_j - level_j) / g, weighted by how well each offset is known
+    known = np.array([math.isfinite(s.offset.value) for s in samples])
+    if known.any():
+        b = np.array([s.offset.value for s in samples])[known]
+        sd = np.array([max(s.offset.sd, 0.01) for s in samples])[known]
+        weight = sd**-2 / (sd**-2).sum()
+        rolling = float((weight * (b - levels[known])).sum()) / G
+    return Balance(inverse_mass, kappa, levels, drifts, rolling, condition)
 
 
 def residual(sample: Sample, *, inverse_mass: float, drag: float, level: float, drift: float) -> FloatArray:
@@ -137,14 +189,3 @@ def _centred(sample: Sample, y: FloatArray) -> FloatArray:
     t = sample.windows.t
     centred: FloatArray = y - y.mean() - slope * (t - t.mean())
     return centred
-
-
-def _rolling(samples: Sequence[Sample], levels: FloatArray) -> float:
-    """Average (b_j - level_j) / g, weighted by how well each offset is known; NaN without any offset."""
-    known = np.array([math.isfinite(s.offset.value) for s in samples])
-    if not known.any():
-        return math.nan
-    b = np.array([s.offset.value for s in samples])[known]
-    sd = np.array([max(s.offset.sd, 0.01) for s in samples])[known]
-    weight = sd**-2 / (sd**-2).sum()
-    return float((weight * (b - levels[known])).sum()) / G

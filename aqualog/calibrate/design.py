@@ -1,4 +1,4 @@
-"""Select the stretches of a drive that identify the balance of forces, as means over windows."""
+"""Select the stretches of a drive that identify the balance of forces, as means over windows without delays."""
 
 from __future__ import annotations
 
@@ -8,15 +8,83 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.calibrate.lag import earlier, lag_between
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.features.smoothing import earlier
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.physics.resistance import air_drag
 
-__all__ = ["BESIDE_S", "BRAKE_PRESSURE", "REASONS", "WINDOW_S", "Drive", "Windows", "prepare", "widened"]
+__all__ = [
+    "BESIDE_S", "BRAKE_PRESSURE", "LAG_MAX", "REASONS", "WINDOW_S", "Drive", "Windows", "lag_between",
+    "prepare", "widened",
+]  # fmt: skip
+
+LAG_MAX = 0.6  # [s] buses and GNSS receivers stay below
+FAST_S, SLOW_S = 0.2, 4.0  # [s] band in which a driver's pedal moves force and acceleration alike
+CORRELATION_MIN = 0.5  # below it the two do not move together and the lag is left at zero
+LEAST_S = 20.0  # [s]
+
+
+def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
+    """Return the time by which x is late against y.
+
+    Parameters
+    ----------
+    x, y : array (n,)
+        Two signals that move alike, up to scale, offset and slow parts; NaN where missing.
+    dt : float
+        Sample time. [s]
+
+    Returns
+    -------
+    lag : float
+        Within ±0.6, positive where x comes later; 0 if their best correlation is below 0.5 or less than 20 s are
+        usable. [s]
+
+    The peak of the correlation of both signals between 0.25 and 5 Hz, by a parabola through its three highest points.
+    """
+    a, b = (_mean(z, FAST_S, dt) - _mean(z, SLOW_S, dt) for z in (x, y))
+    most = round(LAG_MAX / dt)
+    if np.count_nonzero(np.isfinite(a + b)) * dt < LEAST_S or most < 1:
+        return 0.0
+    shifts = np.arange(-most, most + 1)
+    found = np.array([_correlation(a, b, int(k)) for k in shifts])
+    best = int(np.argmax(found))
+    if not found[best] > CORRELATION_MIN or best in (0, shifts.size - 1):
+        return 0.0
+    low, top, high = found[best - 1 : best + 2]
+    curvature = low - 2.0 * top + high
+    part = 0.5 * (low - high) / curvature if curvature < 0.0 else 0.0
+    return float((shifts[best] + part) * dt)
+
+
+def _mean(x: FloatArray, seconds: float, dt: float) -> FloatArray:
+    """Return the centred mean without delay; NaN where one of its samples is NaN."""
+    half = max(round(0.5 * seconds / dt), 0)
+    width = 2 * half + 1
+    out = np.full(x.size, np.nan)
+    if x.size < width:
+        return out
+    good = np.isfinite(x)
+    total = np.concatenate([[0.0], np.cumsum(np.where(good, x, 0.0))])
+    count = np.concatenate([[0], np.cumsum(good)])
+    full = count[width:] - count[:-width] == width
+    out[half : x.size - half] = np.where(full, (total[width:] - total[:-width]) / width, np.nan)
+    return out
+
+
+def _correlation(a: FloatArray, b: FloatArray, k: int) -> float:
+    """Of a[i + k] with b[i]."""
+    x, y = (a[k:], b[: b.size - k]) if k >= 0 else (a[:k], b[-k:])
+    good = np.isfinite(x + y)
+    if not good.any():
+        return 0.0
+    x, y = x[good], y[good]
+    scale = math.sqrt(float(x @ x) * float(y @ y))
+    return float(x @ y) / scale if scale > 0.0 else 0.0
+
 
 WINDOW_S = 2.0  # [s] long against sensor lags (0.1 s), short against manoeuvres
 BLOCK_S = 40.0  # [s] driving within which residuals (wind, surface) hang together
@@ -88,18 +156,22 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     neighbours within 0.6 s are left out, too. Torque and velocity are moved to the accelerometer's time first.
     """
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
-    _check(present, vehicle, name)
     columns = {s: signals.array(s) for s in present}
-    _check_alive(columns, vehicle, name)
+    _check(columns, vehicle, name)
     dt = signals.dt
     features = FeatureStream(vehicle, dt, present).push({s: columns[s] for s in present if s in INPUTS})
     a_x = columns["a_x"]
     v = features["v_x_hat"]
-    torque = _torque_force(columns, vehicle)
+    # a wheel without a torque signal rolls freely
+    torque = np.sum([columns[f"torque_{w}"] / vehicle.r_l(w) for w in WHEELS if f"torque_{w}" in columns], axis=0)
     v_lag = lag_between(np.gradient(v, dt), a_x, dt)
     torque_lag = lag_between(torque, a_x, dt)
     v = earlier(v, v_lag, dt)
-    force = earlier(torque, torque_lag, dt) - _spinning_force(columns, vehicle, v, dt)
+    spinning = np.zeros_like(v)  # the part of the torque that spins the wheels (E5); else they follow the car
+    for w in WHEELS:
+        omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
+        spinning = spinning + vehicle.inertia(w) * np.gradient(omega, dt) / vehicle.r_l(w)
+    force = earlier(torque, torque_lag, dt) - spinning
     reason = _reasons(a_x, v, force, columns, features, vehicle, dt)
     used = reason == 0
     windows = _windows(a_x, v, force, used, vehicle, dt)
@@ -112,9 +184,10 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     )  # fmt: skip
 
 
-def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
-    missing = [s for s in ("a_x", *(f"torque_{w}" for w in vehicle.driven)) if s not in present]
-    if "v_x" not in present and not all(f"omega_{w}" in present for w in WHEELS):
+def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> None:
+    needed = ("a_x", *(f"torque_{w}" for w in vehicle.driven))
+    missing = [s for s in needed if s not in columns]
+    if "v_x" not in columns and not all(f"omega_{w}" in columns for w in WHEELS):
         missing.append("v_x or the four wheel speeds")
     if missing:
         raise SignalError(
@@ -122,35 +195,14 @@ def _check(present: list[str], vehicle: Vehicle, name: str) -> None:
             expected="accelerometer, torques of the driven wheels, and velocity or wheel speeds",
             hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
         )  # fmt: skip
-
-
-def _check_alive(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> None:
-    """Refuse a signal that never changes: it is frozen or not connected, and would be fitted to the last digit."""
-    torques = [f"torque_{w}" for w in vehicle.driven]
+    # what never changes is frozen or not connected, and would be fitted to the last digit
     speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]
-    dead = [s for s in ("a_x", *torques, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
+    dead = [s for s in (*needed, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
     if dead:
         raise SignalError(
             f"{', '.join(dead)} never change{'s' if len(dead) == 1 else ''}", where=name,
             expected="measured signals", hint="check the channel in the signal map",
         )  # fmt: skip
-
-
-def _torque_force(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:
-    """Return wheel torques over the loaded radii; a wheel without a torque signal rolls freely. [N]"""
-    force: FloatArray = np.sum(
-        [columns[f"torque_{w}"] / vehicle.r_l(w) for w in WHEELS if f"torque_{w}" in columns], axis=0
-    )
-    return force
-
-
-def _spinning_force(columns: Mapping[str, FloatArray], vehicle: Vehicle, v: FloatArray, dt: float) -> FloatArray:
-    """Return the part of the torque that spins the wheels (E5); without wheel speeds they follow the car. [N]"""
-    total = np.zeros_like(v)
-    for w in WHEELS:
-        omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
-        total = total + vehicle.inertia(w) * np.gradient(omega, dt) / vehicle.r_l(w)
-    return total
 
 
 def _reasons(

@@ -67,7 +67,8 @@ def initial_state(offset: float = 0.0) -> OnlineState:
 
 
 @compiled
-def _scan(p, offset, age, fast, above, beneath, resting, before, back, x, v_x, frozen):  # type: ignore[no-untyped-def]
+def _scan(p, state, x, v_x, frozen):  # type: ignore[no-untyped-def]
+    offset, age, fast, above, beneath, resting, before, back = state
     out = np.empty(x.size)
     for i in range(x.size):
         if not math.isnan(v_x[i]):
@@ -102,7 +103,7 @@ def _scan(p, offset, age, fast, above, beneath, resting, before, back, x, v_x, f
                 offset += p.dt / age * ((fast if watched else x[i]) - offset)
                 offset = min(max(offset, -p.bound), p.bound)
         out[i] = offset
-    return out, offset, age, fast, above, beneath, resting, before, back
+    return out, OnlineState(offset, age, fast, above, beneath, resting, before, back)
 
 
 def scan(
@@ -138,8 +139,8 @@ def scan(
     Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives no method. This one
     estimates their joint effect at even traction only.
     """
-    out, *last = _scan(
-        p, *state, np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(v_x, dtype=np.float64),
+    found: tuple[FloatArray, OnlineState] = _scan(
+        p, state, np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(v_x, dtype=np.float64),
         np.ascontiguousarray(frozen, dtype=np.bool_),
     )  # fmt: skip
-    return out, OnlineState(*last)
+    return found

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.calibrate import words
-from aqualog.calibrate.design import WINDOW_S, Drive
-from aqualog.calibrate.lag import earlier, lag_between
+from aqualog.calibrate.design import WINDOW_S, Drive, lag_between
 from aqualog.calibrate.records import Parameter
 from aqualog.calibrate.spread import BLOCKS_MIN, DRIVES_MIN, Spread, combined, half_width, jackknife, stratified
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
+from aqualog.features.smoothing import earlier
 from aqualog.physics.load import G
 
 __all__ = ["Radii", "fit_radii", "radii_of_blocks", "radii_spread", "radius_parameters"]

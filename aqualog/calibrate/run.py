@@ -6,23 +6,92 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
+import numpy as np
+
 from aqualog.calibrate import words
-from aqualog.calibrate.apply import calibrated
-from aqualog.calibrate.balance import Sample, fit_balance
-from aqualog.calibrate.derive import balance_parameters, check_fixed, derived, estimates
-from aqualog.calibrate.design import prepare
-from aqualog.calibrate.fits import drive_fits
-from aqualog.calibrate.offset import energy_offset
+from aqualog.calibrate.balance import Sample, energy_offset, fit_balance, residual
+from aqualog.calibrate.derive import balance_parameters, calibrated, check_fixed, derived, estimates
+from aqualog.calibrate.design import Drive, prepare
 from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
-from aqualog.calibrate.spread import one_more, spread_of
+from aqualog.calibrate.spread import half_width, jackknife_of, one_more, spread_of
 from aqualog.calibrate.tie_rod import transfers
 from aqualog.core.errors import FitError
-from aqualog.core.records import Signals
+from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import SPREAD, Vehicle
 from aqualog.physics.load import G
 
-__all__ = ["calibrate"]
+__all__ = ["calibrate", "drive_fits", "mass_difference"]
+
+
+def mass_difference(mass: float, sd: float, others: Sequence[float]) -> tuple[float, float, float]:
+    """Return the difference between a drive's mass and the mean of others, with the 95 % interval.
+
+    Parameters
+    ----------
+    mass, sd : float
+        Of the drive, and its standard deviation within the drive. [kg]
+    others : sequence of float
+        Masses by the other drives, each from that drive alone. [kg]
+
+    Returns
+    -------
+    difference, low, high : float
+        NaN with fewer than two others. [kg]
+
+    Two drives with the same load differ by driver, fuel, rig, driveline temperature and all else that the balance does
+    not know. The scatter among the other drives, times sqrt(1 + 1/J), is the difference to expect of this drive without
+    any load. Its own scatter counts where it is larger.
+    """
+    n = len(others)
+    if n < 2:
+        return math.nan, math.nan, math.nan
+    spread = float(np.std(others, ddof=1))
+    half = half_width(math.sqrt(max(spread, sd) ** 2 + spread**2 / n), n - 1.0)
+    difference = mass - float(np.mean(others))
+    return difference, difference - half, difference + half
+
+
+def drive_fits(
+    drives: Sequence[Drive], samples: Sequence[Sample], found: Mapping[str, float], vehicle: Vehicle
+) -> list[DriveFit]:
+    """Fit a mass, an offset and a drift for each drive; torque gain and drag area are those of all drives."""
+    fixed = {"torque_gain": found["torque_gain"], "drag_area": found["drag_area"]}
+    alone = [_alone(s, fixed) for s in samples]
+    k, drag = found["torque_gain"] / found["mass"], found["drag_area"] / found["mass"]
+    fits = []
+    for j, (drive, sample) in enumerate(zip(drives, samples, strict=True)):
+        w, offset = sample.windows, sample.offset
+        others = [m for i, (m, _) in enumerate(alone) if i != j and math.isfinite(m)]
+        rest = residual(sample, inverse_mass=k, drag=drag, level=0.0, drift=0.0)
+        t = w.t - (offset.t if math.isfinite(offset.t) else float(w.t.mean()))
+        drift, level = np.polyfit(t, rest, 1) if w.v.size > 2 else (0.0, float(rest.mean()))
+        after: FloatArray = rest - level - drift * t
+        before: FloatArray = (
+            w.a_x - w.force / vehicle.mass + vehicle.drag_area / vehicle.mass * w.drag + G * vehicle.rolling_resistance
+        )
+        rms_before, rms_after = (math.sqrt(float((x * x).mean())) for x in (before, after))
+        fits.append(
+            DriveFit(
+                drive.name, *alone[j], mass_difference(*alone[j], others), offset.value, offset.sd, float(drift),
+                drive.torque_lag_s, drive.v_lag_s, float(drive.used.sum()) * drive.dt, drive.driven_s, drive.left_out,
+                rms_before, rms_after, w.v, w.force, before, after,
+            )
+        )  # fmt: skip
+    return fits
+
+
+def _alone(sample: Sample, fixed: Mapping[str, float]) -> tuple[float, float]:
+    """Return the mass by one drive and its standard deviation within the drive; NaN if the drive is too short."""
+
+    def mass(part: Sequence[Sample]) -> dict[str, float]:
+        return {"mass": fixed["torque_gain"] / fit_balance(part, fixed).inverse_mass}
+
+    try:
+        return mass([sample])["mass"], jackknife_of(mass, [sample]).sd["mass"]
+    except FitError:
+        return math.nan, math.nan
+
 
 LEAST_WINDOWS = 10  # of 2 s in a drive that contributes to the balance
 OFFSET_WIDE = 0.1  # [m/s^2] half of the resistance threshold: an offset known worse than that is of no use

@@ -11,12 +11,11 @@ import numpy as np
 from aqualog.calibrate.balance import Sample
 from aqualog.calibrate.design import Windows
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import student_quantile
-from aqualog.core.records import FloatArray
+from aqualog.core.intervals import jackknife_sd, student_quantile, variance_ratio_chance
 
 __all__ = [
     "BLOCKS_MIN", "DRIVES_MIN", "WIND_SD", "Spread", "combined", "half_width", "jackknife", "jackknife_of",
-    "of_drives", "one_more", "spread_of", "stratified",
+    "one_more", "spread_of", "stratified",
 ]  # fmt: skip
 
 DRIVES_MIN = 4  # from here on the drives themselves show how they differ
@@ -69,7 +68,8 @@ def spread_of(estimator: Estimator, samples: Sequence[Sample], *, drag: float, a
     assumed = _of_blocks_and_assumptions(estimator, samples, drag=drag, air_density=air_density)
     if len(samples) < DRIVES_MIN:
         return assumed
-    return combined(assumed, of_drives(estimator, samples))
+    left = [estimator([s for k, s in enumerate(samples) if k != j]) for j in range(len(samples))]
+    return combined(assumed, Spread(*jackknife(left), by_drive=True))
 
 
 def one_more(spread: Spread, count: int) -> dict[str, float]:
@@ -106,16 +106,6 @@ def combined(assumed: Spread, seen: Spread) -> Spread:
     return Spread(sd, dof, by_drive=True)
 
 
-def variance_ratio_chance(ratio: float, dof: float, dof_below: float) -> float:
-    """Return the chance that F of two independent variances exceeds `ratio`; degrees of freedom >= 1 for both."""
-    # x = sin^2(u) turns the beta density of x = dof F / (dof F + dof_below) into powers without a pole
-    u = np.linspace(0.0, 0.5 * math.pi, 4_001)
-    density = np.sin(u) ** (dof - 1.0) * np.cos(u) ** (dof_below - 1.0)
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
-    at = math.atan(math.sqrt(ratio * dof / dof_below))
-    return 1.0 - float(np.interp(at, u, area)) / float(area[-1])
-
-
 def _of_blocks_and_assumptions(
     estimator: Estimator, samples: Sequence[Sample], *, drag: float, air_density: float
 ) -> Spread:
@@ -123,9 +113,13 @@ def _of_blocks_and_assumptions(
     best = estimator(samples)
     assumed = dict.fromkeys(best, 0.0)
     for j, sample in enumerate(samples):
-        winds = [_in_wind(sample, w, drag=drag, air_density=air_density) for w in (WIND_SD, -WIND_SD)]
-        for others in (winds, [_offset_moved(sample)]):
-            moved = [estimator([*samples[:j], o, *samples[j + 1 :]]) for o in others if o is not None]
+        w, o = sample.windows, sample.offset
+        # the drive as it would have been in more head or tail wind, and with another offset where the height allows it
+        air = (0.5 * air_density * ((w.v + wind) ** 2 - w.v**2) for wind in (WIND_SD, -WIND_SD))
+        winds = [sample._replace(windows=w._replace(a_x=w.a_x - drag * extra)) for extra in air]
+        offset = [sample._replace(offset=o._replace(value=o.value + o.sd))] if math.isfinite(o.sd) else []
+        for others in (winds, offset):
+            moved = [estimator([*samples[:j], other, *samples[j + 1 :]]) for other in others]
             for name in assumed if moved else ():
                 # mean square over head and tail wind, which come alike
                 assumed[name] += sum((m[name] - best[name]) ** 2 for m in moved) / len(moved)
@@ -133,12 +127,6 @@ def _of_blocks_and_assumptions(
     # [welch1947], [satterthwaite1946]: the assumed part is known, the part from the blocks is not
     dof = {n: within.dof[n] * (sd[n] / within.sd[n]) ** 4 if within.sd[n] > 0.0 else DOF_KNOWN for n in best}
     return Spread(sd, dof, by_drive=False)
-
-
-def of_drives(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
-    """Leave out each drive in turn."""
-    left = [estimator([s for k, s in enumerate(samples) if k != j]) for j in range(len(samples))]
-    return Spread(*jackknife(left), by_drive=True)
 
 
 def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
@@ -157,7 +145,8 @@ def jackknife_of(estimator: Estimator, samples: Sequence[Sample]) -> Spread:
     for of_drive in blocks:
         left = []
         for j, b in of_drive:
-            rest = [*samples[:j], _without(samples[j], b), *samples[j + 1 :]]
+            kept = Windows(*(x[samples[j].windows.block != b] for x in samples[j].windows))
+            rest = [*samples[:j], samples[j]._replace(windows=kept), *samples[j + 1 :]]
             left.append(estimator([s for s in rest if s.windows.v.size]))
         parts.append(left)
     return stratified(parts)
@@ -182,27 +171,5 @@ def stratified(parts: Sequence[Sequence[Estimate]]) -> Spread:
 
 def jackknife(left: Sequence[Estimate]) -> tuple[dict[str, float], dict[str, float]]:
     """Return standard deviations and degrees of freedom from estimates with one part left out each."""
-    n = len(left)
-    sd, dof = {}, {}
-    for name in left[0]:
-        x = np.array([e[name] for e in left])
-        sd[name] = math.sqrt((n - 1.0) / n * float(((x - x.mean()) ** 2).sum()))
-        dof[name] = n - 1.0
-    return sd, dof
-
-
-def _without(sample: Sample, block: float) -> Sample:
-    keep = sample.windows.block != block
-    return sample._replace(windows=Windows(*(x[keep] for x in sample.windows)))
-
-
-def _in_wind(sample: Sample, wind: float, *, drag: float, air_density: float) -> Sample:
-    """Return the drive as it would have been with more head wind."""
-    w = sample.windows
-    extra: FloatArray = 0.5 * air_density * ((w.v + wind) ** 2 - w.v**2)
-    return sample._replace(windows=w._replace(a_x=w.a_x - drag * extra))
-
-
-def _offset_moved(sample: Sample) -> Sample | None:
-    o = sample.offset
-    return sample._replace(offset=o._replace(value=o.value + o.sd)) if math.isfinite(o.sd) else None
+    sd = {name: float(jackknife_sd(np.array([e[name] for e in left]))) for name in left[0]}
+    return sd, dict.fromkeys(sd, len(left) - 1.0)

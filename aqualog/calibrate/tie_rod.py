@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aqualog.calibrate.design import BESIDE_S, BRAKE_PRESSURE, Drive, widened
 from aqualog.calibrate.records import TieRodFit
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import jackknife_sd, student_quantile
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
@@ -145,9 +144,12 @@ def fit_tie_rod(
     columns = [np.ones_like(y), *((y / scale) ** k for k in range(1, degree + 1)), *([x / scale] if has_x else [])]
     block = np.broadcast_to(np.arange(good.shape[1]) // max(round(BLOCK_S / dt), 1), good.shape)[good]
     table = np.column_stack(columns)
-    best, residual = _solve(table, f)
-    sd, dof = _jackknife(table, f, block)
-    half = student_quantile(0.975, max(dof, 1.0)) * sd
+    best = np.asarray(np.linalg.lstsq(table, f, rcond=None)[0], dtype=np.float64)
+    residual = f - table @ best
+    gram, right = table.T @ table, table.T @ f
+    parts = [(table[block == b], f[block == b]) for b in np.unique(block)]
+    left = [np.linalg.lstsq(gram - x.T @ x, right - x.T @ y, rcond=None)[0] for x, y in parts]
+    half = student_quantile(0.975, max(len(parts) - 1.0, 1.0)) * jackknife_sd(np.array(left))
     units = np.array([1.0, *(scale**k for k in range(1, degree + 1)), *([scale] if has_x else [])])
     values, low, high = best / units, (best - half) / units, (best + half) / units
     pairs = [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
@@ -164,21 +166,3 @@ def fit_tie_rod(
     explained = 1.0 - float(residual @ residual) / float(((f - f.mean()) ** 2).sum())
     sigma = math.sqrt(float(residual @ residual) / residual.size)
     return TieRodFit(coefficients, intervals, sigma, explained, seconds)
-
-
-def _solve(table: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
-    best = np.asarray(np.linalg.lstsq(table, f, rcond=None)[0], dtype=np.float64)
-    return best, f - table @ best
-
-
-def _jackknife(table: FloatArray, f: FloatArray, block: NDArray[np.intp]) -> tuple[FloatArray, float]:
-    """Return standard deviations of the coefficients with one block left out each, and degrees of freedom."""
-    gram, right = table.T @ table, table.T @ f
-    left = []
-    for b in np.unique(block):
-        part = table[block == b]
-        left.append(np.linalg.lstsq(gram - part.T @ part, right - part.T @ f[block == b], rcond=None)[0])
-    x = np.array(left)
-    n = x.shape[0]
-    sd: FloatArray = np.sqrt((n - 1.0) / n * ((x - x.mean(axis=0)) ** 2).sum(axis=0))
-    return sd, n - 1.0

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from aqualog.calibrate.balance import Sample
-from aqualog.calibrate.offset import CLIMB_SD
+from aqualog.calibrate.balance import CLIMB_SD, Sample
 from aqualog.calibrate.records import DriveFit, Parameter
 from aqualog.core.vehicle import Key
 

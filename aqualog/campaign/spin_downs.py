@@ -11,7 +11,7 @@ import numpy as np
 from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of
 from aqualog.campaign.regress import Interval
 from aqualog.campaign.samples import CampaignData, RunInfo
-from aqualog.evaluate.intervals import poisson, wilson
+from aqualog.core.intervals import poisson, wilson
 
 __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 

@@ -122,7 +122,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     Keys that neither the old file gives nor the drives identify stand as comments: no default looks like a given value.
     Values have seven digits.
     """
-    from aqualog.calibrate.apply import calibrated, told
+    from aqualog.calibrate.derive import calibrated, told
 
     new = calibrated(vehicle, calibration.parameters, calibration.transfers, calibration.spread)
     values = told(calibration.parameters, vehicle)

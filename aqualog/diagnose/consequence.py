@@ -13,8 +13,8 @@ from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.diagnose.records import Consequence
 from aqualog.evaluate.drives import labels_in
+from aqualog.evaluate.judge import LIMITS_S, beginning_in, hits
 from aqualog.evaluate.labels import Labels, Span, joined, without
-from aqualog.evaluate.match import LIMITS_S, beginning_in, hits
 from aqualog.model.drawing import KMH, Drawing, full_speed
 from aqualog.model.log import as_signals
 from aqualog.model.pools import TUNING_POOL

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.roc import JOINT
-from aqualog.evaluate.score import Rate, Score, detector_names, grouped, score
+from aqualog.evaluate.score import Score, detector_names, grouped, score
+from aqualog.evaluate.sweep import JOINT
 
 __all__ = ["TARGETS", "Better", "Coverage", "better_rivals", "coverage", "situation_scores"]
 
@@ -96,27 +95,18 @@ def _compared(
     records: Sequence[RunRecord], rival: str, own: str, situation: str, *, is_worse: bool = False
 ) -> Iterator[Better]:
     a, b = score(records, rival), score(records, own)
-    better: list[tuple[str, float, float, bool]] = []
     is_worse = is_worse or _is_worse(a, b)
-    for name in ("full", "partial"):
-        x, y = getattr(a, name), getattr(b, name)
-        if not x.episodes:
-            continue
-        if x.share > y.share:
-            better.append((name, x.share, y.share, x.ci95[0] > y.ci95[1]))
-    x, y = a.false_alarms, b.false_alarms
-    if x.count < y.count:
-        better.append(("false alarms", x.per_hour, y.per_hour, _is_below(x, y)))
-    for measure, mine, theirs, sure in better:
-        yield Better(rival, own, situation, measure, mine, theirs, sure, is_worse)
+    for name, x, y in (("full", a.full, b.full), ("partial", a.partial, b.partial)):
+        if x.episodes and x.share > y.share:
+            yield Better(rival, own, situation, name, x.share, y.share, x.ci95[0] > y.ci95[1], is_worse)
+    mine, theirs = a.false_alarms, b.false_alarms
+    if mine.count < theirs.count:
+        # NaN, which is no time at all, is never below
+        sure = mine.per_hour_ci95[1] < theirs.per_hour_ci95[0]
+        yield Better(rival, own, situation, "false alarms", mine.per_hour, theirs.per_hour, sure, is_worse)
 
 
 def _is_worse(a: Score, b: Score) -> bool:
     """Return whether the first is worse in any measure."""
     pairs = ((a.full, b.full), (a.partial, b.partial))
     return a.false_alarms.count > b.false_alarms.count or any(x.share < y.share for x, y in pairs if x.episodes)
-
-
-def _is_below(x: Rate, y: Rate) -> bool:
-    high, low = x.per_hour_ci95[1], y.per_hour_ci95[0]
-    return not math.isnan(high) and high < low

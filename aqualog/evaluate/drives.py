@@ -16,12 +16,11 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.settings import JointCusumParams
-from aqualog.evaluate.labels import Label, Labels, Span, after, until
-from aqualog.evaluate.truth import TRUTH_STEMS, spans_of, truth_labels
+from aqualog.evaluate.labels import TRUTH_STEMS, Label, Labels, Span, after, spans_of, truth_labels, until
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions
 
-__all__ = ["Drive", "LogSource", "MadeSource", "Source", "labels_in"]
+__all__ = ["Drive", "LogSource", "Source", "labels_in"]
 
 _TRUTH = (*(f"{stem}_{w}" for stem in TRUTH_STEMS for w in WHEELS), "true_v_x")
 
@@ -40,6 +39,10 @@ class Drive:
     groups: Mapping[str, str] = field(default_factory=dict)
     joint: JointCusumParams = field(default_factory=JointCusumParams)
 
+    def load(self) -> Drive:
+        """Return itself: a drive in memory is a source of drives too."""
+        return self
+
 
 class Source(Protocol):
     """Source of a drive; it may be loaded more than once."""
@@ -54,27 +57,6 @@ class Source(Protocol):
 
     def load(self) -> Drive:
         """The drive; raises AqualogError or OSError."""
-
-
-@dataclass(frozen=True, slots=True)
-class MadeSource:
-    """A drive in memory."""
-
-    drive: Drive
-
-    @property
-    def name(self) -> str:
-        """Name of the drive."""
-        return self.drive.name
-
-    @property
-    def groups(self) -> Mapping[str, str]:
-        """Its configuration."""
-        return self.drive.groups
-
-    def load(self) -> Drive:
-        """The drive."""
-        return self.drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +87,7 @@ class LogSource:
 
     def _labels(self, signals: Signals) -> Labels:
         if self.labels is not None:
-            inside = until(self.labels, _end(signals))
+            inside = until(self.labels, signals.frame.height * signals.dt)
             return Labels(inside, frozenset(("full", "partial", "water")), "labels file")
         found = _truth_of(self.paths, read_options(self.signal_map, self.dbc), signals) or labels_in(signals)
         if found is not None:
@@ -121,14 +103,9 @@ class LogSource:
         )
 
 
-def _end(signals: Signals) -> float:
-    """Return the time at which the last sample ends. [s]"""
-    return signals.frame.height * signals.dt
-
-
 def _told(signals: Signals, labels: Sequence[Label]) -> Signals:
     """Return the drive, with a note on labels that do not end before it does."""
-    end = _end(signals)
+    end = signals.frame.height * signals.dt
     late = dict.fromkeys(x.start_s for x in after(labels, end))
     cut = dict.fromkeys(x.end_s for x in labels if x.start_s < end < x.end_s - signals.dt)
     notes = [f"the label from {t:g} s begins after the log, which ends at {end:g} s; left out" for t in late]

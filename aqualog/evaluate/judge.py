@@ -1,4 +1,4 @@
-"""Run all detectors over one drive, and score their events against its labels."""
+"""Run all detectors over one drive, and match their events to the episodes of its labels."""
 
 from __future__ import annotations
 
@@ -7,18 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.core.records import Event, FloatArray, Track
+from aqualog.core.records import DriveResult, Event, FloatArray
 from aqualog.detect.registry import DETECTORS
-from aqualog.detect.rivals.run import run_rivals
+from aqualog.detect.rivals.run import RivalResult, run_rivals
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
-from aqualog.evaluate.labels import Labels, Span, joined, without
-from aqualog.evaluate.match import LIMITS_S, beginning_in, cells_of, hits, outlasting, rows_of
-from aqualog.evaluate.records import DetectorRun, RunRecord
+from aqualog.evaluate.labels import Labels, Span, joined, overlaps, without
+from aqualog.evaluate.records import Cell, DetectorRun, Hit, RunRecord
 
-__all__ = ["ODD_LABELS", "Found", "judge", "record_of", "run_detectors"]
+__all__ = [
+    "LIMITS_S", "ODD_LABELS", "Found", "beginning_in", "cells_of", "hits", "judge", "outlasting", "record_of",
+    "rows_of", "run_detectors",
+]  # fmt: skip
 
+LIMITS_S = {"full": 0.5, "partial": 2.0}
+"""Longest time from the beginning of an episode to its detection. [s]"""
+
+OUTLASTS_S = 10.0  # [s] an alarm that is still on so long after the water is a false one too
 ODD_LABELS = "effects without a meaning here:"  # how such a note begins
 
 
@@ -51,29 +57,26 @@ def run_detectors(
     drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None, own: bool = True
 ) -> Found:
     """Return events of the thesis' detectors (`own`) and of the rivals; arguments as `judge`."""
-    events: list[Event] = []
-    tracks: list[Track] = []
-    unavailable: list[str] = []
-    notes: list[str] = []
     v_x = drive.signals.array("v_x")
+    results: list[DriveResult | RivalResult] = []
+    ran: list[str] = []
     if own:
         result = detect_drive(drive.signals, drive.vehicle, settings=Settings(thresholds, joint_cusum=drive.joint))
-        events += result.events
-        tracks += result.tracks
-        unavailable += [u.detector for u in result.unavailable]
-        notes += [f"{u.detector} lacks {', '.join(u.missing)}" for u in result.unavailable]
+        results.append(result)
+        ran += [d for d in DETECTORS if d not in {u.detector for u in result.unavailable}]
         if "v_x_hat" in result.features.columns:
             v_x = result.features["v_x_hat"].to_numpy()
-    ran = [d for d in DETECTORS if d not in unavailable] if own else []
     if rivals is not None:
         of_rivals = run_rivals(drive.signals, drive.vehicle, thresholds=rivals)
-        events += of_rivals.events
-        tracks += of_rivals.tracks
-        unavailable += [u.detector for u in of_rivals.unavailable]
-        notes += [f"{u.detector} lacks {', '.join(u.missing)}" for u in of_rivals.unavailable]
-        ran += list(dict.fromkeys(t.detector for t in of_rivals.tracks))
+        results.append(of_rivals)
+        ran += dict.fromkeys(t.detector for t in of_rivals.tracks)
+    tracks = [t for r in results for t in r.tracks]
+    missing = [u for r in results for u in r.unavailable]
     wheels = {d: tuple(dict.fromkeys(t.wheel for t in tracks if t.detector == d and t.wheel)) for d in ran}
-    return Found(tuple(events), wheels, tuple(unavailable), v_x, tuple(notes))
+    return Found(
+        tuple(e for r in results for e in r.events), wheels, tuple(u.detector for u in missing), v_x,
+        tuple(f"{u.detector} lacks {', '.join(u.missing)}" for u in missing),
+    )  # fmt: skip
 
 
 def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -> RunRecord:
@@ -87,6 +90,8 @@ def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -
     wet = without(labels.water, labels.afloat) if "partial" in labels.knows else []
     v_x = np.nan_to_num(np.abs(found.v_x))
     names = [d for d in found.wheels if only is None or d in only]
+    unknown = ", ".join(labels.unknown)
+    odd = [f"{ODD_LABELS} {unknown} enter the confusion table only; full, partial and water are scored"]
     return RunRecord(
         name=drive.name,
         groups=drive.groups,
@@ -96,7 +101,7 @@ def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -
         wet_s=sum(b - a for a, b in wet),
         detectors={d: _detector_run(d, found, labels, rows, dry, wet) for d in names},
         unavailable=tuple(d for d in found.unavailable if only is None or d in only),
-        notes=(*found.notes, *_odd_labels(drive)),
+        notes=(*found.notes, *(odd if unknown else ())),
         is_lossy=quality.truncated or quality.lost_in_files > 0,
     )
 
@@ -140,8 +145,84 @@ def _detector_run(
     )
 
 
-def _odd_labels(drive: Drive) -> list[str]:
-    unknown = ", ".join(drive.labels.unknown)
-    if not unknown:
-        return []
-    return [f"{ODD_LABELS} {unknown} enter the confusion table only; full, partial and water are scored"]
+def hits(episodes: Sequence[Span], events: Sequence[Span], *, limit: float, water: Sequence[Span]) -> tuple[Hit, ...]:
+    """Match events to episodes.
+
+    Parameters
+    ----------
+    episodes, events : sequence of (start, end)
+        Of one effect, of one detector. [s]
+    limit : float
+        An event that overlaps the first `limit` seconds finds the episode. [s]
+    water : sequence of (start, end)
+        An event that was on before the episode counts only if it began on the same stretch of water: else a stuck
+        alarm would find all episodes.
+
+    Returns
+    -------
+    tuple of Hit
+        One per episode.
+    """
+    return tuple(_hit(span, sorted(events), limit, water) for span in episodes)
+
+
+def _hit(episode: Span, events: Sequence[Span], limit: float, water: Sequence[Span]) -> Hit:
+    start, end = episode
+    for begin, stop in events:
+        if stop <= start or begin > max(end, start + limit):
+            continue
+        if begin >= start:
+            return Hit(begin - start <= limit + 1e-9, begin - start, before=False)
+        if any(_is_in(begin, [stretch]) and _is_in(start, [stretch]) for stretch in water):
+            return Hit(found=True, latency=0.0, before=True)
+    return Hit(found=False, latency=float("nan"), before=False)
+
+
+def outlasting(events: Sequence[Span], water: Sequence[Span]) -> list[float]:
+    """Return times at which events from water had lasted `OUTLASTS_S` beyond the end of their stretch. [s]"""
+    return [b + OUTLASTS_S for begin, stop in events for a, b in water if a <= begin < b and stop > b + OUTLASTS_S]
+
+
+def beginning_in(events: Sequence[Span], spans: Sequence[Span]) -> list[Span]:
+    """Return events that begin within any of the stretches."""
+    return [e for e in events if _is_in(e[0], spans)]
+
+
+def _is_in(t: float, spans: Sequence[Span]) -> bool:
+    # half a sample of slack: stamps of truth and detector are not the same floats
+    return any(a - 1e-6 <= t < b for a, b in spans)
+
+
+def rows_of(labels: Labels, duration_s: float) -> dict[str, list[Span]]:
+    """Return rows of the confusion table: `full`, `partial` (without full), `water only`, other labels, `none`.
+
+    Parameters
+    ----------
+    labels : Labels
+    duration_s : float
+        Of the drive. [s]
+    """
+    full, afloat, water = labels.of("full"), labels.afloat, labels.water
+    others = {e: labels.of(e) for e in labels.others}
+    taken = joined([*labels.water_widened, *(s for spans in others.values() for s in spans)], 0.0)
+    rows = {
+        "full": full,
+        "partial": without(labels.of("partial"), full),
+        "water only": without(water, afloat),
+        **others,
+        "none": without([(0.0, duration_s)], taken),
+    }
+    return {name: spans for name, spans in rows.items() if spans}
+
+
+def cells_of(rows: dict[str, list[Span]], events: Sequence[Span]) -> dict[str, Cell]:
+    """Return a detector's column of the confusion table. `events` are those of the car: disjoint stretches."""
+    return {
+        name: Cell(
+            len(spans),
+            sum(overlaps(s, events) for s in spans),
+            len(beginning_in(events, spans)),
+            sum(b - a for a, b in spans),
+        )
+        for name, spans in rows.items()
+    }

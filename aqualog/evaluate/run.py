@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.detect.registry import DETECTORS
@@ -12,9 +13,18 @@ from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive, Source
 from aqualog.evaluate.judge import judge
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.roc import FACTORS, JOINT, RocPoint, curve_points, records_at
-from aqualog.evaluate.split import split_runs
-from aqualog.evaluate.tune import LIMIT_PER_HOUR, Choice, applied, choose
+from aqualog.evaluate.sweep import (
+    FACTORS,
+    JOINT,
+    LIMIT_PER_HOUR,
+    Choice,
+    RocPoint,
+    applied,
+    choose,
+    curve_points,
+    records_at,
+    split_runs,
+)
 
 __all__ = ["Evaluation", "Tuning", "evaluate", "tune"]
 
@@ -81,7 +91,7 @@ def evaluate(
 
     def work(drive: Drive) -> dict[float, RunRecord]:
         first = {1.0: judge(drive, thresholds=thresholds, rivals=rivals)}
-        return first | {f: records_at(drive, f, thresholds=thresholds, rivals=rivals) for f in swept}
+        return first | _swept(drive, factors=swept, thresholds=thresholds, rivals=rivals)
 
     done = _each(sources, work, failed, report, "evaluating")
     by_factor = {f: [d[f] for d in done] for f in (1.0, *swept)}
@@ -119,8 +129,8 @@ def tune(
     tuned, tuned_rivals = thresholds, dict(rivals or {})
     for names, with_rivals in ((single, rivals is not None), (JOINT, False)):
         asked = tuned_rivals if with_rivals else None
-        sweep = partial(_sweep, factors=factors, thresholds=tuned, rivals=asked, names=names)
-        done = _each(on, sweep, failed, report, "tuning")
+        at = partial(_swept, factors=factors, thresholds=tuned, rivals=asked, names=names)
+        done = _each(on, at, failed, report, "tuning")
         by_factor = {f: [d[f] for d in done] for f in factors}
         new = choose(curve_points(by_factor, thresholds=tuned, rivals=asked), limit=limit_per_hour)
         choices |= new
@@ -135,25 +145,15 @@ def tune(
     return Evaluation(
         result.records, tuned, used_rivals, result.roc, {**failed, **result.failed},
         Tuning(
-            split.rule, limit_per_hour, _names(sources, split.tuning, failed),
-            tuple(r.name for r in result.records), _names(sources, split.unused, {}), choices, before.records,
+            split.rule, limit_per_hour, tuple(s.name for s in on if s.name not in failed),
+            tuple(r.name for r in result.records), tuple(sources[i].name for i in split.unused), choices,
+            before.records,
         ),
     )  # fmt: skip
 
 
-def _names(sources: Sequence[Source], indices: Sequence[int], failed: Mapping[str, str]) -> tuple[str, ...]:
-    return tuple(sources[i].name for i in indices if sources[i].name not in failed)
-
-
-def _sweep(
-    drive: Drive,
-    *,
-    factors: Sequence[float],
-    thresholds: Thresholds,
-    rivals: Mapping[str, float] | None,
-    names: Sequence[str],
-) -> dict[float, RunRecord]:
-    return {f: records_at(drive, f, thresholds=thresholds, rivals=rivals, names=names) for f in factors}
+def _swept(drive: Drive, *, factors: Sequence[float], **given: Any) -> dict[float, RunRecord]:
+    return {f: records_at(drive, f, **given) for f in factors}
 
 
 def _each(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.evaluate.intervals import poisson, wilson
-from aqualog.evaluate.match import Cell, Hit
-from aqualog.evaluate.records import RunRecord
+from aqualog.core.intervals import poisson, wilson
+from aqualog.evaluate.judge import Hit
+from aqualog.evaluate.records import Cell, RunRecord
 
 __all__ = [
     "Rate", "Recall", "Score", "confusion", "detector_names", "grouped", "recall_of", "score", "score_all",
@@ -106,19 +106,12 @@ def detector_names(records: Iterable[RunRecord]) -> list[str]:
 def score(records: Sequence[RunRecord], detector: str) -> Score:
     """Add up the drives on which a detector ran."""
     ran = [(r, r.detectors[detector]) for r in records if detector in r.detectors]
-
-    def recall(name: str) -> Recall:
-        return recall_of(h for _, d in ran for h in getattr(d, name))
-
+    kinds = ("full", "partial", "wheel_full", "wheel_partial", "own")
     return Score(
         detector=detector,
         runs=len(ran),
         unavailable=sum(detector in r.unavailable for r in records),
-        full=recall("full"),
-        partial=recall("partial"),
-        wheel_full=recall("wheel_full"),
-        wheel_partial=recall("wheel_partial"),
-        own=recall("own"),
+        **{kind: recall_of(h for _, d in ran for h in getattr(d, kind)) for kind in kinds},
         false_alarms=Rate(
             sum(len(d.false_alarms) for _, d in ran), sum(r.dry_s for r, _ in ran), sum(r.dry_m for r, _ in ran)
         ),

@@ -44,7 +44,7 @@ class Calibration(Result):
     @cached_property
     def vehicle(self) -> Vehicle:
         """The car with the calibrated values, as `write_vehicle` writes it."""
-        from aqualog.calibrate.apply import calibrated
+        from aqualog.calibrate.derive import calibrated
 
         return calibrated(self.before, self.found.parameters, self.found.transfers, self.found.spread)
 

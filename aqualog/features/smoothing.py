@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 
-__all__ = ["UNSET", "derivative", "fading_lowpass", "gain", "lowpass"]
+__all__ = ["UNSET", "derivative", "earlier", "fading_lowpass", "gain", "lowpass"]
 
 UNSET = math.nan  # state before the first sample
 
@@ -129,3 +129,12 @@ def derivative(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[F
     """
     y, last = _derivative(gain(tau, dt), dt, state, np.ascontiguousarray(x, dtype=np.float64))
     return y, last
+
+
+def earlier(x: FloatArray, lag: float, dt: float) -> FloatArray:
+    """Shift a signal that is late by `lag` [s] back; linear between its samples, NaN beyond its ends."""
+    if lag == 0.0:
+        return x
+    k = np.arange(x.size, dtype=np.float64)
+    moved: FloatArray = np.interp(k + lag / dt, k, x, left=math.nan, right=math.nan)
+    return moved

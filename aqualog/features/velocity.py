@@ -62,8 +62,12 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
 
 
 @compiled
-def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
-    """Process one sample. `kappa`, `age` and `w` (corrected in place) are work arrays of the caller."""
+def _step(p, motion, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+    """Process one sample: `motion` is (v, b, a, lost); `kappa`, `age` and `w` (corrected in place) the caller's arrays.
+
+    Returns the motion, and velocity and acceleration where a wheel or the reference has a value.
+    """
+    v, b, a, lost = motion
     for i in range(_N):
         w[i] = w[i] * (1.0 + kappa[i])
     if not p.has_accelerometer:
@@ -76,7 +80,7 @@ def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # ty
     if math.isnan(v):
         v = v_ref if not math.isnan(v_ref) else _median(w)
         if math.isnan(v):
-            return math.nan, b, a, lost, math.nan, math.nan
+            return (math.nan, b, a, lost), math.nan, math.nan
         lost = 0.0
     else:
         v = v + a * p.dt
@@ -124,12 +128,12 @@ def _step(p, v, b, a, lost, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # ty
             v = middle
             lost = 0.0
             if math.isnan(v):
-                return math.nan, b, a, lost, math.nan, math.nan
+                return (math.nan, b, a, lost), math.nan, math.nan
 
     if v > 8.0 and abs(a) < 1.5 and not abs(yaw_rate) > 0.1:
         _learn_radii(p, kappa, age, w, v, use_reference)
     is_seen = known > 0.0 or use_reference
-    return v, b, a, lost, (v if is_seen else math.nan), (a if is_seen else math.nan)
+    return (v, b, a, lost), (v if is_seen else math.nan), (a if is_seen else math.nan)
 
 
 @compiled
@@ -172,7 +176,7 @@ def _median(w):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _scan(p, v, b, a, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+def _scan(p, motion, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
     n = v_ref.size
     velocity = np.empty(n)
     acceleration = np.empty(n)
@@ -181,12 +185,10 @@ def _scan(p, v, b, a, lost, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # 
     for k in range(n):
         for i in range(_N):
             w[i] = v_w[i, k]
-        v, b, a, lost, velocity[k], acceleration[k] = _step(
-            p, v, b, a, lost, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k]
-        )
+        motion, velocity[k], acceleration[k] = _step(p, motion, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k])
         for i in range(_N):
             corrected[i, k] = w[i]
-    return velocity, acceleration, corrected, v, b, a, lost
+    return velocity, acceleration, corrected, motion
 
 
 def observe(
@@ -236,7 +238,7 @@ def observe(
     state : VelocityState
     """
     kappa, age = state.kappa.copy(), state.age.copy()
-    velocity, acceleration, corrected, v, b, a, lost = _scan(
-        p, state.v, state.b, state.a, state.lost, kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
+    velocity, acceleration, corrected, motion = _scan(
+        p, state[:4], kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
     )
-    return velocity, acceleration, corrected, VelocityState(v, b, a, lost, kappa, age)
+    return velocity, acceleration, corrected, VelocityState(*motion, kappa, age)

@@ -9,9 +9,9 @@ from typing import Any
 from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.compare import situation_scores
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.roc import RocPoint
 from aqualog.evaluate.run import Evaluation
 from aqualog.evaluate.score import Score, score_all
+from aqualog.evaluate.sweep import RocPoint
 from aqualog.report.axes import axis, layout
 from aqualog.report.evaluation_words import short
 from aqualog.report.wording import plot_text

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 
 from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.compare import TARGETS, Better, better_rivals, coverage, situation_scores
-from aqualog.evaluate.match import LIMITS_S
+from aqualog.evaluate.judge import LIMITS_S
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.roc import JOINT
 from aqualog.evaluate.run import Evaluation, Tuning
 from aqualog.evaluate.score import HOUR_S, Rate, Recall, Score, score_all
+from aqualog.evaluate.sweep import JOINT
 
 __all__ = [
     "better_sentences", "coverage_sentences", "headline", "notes_of", "percent", "rate_text", "recall_text",

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from aqualog.calibrate.balance import Sample, fit_balance
-from aqualog.calibrate.compare import mass_difference
+from aqualog.calibrate.balance import ALTITUDE_SD, Offset, Sample, fit_balance
 from aqualog.calibrate.derive import balance_parameters, derived, estimates
 from aqualog.calibrate.design import Windows
-from aqualog.calibrate.offset import ALTITUDE_SD, Offset
+from aqualog.calibrate.run import mass_difference
 from aqualog.calibrate.spread import WIND_SD, jackknife_of, spread_of
 from aqualog.core.errors import ConfigError, FitError
 from aqualog.core.vehicle import Vehicle

@@ -7,14 +7,14 @@ import polars as pl
 import pytest
 
 from aqualog.align.load import load_signals
-from aqualog.calibrate.design import prepare
-from aqualog.calibrate.lag import earlier, lag_between
-from aqualog.calibrate.offset import energy_offset
+from aqualog.calibrate.balance import energy_offset
+from aqualog.calibrate.design import lag_between, prepare
 from aqualog.calibrate.run import calibrate
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.features.smoothing import earlier
 from aqualog.model.sensors import ESC, IDEAL
 from tests.calibrate.dry_drives import believed, campaign, car, one_drive, truth
 

@@ -13,8 +13,8 @@ from aqualog.calibrate.spread import (
     one_more,
     spread_of,
     stratified,
-    variance_ratio_chance,
 )  # fmt: skip
+from aqualog.core.intervals import variance_ratio_chance
 from tests.calibrate.test_balance import RHO, drives
 
 

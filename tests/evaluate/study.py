@@ -17,6 +17,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import pickle
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -86,8 +87,7 @@ def chunk(seed: int, options: dict) -> dict:
     from aqualog.config.thresholds import load_thresholds
     from aqualog.detect.thresholds import DEFAULT
     from aqualog.evaluate.judge import judge
-    from aqualog.evaluate.records import record_to_json
-    from aqualog.evaluate.roc import FACTORS, records_at
+    from aqualog.evaluate.sweep import FACTORS, records_at
 
     own, rivals = load_thresholds(Path(options["thresholds"])) if options["thresholds"] else (DEFAULT, {})
     asked = rivals if options["rivals"] else None
@@ -102,28 +102,28 @@ def chunk(seed: int, options: dict) -> dict:
         except AqualogError as error:
             failed[f"{name} {seed}"] = error.line()
             continue
-        drives.append({repr(f): record_to_json(r) for f, r in records.items()})
+        drives.append(records)
     return {"options": options, "seed": seed, "drives": drives, "failed": failed}
 
 
 def load(path: Path, options: dict) -> dict | None:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = pickle.loads(path.read_bytes())  # of this command alone
+    except (OSError, ValueError, EOFError, pickle.UnpicklingError):
         return None
     return found if found.get("options") == options else None
 
 
 def seconds_of(found: dict) -> float:
     """Driving outside aquaplaning situations. [s]"""
-    return sum(d["1.0"]["duration_s"] for d in found["drives"] if d["1.0"]["groups"]["kind"] == "nuisance")
+    return sum(d[1.0].duration_s for d in found["drives"] if d[1.0].groups["kind"] == "nuisance")
 
 
 def collect(a, options: dict) -> list[dict]:
     a.out.mkdir(parents=True, exist_ok=True)
     began, done, seconds, seed = time.monotonic(), [], 0.0, a.first
     kept = 0
-    while seconds < 3600.0 * a.hours and (found := load(a.out / f"chunk_{seed}.json", options)):
+    while seconds < 3600.0 * a.hours and (found := load(a.out / f"chunk_{seed}.pickle", options)):
         done.append(found)
         seconds += seconds_of(found)
         seed += 1
@@ -140,7 +140,7 @@ def collect(a, options: dict) -> list[dict]:
 
         def submit() -> None:
             nonlocal seed
-            while (found := load(a.out / f"chunk_{seed}.json", options)) is not None:
+            while (found := load(a.out / f"chunk_{seed}.pickle", options)) is not None:
                 done.append(found)
                 seed += 1
             pending[pool.submit(chunk, seed, options)] = seed
@@ -152,8 +152,8 @@ def collect(a, options: dict) -> list[dict]:
             future = next(as_completed(pending))
             number, found = pending.pop(future), future.result()
             temporary = a.out / f"chunk_{number}.tmp"
-            temporary.write_text(json.dumps(found, allow_nan=False), encoding="utf-8")
-            temporary.replace(a.out / f"chunk_{number}.json")
+            temporary.write_bytes(pickle.dumps(found))
+            temporary.replace(a.out / f"chunk_{number}.pickle")
             done.append(found)
             seconds = sum(seconds_of(f) for f in done)
             print(f"{seconds / 3600.0:.2f} h of {a.hours:g} h, {time.monotonic() - began:.0f} s", flush=True)
@@ -203,10 +203,8 @@ def by_margin(records) -> str:
 def main() -> None:
     from aqualog.config.thresholds import load_thresholds, thresholds_text
     from aqualog.detect.thresholds import DEFAULT
-    from aqualog.evaluate.records import record_from_json
-    from aqualog.evaluate.roc import curve_points
     from aqualog.evaluate.run import Evaluation
-    from aqualog.evaluate.tune import applied, choose
+    from aqualog.evaluate.sweep import applied, choose, curve_points
     from aqualog.model.situations import SITUATIONS
     from aqualog.report.evaluation import evaluation_document, evaluation_report
     from aqualog.report.offline import write_page
@@ -239,8 +237,8 @@ def main() -> None:
     found = collect(a, options)
     by_factor: dict[float, list] = {}
     for drive in (d for f in found for d in f["drives"]):
-        for factor, raw in drive.items():
-            by_factor.setdefault(float(factor), []).append(record_from_json(raw))
+        for factor, record in drive.items():
+            by_factor.setdefault(factor, []).append(record)
     failed = {name: reason for f in found for name, reason in f["failed"].items()}
     own, rivals = load_thresholds(Path(a.thresholds)) if a.thresholds else (DEFAULT, {})
     asked = rivals if a.rivals else None

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from aqualog.evaluate.drives import LogSource, labels_in
-from aqualog.evaluate.labels import Label, Labels, after, joined, overlaps, until, without
-from aqualog.evaluate.truth import spans_of, truth_labels
+from aqualog.evaluate.labels import Label, Labels, after, joined, overlaps, spans_of, truth_labels, until, without
 from aqualog.model.log import as_signals, write_simulation
 from aqualog.model.simulate import simulate
 from tests.evaluate.made import FWD, scenario

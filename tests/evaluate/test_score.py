@@ -1,14 +1,13 @@
 """Episodes, events and what they add up to; all counted by hand."""
 
-import json
 import math
 
 import pytest
 
-from aqualog.evaluate.intervals import poisson, wilson
+from aqualog.core.intervals import poisson, wilson
+from aqualog.evaluate.judge import beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.labels import Label, Labels
-from aqualog.evaluate.match import Cell, beginning_in, cells_of, hits, outlasting, rows_of
-from aqualog.evaluate.records import DetectorRun, RunRecord, record_from_json, record_to_json
+from aqualog.evaluate.records import Cell, DetectorRun, RunRecord
 from aqualog.evaluate.score import Rate, confusion, grouped, recall_of, score
 
 WATER = [(10.0, 20.0)]
@@ -126,13 +125,6 @@ def test_missed_episodes_are_infinitely_late():
 def test_configurations_are_sorted_as_numbers():
     records = [record(str(i), tyre, 1.0, ()) for i, tyre in enumerate(("10", "9", "", "1.5"))]
     assert [k[0] for k in grouped(records, ["tyre"])] == ["1.5", "9", "10", "-"]
-
-
-def test_record_goes_through_json():
-    h = hits([(12.0, 13.0), (17.0, 18.0)], [(12.1, 13.0)], limit=0.5, water=WATER)
-    r = record("a", "worn", 2.0, (1.0,), h, notes=("x",), is_lossy=True)
-    back = record_from_json(json.loads(json.dumps(record_to_json(r), allow_nan=False)))
-    assert repr(back) == repr(r).replace(repr(h[0].latency), repr(round(h[0].latency, 6)))
 
 
 # Garwood's exact limits as tabulated (Pearson and Hartley, Biometrika Tables 1, table 40)

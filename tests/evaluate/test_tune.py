@@ -11,14 +11,11 @@ from aqualog.detect.thresholds import DEFAULT
 from aqualog.evaluate import judge as judge_module
 from aqualog.evaluate import run
 from aqualog.evaluate.compare import better_rivals, coverage, situation_scores
-from aqualog.evaluate.drives import Drive, MadeSource, labels_in
+from aqualog.evaluate.drives import Drive, labels_in
 from aqualog.evaluate.judge import judge
-from aqualog.evaluate.match import Hit
-from aqualog.evaluate.records import DetectorRun, RunRecord
-from aqualog.evaluate.roc import RocPoint, records_at
+from aqualog.evaluate.records import DetectorRun, Hit, RunRecord
 from aqualog.evaluate.score import Rate, Recall
-from aqualog.evaluate.split import split_runs
-from aqualog.evaluate.tune import choose
+from aqualog.evaluate.sweep import RocPoint, choose, records_at, split_runs
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from tests.evaluate.made import FWD, RWD, scenario
@@ -104,9 +101,7 @@ class Watched:
 
 def made(name, car, tyre, kmh, depth, seed):
     signals = as_signals(simulate(replace(scenario(car, tyre, kmh, depth), seed=seed)))
-    return MadeSource(
-        Drive(name, signals, car, labels_in(signals), {"vehicle": car.name, "tyre": tyre, "manoeuvre": name})
-    )
+    return Drive(name, signals, car, labels_in(signals), {"vehicle": car.name, "tyre": tyre, "manoeuvre": name})
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aqualog.align.load import load_signals
-from aqualog.calibrate.apply import calibrated
+from aqualog.calibrate.derive import calibrated
 from aqualog.calibrate.run import calibrate
 from aqualog.cli.main import app
 from aqualog.config.signal_map import load_signal_map

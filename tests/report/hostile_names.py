@@ -13,8 +13,7 @@ from aqualog.config.configured import configure
 from aqualog.core.records import Unavailable
 from aqualog.detect.slip_slope.direct import DirectResult
 from aqualog.detect.thresholds import DEFAULT
-from aqualog.evaluate.match import Cell
-from aqualog.evaluate.records import DetectorRun, RunRecord
+from aqualog.evaluate.records import Cell, DetectorRun, RunRecord
 from aqualog.evaluate.run import Evaluation
 from aqualog.report.calibration import calibration_report
 from aqualog.report.campaign.findings import find

@@ -10,10 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.evaluate.match import Hit
-from aqualog.evaluate.records import DetectorRun, RunRecord
-from aqualog.evaluate.roc import JOINT
+from aqualog.evaluate.records import DetectorRun, Hit, RunRecord
 from aqualog.evaluate.score import score
+from aqualog.evaluate.sweep import JOINT
 from aqualog.model.pools import TUNING_POOL
 from aqualog.thesis.checks import joint
 from aqualog.thesis.checks.joint import (

@@ -24,7 +24,6 @@ from aqualog.detect.slip_slope.direct_inputs import (
     Reference,
     accelerometer_traction,
     choose_way,
-    earlier,
     left_out,
     mean_of,
     reference_of,
@@ -38,6 +37,7 @@ from aqualog.detect.slip_slope.regression import Late, Line, fit_line, lag_of_sl
 from aqualog.detect.slip_slope.stability import block_labels, judge_stability, make_segments
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.detect.slip_slope.watch import SlipSlopeWatch, pairs
+from aqualog.features.smoothing import earlier
 from aqualog.features.stream import FeatureStream
 
 __all__ = ["MU_MAX", "slip_slopes"]

@@ -32,7 +32,6 @@ __all__ = [
     "Way",
     "accelerometer_traction",
     "choose_way",
-    "earlier",
     "left_out",
     "mean_of",
     "reference_of",
@@ -153,15 +152,6 @@ def reference_of(
     variance = sum(float(np.median(d[calm] ** 2)) for d in apart) / MEDIAN_SQUARE if calm.any() else 0.0
     sd = 0.5 * math.sqrt(variance) / len(axles)
     return Reference(v_x, np.gradient(v, dt) / fast, sd / fast, delay)
-
-
-def earlier(v_x: FloatArray, delay: float, dt: float) -> FloatArray:
-    """Shift a late velocity back."""
-    if delay == 0.0:
-        return v_x
-    k = np.arange(v_x.size, dtype=np.float64)
-    moved: FloatArray = np.interp(k + delay / dt, k, v_x, left=math.nan, right=math.nan)
-    return moved
 
 
 def mean_of(f: Mapping[str, FloatArray], stem: str, wheels: Sequence[str]) -> FloatArray:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.tuning import TUNING
-from aqualog.evaluate.intervals import wilson
 from aqualog.physics.tyre_brush import brush_force
 from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.half_car import (

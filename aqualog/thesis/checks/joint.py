@@ -18,8 +18,8 @@ from aqualog.evaluate.compare import Coverage, coverage, situation_scores
 from aqualog.evaluate.drives import Drive, labels_in
 from aqualog.evaluate.judge import judge as judge_drive
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.roc import JOINT
 from aqualog.evaluate.score import Score, score
+from aqualog.evaluate.sweep import JOINT
 from aqualog.model.log import as_signals
 from aqualog.model.pools import SCORING_POOL, Pool
 from aqualog.model.simulate import simulate

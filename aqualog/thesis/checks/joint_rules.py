@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.core.notation import WHEELS
 from aqualog.detect import ewvar
 from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.minor_spin_down import MinorParams
 from aqualog.detect.slip_slope.watch import TAU_VARIANCE, VARIANCE_MAX, Memory
 from aqualog.detect.stream import detect_drive
-from aqualog.evaluate.intervals import wilson
-from aqualog.evaluate.truth import CONTACT_FULL
+from aqualog.evaluate.labels import CONTACT_FULL
 from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
 from aqualog.thesis.claims import Check, Checks, judge, limit
 from aqualog.thesis.evidence.drives import NUISANCE, WATER, Score, Taken, detected, drives, score, starts, variants

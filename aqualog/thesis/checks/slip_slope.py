@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.core.records import FloatArray
-from aqualog.evaluate.intervals import wilson
 from aqualog.model.programme import scene
 from aqualog.model.scenario import Lane, Profile, Scenario
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds

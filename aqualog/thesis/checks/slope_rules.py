@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.core.records import DriveResult
 from aqualog.core.vehicle import KEYS
 from aqualog.detect.slip_slope.history import History, Rule, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
-from aqualog.evaluate.intervals import wilson
 from aqualog.model.effects import EFFECTS
 from aqualog.model.pools import SCORING_POOL
 from aqualog.model.scenario import SURFACES, Lane, Scenario

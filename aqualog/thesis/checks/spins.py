@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.core.records import FloatArray
-from aqualog.evaluate.intervals import wilson
-from aqualog.evaluate.truth import CONTACT_FULL
+from aqualog.evaluate.labels import CONTACT_FULL
 from aqualog.thesis.claims import Check, Checks, judge, limit
 from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SPIN_EDGES, SPIN_UP, Pass
 from aqualog.thesis.evidence.seeds import (

@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from aqualog.core.intervals import wilson
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, ewvar, minor_spin_down, spin
-from aqualog.evaluate.intervals import wilson
 from aqualog.features.stream import FeatureStream
 from aqualog.model.situations import SCORING_POOL, draw
 from aqualog.thesis.claims import Check, judge

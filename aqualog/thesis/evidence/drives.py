@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from aqualog.core.errors import SignalError
+from aqualog.core.intervals import poisson, wilson
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, DriveResult, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
@@ -16,10 +17,8 @@ from aqualog.detect.braking import hold_on
 from aqualog.detect.joint_criteria import CRITERIA, GATED
 from aqualog.detect.stream import Settings, detect_drive
 from aqualog.evaluate.drives import labels_in
-from aqualog.evaluate.intervals import poisson, wilson
-from aqualog.evaluate.labels import Labels, Span, joined, without
-from aqualog.evaluate.match import LIMITS_S, beginning_in, hits
-from aqualog.evaluate.truth import spans_of
+from aqualog.evaluate.judge import LIMITS_S, beginning_in, hits
+from aqualog.evaluate.labels import Labels, Span, joined, spans_of, without
 from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate

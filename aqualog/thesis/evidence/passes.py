@@ -9,7 +9,7 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.evaluate.truth import CONTACT_PARTIAL, PARTIAL_S, spans_of
+from aqualog.evaluate.labels import CONTACT_PARTIAL, PARTIAL_S, spans_of
 from aqualog.model.programme import LEFT_SHARE, SEDAN
 from aqualog.model.scenario import Lane, Profile, Scenario
 from aqualog.model.sensors import IDEAL

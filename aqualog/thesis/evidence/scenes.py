@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.calibrate.apply import calibrated
+from aqualog.calibrate.derive import calibrated
 from aqualog.calibrate.design import prepare
 from aqualog.calibrate.tie_rod import transfers
 from aqualog.core.errors import FitError

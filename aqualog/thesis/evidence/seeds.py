@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.errors import ConfigError
+from aqualog.core.intervals import wilson
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.evaluate.intervals import wilson
 from aqualog.guard.pool import work_on
 from aqualog.guard.worker import Crashed
 from aqualog.thesis.claims import Check, Checks

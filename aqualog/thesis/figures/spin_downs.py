@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from aqualog.campaign.spin_downs import Pass
+from aqualog.core.intervals import wilson
 from aqualog.core.records import FloatArray
-from aqualog.evaluate.intervals import wilson
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence.campaign import KMH, Evidence, free_wheels

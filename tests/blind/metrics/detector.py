@@ -10,8 +10,8 @@ from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.consequence import DETECTORS
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.evaluate.drives import labels_in
+from aqualog.evaluate.judge import beginning_in
 from aqualog.evaluate.labels import joined, without
-from aqualog.evaluate.match import beginning_in
 from aqualog.model.term import Model
 
 __all__ = ["consequence"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.errors import ConfigError
-from aqualog.evaluate.intervals import wilson
+from aqualog.core.intervals import wilson
 from aqualog.thesis.checks import joint, resistance, slip_slope, spins
 from aqualog.thesis.checks.slip_slope import Found, regressed
 from aqualog.thesis.checks.spins import aic_gain, rank_correlation
