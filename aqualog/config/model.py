@@ -8,8 +8,7 @@ from pathlib import Path
 
 from aqualog.config.reader import Table, is_number, read
 from aqualog.core.errors import ConfigError
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.term import Effect, Knots, Model, Term
 
 __all__ = ["dump_model", "load_model"]

@@ -15,9 +15,8 @@ from aqualog.diagnose.records import Consequence
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.judge import LIMITS_S, beginning_in, hits
 from aqualog.evaluate.labels import Labels, Span, joined, without
-from aqualog.model.drawing import KMH, Drawing, full_speed
+from aqualog.model.drawing import KMH, TUNING_POOL, Drawing, full_speed
 from aqualog.model.log import as_signals
-from aqualog.model.pools import TUNING_POOL
 from aqualog.model.scenario import Lane, Profile, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS

@@ -20,7 +20,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.records import Cause, Estimate
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Knots, Model, Term
 from aqualog.physics.load import G
 

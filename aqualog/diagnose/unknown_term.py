@@ -7,7 +7,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.unknown_proxy import Choice
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
 from aqualog.physics.load import G
 

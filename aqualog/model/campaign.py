@@ -80,12 +80,17 @@ def simulate_campaign(
     _own(folder)
     (folder / "logs").mkdir(parents=True, exist_ok=True)
     stamp = _code_stamp()
-    digests = {r.name: hashlib.sha256(f"{stamp}{_told(r)}".encode()).hexdigest() for r in runs}
+    # all inputs of a run, the same in every process: sets of names, as in a vehicle, have no order of their own
+    believed = {r.name: "" if r.vehicle is None else vehicle_toml(r.vehicle) for r in runs}
+    inputs = {r.name: f"{stamp}{replace(r, vehicle=None)!r}{believed[r.name]}" for r in runs}
+    digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in inputs.items()}
     known = {} if force else _finished(folder, digests)
     # a torn last line would swallow the next one
     write_text(folder / STATE, "".join(_line(done) for done in known.values()))
     todo = [r for r in runs if r.name not in known]
-    _sweep(folder, todo)
+    for run in todo:  # half-written files that a killed process has left, by the names that `write_whole` gives
+        for orphan in (folder / "logs").glob(f".{run.name[:40]}-{'?' * 8}.mf4.tmp"):
+            orphan.unlink(missing_ok=True)
     report(len(known), len(runs))
     failed: dict[str, str] = {}
     made: dict[str, Done] = {}
@@ -104,12 +109,6 @@ def simulate_campaign(
     return CampaignOutcome(len(made), len(known), failed)
 
 
-def _told(run: Run) -> str:
-    """Return all inputs of a run, the same in every process: sets of names have no order of their own."""
-    believed = "" if run.vehicle is None else vehicle_toml(run.vehicle)
-    return repr(replace(run, vehicle=None)) + believed
-
-
 def _own(folder: Path) -> None:
     """Refuse a folder that holds anything but an earlier state of a campaign."""
     if folder.exists() and not folder.is_dir():
@@ -126,13 +125,8 @@ def _finished(folder: Path, digests: dict[str, str]) -> dict[str, Done]:
     for line in (folder / STATE).read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             raw = json.loads(line)
-            entry = Done(
-                str(raw["name"]),
-                str(raw["digest"]),
-                int(raw["size"]),
-                float(raw["lane_start_s"]),
-                float(raw["lane_end_s"]),
-            )
+            kinds = {"name": str, "digest": str, "size": int, "lane_start_s": float, "lane_end_s": float}
+            entry = Done(**{key: kind(raw[key]) for key, kind in kinds.items()})
         except (ValueError, TypeError, KeyError, RecursionError):
             continue
         log = _log(folder, entry.name)
@@ -147,13 +141,6 @@ def _line(done: Done) -> str:
 
 def _log(folder: Path, name: str) -> Path:
     return folder / "logs" / f"{name}.mf4"
-
-
-def _sweep(folder: Path, runs: Sequence[Run]) -> None:
-    """Remove half-written files of these logs, left by a killed process, by the names that `write_whole` gives."""
-    for run in runs:
-        for orphan in (folder / "logs").glob(f".{run.name[:40]}-{'?' * 8}.mf4.tmp"):
-            orphan.unlink(missing_ok=True)
 
 
 def _code_stamp() -> str:

@@ -17,10 +17,21 @@ from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.model.plant import Plant, with_mass_at
 from aqualog.model.sensors import Channel
-from aqualog.model.term import CampaignSearch, Check, DayToDay, DriveSearch, Effect, Need, Parameter, Setup
+from aqualog.model.term import (
+    CampaignSearch,
+    Check,
+    DayToDay,
+    DriveSearch,
+    Effect,
+    Knots,
+    Need,
+    Parameter,
+    Setup,
+    Table,
+)
 from aqualog.physics.load import G
 
-__all__ = ["EFFECTS", "wheels_at"]
+__all__ = ["EFFECTS", "EMPIRICAL", "wheels_at"]
 
 Values = Mapping[str, float]
 
@@ -37,20 +48,36 @@ def wheels_at(where: str | None) -> tuple[int, ...]:
     return tuple(WHEELS.index(w) for w in names)
 
 
-def _scaled(x: FloatArray, where: str | None, factor: float) -> FloatArray:
-    out = x.copy()
-    out[list(wheels_at(where))] *= factor
+def _changed(x: FloatArray, where: str | None, change: np.ufunc, by: float) -> FloatArray:
+    out, at = x.copy(), list(wheels_at(where))
+    out[at] = change(out[at], by)
     return out
 
 
-def _shifted(x: FloatArray, where: str | None, delta: float) -> FloatArray:
-    out = x.copy()
-    out[list(wheels_at(where))] += delta
-    return out
+Apply = Callable[[Setup, Values, str | None], Setup]
 
 
-def _on_plant(change: Callable[[Plant, Values, str | None], Plant]) -> Callable[[Setup, Values, str | None], Setup]:
+def _on_plant(change: Callable[[Plant, Values, str | None], Plant]) -> Apply:
     return lambda setup, v, where: setup._replace(plant=change(setup.plant, v, where))
+
+
+def _plus(**quantities: str) -> Apply:
+    """Add parameters to quantities of the plant, each by its name: of the car, or of the wheels at the place."""
+
+    def change(p: Plant, v: Values, where: str | None) -> Plant:
+        of = {field: (getattr(p, field), v[name]) for field, name in quantities.items()}
+        return p._replace(**{f: _changed(x, where, np.add, by) if np.ndim(x) else x + by for f, (x, by) in of.items()})
+
+    return _on_plant(change)
+
+
+def _times(**quantities: str) -> Apply:
+    """Multiply quantities of the wheels at the place with parameters, each by its name."""
+    return _on_plant(
+        lambda p, v, w: p._replace(
+            **{field: _changed(getattr(p, field), w, np.multiply, v[name]) for field, name in quantities.items()}
+        )
+    )
 
 
 def _signals_at(where: str | None) -> tuple[str, ...]:
@@ -58,7 +85,7 @@ def _signals_at(where: str | None) -> tuple[str, ...]:
     return tuple(f"{where}_{w}" for w in WHEELS) if where in ("omega", "torque") else (str(where),)
 
 
-def _on_channels(change: Callable[[Channel, Values], Channel]) -> Callable[[Setup, Values, str | None], Setup]:
+def _on_channels(change: Callable[[Channel, Values], Channel]) -> Apply:
     """Change the channel of a signal, or of all four wheels' for `omega` and `torque`."""
 
     def apply(setup: Setup, v: Values, where: str | None) -> Setup:
@@ -177,14 +204,14 @@ _ALL = [
         "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
         (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive",
             DayToDay("drag", _as_wind)),),
-        _on_plant(lambda p, v, _: p._replace(head_wind=p.head_wind + v["speed"])), twins=("aero_drag",),
+        _plus(head_wind="speed"), twins=("aero_drag",),
         drive=DriveSearch((_TORQUE,), turns=True),
     ),
     Effect(
         "aero_drag", "drag area c_w A [m²]", "The drag area is {delta_drag_area:+.2f} m² off.", "roof box +0.2 (K)",
         (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's",
             DayToDay("drag", lambda sd, *_: sd, "drag_area")),),
-        _on_plant(lambda p, v, _: p._replace(drag_area=p.drag_area + v["delta_drag_area"])), twins=("head_wind",),
+        _plus(drag_area="delta_drag_area"), twins=("head_wind",),
         drive=DriveSearch((_TORQUE,)),
     ),
     Effect(
@@ -192,7 +219,7 @@ _ALL = [
         "0.007-0.017 (V, TRB [trb2006])",
         (Parameter("delta_r_w", "-", 0.0, 0.002, -0.01, 0.05, 0.0005, "on top of the vehicle file's",
             DayToDay("rolling", _as_rolling, "rolling_resistance")),),
-        _on_plant(lambda p, v, w: p._replace(r_w=_shifted(p.r_w, w, v["delta_r_w"]))), _WHEEL_PLACES,
+        _plus(r_w="delta_r_w"), _WHEEL_PLACES,
         twins=("brake_drag",),
         drive=DriveSearch((_TORQUE,)),
     ),
@@ -211,7 +238,7 @@ _ALL = [
         "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
         "momentum estimate within a factor of two (D)",
         (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.3, "on film and wave"),),
-        _on_plant(lambda p, v, w: p._replace(water_drag_gain=_scaled(p.water_drag_gain, w, v["gain"]))), _WHEEL_PLACES,
+        _times(water_drag_gain="gain"), _WHEEL_PLACES,
         twins=("track_clearing", "contact_loss"),
         drive=DriveSearch((_WATER, _TORQUE)),
         campaign=CampaignSearch(2, (None, "f", "r"), "drag of the water",
@@ -222,7 +249,7 @@ _ALL = [
         "brake_drag", "torque against a wheel [N·m]", "The brake drags with {torque:.0f} N·m.", "a few N·m a wheel (K)",
         (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel",
             DayToDay("rolling", _as_brake)),),
-        _on_plant(lambda p, v, w: p._replace(brake_drag=_shifted(p.brake_drag, w, v["torque"]))), _WHEEL_PLACES,
+        _plus(brake_drag="torque"), _WHEEL_PLACES,
         twins=("rolling_resistance",),
         drive=DriveSearch((_TORQUE,), by_wheel=True),
     ),
@@ -230,7 +257,7 @@ _ALL = [
         "cornering_drag", "resistance in curves [s^2/m]", "Curves cost more than the two-track model says.",
         "scrub, toe (K)",
         (Parameter("coefficient", "s^2/m", 0.0, 0.005, -0.02, 0.1, 0.001, "F = coefficient m a_y^2"),),
-        _on_plant(lambda p, v, _: p._replace(cornering_drag=p.cornering_drag + v["coefficient"])),
+        _plus(cornering_drag="coefficient"),
         drive=DriveSearch((_TORQUE,), tolerance=0.003),
     ),
     Effect(
@@ -259,8 +286,7 @@ _ALL = [
             Parameter("delta_drag_area", "m^2", 0.0, 0.5, 0.0, 5.0, 0.05, "on top of the car's",
                 DayToDay("drag", lambda sd, *_: sd)),
         ),
-        _on_plant(lambda p, v, _: p._replace(
-            towed_mass=p.towed_mass + v["mass"], drag_area=p.drag_area + v["delta_drag_area"])),
+        _plus(towed_mass="mass", drag_area="delta_drag_area"),
         twins=("payload_mass", "aero_drag"),
         drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0),
     ),
@@ -269,7 +295,8 @@ _ALL = [
         "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel",
             DayToDay("inertia", _as_inertia)),),
-        _on_plant(lambda p, v, w: p._replace(inertia=np.maximum(_shifted(p.inertia, w, v["delta_inertia"]), 0.05))),
+        _on_plant(lambda p, v, w: p._replace(
+            inertia=np.maximum(_changed(p.inertia, w, np.add, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
         drive=DriveSearch((_TORQUE,), tolerance=0.15, unset=("wheels.inertia_", 0.3)),
     ),
@@ -318,7 +345,7 @@ _ALL = [
         "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
         "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
-        _on_plant(lambda p, v, w: p._replace(slip_slope=_scaled(p.slip_slope, w, v["gain"]))), _WHEEL_PLACES,
+        _times(slip_slope="gain"), _WHEEL_PLACES,
         drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, unset=("tyre.slip_slope_", 0.2)),
         campaign=CampaignSearch(5, ("f", "r"), "slip slope",
             "The slip slope of {place} is {0.value:.2f} times the vehicle file's " + _SPAN + ".", driven=True,
@@ -328,7 +355,7 @@ _ALL = [
         "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
         "-0.4 to -1 %/K (K)",
         (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, exp(rate t)"),),
-        _on_plant(lambda p, v, w: p._replace(slip_slope_drift=_shifted(p.slip_slope_drift, w, v["rate"]))),
+        _plus(slip_slope_drift="rate"),
         _WHEEL_PLACES,
         drive=DriveSearch((_SPEEDS,)),
     ),
@@ -336,7 +363,7 @@ _ALL = [
         "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
         "0.22 in MF6.1 (V, [besselink2010])",
         (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
-        _on_plant(lambda p, v, w: p._replace(load_sensitivity=_shifted(p.load_sensitivity, w, v["delta"]))),
+        _plus(load_sensitivity="delta"),
         _WHEEL_PLACES,
         drive=DriveSearch((_TORQUE, _SPEEDS), tolerance=0.25),
         campaign=CampaignSearch(4, (None,), "slip slope over load",
@@ -346,11 +373,8 @@ _ALL = [
     Effect(
         "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
         (Parameter("delta", "-", 0.0, 0.005, -0.1, 0.1, 0.001, "relative, effective and loaded"),),
-        _on_plant(
-            lambda p, v, w: p._replace(
-                r_e=_scaled(p.r_e, w, 1.0 + v["delta"]), r_l=_scaled(p.r_l, w, 1.0 + v["delta"])
-            )
-        ),
+        _on_plant(lambda p, v, w: p._replace(
+            **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
         _WHEEL_PLACES, twins=("velocity_scale",),
         drive=DriveSearch((_SPEEDS,), by_wheel=True, unset=("wheels.r_e_", 0.01)),
     ),
@@ -364,8 +388,8 @@ _ALL = [
             Parameter("duration", "s", 30.0, 20.0, 0.1, 86400.0, 1.0, "until the end state; of the last such term"),
         ),
         _on_plant(lambda p, v, w: p._replace(
-            leak_radius=_shifted(p.leak_radius, w, v["radius"]), leak_slope=_shifted(p.leak_slope, w, v["slope"]),
-            leak_start=v["start"], leak_time=v["duration"])),
+            leak_radius=_changed(p.leak_radius, w, np.add, v["radius"]),
+            leak_slope=_changed(p.leak_slope, w, np.add, v["slope"]), leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
         drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, tolerance=1e-3),
     ),
@@ -373,14 +397,14 @@ _ALL = [
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
         "2.9e-6 in MF6.1 (V, D, [besselink2010])",
         (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
-        _on_plant(lambda p, v, w: p._replace(radius_growth=_shifted(p.radius_growth, w, v["growth"]))), _WHEEL_PLACES,
+        _plus(radius_growth="growth"), _WHEEL_PLACES,
         drive=DriveSearch((_SPEEDS,)),
     ),
     Effect(
         "relaxation_length", "build-up of tyre forces [m]", "Tyre forces build up over {length:.2f} m.",
         "0.12-0.45 m (V)",
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
-        _on_plant(lambda p, v, w: p._replace(relaxation_length=_shifted(p.relaxation_length, w, v["length"]))),
+        _plus(relaxation_length="length"),
         _WHEEL_PLACES, twins=("signal_delay",),
         drive=DriveSearch((_SPEEDS,), tolerance=0.15),
     ),
@@ -388,7 +412,7 @@ _ALL = [
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
         "shape assumed (D)",
         (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.3, "on the lost share"),),
-        _on_plant(lambda p, v, w: p._replace(contact_gain=_scaled(p.contact_gain, w, v["gain"]))), _WHEEL_PLACES,
+        _times(contact_gain="gain"), _WHEEL_PLACES,
         twins=("water_drag", "uneven_water"),
         drive=DriveSearch((_WATER,)),
         campaign=CampaignSearch(1, (None, "f", "r"), "lost contact on water",
@@ -431,3 +455,40 @@ _ALL = [
 ]  # fmt: skip
 
 EFFECTS: dict[str, Effect] = {e.name: e for e in _ALL}
+
+
+def _sum(a: Knots, b: Knots) -> Knots:
+    """Sum of two piecewise linear functions that are constant beyond their ends."""
+    x = np.unique([k[0] for k in (*a, *b)])
+    total = sum(np.interp(x, [k[0] for k in knots], [k[1] for k in knots]) for knots in (a, b))
+    return tuple(zip(x.tolist(), np.asarray(total).tolist(), strict=True))
+
+
+def _force(setup: Setup, knots: Knots, _: str | None) -> Setup:
+    now = tuple((float(v), float(force)) for v, force in setup.plant.drag_over_v)
+    return setup._replace(plant=setup.plant._replace(drag_over_v=np.array(_sum(now, knots))))
+
+
+def _grade(setup: Setup, knots: Knots, _: str | None) -> Setup:
+    now = setup.scenario.grade or ((0.0, 0.0),)
+    return setup._replace(scenario=replace(setup.scenario, grade=_sum(now, knots)))
+
+
+EMPIRICAL: dict[str, Effect] = {e.name: e for e in (
+    Effect(
+        "unexplained_force", "extra force against the motion, over the speed [N]",
+        "A force that depends on the speed holds the car back, and no known effect explains it.", "found in a drive",
+        (), lambda setup, _v, _w: setup, twins=("aero_drag", "head_wind", "rolling_resistance"),
+        table=Table("v_x", "m/s", 0.0, 150.0, "N", -2e4, 2e4, _force),
+    ),
+    Effect(
+        "unexplained_grade", "slope angle along the way [rad]",
+        "The road climbs and falls along the way.", "found in a drive",
+        (), lambda setup, _v, _w: setup, twins=("road_grade", "accelerometer_drift"),
+        table=Table("position", "m", 0.0, 1e7, "rad", -0.3, 0.3, _grade),
+    ),
+)}  # fmt: skip
+"""Terms without a name in physics, as tables of knots; no parameters, neutral without knots.
+
+They are separate from the effects that a search may name: any of them could imitate several effects.
+"""

@@ -13,18 +13,9 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "AMPLITUDE_KINDS",
-    "WAVEFORMS",
-    "axle_forces",
-    "excitation_amplitude",
-    "excitation_force_amplitude",
-    "f_ramp",
-    "f_sine",
-    "f_step",
-    "f_triangle",
-    "force_rate",
-    "waveform",
-]
+    "AMPLITUDE_KINDS", "WAVEFORMS", "axle_forces", "excitation_amplitude", "excitation_force_amplitude", "f_ramp",
+    "f_sine", "f_step", "f_triangle", "force_rate", "waveform",
+]  # fmt: skip
 
 
 def f_triangle(t: FloatArray, *, period: float) -> FloatArray:

@@ -1,10 +1,11 @@
-"""Run the simulation along a measured drive: reported torque and steering in, simulated sensor signals out."""
+"""Run the simulation by measured inputs: along a drive, torque and steering in, signals out; or by a torque alone."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel
 from aqualog.model.plant import Plant, build_plant
-from aqualog.model.road import build_road
+from aqualog.model.road import DRY, build_road
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
@@ -22,7 +23,7 @@ from aqualog.model.state import DRIVE, column, resistance_at, rolling_state, whe
 from aqualog.model.term import Model, Setup
 from aqualog.physics.load import G
 
-__all__ = ["FOLLOW_RATE", "Course", "follow", "led_truth", "setup_along", "shown"]
+__all__ = ["FOLLOW_RATE", "Course", "Replay", "follow", "led_truth", "replay", "setup_along", "shown"]
 
 STEP_S = 5e-3
 RECORD_S = 1e-2
@@ -91,26 +92,18 @@ def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArra
     """Return the output of `sensors` for a truth, on the course's grid; a column without a sensor stays as it is."""
     step = float(course.t[1] - course.t[0])
     out: dict[str, FloatArray] = {}
-    for group in measure(truth, _bare(sensors), rate_hz=1.0 / step, seed=0):
+    bare = replace(sensors, teeth=0)  # a log does not share the phase of the tone ring
+    for group in measure(truth, bare, rate_hz=1.0 / step, seed=0):
         for name, x in group.columns.items():
             same = group.t.size == course.t.size and abs(group.t[-1] - course.t[-1]) < 1e-9
-            out[name] = x if same else _at(group.t, x, course.t)
+            out[name] = x if same else np.interp(course.t, group.t, x)
     for name in ("nudge", "position"):
-        out[name] = _at(truth.t, truth.columns[name], course.t)
+        out[name] = np.interp(course.t, truth.t, truth.columns[name])
     # the accelerometer's delay and gain: a car whose signals are all late is the same car
     channel = sensors.channels.get("a_x", Channel())
     true_t = course.t / (1.0 + _skew(sensors, "a_x")) - channel.delay_s - channel.latency_s
-    out["nudge_seen"] = channel.gain * _at(truth.t, truth.columns["nudge"], true_t)
+    out["nudge_seen"] = channel.gain * np.interp(true_t, truth.t, truth.columns["nudge"])
     return {n: x if x.size == course.t.size else np.resize(x, course.t.size) for n, x in out.items()}
-
-
-def _at(t: FloatArray, x: FloatArray, at: FloatArray) -> FloatArray:
-    return np.interp(at, t, x)
-
-
-def _bare(sensors: Sensors) -> Sensors:
-    """Return the sensors of this run, without the tone ring: a log does not share its phase."""
-    return replace(sensors, teeth=0)
 
 
 def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Truth:
@@ -123,11 +116,18 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
     ])  # fmt: skip
     speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
     # the car is where the measured one was: another resistance must not move it along its road
-    grade = _grade_along(course, scenario, fine)
+    grade = np.zeros_like(fine)
+    if scenario.grade:
+        way = np.cumsum(course.v_x) * float(course.t[1] - course.t[0]) if course.position is None else course.position
+        grade = np.asarray(np.interp(np.interp(fine, course.t, way), *np.array(scenario.grade).T))
     steer = _undone(course.t, course.steer, setup.sensors, "steer_angle", fine)
-    controls = _controls(speed, steer, grade, rate)
+    controls = _undriven(n + 1, v_target=speed, steer=steer, grade=grade, follow=rate)
     road = build_road(replace(scenario, grade=()), float(speed.sum()) * STEP_S * 1.02 + 50.0)
-    start = _start(plant, torque[:, 0], float(max(speed[0], V_START)), float(grade[0]))
+    v, theta = float(max(speed[0], V_START)), float(grade[0])
+    drag, rolling = resistance_at(plant, v, G * math.sin(theta))
+    force = float(torque[:, 0].sum()) * plant.torque_gain / float(plant.r_l.mean()) - float(rolling.sum()) - drag
+    start = rolling_state(plant, v=v, a=force / (plant.mass + plant.towed_mass), drive=0.0, split_rear=0.5)
+    start[DRIVE] = 0.0
     every = round(RECORD_S / STEP_S)
     rows = kernel.run(n, STEP_S, every, start, plant, road, controls, np.ascontiguousarray(torque.T))
     if not np.isfinite(rows).all():
@@ -136,37 +136,12 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
     return Truth(t, _columns(rows, plant, scenario, rods=course.has_rods))
 
 
-def _grade_along(course: Course, scenario: Scenario, at: FloatArray) -> FloatArray:
-    """Return the slope angle of the road where the measured car was. [rad]"""
-    if not scenario.grade:
-        return np.zeros_like(at)
-    position = course.position
-    if position is None:
-        position = np.cumsum(course.v_x) * float(course.t[1] - course.t[0])
-    s, theta = np.array(scenario.grade).T
-    return np.asarray(np.interp(np.interp(at, course.t, position), s, theta))
-
-
-def _controls(speed: FloatArray, steer: FloatArray, grade: FloatArray, rate: float) -> kernel.Controls:
-    still = np.zeros_like(speed)
-    return kernel.Controls(
-        v_target=speed,
-        a_target=still,
-        drive=still,
-        brake=still,
-        split_rear=still + 0.5,
-        steer=steer,
-        exc=still,
-        grade=grade,
-        wind=still,
-        gain=still + 1.0,
-        has_driver=False,
-        keeps_lane=False,
-        exc_kind=0,
-        exc_amplitude=0.0,
-        scatter=0.0,
-        follow=rate,
-    )
+def _undriven(n: int, **given: Any) -> kernel.Controls:
+    """Return controls of `n` time steps without a driver: nothing acts but what is given."""
+    still = np.zeros(n)
+    series = dict.fromkeys(("v_target", "a_target", "drive", "brake", "steer", "exc", "grade", "wind"), still)
+    base = {"split_rear": still + 0.5, "gain": still + 1.0, "has_driver": False, "keeps_lane": False}
+    return kernel.Controls(**{**series, **base, "exc_kind": 0, "exc_amplitude": 0.0, "scatter": 0.0, **given})
 
 
 def _undone(t: FloatArray, x: FloatArray, sensors: Sensors, name: str, at: FloatArray) -> FloatArray:
@@ -179,15 +154,6 @@ def _undone(t: FloatArray, x: FloatArray, sensors: Sensors, name: str, at: Float
 
 def _skew(sensors: Sensors, name: str) -> float:
     return sum(g.skew_ppm for g in sensors.groups if name in g.signals) * 1e-6
-
-
-def _start(plant: Plant, torque: FloatArray, v: float, theta: float) -> FloatArray:
-    drive = float(torque.sum()) * plant.torque_gain
-    drag, rolling = resistance_at(plant, v, G * math.sin(theta))
-    a = (drive / float(plant.r_l.mean()) - float(rolling.sum()) - drag) / (plant.mass + plant.towed_mass)
-    state = rolling_state(plant, v=v, a=a, drive=0.0, split_rear=0.5)
-    state[DRIVE] = 0.0
-    return state
 
 
 _SCALARS = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
@@ -204,3 +170,73 @@ def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) 
         names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "aligning", "braking", "contact")
         columns |= steering_columns({n: wheel_columns(rows, n) for n in names}, plant, scenario)
     return columns
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """Result of a torque: `t` [s], `v_x` [m/s], specific force `a_x` [m/s²], `omega` (4, n) [rad/s]."""
+
+    t: FloatArray
+    v_x: FloatArray
+    a_x: FloatArray
+    omega: FloatArray
+
+
+def replay(
+    plant: Plant,
+    t: FloatArray,
+    torque: FloatArray,
+    *,
+    split_rear: float,
+    v_0: float,
+    grade: FloatArray | None = None,
+    dt: float = 2e-3,
+) -> Replay:
+    """Drive a dry straight road with a given torque, free from the first speed on.
+
+    Parameters
+    ----------
+    plant : Plant
+        The car; its `torque_gain` scales the torque.
+    t : array (n,)
+        Even time base of the inputs, from any start. [s]
+    torque : array (n,)
+        Sum of the net wheel torques, drive minus brake. [N·m] Finite.
+    split_rear : float
+        Rear share of the torque. [-]
+    v_0 : float
+        Speed at the first sample, > 0. [m/s]
+    grade : array (n,), optional
+        Slope angle at each sample, uphill positive. [rad]
+    dt : float
+        Step of the integration. [s]
+
+    Returns
+    -------
+    replay : Replay
+        On the samples of `t`. Where the car has come to a standstill, resistance fades out below 1 rad/s and it stays
+        about there.
+
+    Raises
+    ------
+    ConfigError
+        If the inputs are not finite or not even in time.
+    """
+    step = float(t[1] - t[0])
+    every = round(step / dt)
+    if every < 1 or abs(every * dt - step) > 1e-6 or not np.allclose(np.diff(t), step, rtol=0.0, atol=1e-6):
+        raise ConfigError(f"a replay needs an even time base in steps of {dt:g} s")
+    if not (np.isfinite(torque).all() and np.isfinite(v_0)):
+        raise ConfigError("a replay needs finite torque and speed")
+    n = every * (t.size - 1)
+    fine = np.arange(n + 1) * dt
+    given = {} if grade is None else {"grade": np.interp(fine, t - t[0], grade)}
+    controls = _undriven(
+        n + 1, drive=np.interp(fine, t - t[0], torque), split_rear=np.full(n + 1, split_rear), **given
+    )  # fmt: skip
+    drive = float(torque[0]) * plant.torque_gain
+    drag, rolling = resistance_at(plant, v_0, 0.0)
+    a_0 = (drive / float(plant.r_l.mean()) - rolling.sum() - drag) / plant.mass
+    start = rolling_state(plant, v=v_0, a=a_0, drive=drive, split_rear=split_rear)
+    rows = kernel.run(n, dt, every, start, plant, DRY, controls)
+    return Replay(t, column(rows, "v_x"), column(rows, "a_x"), np.array(wheel_columns(rows, "omega")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,11 +130,4 @@ def as_signals(simulation: Simulation, *, vehicle: Vehicle | None = None, truth:
     # a grid that begins or ends with dropped samples is shorter than the drive
     first = round((signals.start_ns or START_NS) - START_NS) // signals.dt_ns
     known = [s.slice(first, signals.frame.height) for s in known]
-    return Signals(
-        signals.frame.with_columns(known),
-        signals.dt_ns,
-        signals.start_ns,
-        signals.origins,
-        signals.quality,
-        signals.files,
-    )
+    return replace(signals, frame=signals.frame.with_columns(known))

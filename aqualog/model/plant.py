@@ -89,6 +89,16 @@ def understeer_gradient(cornering_slope: float) -> float:
     return (1.0 / (FRONT_COMPLIANCE * cornering_slope) - 1.0 / cornering_slope) / G
 
 
+# what a plant takes as it is from vehicle and tyres, and what is added to it, neutral at first
+_OF_CAR = ("mass", "l_f", "l_r", "h_cg", "track", "drag_area", "air_density")
+_OF_TYRES = (
+    "load_sensitivity", "wet_friction", "tread_capacity", "half_length", "width", "v_anchor", "h_bulk", "h_onset",
+    "contact_exponent", "wedge_peak", "h_film", "groove_relief", "h_wave", "h_track", "contact_scatter",
+)  # fmt: skip
+_ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
+_ADDED_AT_WHEELS = ("radius_growth", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope")
+
+
 def build_plant(
     vehicle: Vehicle, front: Tyre, rear: Tyre, *, p_front: float = P_REFERENCE, p_rear: float = P_REFERENCE
 ) -> Plant:
@@ -112,58 +122,28 @@ def build_plant(
     def of(name: str) -> FloatArray:
         return np.array([float(getattr(t, name)) for t in tyres])
 
+    as_they_are: dict[str, Any] = {name: getattr(vehicle, name) for name in _OF_CAR}
+    as_they_are |= {name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia")}
+    as_they_are |= {name: of(name) for name in _OF_TYRES}
+    nothing: dict[str, Any] = dict.fromkeys(_ADDED, 0.0) | {name: np.zeros(4) for name in _ADDED_AT_WHEELS}
     return Plant(
-        mass=vehicle.mass,
-        l_f=vehicle.l_f,
-        l_r=vehicle.l_r,
-        h_cg=vehicle.h_cg,
-        track=vehicle.track,
+        **as_they_are,
+        **nothing,
         I_zz=vehicle.mass * vehicle.l_f * vehicle.l_r,  # radius of gyration sqrt(l_f l_r) (K)
-        drag_area=vehicle.drag_area,
-        air_density=vehicle.air_density,
-        head_wind=0.0,
-        cornering_drag=0.0,
         roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
         brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
         power=POWER_PER_MASS * vehicle.mass,
         torque_gain=1.0,
-        r_e=np.array([vehicle.r_e(w) for w in WHEELS]),
-        r_l=np.array([vehicle.r_l(w) for w in WHEELS]),
-        radius_growth=np.zeros(4),
-        inertia=np.array([vehicle.inertia(w) for w in WHEELS]),
         r_w=np.full(4, vehicle.rolling_resistance),
-        warmup_extra=0.0,
         warmup_time=600.0,
-        brake_drag=np.zeros(4),
         slip_slope=slope * of("slip_slope_factor") * pressure_factor(p, p_ref=P_REFERENCE, p_nominal=P_NOMINAL),
-        slip_slope_drift=np.zeros(4),
         cornering_slope=of("cornering_slope") * np.array([FRONT_COMPLIANCE, FRONT_COMPLIANCE, 1.0, 1.0]),
-        load_sensitivity=of("load_sensitivity"),
         F_z_ref=0.5 * np.array([front_axle, front_axle, rear_axle, rear_axle]),
         mu=vehicle.mu_max * of("mu_factor"),
-        relaxation_length=np.zeros(4),
-        wet_friction=of("wet_friction"),
         p=p,
-        tread_capacity=of("tread_capacity"),
-        half_length=of("half_length"),
-        width=of("width"),
-        v_anchor=of("v_anchor"),
-        h_bulk=of("h_bulk"),
-        h_onset=of("h_onset"),
-        contact_exponent=of("contact_exponent"),
         contact_gain=np.ones(4),
-        wedge_peak=of("wedge_peak"),
-        h_film=of("h_film"),
-        groove_relief=of("groove_relief"),
-        h_wave=of("h_wave"),
         water_drag_gain=np.ones(4),
-        h_track=of("h_track"),
-        contact_scatter=of("contact_scatter"),
-        towed_mass=0.0,
-        leak_start=0.0,
         leak_time=1.0,
-        leak_radius=np.zeros(4),
-        leak_slope=np.zeros(4),
         drag_over_v=np.array([[0.0, 0.0], [100.0, 0.0]]),
     )
 

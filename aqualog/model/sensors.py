@@ -15,20 +15,9 @@ from aqualog.core.records import FloatArray
 from aqualog.model.pickup import edge_times, reported_speed, ring_angles, rolled_angle
 
 __all__ = [
-    "ESC",
-    "FAULT_KINDS",
-    "IDEAL",
-    "SENSORS",
-    "Channel",
-    "FaultKind",
-    "Group",
-    "Measured",
-    "SensorFault",
-    "Sensors",
-    "Truth",
-    "measure",
-    "with_faults",
-]
+    "ESC", "FAULT_KINDS", "IDEAL", "SENSORS", "Channel", "FaultKind", "Group", "Measured", "SensorFault", "Sensors",
+    "Truth", "measure", "with_faults",
+]  # fmt: skip
 
 SNAP = 1e-6  # [grid steps] a time this close to a point of the fine grid is that point
 
@@ -135,7 +124,8 @@ def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> lis
     """
     groups = [_measure_group(truth, sensors, g, g.rate_hz or rate_hz, seed) for g in sensors.groups]
     at = _sample_times(truth, rate_hz)
-    known = {n: _sampled(truth, _column(truth, n), at, held=_is_state(truth, n)) for n in truth.columns if _is_truth(n)}
+    names = [n for n in truth.columns if n.startswith("true_")]
+    known = {n: _sampled(truth, _column(truth, n), at, held=_is_state(truth, n)) for n in names}
     return [g for g in (*groups, Measured("truth", at, known)) if g.columns]
 
 
@@ -187,13 +177,9 @@ def _picked_up(truth: Truth, sensors: Sensors, name: str, seen: FloatArray, wind
     pattern = sensors.tooth_pattern * place.standard_normal(sensors.teeth)
     ring = ring_angles(pattern, phase=phase, tone_ring=sensors.tone_ring[_OMEGA[name]])
     edges = edge_times(
-        truth.t,
-        _angle(truth, name),
-        ring,
-        jitter=sensors.tooth_jitter,
-        rng=_stream(seed, name, "edges"),
+        truth.t, _angle(truth, name), ring, jitter=sensors.tooth_jitter, rng=_stream(seed, name, "edges"),
         before=max(0.0, -float(seen[0])) + window,
-    )
+    )  # fmt: skip
     return reported_speed(edges, np.minimum(seen, truth.t[-1]), window=window, teeth=sensors.teeth)
 
 
@@ -256,10 +242,6 @@ def _step(truth: Truth) -> float:
 
 def _column(truth: Truth, name: str) -> FloatArray:
     return np.ascontiguousarray(truth.columns[name], dtype=np.float64)
-
-
-def _is_truth(name: str) -> bool:
-    return name.startswith("true_")
 
 
 def _is_state(truth: Truth, name: str) -> bool:

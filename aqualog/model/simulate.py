@@ -10,7 +10,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.model import kernel
-from aqualog.model.excitation import waveform
+from aqualog.model.excitation import AMPLITUDE_KINDS, waveform
 from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, Plant, build_plant, with_mass_at
 from aqualog.model.road import GRADE, build_road
 from aqualog.model.scenario import Profile, Scenario
@@ -23,15 +23,8 @@ from aqualog.physics.slip import slip_of_wheel_speed
 from aqualog.physics.steering import STEERING, kingpin_moment, steering_torque, tie_rod_force
 
 __all__ = [
-    "STEP_S",
-    "TRUTH_SYMBOLS",
-    "Simulation",
-    "assemble",
-    "drive_truth",
-    "run_kernel",
-    "simulate",
-    "steering_columns",
-]
+    "STEP_S", "TRUTH_SYMBOLS", "Simulation", "assemble", "drive_truth", "run_kernel", "simulate", "steering_columns",
+]  # fmt: skip
 
 BASE = Model()
 STEP_S = 1e-3
@@ -40,7 +33,6 @@ FINE_RATE_HZ = 1000.0  # of the record that sensors sample
 FINE_LIMIT_S = 300.0  # longer drives are recorded more coarsely, to keep memory in bounds
 NO_WEDGE = 1e4  # [m/s] from here on the physics means: no aquaplaning at any speed
 PRESSURE_PER_TORQUE = 1.5e3  # [Pa/(N m)] brake pressure over the sum of the brake torques (K)
-_EXC_KIND = {"force": 0, "mu": 1, "relative": 2}
 
 _WHEEL_TRUTH = {
     "contact": ("contact", "-", "remaining share of the contact length L"),
@@ -51,11 +43,7 @@ _WHEEL_TRUTH = {
     "slope": ("slip_slope", "-", "slip slope C_s / F_z of the remaining contact"),
     "mu_max": ("mu_max", "-", "friction of the remaining contact over the wheel load"),
     "film": ("film", "m", "water in front of the wheel"),
-    "v_full": (
-        "full_speed",
-        "m/s",
-        "speed of full aquaplaning of this wheel here and now; none without a wedge",
-    ),
+    "v_full": ("full_speed", "m/s", "speed of full aquaplaning of this wheel here and now; none without a wedge"),
     "torque": ("torque", "N*m", "net wheel torque"),
     "water_torque": ("water_torque", "N*m", "torque of the water against the wheel: shifted load and film"),
 }
@@ -183,7 +171,7 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         gain=_profile(scenario.drive_share, t) if scenario.drive_share else np.ones(n + 1),
         has_driver=True,
         keeps_lane=steering is None,
-        exc_kind=0 if exc is None else _EXC_KIND[exc.amplitude_kind],
+        exc_kind=0 if exc is None else AMPLITUDE_KINDS[exc.amplitude_kind],
         exc_amplitude=0.0 if exc is None else float(exc.amplitude),
         scatter=float(scenario.water_scatter),
         antilock=scenario.antilock,
@@ -203,14 +191,8 @@ def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
 
 def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:
     wheels = {name: wheel_columns(rows, name) for name in ("omega", "angle", "torque", *_WHEEL_TRUTH)}
-    columns = {
-        "v_x": column(rows, "v_x"),
-        "a_x": column(rows, "a_x"),
-        "a_y": column(rows, "a_y"),
-        "yaw_rate": column(rows, "yaw_rate"),
-        "steer_angle": column(rows, "steer_angle"),
-        "brake_pressure": column(rows, "brake_torque") * PRESSURE_PER_TORQUE,
-    }
+    columns = {name: column(rows, name) for name in ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle")}
+    columns["brake_pressure"] = column(rows, "brake_torque") * PRESSURE_PER_TORQUE
     for i, w in enumerate(WHEELS):
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
@@ -224,13 +206,8 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
     wheels["v_full"] = [np.where(x < NO_WEDGE, x, np.nan) for x in wheels["v_full"]]
     for name, (label, _, _) in _WHEEL_TRUTH.items():
         columns |= {f"true_{label}_{w}": wheels[name][i] for i, w in enumerate(WHEELS)}
-    return columns | {
-        "true_grade": column(rows, "grade"),
-        "true_v_x": column(rows, "v_x"),
-        "true_v_y": column(rows, "v_y"),
-        "true_position": column(rows, "position"),
-        "true_wave_drag": np.sum(wheel_columns(rows, "wave_drag"), axis=0),
-    }
+    columns |= {f"true_{name}": column(rows, name) for name in ("grade", "v_x", "v_y", "position")}
+    return columns | {"true_wave_drag": np.sum(wheel_columns(rows, "wave_drag"), axis=0)}
 
 
 def steering_columns(wheels: dict[str, list[FloatArray]], plant: Plant, scenario: Scenario) -> dict[str, FloatArray]:

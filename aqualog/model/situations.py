@@ -11,11 +11,10 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import KEYS, Vehicle
-from aqualog.model import situations_dry, situations_water
-from aqualog.model.drawing import Drawing, Drawn, Taken
+from aqualog.model.drawing import SCORING_POOL, TUNING_POOL, Drawing, Drawn, Pool, Taken
 from aqualog.model.plant import build_plant
-from aqualog.model.pools import SCORING_POOL, TUNING_POOL, Pool
 from aqualog.model.scenario import Scenario
+from aqualog.model.situations_made import DRY, FAULTS, WATER
 
 __all__ = ["SCORING_POOL", "SITUATIONS", "TUNING_POOL", "Drawn", "Pool", "Situation", "believed_vehicle", "draw"]
 
@@ -34,11 +33,9 @@ class Situation:
 
 
 SITUATIONS: dict[str, Situation] = {
-    **{n: Situation(n, title, "aquaplaning", make) for n, (title, make) in situations_water.MAKERS.items()},
-    **{
-        n: Situation(n, title, "nuisance", make)
-        for n, (title, make) in (situations_dry.MAKERS | situations_dry.FAULTS).items()
-    },
+    n: Situation(n, title, kind, make)
+    for kind, makers in (("aquaplaning", WATER), ("nuisance", DRY), ("nuisance", FAULTS))
+    for n, (title, make) in makers.items()
 }
 
 

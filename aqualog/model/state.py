@@ -14,16 +14,8 @@ from aqualog.physics.resistance import air_drag
 from aqualog.physics.rolling import effective_radius
 
 __all__ = [
-    "AT",
-    "COLUMNS",
-    "N_JACOBIAN",
-    "N_STATES",
-    "WIDTH",
-    "column",
-    "resistance_at",
-    "rolling_state",
-    "wheel_columns",
-]
+    "AT", "COLUMNS", "N_JACOBIAN", "N_STATES", "WIDTH", "column", "resistance_at", "rolling_state", "wheel_columns",
+]  # fmt: skip
 
 # states: speeds and attitude, low-passed specific forces, the driver; then four of each wheel
 V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = range(12)

@@ -28,8 +28,7 @@ from aqualog.core.units import spellings
 from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD
 from aqualog.detect.registry import DETECTORS, RIVALS
 from aqualog.detect.slip_slope.tuning import MEANINGS, TUNING
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.simulate import TRUTH_SYMBOLS
 from aqualog.model.tyre import TYRE_KEYS, TYRES
 

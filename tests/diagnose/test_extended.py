@@ -11,8 +11,7 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.log import as_signals
 from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.sensors import ESC, IDEAL, Sensors

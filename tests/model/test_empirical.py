@@ -7,8 +7,7 @@ import pytest
 
 from aqualog.config.model import dump_model, load_model
 from aqualog.core.errors import ConfigError
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.term import Model, Term

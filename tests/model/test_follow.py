@@ -8,8 +8,7 @@ import pytest
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel, state
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.follow import Course, follow
 from aqualog.model.road import build_road
 from aqualog.model.scenario import Scenario

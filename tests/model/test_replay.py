@@ -5,8 +5,8 @@ import pytest
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
+from aqualog.model.follow import replay
 from aqualog.model.plant import build_plant
-from aqualog.model.replay import replay
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from aqualog.config.vehicle import load_vehicle
+from aqualog.model.follow import replay
 from aqualog.model.plant import build_plant
-from aqualog.model.replay import replay
 from aqualog.model.tyre import TYRES
 
 HERE = Path(__file__).resolve().parent

@@ -13,7 +13,7 @@ import pytest
 from aqualog.evaluate.records import DetectorRun, Hit, RunRecord
 from aqualog.evaluate.score import score
 from aqualog.evaluate.sweep import JOINT
-from aqualog.model.pools import TUNING_POOL
+from aqualog.model.drawing import TUNING_POOL
 from aqualog.thesis.checks import joint
 from aqualog.thesis.checks.joint import (
     MEASURED,

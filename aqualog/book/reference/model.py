@@ -7,8 +7,7 @@ from dataclasses import replace
 from aqualog.book.markdown import code, fence, number, page, table
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, vehicle_toml
-from aqualog.model.effects import EFFECTS
-from aqualog.model.empirical import EMPIRICAL
+from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.term import Effect
 
 __all__ = ["EFFECTS_EXAMPLE", "effects_page", "vehicle_example", "vehicle_page"]

@@ -20,23 +20,8 @@ from aqualog.physics.slip import V_MIN, wheel_slip
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
 
 __all__ = [
-    "BESIDE",
-    "LEFT_OUT",
-    "LIMITS",
-    "METHODS",
-    "TRACTIONS",
-    "Method",
-    "Place",
-    "Reference",
-    "TractionSource",
-    "Way",
-    "accelerometer_traction",
-    "choose_way",
-    "left_out",
-    "mean_of",
-    "reference_of",
-    "slip_of",
-    "smoothed",
+    "BESIDE", "LEFT_OUT", "LIMITS", "METHODS", "TRACTIONS", "Method", "Place", "Reference", "TractionSource", "Way",
+    "accelerometer_traction", "choose_way", "left_out", "mean_of", "reference_of", "slip_of", "smoothed",
     "torque_traction",
 ]  # fmt: skip
 

@@ -20,8 +20,8 @@ from aqualog.evaluate.judge import judge as judge_drive
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.score import Score, score
 from aqualog.evaluate.sweep import JOINT
+from aqualog.model.drawing import SCORING_POOL, Pool
 from aqualog.model.log import as_signals
-from aqualog.model.pools import SCORING_POOL, Pool
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, draw
 from aqualog.thesis.claims import Check, Checks, judge, limit

@@ -13,8 +13,8 @@ from aqualog.core.vehicle import KEYS
 from aqualog.detect.slip_slope.history import History, Rule, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
+from aqualog.model.drawing import SCORING_POOL
 from aqualog.model.effects import EFFECTS
-from aqualog.model.pools import SCORING_POOL
 from aqualog.model.scenario import SURFACES, Lane, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES

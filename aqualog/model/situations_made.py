@@ -1,4 +1,4 @@
-"""Situations in which no wheel floats: road, weather and driving, and things that fail or hit."""
+"""How each situation is driven: those in which a car aquaplanes, and those in which no wheel floats."""
 
 from __future__ import annotations
 
@@ -6,13 +6,143 @@ from dataclasses import replace
 from typing import Any
 
 from aqualog.core.notation import WHEELS
-from aqualog.model.drawing import KMH, Drawing, Taken, lagging_torque, slalom_angle, terms
-from aqualog.model.scenario import Kick, Lane, Profile, Steering, Surface
+from aqualog.model.drawing import KMH, Drawing, Taken, full_speed, lagging_torque, slalom_angle, terms
+from aqualog.model.scenario import Kick, Lane, Profile, Scenario, Steering, Surface
 from aqualog.model.sensors import ESC, SensorFault
 from aqualog.model.term import Model
 from aqualog.physics.load import G
 
-__all__ = ["FAULTS", "MAKERS"]
+__all__ = ["DRY", "FAULTS", "WATER"]
+
+V_FULL = (70.0 * KMH, 145.0 * KMH)  # [m/s] tyre, water and pressure that a road car can aquaplane on
+LANE_S = (1.5, 10.0)  # [s]
+FLOATING_S = (1.5, 3.5)  # near and above full aquaplaning: who stays longer spins
+APPROACH_S = (10.0, 20.0)  # dry road before it
+RUN_OUT_S = 6.0
+
+
+def _water(k: Drawing, deeper: float = 1.0) -> tuple[Drawing, float, float]:
+    """A drawing whose tyre aquaplanes at a speed that can be driven, the depth of the water [m], and that speed."""
+    tyres = [t for t in k.pool.tyres for _ in k.pool.depths]
+    pairs = [(t, h * deeper, p) for t, h in zip(tyres, k.pool.depths * len(k.pool.tyres), strict=True)
+             for p in k.pool.pressures]  # fmt: skip
+    fit = [x for x in pairs if V_FULL[0] <= full_speed(replace(k, tyre=x[0], p=x[2]), x[1]) <= V_FULL[1]]
+    tyre, depth, p = k.one_of(*fit)
+    k = replace(k, tyre=tyre, p=p)
+    return k, depth, full_speed(k, depth)
+
+
+def _lane(k: Drawing, start_m: float, length: float, depth: float, **given: Any) -> Lane:
+    """A lane as on a proving ground: the left track has less water and less even (thesis 2.1)."""
+    usual = {
+        "depth_left": depth * k.between(0.6, 1.0), "depth_right": depth,
+        "irregularity_left": k.between(0.05, 0.5), "irregularity_right": k.between(0.03, 0.15),
+    }  # fmt: skip
+    return Lane(start_m, start_m + length, in_metres=True, **{**usual, **given})
+
+
+def _through(
+    k: Drawing, depth: float, v: float, v_full: float, a: float = 0.0, before: float = 0.0, **given: Any
+) -> tuple[Scenario, str]:
+    """Through a lane that is met at the speed v [m/s], at the acceleration a on it and `before` ahead of it. [m/s²]"""
+    approach = k.between(*APPROACH_S)
+    on_lane = k.between(*(LANE_S if v + max(a, 0.0) * LANE_S[1] < v_full - 10.0 * KMH else FLOATING_S))
+    v_0 = v - before * 5.0
+    v_end = max(v + a * on_lane, 5.0)
+    t = approach + on_lane
+    speed: Profile = ((0.0, v_0), (approach - 5.0, v_0), (approach, v), (t, v_end), (t + RUN_OUT_S, v_end))
+    start = v_0 * (approach - 5.0) + 2.5 * (v_0 + v)
+    lane_given = given.pop("lane", {})
+    length = lane_given.pop("length", 0.5 * (v + v_end) * on_lane)
+    lane = _lane(k, start, length, depth, **lane_given)
+    scenario = k.drive(t + RUN_OUT_S, speed, lanes=(lane,), **given)
+    return scenario, f"{k.tyre.name}, {lane.depth_right * 1e3:.1f} mm, entry at {v / KMH:.0f} km/h"
+
+
+def _below(k: Drawing, v_full: float, low: float = -40.0, high: float = 10.0) -> float:
+    return max(v_full + k.between(low, high) * KMH, 40.0 * KMH)
+
+
+def _constant(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    scenario, note = _through(k, depth, _below(k, v_full), v_full)
+    return Taken(scenario, Model(), note)
+
+
+def _accelerating(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    a = k.between(0.5, 1.5)
+    scenario, note = _through(k, depth, _below(k, v_full, -30.0, 0.0), v_full, a, before=a)
+    return Taken(scenario, Model(), f"{note}, {a:.1f} m/s^2")
+
+
+def _coasting(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    a = -k.between(0.2, 0.8)
+    scenario, note = _through(k, depth, _below(k, v_full, -20.0, 10.0), v_full, a, before=a)
+    return Taken(scenario, Model(), f"{note}, {a:.1f} m/s^2")
+
+
+def _lane_slalom(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    v = _below(k, v_full, -30.0, 5.0)
+    a_y = k.between(1.0, 2.0)
+    steering = Steering(slalom_angle(k.vehicle, k.tyre, v, a_y), k.between(3.0, 5.0), 2.0)
+    scenario, note = _through(k, depth, v, v_full, steering=steering)
+    return Taken(scenario, Model(), f"{note}, {a_y:.1f} m/s^2 to the side")
+
+
+def _one_sided(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    side = k.one_of("left", "right")
+    dry = {f"depth_{'right' if side == 'left' else 'left'}": 0.0, f"depth_{side}": depth}
+    scenario, note = _through(k, depth, _below(k, v_full, -25.0, 10.0), v_full, lane=dry)
+    return Taken(scenario, Model(), f"{note}, water on the {side}")
+
+
+def _puddle(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k, 1.25)
+    length = k.between(5.0, 15.0)
+    scenario, note = _through(k, depth, _below(k, v_full, -20.0, 10.0), v_full, lane={"length": length})
+    return Taken(scenario, Model(), f"{note}, {length:.0f} m long")
+
+
+def _uneven(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    rms = {"irregularity_left": k.between(0.5, 1.0), "irregularity_right": k.between(0.4, 0.9)}
+    scenario, note = _through(k, depth, _below(k, v_full, -30.0, 10.0), v_full, lane=rms)
+    return Taken(scenario, Model(), note)
+
+
+def _deep(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k, 2.0)
+    scenario, note = _through(k, depth, _below(k, v_full, 15.0, 30.0), v_full, lane={"depth_left": depth * 0.9})
+    return Taken(scenario, Model(), note)
+
+
+def _foot_off(k: Drawing) -> Taken:
+    k, depth, v_full = _water(k)
+    v = _below(k, v_full, -25.0, 10.0)
+    scenario, note = _through(k, depth, v, v_full, -0.4)
+    t_lane, t_out = scenario.speed[2][0], scenario.speed[3][0]
+    drag = 0.015 * k.vehicle.mass * G * k.vehicle.r_l_r  # [N m] of an engine in a high gear (K)
+    share = ((0.0, 1.0), (t_lane - 1.0, 1.0), (t_lane - 0.7, 0.0), (t_out, 0.0), (t_out + 1.0, 1.0))
+    engine = ((t_lane - 1.0, 0.0), (t_lane - 0.7, -drag), (t_out, -drag), (t_out + 1.0, 0.0))
+    return Taken(replace(scenario, drive_share=share, extra_torque=engine), Model(), f"{note}, foot off")
+
+
+WATER = {
+    "lane_constant": ("constant speed through a watered lane", _constant),
+    "lane_accelerating": ("accelerating into and on the lane", _accelerating),
+    "lane_coasting": ("slowing down through the lane", _coasting),
+    "lane_slalom": ("slalom on the lane", _lane_slalom),
+    "lane_one_sided": ("water under the wheels of one side", _one_sided),
+    "puddle": ("a puddle of 5 to 15 m", _puddle),
+    "lane_uneven": ("water of very uneven depth", _uneven),
+    "lane_deep": ("into deep water far above full aquaplaning", _deep),
+    "lane_foot_off": ("on the lane without the foot on the pedal", _foot_off),
+}
+
 
 NONE = Model()
 
@@ -21,23 +151,6 @@ def _cruise(k: Drawing, low: float, high: float, *, spread: float = 0.08, **give
     duration, v = k.between(60.0, 120.0), k.between(low, high) * KMH
     scenario = k.drive(duration, k.cruise(duration, v, spread=spread), **given)
     return Taken(scenario, NONE, f"about {v / KMH:.0f} km/h")
-
-
-def _dry(k: Drawing) -> Taken:
-    return _cruise(k, 60.0, 110.0, spread=0.15)
-
-
-def _motorway(k: Drawing) -> Taken:
-    """Turbulence behind lorries: gusts of 3 m/s rms, faster than those of the weather (K)."""
-    return _cruise(k, 110.0, 140.0, wind=k.gusts(125.0, 3.0, mean=k.between(-3.0, 3.0), every_s=1.0))
-
-
-def _hilly(k: Drawing) -> Taken:
-    return _cruise(k, 50.0, 90.0, grade=k.hills(0.05, every_m=k.between(60.0, 150.0)))
-
-
-def _head_wind(k: Drawing) -> Taken:
-    return _cruise(k, 80.0, 120.0, head_wind=10.0, wind=k.gusts(125.0, 2.0))
 
 
 def _wind_shelter(k: Drawing) -> Taken:
@@ -51,41 +164,29 @@ def _wind_shelter(k: Drawing) -> Taken:
     return _cruise(k, 80.0, 120.0, wind=tuple(profile))
 
 
-def _all_the_way(k: Drawing, surface: Surface, low: float, high: float, **given: Any) -> Taken:
-    taken = _cruise(k, low, high, lanes=(Lane(0.0, 1e5, in_metres=True, surface=surface),), **given)
+def _on(
+    k: Drawing,
+    name: str,
+    friction: tuple[float, float] | None,
+    low: float,
+    high: float,
+    *,
+    rolling: tuple[float, float] | None = None,
+    roughness: tuple[float, float] | None = None,
+    hills: float | None = None,
+    spread: float = 0.08,
+) -> Taken:
+    """All the way on one surface, whose properties are drawn between two."""
+    drawn = {n: k.between(*ends) for n, ends in (("rolling", rolling), ("roughness", roughness)) if ends}
+    surface = k.surface(name, friction, **drawn)
+    given = {} if hills is None else {"grade": k.hills(hills)}
+    lanes = (Lane(0.0, 1e5, in_metres=True, surface=surface),)
+    taken = _cruise(k, low, high, spread=spread, lanes=lanes, **given)
     return taken._replace(note=f"{taken.note}, {_told(surface)}")
 
 
 def _told(surface: Surface) -> str:
     return surface.name + ("" if surface.mu is None else f" of mu {surface.mu:.2f}")
-
-
-def _damp(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("damp", k.pool.damp), 70.0, 120.0, spread=0.12)
-
-
-def _snow(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("snow", k.pool.snow), 40.0, 80.0)
-
-
-def _deep_snow(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("deep_snow", k.pool.snow, rolling=k.between(0.02, 0.04)), 30.0, 60.0)
-
-
-def _ice(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("ice", k.pool.ice), 30.0, 60.0, grade=k.hills(0.005))
-
-
-def _wet_ice(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("wet_ice", k.pool.wet_ice), 20.0, 50.0, spread=0.04, grade=k.hills(0.002))
-
-
-def _gravel(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("gravel", (0.5, 0.7)), 40.0, 80.0)
-
-
-def _rough(k: Drawing) -> Taken:
-    return _all_the_way(k, k.surface("rough", roughness=k.between(40.0, 80.0)), 50.0, 100.0)
 
 
 def _snow_entry(k: Drawing) -> Taken:
@@ -112,8 +213,12 @@ def _split(k: Drawing) -> Taken:
     return Taken(scenario, NONE, f"{_told(low)} {'left' if left is low else 'right'}, {v / KMH:.0f} km/h")
 
 
-def _braking(k: Drawing, surface: Surface, mu: float, *, demand: float, antilock: bool) -> Taken:
+def _braking(
+    k: Drawing, name: str, friction: tuple[float, float] | None, demand: float, *, antilock: bool = True
+) -> Taken:
     """Two stops, or nearly; the driver requests `demand` of the available friction."""
+    surface = k.surface(name, friction)
+    mu = 1.0 if surface.mu is None else surface.mu
     v, low = k.between(70.0, 110.0) * KMH if mu > 0.5 else k.between(50.0, 80.0) * KMH, 10.0 * KMH
     a = min(demand, 0.85) * mu * G
     seconds = (v - low) / a
@@ -130,24 +235,6 @@ def _braking(k: Drawing, surface: Surface, mu: float, *, demand: float, antilock
         lanes=() if surface.name == "asphalt" else (Lane(0.0, 1e5, in_metres=True, surface=surface),),
     )  # fmt: skip
     return Taken(scenario, NONE, f"{_told(surface)}, from {v / KMH:.0f} km/h")
-
-
-def _abs_dry(k: Drawing) -> Taken:
-    return _braking(k, k.surface("asphalt"), 1.0, demand=1.3, antilock=True)
-
-
-def _abs_damp(k: Drawing) -> Taken:
-    surface = k.surface("damp", k.pool.damp)
-    return _braking(k, surface, surface.mu or 1.0, demand=1.35, antilock=True)
-
-
-def _abs_snow(k: Drawing) -> Taken:
-    surface = k.surface("snow", k.pool.snow)
-    return _braking(k, surface, surface.mu or 0.3, demand=1.6, antilock=True)
-
-
-def _hard_braking(k: Drawing) -> Taken:
-    return _braking(k, k.surface("asphalt"), 1.0, demand=k.between(0.5, 0.75), antilock=False)
 
 
 def _hard_acceleration(k: Drawing) -> Taken:
@@ -214,25 +301,35 @@ def _trailer(k: Drawing) -> Taken:
     return Taken(replace(taken.scenario, load_rear=60.0), model, f"{taken.note}, {mass:.0f} kg in tow")
 
 
-MAKERS = {
-    "dry_cruise": ("dry country road", _dry),
-    "motorway": ("dry motorway in the turbulence of others", _motorway),
-    "hilly": ("grades of up to 8 %", _hilly),
-    "head_wind": ("a head wind of 10 m/s", _head_wind),
+DRY = {
+    "dry_cruise": ("dry country road", lambda k: _cruise(k, 60.0, 110.0, spread=0.15)),
+    "motorway": (
+        # gusts of 3 m/s rms behind lorries, faster than those of the weather (K)
+        "dry motorway in the turbulence of others",
+        lambda k: _cruise(k, 110.0, 140.0, wind=k.gusts(125.0, 3.0, mean=k.between(-3.0, 3.0), every_s=1.0)),
+    ),
+    "hilly": (
+        "grades of up to 8 %",
+        lambda k: _cruise(k, 50.0, 90.0, grade=k.hills(0.05, every_m=k.between(60.0, 150.0))),
+    ),
+    "head_wind": ("a head wind of 10 m/s", lambda k: _cruise(k, 80.0, 120.0, head_wind=10.0, wind=k.gusts(125.0, 2.0))),
     "wind_shelter": ("a head wind that pauses behind woods and lorries", _wind_shelter),
-    "damp": ("a damp road without a layer of water", _damp),
+    "damp": ("a damp road without a layer of water", lambda k: _on(k, "damp", k.pool.damp, 70.0, 120.0, spread=0.12)),
     "snow_entry": ("onto snow at speed", _snow_entry),
-    "snow": ("snow from the start", _snow),
-    "deep_snow": ("deep snow", _deep_snow),
-    "ice": ("dry ice", _ice),
-    "wet_ice": ("wet ice", _wet_ice),
-    "gravel": ("gravel", _gravel),
-    "rough_asphalt": ("broken asphalt", _rough),
+    "snow": ("snow from the start", lambda k: _on(k, "snow", k.pool.snow, 40.0, 80.0)),
+    "deep_snow": ("deep snow", lambda k: _on(k, "deep_snow", k.pool.snow, 30.0, 60.0, rolling=(0.02, 0.04))),
+    "ice": ("dry ice", lambda k: _on(k, "ice", k.pool.ice, 30.0, 60.0, hills=0.005)),
+    "wet_ice": ("wet ice", lambda k: _on(k, "wet_ice", k.pool.wet_ice, 20.0, 50.0, spread=0.04, hills=0.002)),
+    "gravel": ("gravel", lambda k: _on(k, "gravel", (0.5, 0.7), 40.0, 80.0)),
+    "rough_asphalt": ("broken asphalt", lambda k: _on(k, "rough", None, 50.0, 100.0, roughness=(40.0, 80.0))),
     "split_friction": ("snow or ice under one side", _split),
-    "abs_dry": ("antilock braking on dry asphalt", _abs_dry),
-    "abs_damp": ("antilock braking on a damp road", _abs_damp),
-    "abs_snow": ("antilock braking on snow", _abs_snow),
-    "hard_braking": ("hard braking without an antilock system, wheels not locked", _hard_braking),
+    "abs_dry": ("antilock braking on dry asphalt", lambda k: _braking(k, "asphalt", None, 1.3)),
+    "abs_damp": ("antilock braking on a damp road", lambda k: _braking(k, "damp", k.pool.damp, 1.35)),
+    "abs_snow": ("antilock braking on snow", lambda k: _braking(k, "snow", k.pool.snow, 1.6)),
+    "hard_braking": (
+        "hard braking without an antilock system, wheels not locked",
+        lambda k: _braking(k, "asphalt", None, k.between(0.5, 0.75), antilock=False),
+    ),
     "hard_acceleration": ("hard acceleration", _hard_acceleration),
     "gear_shifts": ("gear shifts, torque reported late", _gear_shifts),
     "cornering_limit": ("0.7 to 0.9 g to the side", _cornering),
