@@ -15,8 +15,9 @@ from aqualog.align.windows import LongDrive
 from aqualog.campaign.thin import STEP_S, Thinning
 from aqualog.core.records import DriveResult, Event, FileFaults, FloatArray, Signals, Track
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.long import detect_long, present_in
 from aqualog.detect.slip_slope import activation
-from aqualog.detect.stream import ROWS, Settings, detect_drive, detect_long, present_in
+from aqualog.detect.stream import ROWS, Settings, detect_drive
 
 __all__ = ["REASONS", "STEP_S", "Measurement", "measure", "measure_long"]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from aqualog.config.reader import Key, Table, read
 from aqualog.core.errors import ConfigError
+from aqualog.detect.detector import JointCusumParams, Settings
 from aqualog.detect.joint_cusum import TERMS
 from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS
-from aqualog.detect.settings import JointCusumParams, Settings
 from aqualog.detect.thresholds import Thresholds
 
 __all__ = ["JOINT_KEYS", "joint_text", "load_settings", "load_thresholds", "thresholds_text"]

@@ -13,14 +13,53 @@ from aqualog.core.notation import WHEELS, side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.events import Evidence, as_they_are
-from aqualog.detect.settings import Settings
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.features.stream import Features
 
 __all__ = [
-    "Detector", "Found", "Kind", "Needs", "Output", "Scene", "Setup", "Watch", "always_partial", "any_wheel",
-    "missing_balance", "missing_torques", "missing_wheels", "too_slow", "traction",
+    "Detector", "Found", "JointCusumParams", "Kind", "Needs", "Output", "Scene", "Settings", "Setup", "Watch",
+    "always_partial", "any_wheel", "missing_balance", "missing_torques", "missing_wheels", "too_slow", "traction",
 ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class JointCusumParams:
+    """Scales of the terms of joint detector 2; each term reaches 1 at its scale and no more.
+
+    `third` is the third term of (2.11): `resistance`, as the text has it, or `variance`, a CUSUM of the variance
+    difference, as its printed index says (E6). `with_slope` adds the lost share of the slip slope, an option in the
+    thesis. `gated`: the sum warns only while the resistance gate is open. A wheel that is braked or spun on ice, or a
+    bus that loses messages, fills several terms at once, and the thesis calls resistance necessary.
+    """
+
+    g_up: float = 1.5  # [m/s]
+    g_down: float = 1.5  # [m/s]
+    g_resistance: float = 0.3  # [m/s]
+    var_low: float = 0.5  # [(m/s^2)^2] what tooth noise and rough asphalt leave of the difference
+    var_high: float = 4.0
+    g_variance: float = 1.0  # [(m/s^2)^2 s]
+    loss_low: float = 0.25  # [-] what load, grip and noise of the estimate cost on dry road
+    loss_high: float = 0.75
+    third: Literal["resistance", "variance"] = "resistance"
+    with_slope: bool = True
+    gated: bool = True
+    weights: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings of the detectors.
+
+    `thresholds` by the name of the detector, in the unit of its statistic; those left out keep their default.
+    `correct_yaw` as in `FeatureStream`. `learns_offset`: the offset of the resistance measure on dry road is estimated
+    and subtracted. `joint_cusum`: scales of joint detector 2.
+    """
+
+    thresholds: Mapping[str, float] = field(default_factory=dict)
+    correct_yaw: bool = True
+    learns_offset: bool = True
+    joint_cusum: JointCusumParams = field(default_factory=JointCusumParams)
+
 
 Kind = Literal["effect", "joint", "rival"]
 """A single effect of the thesis, a joint detector that reads the single ones, or a method of the prior art."""

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
-from aqualog.detect.detector import Detector, Found, Output, Scene, Setup
+from aqualog.detect.detector import Detector, Found, JointCusumParams, Output, Scene, Setup
 from aqualog.detect.joint_criteria import (
     FULL,
     GATE,
@@ -23,7 +23,6 @@ from aqualog.detect.joint_criteria import (
 )
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import MEASURE, RESISTANCE
-from aqualog.detect.settings import JointCusumParams
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
 

@@ -14,8 +14,7 @@ from aqualog.detect.resistance import RESISTANCE
 from aqualog.detect.rivals.front_rear_pattern import FRONT_REAR_PATTERN
 from aqualog.detect.rivals.resistance_model import RESISTANCE_MODEL
 from aqualog.detect.rivals.slope_friction_ekf import SLOPE_FRICTION_EKF
-from aqualog.detect.rivals.slope_kalman import SLOPE_KALMAN
-from aqualog.detect.rivals.slope_rls import SLOPE_RLS
+from aqualog.detect.rivals.slope_line import SLOPE_KALMAN, SLOPE_RLS
 from aqualog.detect.rivals.wheel_oscillation import WHEEL_OSCILLATION
 from aqualog.detect.rivals.wheel_thresholds import WHEEL_THRESHOLDS
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP

@@ -15,7 +15,7 @@ from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.settings import JointCusumParams
+from aqualog.detect.detector import JointCusumParams
 from aqualog.evaluate.labels import TRUTH_STEMS, Label, Labels, Span, after, spans_of, truth_labels, until
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions

@@ -9,8 +9,7 @@ import numpy as np
 
 from aqualog.core.records import DriveResult, Event, FloatArray
 from aqualog.detect.registry import DETECTORS
-from aqualog.detect.rivals.run import RivalResult, run_rivals
-from aqualog.detect.stream import Settings, detect_drive
+from aqualog.detect.stream import RivalResult, Settings, detect_drive, run_rivals
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
 from aqualog.evaluate.labels import Labels, Span, joined, overlaps, without

@@ -9,8 +9,9 @@ from pathlib import Path
 from aqualog.align.load import LoadedLong
 from aqualog.core.records import DriveResult
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.long import detect_long
 from aqualog.detect.slip_slope.watch import Memory
-from aqualog.detect.stream import Settings, detect_long
+from aqualog.detect.stream import Settings
 from aqualog.face.paths import write_whole
 from aqualog.guard.reading import unfinished
 

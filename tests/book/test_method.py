@@ -8,8 +8,8 @@ from aqualog.align import freezes, glitches
 from aqualog.calibrate import design, online
 from aqualog.campaign import full_speed, samples
 from aqualog.detect import braking, joint_criteria, minor_spin_down, other_surface, resistance, spin, tie_rod
+from aqualog.detect.detector import JointCusumParams
 from aqualog.detect.registry import DETECTORS, RIVALS
-from aqualog.detect.settings import JointCusumParams
 from aqualog.detect.slip_slope import activation, direct, drop, history, watch
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.detect.thresholds import DEFAULT

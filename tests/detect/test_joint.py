@@ -9,12 +9,11 @@ import pytest
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
 from aqualog.detect import joint_criteria, joint_cusum, other_surface
-from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.detector import JointCusumParams, Scene, Settings, Setup
 from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, JOINT_CRITERIA, MAY_BE_WATER
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
-from aqualog.detect.settings import JointCusumParams, Settings
 from tests.drives import CAR
 
 DT = 0.01

@@ -12,8 +12,8 @@ from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect import plausibility
-from aqualog.detect.extremes import Extremes
-from aqualog.detect.stream import detect_drive, detect_long
+from aqualog.detect.long import Extremes, detect_long
+from aqualog.detect.stream import detect_drive
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages

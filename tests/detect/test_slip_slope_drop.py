@@ -18,8 +18,7 @@ from aqualog.core.records import SlopeSummary
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import drop
 from aqualog.detect.slip_slope.history import History, Period, reference, remembered
-from aqualog.detect.slip_slope.remarks import remarks
-from aqualog.detect.slip_slope.watch import Memory, pairs
+from aqualog.detect.slip_slope.watch import Memory, pairs, remarks
 from aqualog.detect.stream import DriveStream, detect_drive
 from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from aqualog.detect.slip_slope import ekf, estimator, observability
+from aqualog.detect.slip_slope import ekf, estimator
 from aqualog.detect.slip_slope.ekf import Belief
 from aqualog.detect.slip_slope.estimator import cusum_input
 from aqualog.detect.slip_slope.tuning import TUNING, Params
@@ -188,18 +188,18 @@ def test_a_window_tells_as_much_as_least_squares():
     n, dt, k, beta, r = 3000, 0.01, 1 / 28, 1.3, 1.4e-7
     a = 0.05 + 0.03 * np.sin(np.arange(n) * 0.01) + rng.normal(0, 0.01, n)
     b = 0.03 + 0.5 * a + rng.normal(0, 0.02, n)
-    window = observability.EMPTY
+    window = ekf.EMPTY
     for one in zip(a, b, strict=True):
-        window = observability.step(window, 1.0, dt, *one)
+        window = ekf.window_step(window, 1.0, dt, *one)
     assert window == pytest.approx(
         (n * dt, a.mean(), b.mean(), a.var(), np.cov(a, b, bias=True)[0, 1], b.var()), rel=1e-9
     )
     H = np.column_stack([a - beta * b, -b * k, np.ones(n)])
     _, P = batch(H, np.zeros(n), np.zeros(3), 1e12 * np.eye(3), r / dt)
-    assert observability.sd_beta(window, k, beta, r) == pytest.approx(np.sqrt(P[1, 1]), rel=1e-4)
+    assert ekf.sd_beta(window, k, beta, r) == pytest.approx(np.sqrt(P[1, 1]), rel=1e-4)
     # that of the slope takes the ratio as known
     _, P = batch(H[:, [0, 2]], np.zeros(n), np.zeros(2), 1e12 * np.eye(2), r / dt)
-    assert observability.sd_slope(window, beta, r) == pytest.approx(np.sqrt(P[0, 0]), rel=1e-4)
+    assert ekf.sd_slope(window, beta, r) == pytest.approx(np.sqrt(P[0, 0]), rel=1e-4)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.002])
@@ -209,9 +209,9 @@ def test_the_window_forgets(dt):
     n = round(30.0 / dt)
     rng = np.random.default_rng(7)
     a, b = rng.normal(0.1, 0.05, (2, n))
-    window = observability.EMPTY
+    window = ekf.EMPTY
     for one in zip(a, b, strict=True):
-        window = observability.step(window, math.exp(-dt / tau), dt, *one)
+        window = ekf.window_step(window, math.exp(-dt / tau), dt, *one)
     weights = np.exp(-np.arange(n)[::-1] * dt / tau)
     share = weights / weights.sum()
     mean_a, mean_b = share @ a, share @ b
@@ -224,15 +224,15 @@ def test_the_window_forgets(dt):
 
 def test_nothing_told_is_infinite_doubt():
     """E10: constant traction leaves the slope open, a fixed split the ratio."""
-    window = observability.EMPTY
+    window = ekf.EMPTY
     for _ in range(1000):
-        window = observability.step(window, 0.9995, DT, 0.08, 0.03)
-    assert observability.sd_slope(window, 1.0, TUNING.r) > 100.0
-    window = observability.EMPTY
+        window = ekf.window_step(window, 0.9995, DT, 0.08, 0.03)
+    assert ekf.sd_slope(window, 1.0, TUNING.r) > 100.0
+    window = ekf.EMPTY
     for a in 0.08 + 0.05 * np.sin(np.arange(3000) * 0.01):
-        window = observability.step(window, 0.9995, DT, a, 0.4 * a)
-    assert observability.sd_slope(window, 1.0, TUNING.r) < 0.01
-    assert observability.sd_beta(window, 1 / 30, 1.0, TUNING.r) > 100.0
+        window = ekf.window_step(window, 0.9995, DT, a, 0.4 * a)
+    assert ekf.sd_slope(window, 1.0, TUNING.r) < 0.01
+    assert ekf.sd_beta(window, 1 / 30, 1.0, TUNING.r) > 100.0
 
 
 def test_agrees_with_plain_loops():

@@ -7,9 +7,8 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import SlopeSummary
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import estimator
-from aqualog.detect.slip_slope.remarks import remarks
 from aqualog.detect.slip_slope.tuning import TUNING, Params
-from aqualog.detect.slip_slope.watch import TAU_SMOOTH, SlipSlopeWatch, pairs
+from aqualog.detect.slip_slope.watch import TAU_SMOOTH, SlipSlopeWatch, pairs, remarks
 from aqualog.features.smoothing import UNSET, lowpass
 
 DT = 0.01

@@ -10,9 +10,9 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray, Track
-from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.detector import Detector, Scene, Setup
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
-from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
+from aqualog.detect.rivals.rival import WholeDrive, alarm_bits, needs_wheels
 from aqualog.features.smoothing import fading_lowpass, gain
 
 __all__ = ["FRONT_REAR_PATTERN", "THRESHOLD", "at_the_rear", "dips"]
@@ -140,11 +140,13 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     return tuple(tracks)
 
 
-FRONT_REAR_PATTERN = rival(
-    "front_rear_pattern",
-    "front-rear comparison over the same spot",
-    "dips of a front wheel beyond a stored reference that the rear wheel does not repeat over the same spot",
-    run,
+FRONT_REAR_PATTERN = Detector(
+    name="front_rear_pattern",
+    title="front-rear comparison over the same spot",
+    meaning="dips of a front wheel beyond a stored reference that the rear wheel does not repeat over the same spot",
+    statistic="statistic",
+    start=partial(WholeDrive, run=run),
+    kind="rival",
     reference="[33], [34]",
     unit="-",
     threshold=THRESHOLD,

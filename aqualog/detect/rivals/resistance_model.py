@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 
 import numpy as np
 
 from aqualog.core.records import Track
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.detector import Needs, Scene, Setup, any_wheel, missing_balance, too_slow
+from aqualog.detect.detector import Detector, Needs, Scene, Setup, any_wheel, missing_balance, too_slow
 from aqualog.detect.resistance import RESISTANCE
-from aqualog.detect.rivals.rival import MIN_RATE, alarm_bits, rival
+from aqualog.detect.rivals.rival import MIN_RATE, WholeDrive, alarm_bits
 from aqualog.features.smoothing import UNSET, fading_lowpass, lowpass
 from aqualog.physics.load import G
 
@@ -50,11 +51,13 @@ def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     return Needs((*missing_balance(vehicle, have), *too_slow(rate_hz, MIN_RATE)))
 
 
-RESISTANCE_MODEL = rival(
-    "resistance_model",
-    "resistance from a longitudinal model",
-    "what holds the car back beyond nominal rolling, air and grade is water that the tyres displace",
-    run,
+RESISTANCE_MODEL = Detector(
+    name="resistance_model",
+    title="resistance from a longitudinal model",
+    meaning="what holds the car back beyond nominal rolling, air and grade is water that the tyres displace",
+    statistic="statistic",
+    start=partial(WholeDrive, run=run),
+    kind="rival",
     reference="[36]",
     unit="m/s^2",
     threshold=THRESHOLD,

@@ -10,8 +10,7 @@ on the same drives and on 120 passes over a watered lane. The rule covers no ker
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
-from functools import partial
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -20,57 +19,27 @@ from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import (
-    Detector,
     Found,
     Needs,
     Output,
     Scene,
     Setup,
-    always_partial,
     missing_torques,
     missing_wheels,
     too_slow,
 )
 from aqualog.physics.slip import slip_of_wheel_speed
 
-__all__ = ["MIN_RATE", "alarm_bits", "needs_slip", "needs_wheels", "rival"]
+__all__ = ["MIN_RATE", "WholeDrive", "alarm_bits", "needs_slip", "needs_wheels"]
 
 MIN_RATE = 5.0  # [Hz] as of the spin detectors: a full spin-down lasts half a second and more
 
 
-def rival(
-    name: str,
-    title: str,
-    idea: str,
-    run: Callable[[Scene, Setup], tuple[Track, ...]],
-    *,
-    reference: str,
-    unit: str,
-    threshold: float,
-    needs: Callable[[Vehicle, Collection[str], float], Needs],
-    counterpart: Detector,
-    severity: Callable[[Mapping[str, Any]], str] = always_partial,
-) -> Detector:
-    """Return the description of a rival.
+class WholeDrive:
+    """A rival on one drive, which is one piece: its methods look at the past as a whole.
 
-    Parameters
-    ----------
-    name, title, reference, unit, threshold, needs, counterpart, severity
-        As of `Detector`.
-    idea : str
-        In one sentence.
-    run : callable
-        (whole drive, setup) -> tracks.
+    `run`: (whole drive, setup) -> tracks.
     """
-    return Detector(
-        name=name, title=title, unit=unit, meaning=idea, statistic="statistic", threshold=threshold, needs=needs,
-        start=partial(_WholeDrive, run=run), kind="rival", severity=severity, reference=reference,
-        counterpart=counterpart,
-    )  # fmt: skip
-
-
-class _WholeDrive:
-    """A rival on one drive, which is one piece: its methods look at the past as a whole."""
 
     def __init__(self, setup: Setup, *, run: Callable[[Scene, Setup], tuple[Track, ...]]) -> None:
         self._setup = setup
@@ -86,17 +55,12 @@ def _evidence(scene: Scene, track: Track) -> dict[str, Any]:
     evidence: dict[str, Any] = {"v_x": ("first", f["v_x_hat"]), "statistic_max": ("max", track.statistic)}
     if track.wheel is not None:
         slip = slip_of_wheel_speed(f[f"v_w_{track.wheel}"], f["v_x_hat"])
-        evidence |= {
-            "slip_min": ("min", slip),
-            "slip_max": ("max", slip),
-            "braking": ("any", scene.braking[track.wheel]),
-        }
+        braking = ("any", scene.braking[track.wheel])
+        evidence |= {"slip_min": ("min", slip), "slip_max": ("max", slip), "braking": braking}
     return evidence
 
 
-def needs_wheels(
-    vehicle: Vehicle, have: Collection[str], rate_hz: float, *, least: float = MIN_RATE
-) -> Needs:  # fmt: skip
+def needs_wheels(vehicle: Vehicle, have: Collection[str], rate_hz: float, *, least: float = MIN_RATE) -> Needs:
     """Wheel speeds of all wheels at a rate. [Hz]"""
     return Needs((*missing_wheels(have), *too_slow(rate_hz, least)))
 

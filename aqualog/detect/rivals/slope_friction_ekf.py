@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from aqualog.core.compiled import compiled, inlined
 from aqualog.core.records import BoolArray, FloatArray, Track
-from aqualog.detect.detector import Scene, Setup
-from aqualog.detect.rivals.rival import alarm_bits, needs_slip, rival
+from aqualog.detect.detector import Detector, Scene, Setup
+from aqualog.detect.rivals.rival import WholeDrive, alarm_bits, needs_slip
 from aqualog.detect.rivals.slope_inputs import PATIENCE, driven_wheels, reference_slope
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.features.smoothing import gain
@@ -173,11 +174,13 @@ def _severity(evidence: Mapping[str, Any]) -> str:
     return "full" if evidence.get("statistic_max", 0.0) > 1.0 - MU_FULL else "partial"
 
 
-SLOPE_FRICTION_EKF = rival(
-    "slope_friction_ekf",
-    "slip slope and friction by extended Kalman filter",
-    "slope and maximum friction of a bent tyre curve, estimated together",
-    run,
+SLOPE_FRICTION_EKF = Detector(
+    name="slope_friction_ekf",
+    title="slip slope and friction by extended Kalman filter",
+    meaning="slope and maximum friction of a bent tyre curve, estimated together",
+    statistic="statistic",
+    start=partial(WholeDrive, run=run),
+    kind="rival",
     reference="[16]",
     unit="-",
     threshold=THRESHOLD,

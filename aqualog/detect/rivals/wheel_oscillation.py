@@ -11,9 +11,9 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
-from aqualog.detect.detector import Scene, Setup
+from aqualog.detect.detector import Detector, Scene, Setup
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
-from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
+from aqualog.detect.rivals.rival import WholeDrive, alarm_bits, needs_wheels
 from aqualog.features.smoothing import gain
 
 __all__ = ["THRESHOLD", "WHEEL_OSCILLATION", "BandParams", "level_change"]
@@ -130,11 +130,13 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     return tuple(tracks)
 
 
-WHEEL_OSCILLATION = rival(
-    "wheel_oscillation",
-    "high-frequency oscillation of the wheel",
-    "the wheel's rotational oscillation in a high band changes with the length of its contact",
-    run,
+WHEEL_OSCILLATION = Detector(
+    name="wheel_oscillation",
+    title="high-frequency oscillation of the wheel",
+    meaning="the wheel's rotational oscillation in a high band changes with the length of its contact",
+    statistic="statistic",
+    start=partial(WholeDrive, run=run),
+    kind="rival",
     reference="[35]",
     unit="dB",
     threshold=THRESHOLD,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,8 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Track
-from aqualog.detect.detector import Scene, Setup
-from aqualog.detect.rivals.rival import alarm_bits, needs_wheels, rival
+from aqualog.detect.detector import Detector, Scene, Setup
+from aqualog.detect.rivals.rival import WholeDrive, alarm_bits, needs_wheels
 from aqualog.detect.spin import SLIP_FULL, SPIN_DOWN
 from aqualog.features.smoothing import UNSET, derivative
 from aqualog.features.stream import TAU_WHEEL
@@ -93,11 +94,13 @@ def _severity(evidence: Mapping[str, Any]) -> str:
     return "full" if lost and not evidence.get("braking", False) else "partial"
 
 
-WHEEL_THRESHOLDS = rival(
-    "wheel_thresholds",
-    "thresholds on wheel deceleration and slip",
-    "a wheel that decelerates and slips beyond critical levels, higher ones under braking, spins down",
-    run,
+WHEEL_THRESHOLDS = Detector(
+    name="wheel_thresholds",
+    title="thresholds on wheel deceleration and slip",
+    meaning="a wheel that decelerates and slips beyond critical levels, higher ones under braking, spins down",
+    statistic="statistic",
+    start=partial(WholeDrive, run=run),
+    kind="rival",
     reference="[32]",
     unit="-",
     threshold=THRESHOLD,

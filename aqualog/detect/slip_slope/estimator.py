@@ -11,9 +11,8 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect import cusum
-from aqualog.detect.slip_slope import ekf, observability
-from aqualog.detect.slip_slope.ekf import Belief
-from aqualog.detect.slip_slope.observability import Window
+from aqualog.detect.slip_slope import ekf
+from aqualog.detect.slip_slope.ekf import Belief, Window
 from aqualog.detect.slip_slope.tuning import Params, Tuning
 
 __all__ = ["STATUS", "Estimate", "State", "cusum_input", "initial_state", "scan"]
@@ -85,7 +84,7 @@ def initial_state(tuning: Tuning, *, slope: float, beta: float = 1.0) -> State:
     sd_k = tuning.sd_k * k / K_USUAL
     belief = Belief(k, beta, 0.0, sd_k**2, 0.0, 0.0, tuning.sd_beta**2, 0.0, tuning.sd_delta**2)
     before = Before(belief.k, belief.delta, belief.P_dd)
-    return State(belief, observability.EMPTY, 0.0, 0.0, before, before, before, 0)
+    return State(belief, ekf.EMPTY, 0.0, 0.0, before, before, before, 0)
 
 
 @compiled
@@ -179,10 +178,10 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
             elif abs(y[i] - b.delta) > p.s_max:
                 status = SPINNING
             else:
-                window = observability.step(window, p.keep, p.dt, mu_i[i], rho_mu_j[i])
+                window = ekf.window_step(window, p.keep, p.dt, mu_i[i], rho_mu_j[i])
                 has_traction = abs(mu_delta) >= p.mu_min and abs(y[i] - b.delta) >= p.s_min
-                k_told = observability.sd_slope(window, b.beta, p.r_density) < p.told_k * b.k
-                beta_told = observability.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
+                k_told = ekf.sd_slope(window, b.beta, p.r_density) < p.told_k * b.k
+                beta_told = ekf.sd_beta(window, b.k, b.beta, p.r_density) < p.told_beta
                 status = BLIND if not has_traction else (ESTIMATING if k_told else FROZEN)
                 # while evidence of a change gathers, and for a while after it, the offset rests
                 learn_delta = settling < 0 or (settling == 0 and max(g_drop, g_rise) < p.h_rest)
@@ -232,7 +231,7 @@ def _scan(p, sums, state, y, mu_i, rho_mu_j, is_active, out):  # type: ignore[no
         if status > BLIND:
             # radii go on drifting while nothing can be seen of them
             b = ekf.predict(b, 0.0, 0.0, p.q_delta)
-            window = observability.aged(window, p.keep)
+            window = ekf.window_aged(window, p.keep)
             g_drop, g_rise = _faded(p, g_drop), _faded(p, g_rise)
         out[0, i] = 1.0 / b.k
         out[1, i] = math.sqrt(b.P_kk) / (b.k * b.k)

@@ -8,8 +8,7 @@ import pytest
 from aqualog.detect.rivals import (
     front_rear_pattern,
     slope_friction_ekf,
-    slope_kalman,
-    slope_rls,
+    slope_line,
     wheel_oscillation,
     wheel_thresholds,
 )
@@ -153,8 +152,8 @@ def test_band_passes_its_centre_and_stops_the_rest(rate):
 
 def test_least_squares_recursion():
     s, mu, is_active, _ = slip_and_traction()
-    p = slope_rls.RlsParams.make(DT)
-    slope, offset = slope_rls.scan(p, s, mu, is_active, slope=25.0)
+    p = slope_line.RlsParams.make(DT)
+    slope, offset = slope_line.scan_rls(p, s, mu, is_active, slope=25.0)
     x, P, want = np.array([1.0 / 25.0, 0.0]), np.array([p.P_k, p.P_delta]), []
     keep = np.array([p.keep_k, p.keep_delta])
     for y, m, on in zip(s, mu, is_active, strict=True):
@@ -173,8 +172,8 @@ def test_least_squares_recursion():
 @pytest.mark.parametrize("order", [1, -1], ids=["softer", "stiffer"])
 def test_kalman_recursion(order):
     s, mu, is_active, _ = (x[::order] for x in slip_and_traction())
-    p = slope_kalman.KalmanParams.make(DT)
-    slope, offset, alarm = slope_kalman.scan(p, s, mu, is_active, slope=25.0)
+    p = slope_line.KalmanParams.make(DT)
+    slope, offset, alarm = slope_line.scan_kalman(p, s, mu, is_active, slope=25.0)
     x, P = np.array([1.0 / 25.0, 0.0]), np.diag([p.P_k, p.P_delta])
     up = down = 0.0
     want, alarms = [], []
@@ -278,8 +277,8 @@ def test_slopes_follow_the_road():
     s, mu, _, C = slip_and_traction()
     on = np.ones(s.size, dtype=bool)
     found = {
-        "rls": slope_rls.scan(slope_rls.RlsParams.make(DT), s, mu, on, slope=30.0)[0],
-        "kalman": slope_kalman.scan(slope_kalman.KalmanParams.make(DT), s, mu, on, slope=30.0)[0],
+        "rls": slope_line.scan_rls(slope_line.RlsParams.make(DT), s, mu, on, slope=30.0)[0],
+        "kalman": slope_line.scan_kalman(slope_line.KalmanParams.make(DT), s, mu, on, slope=30.0)[0],
         "ekf": slope_friction_ekf.scan(slope_friction_ekf.CurveParams.make(DT), s, mu, on, slope=30.0, mu_max=1.0)[0],
     }
     for name, slope in found.items():

@@ -9,7 +9,7 @@ import pytest
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import RIVALS
-from aqualog.detect.rivals.run import run_rivals
+from aqualog.detect.stream import run_rivals
 from tests.drives import AWD, CAR, FWD, drive, lane
 from tests.straight_drive import RWD
 from tests.straight_drive import drive as straight
