@@ -5,7 +5,7 @@ difference.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -167,21 +167,18 @@ class SpinWatch:
         f = scene.f
         found = []
         for wheel in (w for w in scene.wheels if w in self._wheels):
-            g, bits, self._states[wheel] = scan(
-                self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
-                self._allowed(scene, wheel),
-            )  # fmt: skip
             # only a spinning driven wheel has the water's resistance booked on it
             mu = traction(f, wheel) if self._is_up else f.get(f"mu_{wheel}")
+            allowed = np.ones(scene.size, dtype=bool)
+            if self._is_up and mu is not None:
+                with np.errstate(invalid="ignore"):
+                    allowed = mu < MU_SPIN_UP
+            g, bits, self._states[wheel] = scan(
+                self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
+                allowed,
+            )  # fmt: skip
             found.append(Found(self._setup.track(g, bits, wheel=wheel), wheel_evidence(scene, wheel, mu)))
         return Output(tuple(found))
-
-    def _allowed(self, scene: Scene, wheel: str) -> BoolArray:
-        mu = traction(scene.f, wheel) if self._is_up else None
-        if mu is None:
-            return np.ones(scene.size, dtype=bool)
-        with np.errstate(invalid="ignore"):
-            return mu < MU_SPIN_UP
 
 
 def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:
@@ -215,15 +212,6 @@ def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     )
 
 
-def _severity_down(evidence: Mapping[str, Any]) -> str:
-    return "full" if evidence.get("slip_min", 0.0) < SLIP_FULL else "partial"
-
-
-def _severity_up(evidence: Mapping[str, Any]) -> str:
-    """Apply thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is unknown."""
-    return "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial"
-
-
 SPIN_DOWN = Detector(
     name="spin_down",
     title="Spin-down",
@@ -233,7 +221,7 @@ SPIN_DOWN = Detector(
     threshold=THRESHOLD,
     needs=_needs_down,
     start=partial(SpinWatch, sign=-1.0),
-    severity=_severity_down,
+    severity=lambda evidence: "full" if evidence.get("slip_min", 0.0) < SLIP_FULL else "partial",
 )
 SPIN_UP = Detector(
     name="spin_up",
@@ -244,5 +232,6 @@ SPIN_UP = Detector(
     threshold=THRESHOLD,
     needs=_needs_up,
     start=partial(SpinWatch, sign=1.0),
-    severity=_severity_up,
+    # thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is unknown
+    severity=lambda evidence: "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial",
 )

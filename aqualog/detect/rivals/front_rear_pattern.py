@@ -92,10 +92,6 @@ def at_the_rear(front: FloatArray, v_x: FloatArray, *, wheelbase: float, dt: flo
     return np.interp(way - wheelbase, way, front, left=np.nan) if way.size else front
 
 
-def _later(x: FloatArray, samples: int) -> FloatArray:
-    return np.concatenate([np.full(min(samples, x.size), np.nan), x[:-samples]])
-
-
 def _widened(x: FloatArray, samples: int) -> FloatArray:
     """Return the largest value of the last 2 samples + 1; NaN where the newest is NaN."""
     largest = x.copy()
@@ -124,9 +120,8 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
             share = {
                 w: np.where(usable, (f[f"v_w_delta_{w}"] - f["v_w_delta_common"]) / v_x, np.nan) for w in SIDES[side]
             }
-        there = _later(
-            at_the_rear(dips(share[front], dt=setup.dt), v_x, wheelbase=setup.vehicle.wheelbase, dt=setup.dt), late
-        )
+        there = at_the_rear(dips(share[front], dt=setup.dt), v_x, wheelbase=setup.vehicle.wheelbase, dt=setup.dt)
+        there = np.concatenate([np.full(min(late, there.size), np.nan), there[:-late]])
         here = _widened(dips(share[rear], dt=setup.dt), late)
         both = there + here  # a power needs both wheels
         power_f, power_r = (

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from functools import partial
 
 import numpy as np
 
 from aqualog.core.records import Track
-from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import Detector, Needs, Scene, Setup, any_wheel, missing_balance, too_slow
 from aqualog.detect.resistance import RESISTANCE
 from aqualog.detect.rivals.rival import MIN_RATE, WholeDrive, alarm_bits
@@ -47,10 +45,6 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     return (setup.track(statistic, bits),)
 
 
-def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
-    return Needs((*missing_balance(vehicle, have), *too_slow(rate_hz, MIN_RATE)))
-
-
 RESISTANCE_MODEL = Detector(
     name="resistance_model",
     title="resistance from a longitudinal model",
@@ -61,6 +55,6 @@ RESISTANCE_MODEL = Detector(
     reference="[36]",
     unit="m/s^2",
     threshold=THRESHOLD,
-    needs=_needs,
+    needs=lambda car, have, rate: Needs((*missing_balance(car, have), *too_slow(rate, MIN_RATE))),
     counterpart=RESISTANCE,
 )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -169,11 +168,6 @@ def run(r: Scene, setup: Setup) -> tuple[Track, ...]:
     return tuple(tracks)
 
 
-def _severity(evidence: Mapping[str, Any]) -> str:
-    """Return full where nine tenths are lost: less friction than wet ice has."""
-    return "full" if evidence.get("statistic_max", 0.0) > 1.0 - MU_FULL else "partial"
-
-
 SLOPE_FRICTION_EKF = Detector(
     name="slope_friction_ekf",
     title="slip slope and friction by extended Kalman filter",
@@ -186,5 +180,6 @@ SLOPE_FRICTION_EKF = Detector(
     threshold=THRESHOLD,
     needs=needs_slip,
     counterpart=SLIP_SLOPE_DROP,
-    severity=_severity,
+    # full where nine tenths are lost: less friction than wet ice has
+    severity=lambda evidence: "full" if evidence.get("statistic_max", 0.0) > 1.0 - MU_FULL else "partial",
 )

@@ -63,7 +63,11 @@ def driven_wheels(r: Scene, setup: Setup) -> tuple[Driven, ...]:
     """
     f, car, dt = r.f, setup.vehicle, setup.dt
     free = [w for w in WHEELS if w not in car.driven]
-    v_free, a_free = _faster(r, free) if free else (_in_time(r, dt), np.zeros(f["v_x_hat"].size))
+    if free:
+        v_free, a_free = _faster(r, free)
+    else:  # the velocity without the lag of its reference, v(t) = v(t - lag) + lag a
+        v_free = f["v_x_hat"] + velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=dt) * f["a_kin_slow"]
+        a_free = np.zeros(v_free.size)
     limits = LIMITS if free else LIMITS._replace(a_x_max=A_X_MAX_LATE)
     found = []
     for wheel in car.driven:
@@ -104,12 +108,6 @@ def _faster(r: Scene, free: list[str]) -> tuple[FloatArray, FloatArray]:
     v = np.where(first, f[f"v_line_{one}"], f[f"v_line_{other}"])
     a_w = np.where(first, f[f"a_w_delta_{one}"], f[f"a_w_delta_{other}"])
     return v, np.abs(a_w)
-
-
-def _in_time(r: Scene, dt: float) -> FloatArray:
-    """Return the velocity without the lag of its reference, v(t) = v(t - lag) + lag a."""
-    lag = velocity_lag(r.columns["v_x"], r.columns["a_x"], dt=dt)
-    return r.f["v_x_hat"] + lag * r.f["a_kin_slow"]
 
 
 def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArray:

@@ -118,17 +118,19 @@ def slip_slopes(
     reference = None
     if way.method == "velocity":
         reference = reference_of(smoothed(columns["v_x"], width), smooth, vehicle, signals.dt, delay)
-    places = tuple(
-        _estimate(
-            place, smooth, reference, braking, vehicle, dt=signals.dt, width=width, mu_max=mu_max,
-            positive_only=way.traction == "accelerometer" and "brake_pressure" not in present,
-        )
-        for place in _places(vehicle, way.method)
-    )  # fmt: skip
+    positive_only = way.traction == "accelerometer" and "brake_pressure" not in present
+    drive = _Drive(smooth, reference, braking, vehicle, signals.dt, width, mu_max, positive_only)
+    places = tuple(_estimate(place, drive) for place in _places(vehicle, way.method))
     recursions: tuple[Recursion, ...] = ()
     if way.method == "differential":
         recursions = tuple(
-            _watched(SlipSlopeWatch(vehicle, pair, signals.dt), smooth, braking, signals.dt)
+            # for a car with two driven axles, as the detector does
+            _course(
+                SlipSlopeWatch(vehicle, pair, signals.dt).push(smooth, braking, smooth["yaw_rate_slow"]).estimate,
+                pair.place,
+                pair.wheel,
+                signals.dt,
+            )
             for pair in (*pairs(vehicle), *pairs(vehicle, per_axle=True))
         )
     refuse(places, recursions, where, signals.frame.height * signals.dt)
@@ -153,6 +155,19 @@ def _places(vehicle: Vehicle, method: Method) -> list[Place]:
 # --- estimates -----------------------------------------------------------------------------------------------------
 
 
+class _Drive(NamedTuple):
+    """What all places of a drive share; `f` smooth features, `width` of the smoothing in samples."""
+
+    f: Mapping[str, FloatArray]
+    reference: Reference | None
+    braking: Mapping[str, BoolArray]
+    vehicle: Vehicle
+    dt: float
+    width: int
+    mu_max: float
+    positive_only: bool  # without brakes in the log only a car that is driven is surely not braked
+
+
 class _Samples(NamedTuple):
     mu: FloatArray  # (n,) of the drive
     slip: FloatArray
@@ -164,26 +179,16 @@ class _Samples(NamedTuple):
     late: Late | None
 
 
-def _estimate(
-    place: Place,
-    f: Mapping[str, FloatArray],
-    reference: Reference | None,
-    braking: Mapping[str, BoolArray],
-    vehicle: Vehicle,
-    *,
-    dt: float,
-    width: int,
-    mu_max: float,
-    positive_only: bool,
-) -> PlaceSlope:
+def _estimate(place: Place, drive: _Drive) -> PlaceSlope:
+    reference, dt = drive.reference, drive.dt
     shift = 0.0 if reference is None or reference.delay is None else reference.delay
     doubt = ("", "")
     for _ in range(ROUNDS):
-        v_x = None if reference is None else earlier(reference.v_x, shift, dt)
-        s = _samples(
-            place, f, v_x, reference, braking, vehicle, dt=dt, width=width, mu_max=mu_max, positive_only=positive_only
-        )
-        line, noise = _line(s, width)
+        s = _samples(place, drive, None if reference is None else earlier(reference.v_x, shift, dt))
+        # a delay goes into this k and into the fast changes of the slip alike, so the noise does not depend on it
+        k = fit_line(s.x, s.y, s.label).k
+        noise = noise_of_traction(s.mu, s.slip, s.reason == 0, apart=drive.width, k=k)
+        line = fit_line(s.x, s.y, s.label, noise=noise, late=s.late)
         doubt = doubt if doubt[0] else (line.reason or _ASTRAY, line.hint or _ALIGN)
         rest = line.delay
         if not _goes_on(line, shift):
@@ -216,7 +221,7 @@ def _estimate(
         lag_s=lag_of_slip(s.mu, slip, is_used, dt) if line.told else math.nan,
         segments=segments,
         stability=judge_stability(s.t, s.x, y, s.label, whole=line, segments=segments, noise=noise, late=late),
-        recursion=_recursion(place, line, s.mu, slip, is_used, vehicle, dt),
+        recursion=_recursion(place, line, s.mu, slip, is_used, drive),
         left_out={name: float(n * dt) for name, n in zip(LEFT_OUT, counts[1:], strict=True)},
         t=s.t,
         mu=s.x,
@@ -224,21 +229,12 @@ def _estimate(
     )
 
 
-def _samples(
-    place: Place,
-    f: Mapping[str, FloatArray],
-    v_x: FloatArray | None,
-    reference: Reference | None,
-    braking: Mapping[str, BoolArray],
-    vehicle: Vehicle,
-    *,
-    dt: float,
-    width: int,
-    mu_max: float,
-    positive_only: bool,
-) -> _Samples:
-    mu, slip = mean_of(f, "mu", place.i), slip_of(place, f, v_x, vehicle)
-    reason = left_out(place, f, mu, slip, braking, width=width, mu_max=mu_max, positive_only=positive_only)
+def _samples(place: Place, drive: _Drive, v_x: FloatArray | None) -> _Samples:
+    f, reference, dt = drive.f, drive.reference, drive.dt
+    mu, slip = mean_of(f, "mu", place.i), slip_of(place, f, v_x, drive.vehicle)
+    reason = left_out(
+        place, f, mu, slip, drive.braking, width=drive.width, mu_max=drive.mu_max, positive_only=drive.positive_only
+    )
     is_open = reference is not None and reference.delay is None
     if reference is not None and is_open:
         reason[(reason == 0) & np.isnan(reference.a_over_v)] = 1 + LEFT_OUT.index(BESIDE)
@@ -246,14 +242,6 @@ def _samples(
     t = dt * which.astype(np.float64)
     late = Late(reference.a_over_v[which], reference.noise[which]) if reference is not None and is_open else None
     return _Samples(mu, slip, reason, block_labels(t), t, mu[which], slip[which], late)
-
-
-def _line(s: _Samples, width: int) -> tuple[Line, float]:
-    """Return the line, and the noise of the traction that it takes into account."""
-    # a delay goes into this k and into the fast changes of the slip alike, so the noise does not depend on it
-    first = fit_line(s.x, s.y, s.label)
-    noise = noise_of_traction(s.mu, s.slip, s.reason == 0, apart=width, k=first.k)
-    return fit_line(s.x, s.y, s.label, noise=noise, late=s.late), noise
 
 
 def _goes_on(line: Line, shift: float) -> bool:
@@ -265,7 +253,7 @@ def _goes_on(line: Line, shift: float) -> bool:
 
 
 def _recursion(
-    place: Place, line: Line, mu: FloatArray, slip: FloatArray, is_used: BoolArray, vehicle: Vehicle, dt: float
+    place: Place, line: Line, mu: FloatArray, slip: FloatArray, is_used: BoolArray, drive: _Drive
 ) -> Recursion:
     """Run the recursive estimator over the samples of the regression, with the noise of this drive.
 
@@ -277,17 +265,10 @@ def _recursion(
         zeta = max(TUNING.zeta, line.scatter)
         density = 2.0 * SMOOTHING * line.scatter**2  # twice that of white noise before the smoothing
         tuning = TUNING._replace(r=max(TUNING.r, density), zeta=zeta, h=TUNING.h / TUNING.zeta * zeta)
-    prior = vehicle.slip_slope_f if place.i[0][0] == "f" else vehicle.slip_slope_r
+    prior = drive.vehicle.slip_slope_f if place.i[0][0] == "f" else drive.vehicle.slip_slope_r
     start = estimator.initial_state(tuning, slope=prior)
-    estimate, _ = estimator.scan(Params.make(tuning, dt), start, slip, mu, np.zeros_like(mu), is_used)
-    return _course(estimate, place.name, place.i[0] if len(place.i) == 1 else None, dt)
-
-
-def _watched(
-    watch: SlipSlopeWatch, f: Mapping[str, FloatArray], braking: Mapping[str, BoolArray], dt: float
-) -> Recursion:
-    """Run the estimator for a car with two driven axles, as the detector does."""
-    return _course(watch.push(f, braking, f["yaw_rate_slow"]).estimate, watch.pair.place, watch.pair.wheel, dt)
+    estimate, _ = estimator.scan(Params.make(tuning, drive.dt), start, slip, mu, np.zeros_like(mu), is_used)
+    return _course(estimate, place.name, place.i[0] if len(place.i) == 1 else None, drive.dt)
 
 
 def _course(estimate: Estimate, place: str, wheel: str | None, dt: float) -> Recursion:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -149,7 +149,13 @@ class SlipSlopeWatch:
         mu_i = self._smooth("mu_i", _mean(f, "mu", i))
         # a free wheel's own rolling resistance is a slip that never changes: it goes to the offset
         rho_mu_j = self._smooth("mu_j", (1.0 - slip) * _mean(f, "mu", j)) if self._two_driven else 0.0 * mu_i
-        rates = [self._rate(f"mu_rate_{w}", f[f"mu_{w}"]) for w in ((*i, *j) if self._two_driven else i)]
+        rates = []
+        for w in (*i, *j) if self._two_driven else i:
+            name = f"mu_rate_{w}"
+            rate, self._smoothed[name] = derivative(
+                f[f"mu_{w}"], self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt
+            )
+            rates.append(np.nan_to_num(rate))
         reason = activation.inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=yaw_rate,
             a_w_delta=np.max([np.abs(f[f"a_w_delta_{w}"]) for w in (*i, *j)], axis=0),
@@ -161,7 +167,10 @@ class SlipSlopeWatch:
         reason = np.where(jumping & (reason == activation.ACTIVE), activation.JUMPING, reason)
         estimate, self._state = estimator.scan(self._params, self._state, s_delta, mu_i, rho_mu_j, reason == 0)
         is_valid = (estimate.status == ESTIMATING) | (estimate.status == FROZEN)
-        is_valid &= self._calm(f)
+        for wheel, state in self._variances.items():
+            _, variance, self._variances[wheel] = ewvar.scan(self._variance, state, f[f"a_w_delta_{wheel}"])
+            with np.errstate(invalid="ignore"):
+                is_valid &= ~(variance > VARIANCE_MAX)
         loss, active, refs, self._drop = drop.scan(
             self._drop_params, self._drop, estimate.slope, estimate.slope_sd, is_valid, estimate.alarm
         )
@@ -177,6 +186,7 @@ class SlipSlopeWatch:
         """Return how the drive's samples were used, and the last estimate."""
         seconds = self._counts * self._dt
         slope, sd, offset = self._last
+        source = "this drive" if self._drop.new > 0 and self._source != "history" else self._source
         return SlopeSummary(
             place=self.pair.place,
             wheel=self.pair.wheel,
@@ -190,7 +200,7 @@ class SlipSlopeWatch:
             inactive={
                 name: float(n * self._dt) for name, n in zip(activation.REASONS[1:], self._reasons[1:], strict=True)
             },
-            reference_from=self._reference_from(),
+            reference_from=source if np.isfinite(self._drop.reference) else "",
             judged_s=self._judged * self._dt,
             dropped_s=self._dropped * self._dt,
             stiff_s=self._stiff * self._dt,
@@ -200,23 +210,6 @@ class SlipSlopeWatch:
     def _smooth(self, name: str, x: FloatArray) -> FloatArray:
         y, self._smoothed[name] = lowpass(x, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
         return y
-
-    def _rate(self, name: str, mu: FloatArray) -> FloatArray:
-        rate, self._smoothed[name] = derivative(mu, self._smoothed.get(name, UNSET), tau=TAU_SMOOTH, dt=self._dt)
-        return np.nan_to_num(rate)
-
-    def _reference_from(self) -> str:
-        if not np.isfinite(self._drop.reference):
-            return ""
-        return "this drive" if self._drop.new > 0 and self._source != "history" else self._source
-
-    def _calm(self, f: Mapping[str, FloatArray]) -> BoolArray:
-        calm = np.ones(f["v_x_hat"].size, dtype=bool)
-        for wheel, state in self._variances.items():
-            _, variance, self._variances[wheel] = ewvar.scan(self._variance, state, f[f"a_w_delta_{wheel}"])
-            with np.errstate(invalid="ignore"):
-                calm &= ~(variance > VARIANCE_MAX)
-        return calm
 
     def _count(self, estimate: Estimate, reason: FloatArray, loss: FloatArray) -> None:
         judged = ~np.isnan(loss)
@@ -277,10 +270,6 @@ class DropWatch:
         return Output(tuple(found), features)
 
 
-def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
-    return Needs((*missing_wheels(have), *missing_torques(vehicle, have), *too_slow(rate_hz, MIN_RATE)))
-
-
 SLIP_SLOPE_DROP = Detector(
     name="slip_slope_drop",
     title="Slip-slope drop",
@@ -288,7 +277,9 @@ SLIP_SLOPE_DROP = Detector(
     meaning="lost share of the dry slip slope",
     statistic="share of the dry slip slope that is lost",
     threshold=THRESHOLD,
-    needs=_needs,
+    needs=lambda car, have, rate: Needs(
+        (*missing_wheels(have), *missing_torques(car, have), *too_slow(rate, MIN_RATE))
+    ),
     start=DropWatch,
     highest=1.0,
 )
