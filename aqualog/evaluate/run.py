@@ -112,7 +112,7 @@ def tune(
     """Propose thresholds on some drives and evaluate them on others; arguments as `evaluate`.
 
     Single detectors and rivals come first, then the joint ones with the single ones at their proposals. Only their
-    configuration decides which drives are tuned on (`split.split_runs`).
+    configuration decides which drives are tuned on (`sweep.split_runs`).
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Claims of section 2.5 about the joint detectors.
 
-C64-C69 are rules and C71 is an identity: `tests/detect/test_joint.py` holds them by truth table and by hand. C72-C77 are
+C64-C69 are rules and C71 is an identity: `tests/detect/test_joint_criteria.py` holds them by truth table and by hand. C72-C77 are
 judged by `aqualog figures 2.25`. Here is C70: the velocity signal only tells spin-up from spin-down, so that a coarse one
 is enough; and how C78 is judged.
 """

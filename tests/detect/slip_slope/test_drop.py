@@ -311,7 +311,7 @@ def test_history_goes_from_drive_to_drive():
 
 def test_text_and_page_of_a_drive():
     """Shares of the time in the text, the slope beside its dry value as a row of the page."""
-    samples = Path(__file__).parents[2] / "sample_logs"
+    samples = Path(__file__).parents[3] / "sample_logs"
     car = load_vehicle(samples / "vehicle.toml")
     result = detect_drive(load_signals([samples / "lane_drive.parquet"], vehicle=car), car)
     told = [line for line in event_table(result).splitlines() if line.startswith(("  rl: ", "  rr: "))]
@@ -325,7 +325,7 @@ def test_text_and_page_of_a_drive():
 
 
 def test_history_of_the_command(tmp_path):
-    samples = Path(__file__).parents[2] / "sample_logs"
+    samples = Path(__file__).parents[3] / "sample_logs"
     path = tmp_path / "slopes.json"
     save_history(path, History().with_periods("worn, 1.9 bar", "left", [Period(62.0, 60.0, 30.0)]))
     args = ["--vehicle", samples / "vehicle.toml", "--history", path, "--configuration", "worn, 1.9 bar", "--json"]
