@@ -113,7 +113,6 @@ def scan(
 
     Parameters
     ----------
-    p : OnlineParams
     state : OnlineState
         From `initial_state` or the piece before.
     x : array (n,)

@@ -68,7 +68,6 @@ def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, 
 
     Parameters
     ----------
-    p : CusumParams
     state : CusumState
         From `initial_state` or the piece before.
     x : array (n,)

@@ -169,7 +169,6 @@ class Detector:
         (vehicle, symbols of the drive, rate of the grid [Hz]) -> Needs.
     start : callable
         Setup -> Watch.
-    kind : Kind
     reads : tuple of Detector
         Those whose tracks, features or `shared` it reads: they run first.
     severity : callable

@@ -68,7 +68,6 @@ def scan(p: EwvarParams, state: EwvarState, x: FloatArray) -> tuple[FloatArray, 
 
     Parameters
     ----------
-    p : EwvarParams
     state : EwvarState
         From `initial_state` or the piece before.
     x : array (n,)

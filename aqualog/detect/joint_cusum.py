@@ -40,7 +40,6 @@ def terms(
 
     Parameters
     ----------
-    p : JointCusumParams
     tracks : sequence of (Track, bool array (n,))
         Statistic of each single detector, and where it may count (no braking force on its wheel).
     g_variance : array (n,)

@@ -90,7 +90,6 @@ def detect_long(
 
     Parameters
     ----------
-    drive : LongDrive
     vehicle, settings, memory
         As of `detect_drive`.
     faults : sequence of FileFaults

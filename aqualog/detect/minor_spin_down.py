@@ -127,8 +127,6 @@ def scan(
 
     Parameters
     ----------
-    p : MinorParams
-    state : MinorState
     a_w_delta, a_w_delta_other : array (n,)
         Acceleration differences of the watched (non-driven) wheel and of the other one on the same side. [m/s²]
     v_w_delta : array (n,)

@@ -81,8 +81,6 @@ def scan(
 
     Parameters
     ----------
-    p : OtherParams
-    state : OtherState
     x : array (n,)
         Trusted resistance measure, NaN where missing. [m/s²]
     v_x : array (n,)

@@ -52,7 +52,6 @@ class Plausibility:
     ----------
     available : collection of str
         Symbols of the drive.
-    vehicle : Vehicle
     dt : float
         [s]
     """

@@ -72,7 +72,6 @@ def check_needs(
 
     Parameters
     ----------
-    vehicle : Vehicle
     available : collection of str
         Symbols of the drive.
     rate_hz : float

@@ -122,8 +122,6 @@ def scan(
 
     Parameters
     ----------
-    p : SpinParams
-    state : SpinState
     a_w_delta : array (n,)
         Acceleration difference of wheel and vehicle. [m/s²]
     v_w_delta : array (n,)

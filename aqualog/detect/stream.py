@@ -41,12 +41,10 @@ class DriveStream:
 
     Parameters
     ----------
-    vehicle : Vehicle
     dt_ns : int
         Sample time. [ns]
     available : collection of str
         Symbols of the drive. Missing ones decide which detectors run (`unavailable`, `limited`).
-    settings : Settings
     memory : Memory, optional
         Prior knowledge of the dry slip slope.
     detectors : iterable of Detector, optional
@@ -166,9 +164,6 @@ def detect_drive(
 
     Parameters
     ----------
-    signals : Signals
-    vehicle : Vehicle
-    settings : Settings
     memory : Memory, optional
         Prior knowledge of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
     samples : bool
@@ -224,7 +219,6 @@ def run_rivals(
     ----------
     signals : Signals
         Truth and labels in it are not read.
-    vehicle : Vehicle
     thresholds : mapping name -> float, optional
         In the unit of each rival, positive; those that are not named keep their default.
     names : collection of str, optional

@@ -45,7 +45,6 @@ def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str
     ----------
     drive : Drive
         Detectors see its signals without the truth.
-    thresholds : Thresholds
     rivals : mapping name -> float, optional
         Thresholds of rivals (those not named: default); None: without rivals.
     """
@@ -197,7 +196,6 @@ def rows_of(labels: Labels, duration_s: float) -> dict[str, list[Span]]:
 
     Parameters
     ----------
-    labels : Labels
     duration_s : float
         Of the drive. [s]
     """

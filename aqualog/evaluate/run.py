@@ -78,7 +78,6 @@ def evaluate(
     Parameters
     ----------
     sources : sequence of Source
-    thresholds : Thresholds
     rivals : mapping name -> float, optional
         Thresholds of the rivals (those not named: default); None: without rivals.
     with_roc : bool

@@ -50,7 +50,6 @@ def records_at(
 
     Parameters
     ----------
-    drive : Drive
     factor : float
         Positive.
     thresholds : Thresholds

@@ -44,7 +44,6 @@ class FeatureStream:
 
     Parameters
     ----------
-    vehicle : Vehicle
     dt : float
         Sample time. [s]
     available : collection of str

@@ -213,7 +213,6 @@ def observe(
 
     Parameters
     ----------
-    p : VelocityParams
     state : VelocityState
         Not changed.
     v_ref : array (n,)

@@ -65,8 +65,6 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
 
     Parameters
     ----------
-    vehicle : Vehicle
-    course : Course
     model : Model
         Its terms act on car, road and sensors. The effect of a term on the sensors of torque, steering and velocity
         is undone before they drive the simulation: a torque that is reported late is applied earlier.

@@ -266,7 +266,6 @@ def simulate_half_car(car: HalfCar, run: HalfCarRun) -> HalfCarResult:
 
     Parameters
     ----------
-    car : HalfCar
     run : HalfCarRun
         The requested speed v0 + a_x (t - t_start) must not become negative.
 

@@ -97,7 +97,6 @@ def as_signals(simulation: Simulation, *, vehicle: Vehicle | None = None, truth:
 
     Parameters
     ----------
-    simulation : Simulation
     vehicle : Vehicle, optional
         The car as the reader of the log knows it (it decides which wheel speeds are impossible); default the
         simulated one.

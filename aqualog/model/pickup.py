@@ -119,7 +119,6 @@ def reported_speed(edges: FloatArray, at: FloatArray, *, window: float, teeth: i
         Times at which the report is made. [s]
     window : float
         Period of the reports. [s]
-    teeth : int
 
     Returns
     -------

@@ -108,7 +108,6 @@ def build_plant(
     ----------
     vehicle : Vehicle
         Car; its slip slope and friction hold for a worn summer tyre at `P_REFERENCE` and the static load.
-    front, rear : Tyre
     p_front, p_rear : float
         Inflation pressures. [Pa]
     """

@@ -49,7 +49,6 @@ def build_road(scenario: Scenario, length: float) -> Road:
 
     Parameters
     ----------
-    scenario : Scenario
     length : float
         Length to be covered, with a margin. [m]
     """

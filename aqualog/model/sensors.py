@@ -105,7 +105,6 @@ def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> lis
     ----------
     truth : Truth
         At least two points; finite.
-    sensors : Sensors
     rate_hz : float
         Rate of groups without one of their own, and of the truth. [Hz]
     seed : int

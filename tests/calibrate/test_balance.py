@@ -81,7 +81,7 @@ def test_intervals_cover_on_made_windows(n):
     inside = {name: [] for name in ("mass_per_gain", "drag_area", "rolling_resistance")}
     truth = {"mass_per_gain": MASS, "drag_area": AREA, "rolling_resistance": R_W}
     fixed = {"torque_gain": 1.0}
-    for seed in range(300 if n < 4 else 600 // n):
+    for seed in range({1: 300, 2: 150}.get(n, 600 // n)):
         samples = drives(seed, n)
         best = fit_balance(samples, fixed)
         spread = spread_of(lambda s: estimates(s, fixed), samples, drag=best.drag, air_density=RHO)

@@ -118,7 +118,7 @@ def test_thresholds_are_never_reported_on_the_drives_they_were_chosen_on(sources
     swept, judged = set(), set()
     monkeypatch.setattr(run, "records_at", lambda d, f, **k: swept.add(d.name) or records_at(d, f, **k))
     monkeypatch.setattr(run, "judge", lambda d, **k: judged.add(d.name) or judge(d, **k))
-    result = run.tune(sources, factors=(0.5, 1.0, 2.0))
+    result = run.tune(sources, factors=(0.5, 1.0))
     reported = {r.name for r in result.records}
     assert swept == set(result.tuning.tuned_on)
     assert judged == reported == set(result.tuning.reported_on)
@@ -149,6 +149,7 @@ def test_a_broken_drive_leaves_the_others(sources):
 
 
 def test_a_larger_threshold_raises_no_more_alarms(sources):
+    sources = sources[:2]
     result = run.evaluate(sources, with_roc=True, factors=(0.25, 1.0, 4.0), rivals={})
     by_name = {}
     for p in result.roc:

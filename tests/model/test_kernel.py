@@ -310,20 +310,23 @@ def test_same_scenario_same_bits_other_seed_other_contact():
     assert not np.array_equal(a["omega_fl"], c["omega_fl"])
 
 
-def neutral(effect, where=None):
-    return Term(effect, {}, where)
+# a lane, a curve, a grade and a changing speed: every effect has something to act on
+EVERYTHING = scenario(
+    AWD, speed=RAMP, lanes=(lane(1.0, 3.0),), steering=Steering(0.01, 2.0), duration_s=4.0, seed=4, load_rear=100.0,
+    grade=((0.0, 0.01),),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def base():
+    return simulate(EVERYTHING)
 
 
 @pytest.mark.parametrize("name", sorted(EFFECTS))
-def test_neutral_terms_change_no_bit(name):
+def test_neutral_terms_change_no_bit(name, base):
     effect = EFFECTS[name]
-    sc = scenario(
-        AWD, speed=RAMP, lanes=(lane(2.0, 5.0),), steering=Steering(0.005, 3.0), duration_s=6.0, seed=4,
-        load_rear=100.0, grade=((0.0, 0.01),),
-    )  # fmt: skip
-    base = simulate(sc)
     for where in (None, *effect.places):
-        with_term = simulate(sc, Model().with_term(neutral(effect, where)))
+        with_term = simulate(EVERYTHING, Model().with_term(Term(effect, {}, where)))
         for a, b in zip(base.measured, with_term.measured, strict=True):
             np.testing.assert_array_equal(a.t, b.t)
             for column in a.columns:
@@ -331,15 +334,12 @@ def test_neutral_terms_change_no_bit(name):
 
 
 @pytest.mark.parametrize("name", sorted(EFFECTS))
-def test_every_effect_does_something(name):
+def test_every_effect_does_something(name, base):
     effect = EFFECTS[name]
     p = effect.parameters[0]
     value = p.neutral + (p.sigma if p.neutral + p.sigma <= p.high else -p.sigma)
-    # a lane, a curve, a grade and a changing speed: every effect has something to act on
-    sc = scenario(AWD, speed=RAMP, lanes=(lane(2.0, 5.0),), steering=Steering(0.01, 3.0), duration_s=6.0)
-    base = simulate(sc)
     where = effect.places[0] if effect.default is None and effect.places else None
-    changed = simulate(sc, Model().with_term(Term(effect, {p.name: value}, where)))
+    changed = simulate(EVERYTHING, Model().with_term(Term(effect, {p.name: value}, where)))
     different = any(
         not np.array_equal(a.columns[c], b.columns[c]) or not np.array_equal(a.t, b.t)
         for a, b in zip(base.measured, changed.measured, strict=True)
@@ -480,11 +480,7 @@ def test_loads_carry_the_weight_where_a_wheel_lifts():
 
 def test_a_drive_too_large_for_memory_is_refused():
     with pytest.raises(ConfigError, match="GB"):
-        assemble_and_run(scenario(duration_s=7200.0, rate_hz=1000.0))
-
-
-def assemble_and_run(sc):
-    return drive_truth(assemble(sc))
+        drive_truth(assemble(scenario(duration_s=7200.0, rate_hz=1000.0)))
 
 
 def test_the_same_effect_at_the_same_place_counts_once():

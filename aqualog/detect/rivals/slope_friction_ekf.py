@@ -126,7 +126,6 @@ def scan(
 
     Parameters
     ----------
-    p : CurveParams
     slip, mu : array (n,)
         NaN: left out. [-]
     is_active : bool array (n,)

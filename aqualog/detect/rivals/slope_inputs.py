@@ -115,7 +115,6 @@ def reference_slope(wheel: Driven, slope: FloatArray, *, dt: float) -> FloatArra
 
     Parameters
     ----------
-    wheel : Driven
     slope : array (n,)
         Estimate, NaN where not active. [-]
     dt : float

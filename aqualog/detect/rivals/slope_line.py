@@ -68,7 +68,6 @@ def scan_rls(
 
     Parameters
     ----------
-    p : RlsParams
     slip, mu : array (n,)
         NaN: left out. [-]
     is_active : bool array (n,)

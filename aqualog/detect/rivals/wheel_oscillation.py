@@ -93,7 +93,6 @@ def level_change(p: BandParams, x: FloatArray, usable: BoolArray) -> FloatArray:
 
     Parameters
     ----------
-    p : BandParams
     x : array (n,)
         Wheel speed over the car's slow speed. NaN: the filter starts anew, 0.3 s without a value. [-]
     usable : bool array (n,)

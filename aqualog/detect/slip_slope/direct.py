@@ -67,7 +67,6 @@ def slip_slopes(
 
     Parameters
     ----------
-    signals : Signals
     vehicle : Vehicle
         Drivetrain, radii, mass and its distribution.
     method, traction : str

@@ -210,7 +210,6 @@ def choose_way(
 
     Parameters
     ----------
-    vehicle : Vehicle
     available : collection of str
         Symbols of the drive.
     method : str

@@ -137,7 +137,6 @@ def scan(
 
     Parameters
     ----------
-    p : DropParams
     state : DropState
         From `initial_state` or the piece before; not changed.
     slope, slope_sd : array (n,)

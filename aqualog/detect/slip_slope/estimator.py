@@ -254,7 +254,6 @@ def scan(
 
     Parameters
     ----------
-    p : Params
     state : State
         From `initial_state` or the piece before.
     s_delta : array (n,)

@@ -95,12 +95,8 @@ class SlipSlopeWatch:
 
     Parameters
     ----------
-    vehicle : Vehicle
-    pair : Pair
     dt : float
         [s]
-    memory : Memory
-    tuning : Tuning
     loss : float
         Share of the dry slope that must be lost. [-]
     """

@@ -211,25 +211,21 @@ def result_names(result):
     return {t.detector for t in result.tracks}
 
 
-def test_same_bits_every_time(wet):
-    again = run_rivals(wet_drive(), CAR)
-    assert again.events == wet.events
-    for a, b in zip(again.tracks, wet.tracks, strict=True):
-        np.testing.assert_array_equal(a.statistic, b.statistic)
-
-
-def test_truth_and_labels_are_not_read(wet):
+def test_truth_and_labels_are_not_read_and_the_bits_are_the_same_every_time(wet):
     signals = wet_drive()
     lie = np.where(np.arange(signals.frame.height) % 2, 1.0, np.nan)
     frame = signals.frame.with_columns(pl.Series("true_contact_fl", lie), pl.Series("on_water", lie))
-    assert run_rivals(replace(signals, frame=frame), CAR).events == wet.events
+    again = run_rivals(replace(signals, frame=frame), CAR)
+    assert again.events == wet.events
+    for a, b in zip(again.tracks, wet.tracks, strict=True):
+        np.testing.assert_array_equal(a.statistic, b.statistic)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_larger_threshold_never_sets_a_bit(name):
     signals, car = soft_road() if name in SLOPES else (wet_drive(), CAR)
     before, times = None, []
-    for factor in (0.1, 0.25, 0.5, 1.0, 1.2, 2.0, 4.0):
+    for factor in (0.1, 0.5, 1.0, 1.2, 4.0):
         result = run_rivals(signals, car, {name: factor * RIVALS[name].threshold}, [name])
         bits = np.array([t.active for t in result.tracks])
         if before is not None:
@@ -250,18 +246,12 @@ def test_thresholds_and_names_are_checked():
             run_rivals(signals, CAR, {"slope_rls": bad})
 
 
-def test_catalogue_tells_itself():
+def test_order_and_references_of_the_catalogue():
     assert NAMES == (
         "wheel_thresholds", "front_rear_pattern", "wheel_oscillation", "resistance_model", "slope_rls", "slope_kalman",
         "slope_friction_ekf",
     )  # fmt: skip
-    for name, rival in RIVALS.items():
-        assert rival.name == name
-        assert rival.threshold > 0.0
-        assert rival.title
-        assert rival.meaning
-        assert rival.counterpart
-        assert rival.reference.startswith("[")
+    assert all(rival.reference.startswith("[") for rival in RIVALS.values())
 
 
 def test_a_drive_of_one_sample():
