@@ -1,28 +1,26 @@
 """The simulation led along a drive: it gives the drive back, and what sensors did to its inputs is undone."""
 
-from dataclasses from aqualog.core.errors import ConfigError
-from aqualog.model.follow import replay
-from aqualog.model.plant import build_plant
-from aqualog.model.simulate import assemble, drive_truth
-from aqualog.model.tyre import TYRES
-from aqualog.physics.load import G
-from tests.thesis.passes import SEDAN
-import replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS, EMPIRICAL
-from aqualog.model.follow import Course, follow
+from aqualog.model.follow import Course, follow, replay
+from aqualog.model.plant import build_plant
 from aqualog.model.road import build_road
 from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
-from aqualog.model.simulate import assemble, simulate
+from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.state import rolling_state
 from aqualog.model.term import Model, Term
+from aqualog.model.tyre import TYRES
+from aqualog.physics.load import G
+from tests.thesis.passes import SEDAN
 
 CAR = Vehicle(name="test car")
 SPEED = ((0.0, 18.0), (5.0, 18.0), (15.0, 26.0), (25.0, 26.0), (45.0, 20.0), (60.0, 28.0))
