@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
@@ -207,53 +208,35 @@ def _name(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str) -> str
     return f"{car}_{case.tyre}_{case.pressure}_{case.depth_mm:.1f}mm{load}_{kmh:03.0f}kmh_{motion}_{repeat + 1}"
 
 
-SCENES = ("2.8", "2.9", "2.21", "2.22", "2.23", "2.25")
 LOW = 1.9e5  # [Pa]
 WORN = TYRES["worn_summer"]
 
 
 def scene(number: str) -> Scenario:
-    """The drive of a figure.
+    """Return the drive of a figure.
 
     Raises
     ------
     ConfigError
         If there is no such scene.
     """
-    scenes = {
-        # full aquaplaning: front right spins down, rear right spins up; 0.8 mm (C28)
-        "2.8": _sedan(118.0, 0.8, entry_s=23.0, on_lane_s=4.0, a=0.5, seed=3),
-        # minor spin-downs of the front right wheel from the entry on, almost constant speed; 0.8 mm, 23 s (C33)
-        "2.9": _sedan(104.0, 0.8, entry_s=23.0, on_lane_s=5.0, seed=3),
-        # below full speed: rear slip rises, minor spin-downs front right; 0.8 mm, 24 s (C72-C77)
-        "2.25": _sedan(107.0, 0.8, entry_s=24.0, on_lane_s=6.0, seed=3),
-        "2.21": _deceleration(),
-        "2.22": _two_accelerations(),
-        "2.23": _slalom(),
-    }
-    if number not in scenes:
+    if number not in _SCENES:
         raise ConfigError(f'no scene of figure "{number}"', expected=", ".join(SCENES))
-    return scenes[number]
+    return _SCENES[number]()
 
 
-def _sedan(kmh: float, depth_mm: float, *, entry_s: float, on_lane_s: float, seed: int, a: float = 0.0) -> Scenario:
-    """Rear-wheel drive on worn summer tyres with low pressure; less water in the left track."""
-    v, depth, end = kmh * KMH, depth_mm * 1e-3, entry_s + on_lane_s
+def _sedan(kmh: float, *, entry_s: float, on_lane_s: float, a: float = 0.0) -> Scenario:
+    """Rear-wheel drive on worn summer tyres with low pressure; 0.8 mm of water, less in the left track."""
+    v, depth, end = kmh * KMH, 0.8 * 1e-3, entry_s + on_lane_s
     lane = Lane(entry_s, end, depth_left=LEFT_SHARE * depth, depth_right=depth, irregularity_left=0.3)
     speed: Profile = ((0.0, v), (entry_s, v), (end + 3.0, v + a * (on_lane_s + 3.0)))
-    return _drive(SEDAN, speed, (lane,), end + 3.0, seed)
+    return _drive(SEDAN, speed, (lane,), end + 3.0, 3)
 
 
 def _drive(
-    car: Vehicle,
-    speed: Profile,
-    lanes: tuple[Lane, ...],
-    duration_s: float,
-    seed: int,
-    steering: Steering | None = None,
+    car: Vehicle, speed: Profile, lanes: tuple[Lane, ...], duration_s: float, seed: int, **given: Any
 ) -> Scenario:
-    return Scenario(car, WORN, WORN, LOW, LOW, duration_s=duration_s, seed=seed, speed=speed, lanes=lanes,
-                    steering=steering)  # fmt: skip
+    return Scenario(car, WORN, WORN, LOW, LOW, duration_s=duration_s, seed=seed, speed=speed, lanes=lanes, **given)
 
 
 def _deceleration() -> Scenario:
@@ -270,8 +253,8 @@ def _two_accelerations() -> Scenario:
     speed: Profile = (
         (0.0, 112 * KMH), (18.6, 112 * KMH), (19.1, 116 * KMH), (22.7, 115 * KMH), (25.0, 129 * KMH), (28.0, 129 * KMH)
     )  # fmt: skip
-    drive = _drive(SUV, speed, (Lane(17.5, 24.5, depth_left=1.3e-3, depth_right=1.3e-3),), 28.0, 5)
-    return replace(drive, split_rear=((0.0, 0.4),))
+    lane = Lane(17.5, 24.5, depth_left=1.3e-3, depth_right=1.3e-3)
+    return _drive(SUV, speed, (lane,), 28.0, 5, split_rear=((0.0, 0.4),))
 
 
 def _slalom() -> Scenario:
@@ -283,4 +266,18 @@ def _slalom() -> Scenario:
         Lane(26.0, 27.1, depth_left=1.2e-3, depth_right=0.3e-3),
         Lane(27.1, 29.0, depth_left=1.2e-3, depth_right=1.6e-3),
     )
-    return _drive(SUV_REAR, ((0.0, v),), lanes, 32.0, 8, steering)
+    return _drive(SUV_REAR, ((0.0, v),), lanes, 32.0, 8, steering=steering)
+
+
+_SCENES: dict[str, Callable[[], Scenario]] = {
+    # full aquaplaning: front right spins down, rear right spins up; 0.8 mm (C28)
+    "2.8": lambda: _sedan(118.0, entry_s=23.0, on_lane_s=4.0, a=0.5),
+    # minor spin-downs of the front right wheel from the entry on, almost constant speed; 0.8 mm, 23 s (C33)
+    "2.9": lambda: _sedan(104.0, entry_s=23.0, on_lane_s=5.0),
+    "2.21": _deceleration,
+    "2.22": _two_accelerations,
+    "2.23": _slalom,
+    # below full speed: rear slip rises, minor spin-downs front right; 0.8 mm, 24 s (C72-C77)
+    "2.25": lambda: _sedan(107.0, entry_s=24.0, on_lane_s=6.0),
+}
+SCENES = tuple(_SCENES)

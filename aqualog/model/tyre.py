@@ -6,7 +6,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Key
@@ -19,49 +20,9 @@ P_REFERENCE = 1.9e5  # [Pa] pressure at which a vehicle file's slip slope holds,
 H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
 
 
-def _key(name: str, unit: str, default: float, low: float, high: float, meaning: str, source: str) -> Key:
-    return Key("tyre", name, unit, default, low, high, meaning, source)
-
-
-_ALL = [
-    _key("tread_depth", "m", 1.6e-3, 0.0, 0.03, "depth of the grooves", "worn: legal limit"),
-    _key("void_ratio", "-", 0.25, 0.0, 0.6,
-         "share of grooves in the tread, by volume",
-         "0.25-0.35 (K); new 8 mm take 2 mm (V, [gengenbach1968])"),
-    _key("slip_slope_factor", "-", 1.0, 0.1, 3.0, "slip slope over the vehicle file's", "worn = 1 by definition"),
-    _key("mu_factor", "-", 1.0, 0.1, 2.0, "friction over the vehicle file's mu_max", "worn = 1 by definition"),
-    _key("wet_friction", "-", 0.8, 0.1, 1.2, "friction of the dry contact on a wet road, over dry", "0.7-0.9 (K)"),
-    _key("cornering_slope", "1/rad", 20.0, 3.0, 60.0, "cornering stiffness over load", "15-25 (K)"),
-    _key("load_sensitivity", "-", 0.22, -1.0, 1.0,
-         "relative change of slip slope per relative change of load", "MF6.1 205/60R15 (V, [besselink2010])"),
-    _key("half_length", "m", 0.07, 0.02, 0.3,
-         "half contact length at 4 kN and 2.2 bar", "QRA1, QRA2 (V, [besselink2010]): 0.066-0.074 (D)"),
-    _key("width", "m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16"),
-    _key("v_anchor", "m/s", 125.0 / 3.6, 5.0, 100.0,
-         "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN",
-         "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h"),
-    _key("h_bulk", "m", 2.0e-3, 1e-4, 0.05,
-         "depth from which v_full falls as 1/sqrt(h)", "0.08 in: treaded tyres' limit (V, [gengenbach1968])"),
-    _key("h_onset", "m", 0.15e-3, 1e-6, 0.01,
-         "free water that completes the wedge", "a fraction of texture depth (K)"),
-    _key("contact_exponent", "-", 4.0, 1.0, 12.0,
-         "n of L = 1 - (v / v_full)^n", "4-6 (D): at full - 20 km/h 0.28-0.45 of the slip slope are left"),
-    _key("wedge_peak", "-", 0.93, 0.5, 1.0,
-         "where the water's force acts in the wedge", "a shift of 60 mm at full aquaplaning (D)"),
-    _key("h_film", "m", 0.6e-3, 0.0, 0.01,
-         "film that the tread throws", "least depth tested; saturates by thesis Fig. 2.11 (D)"),
-    _key("groove_relief", "-", 0.7, 0.0, 1.0, "share of the film's drag that full drainage saves", "(K)"),
-    _key("h_wave", "m", 1.3e-3, 0.0, 0.05,
-         "depth from which water is pushed ahead", "resistance rises between 1.3 and 2 mm (D)"),
-    _key("h_track", "m", 0.5e-3, 0.0, 0.01,
-         "film that a front wheel leaves", "below the least depth tested, 0.6 mm (D)"),
-    _key("contact_scatter", "-", 0.06, 0.0, 0.5,
-         "rms of v_full along the road, relative", "wheel load and texture vary by 10 %, v ~ sqrt(pressure) (K)"),
-    _key("scatter_length", "m", 2.5, 0.1, 50.0,
-         "its correlation length", "a wheel hop of 10-12 Hz at 100 km/h (K)"),
-]  # fmt: skip
-
-TYRE_KEYS: dict[str, Key] = {k.name: k for k in _ALL}
+def _of(unit: str, default: float, low: float, high: float, meaning: str, source: str) -> Any:
+    """Return a field of a tyre, with what a file may give for it."""
+    return field(default=default, metadata={"key": (unit, default, low, high, meaning, source)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,26 +30,59 @@ class Tyre:
     """One tyre, SI. See `TYRE_KEYS` for meaning, bounds and source of each field."""
 
     name: str = "worn_summer"
-    tread_depth: float = TYRE_KEYS["tread_depth"].default
-    void_ratio: float = TYRE_KEYS["void_ratio"].default
-    slip_slope_factor: float = TYRE_KEYS["slip_slope_factor"].default
-    mu_factor: float = TYRE_KEYS["mu_factor"].default
-    wet_friction: float = TYRE_KEYS["wet_friction"].default
-    cornering_slope: float = TYRE_KEYS["cornering_slope"].default
-    load_sensitivity: float = TYRE_KEYS["load_sensitivity"].default
-    half_length: float = TYRE_KEYS["half_length"].default
-    width: float = TYRE_KEYS["width"].default
-    v_anchor: float = TYRE_KEYS["v_anchor"].default
-    h_bulk: float = TYRE_KEYS["h_bulk"].default
-    h_onset: float = TYRE_KEYS["h_onset"].default
-    contact_exponent: float = TYRE_KEYS["contact_exponent"].default
-    wedge_peak: float = TYRE_KEYS["wedge_peak"].default
-    h_film: float = TYRE_KEYS["h_film"].default
-    groove_relief: float = TYRE_KEYS["groove_relief"].default
-    h_wave: float = TYRE_KEYS["h_wave"].default
-    h_track: float = TYRE_KEYS["h_track"].default
-    contact_scatter: float = TYRE_KEYS["contact_scatter"].default
-    scatter_length: float = TYRE_KEYS["scatter_length"].default
+    tread_depth: float = _of("m", 1.6e-3, 0.0, 0.03, "depth of the grooves", "worn: legal limit")
+    void_ratio: float = _of(
+        "-", 0.25, 0.0, 0.6, "share of grooves in the tread, by volume",
+        "0.25-0.35 (K); new 8 mm take 2 mm (V, [gengenbach1968])",
+    )  # fmt: skip
+    slip_slope_factor: float = _of("-", 1.0, 0.1, 3.0, "slip slope over the vehicle file's", "worn = 1 by definition")
+    mu_factor: float = _of("-", 1.0, 0.1, 2.0, "friction over the vehicle file's mu_max", "worn = 1 by definition")
+    wet_friction: float = _of("-", 0.8, 0.1, 1.2, "friction of the dry contact on a wet road, over dry", "0.7-0.9 (K)")
+    cornering_slope: float = _of("1/rad", 20.0, 3.0, 60.0, "cornering stiffness over load", "15-25 (K)")
+    load_sensitivity: float = _of(
+        "-", 0.22, -1.0, 1.0, "relative change of slip slope per relative change of load",
+        "MF6.1 205/60R15 (V, [besselink2010])",
+    )  # fmt: skip
+    half_length: float = _of(
+        "m", 0.07, 0.02, 0.3, "half contact length at 4 kN and 2.2 bar",
+        "QRA1, QRA2 (V, [besselink2010]): 0.066-0.074 (D)",
+    )  # fmt: skip
+    width: float = _of("m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16")
+    v_anchor: float = _of(
+        "m/s", 125.0 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN",
+        "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h",
+    )  # fmt: skip
+    h_bulk: float = _of(
+        "m", 2.0e-3, 1e-4, 0.05, "depth from which v_full falls as 1/sqrt(h)",
+        "0.08 in: treaded tyres' limit (V, [gengenbach1968])",
+    )  # fmt: skip
+    h_onset: float = _of(
+        "m", 0.15e-3, 1e-6, 0.01, "free water that completes the wedge", "a fraction of texture depth (K)"
+    )  # fmt: skip
+    contact_exponent: float = _of(
+        "-", 4.0, 1.0, 12.0, "n of L = 1 - (v / v_full)^n",
+        "4-6 (D): at full - 20 km/h 0.28-0.45 of the slip slope are left",
+    )  # fmt: skip
+    wedge_peak: float = _of(
+        "-", 0.93, 0.5, 1.0, "where the water's force acts in the wedge", "a shift of 60 mm at full aquaplaning (D)"
+    )  # fmt: skip
+    h_film: float = _of(
+        "m", 0.6e-3, 0.0, 0.01, "film that the tread throws", "least depth tested; saturates by thesis Fig. 2.11 (D)"
+    )  # fmt: skip
+    groove_relief: float = _of("-", 0.7, 0.0, 1.0, "share of the film's drag that full drainage saves", "(K)")
+    h_wave: float = _of(
+        "m", 1.3e-3, 0.0, 0.05, "depth from which water is pushed ahead", "resistance rises between 1.3 and 2 mm (D)"
+    )  # fmt: skip
+    h_track: float = _of(
+        "m", 0.5e-3, 0.0, 0.01, "film that a front wheel leaves", "below the least depth tested, 0.6 mm (D)"
+    )  # fmt: skip
+    contact_scatter: float = _of(
+        "-", 0.06, 0.0, 0.5, "rms of v_full along the road, relative",
+        "wheel load and texture vary by 10 %, v ~ sqrt(pressure) (K)",
+    )  # fmt: skip
+    scatter_length: float = _of(
+        "m", 2.5, 0.1, 50.0, "its correlation length", "a wheel hop of 10-12 Hz at 100 km/h (K)"
+    )  # fmt: skip
 
     @property
     def tread_capacity(self) -> float:
@@ -103,6 +97,8 @@ class Tyre:
             exponent=self.contact_exponent,
         )  # fmt: skip
 
+
+TYRE_KEYS: dict[str, Key] = {f.name: Key("tyre", f.name, *f.metadata["key"]) for f in fields(Tyre) if f.metadata}
 
 TYRES: dict[str, Tyre] = {
     t.name: t
