@@ -277,10 +277,8 @@ class SlopeSummary:
 class DriveResult:
     """All results of `detect` for one drive.
 
-    `features` has the rows of `signals.frame` and no `t`: velocity estimate `v_x_hat` [m/s], centre-line wheel speeds
-    `v_w_fl` ... [m/s], differences `v_w_delta_fl` [m/s] (thesis 2.4) and `a_w_delta_fl` [m/s²] (2.3), traction
-    coefficients `mu_fl` [-], `delta_a_x` [m/s²] (2.9), slip slopes `slip_slope_left` with `slip_slope_ref_left` [-];
-    a column is present only if its signals are.
+    `features` has the rows of `signals.frame` and no `t`; `features.names.FEATURES` holds names, units and meanings. A
+    column is present only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
     """
 

@@ -80,10 +80,7 @@ class FeatureStream:
         Returns
         -------
         mapping name -> array (n,)
-            `v_x_hat`, `a_kin`, `v_line_*` (wheel speeds on the centre line with the file's radii), `v_w_*` (the same
-            with corrected radii), `v_w_delta_*` (2.4), `v_w_delta_common`, `a_w_delta_*` (2.3), `mu_*`, `mu_res_*`,
-            `torque_sum`, `delta_a_x` (2.9), low-passed `a_x_slow`, `a_y_slow`, `a_kin_slow`, and those of
-            `SteeringModel`; a feature is missing if its signals are.
+            Those of `names.FEATURES` that no detector makes; a feature is missing if its signals are.
         """
         n = next(iter(columns.values())).size
         get = {s: columns[s] if s in self.available else np.full(n, np.nan) for s in INPUTS}

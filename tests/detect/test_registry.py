@@ -11,6 +11,7 @@ import pytest
 from aqualog.detect.detector import Setup
 from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS, all_of, check_needs, running_order
 from aqualog.detect.stream import DriveStream
+from aqualog.features.names import FEATURES, feature_of
 from tests.conftest import ROOT
 from tests.drives import AWD, CAR, drive, lane
 
@@ -35,6 +36,7 @@ def wet():
 def run(car, columns, detectors, edges):
     stream = DriveStream(car, DT_NS, columns, detectors=detectors)
     pieces = [stream.push({s: x[a:b] for s, x in columns.items()}) for a, b in itertools.pairwise(edges)]
+    assert not [c for c in pieces[0].features if feature_of(c) is None]  # the dictionary knows every column
     tracks = {}
     for piece in pieces:
         for t in piece.tracks:
@@ -95,6 +97,12 @@ def test_needs_are_honest(name, car, wet):
     run(car, some, readers, [0, 400])
     slow, _ = check_needs(car, symbols, rate_hz=0.5, detectors=[detector])
     assert name == "tie_rod" or any("Hz or more" in m for u in slow for m in u.missing)
+
+
+def test_the_dictionary_of_features_names_its_makers():
+    assert len({f.stem for f in FEATURES}) == len(FEATURES)
+    assert {f.made_by for f in FEATURES} <= {"", *BY_NAME}
+    assert {f.shown for f in FEATURES} == {f.shown for f in FEATURES if feature_of(f.shown) is f}
 
 
 def test_each_runs_after_what_it_reads():

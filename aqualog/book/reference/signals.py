@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from aqualog.book.markdown import code, number, page, table
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS, Symbol
 from aqualog.core.units import spellings
+from aqualog.features.names import FEATURES
 from aqualog.model.simulate import TRUTH_SYMBOLS
 
 __all__ = ["signals_page"]
@@ -27,6 +28,10 @@ A log may also bear these names. They become canonical signals on reading.
 _TRUTH = """
 A simulated log carries the truth beside the signals. No detector reads a signal that begins with `true_`;
 `aqualog evaluate` compares with them.
+"""
+_FEATURES = """
+`Detection.features` of the [Python face](python.md) holds these columns for each sample. A name ends in the wheel,
+side, criterion or detector that it belongs to. A column is missing where its signals are.
 """
 _UNITS = """
 CSV headers carry the unit in brackets: `omega_fl [rad/s]`. Other formats carry it in their description, or the map
@@ -49,6 +54,11 @@ def signals_page() -> str:
         "## The truth in simulated logs",
         _TRUTH,
         table(("signal", "unit", "meaning"), _truth()),
+        "## Features",
+        _FEATURES,
+        table(
+            ("feature", "unit", "meaning", "made by"), [(code(f.shown), f.unit, f.meaning, f.made_by) for f in FEATURES]
+        ),
         "## Units",
         _UNITS,
         table(("quantity", "one unit in SI", "spellings"), _units()),
