@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.core.notation import WHEELS, side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.events import Evidence, as_they_are
+from aqualog.detect.events import Evidence, Explain, Severity, as_they_are
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.features.stream import Features
 
@@ -193,8 +193,8 @@ class Detector:
     start: Callable[[Setup], Watch]
     kind: Kind = "effect"
     reads: tuple[Detector, ...] = ()
-    severity: Callable[[Mapping[str, Any]], str] = always_partial
-    explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are
+    severity: Severity = always_partial
+    explain: Explain = as_they_are
     highest: float = math.inf
     reference: str = ""
     counterpart: Detector | None = None

@@ -10,10 +10,13 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, Event, FloatArray, Track
 
-__all__ = ["EventBook", "EventBuilder", "Evidence", "as_they_are"]
+__all__ = ["EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 """Name -> (how, values): `first`, `min`, `max`; of a bit, `any` or `at_start`."""
+
+Severity = Callable[[Mapping[str, Any]], str]
+Explain = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 def as_they_are(evidence: dict[str, Any]) -> dict[str, Any]:
@@ -27,44 +30,42 @@ class _Open:
     peak: float = -np.inf
     evidence: dict[str, Any] = field(default_factory=dict)
 
+    def gather(self, part: slice, statistic: FloatArray, evidence: Evidence) -> None:
+        """Take the samples of a piece in which the bit is set."""
+        values = statistic[part]
+        values = values[~np.isnan(values)]
+        if values.size:
+            self.peak = max(self.peak, float(values.max()))
+        for name, (how, array) in evidence.items():
+            piece = array[part]
+            if how == "any":
+                self.evidence[name] = bool(self.evidence.get(name, False) or piece.any())
+                continue
+            if how == "at_start":
+                self.evidence.setdefault(name, bool(piece[0]))
+                continue
+            piece = piece[~np.isnan(piece)]
+            if piece.size == 0:
+                continue
+            if how == "first":
+                self.evidence.setdefault(name, float(piece[0]))
+                continue
+            new, least = float(piece.min() if how == "min" else piece.max()), min if how == "min" else max
+            self.evidence[name] = least(self.evidence[name], new) if name in self.evidence else new
 
-class EventBuilder:
-    """Build the events of one detector on one wheel.
+
+class _Builder:
+    """Build the events of one detector at one place.
 
     It keeps only minima, maxima and first values, so that an event cut by a piece's end comes out the same to the bit.
-
-    Parameters
-    ----------
-    detector, wheel, side : str
-        As in the event.
-    threshold : float
-        In the unit of the statistic.
-    dt_ns : int
-        Sample time.
-    severity : callable
-        Evidence -> `partial` or `full`.
-    explain : callable
-        Turns gathered evidence into that of the event, where bits and values become words.
     """
 
-    def __init__(
-        self,
-        detector: str,
-        *,
-        wheel: str | None,
-        side: str | None,
-        threshold: float,
-        dt_ns: int,
-        severity: Callable[[Mapping[str, Any]], str],
-        explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are,
-    ) -> None:
-        self._explain = explain
-        self._detector = detector
-        self._wheel = wheel
-        self._side = side
-        self._threshold = threshold
+    def __init__(self, track: Track, dt_ns: int, severity: Severity, explain: Explain) -> None:
+        self._place: dict[str, Any] = {"detector": track.detector, "wheel": track.wheel, "side": track.side}
+        self._threshold = track.threshold
         self._dt_ns = dt_ns
         self._severity = severity
+        self._explain = explain
         self._offset = 0
         self._open: _Open | None = None
 
@@ -73,85 +74,51 @@ class EventBuilder:
         closed: list[Event] = []
         edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            if self._open is not None and begin > 0:
-                closed.append(self._close(self._offset))
+            if begin > 0:
+                closed += self._close(self._offset)
             if self._open is None:
                 self._open = _Open(self._offset + int(begin))
-            self._gather(slice(begin, end), statistic, evidence)
+            self._open.gather(slice(begin, end), statistic, evidence)
             if end < bits.size:
-                closed.append(self._close(self._offset + int(end)))
-        if self._open is not None and bits.size and not bits[0] and edges.size == 0:
-            closed.append(self._close(self._offset))
+                closed += self._close(self._offset + int(end))
+        if bits.size and not bits[0] and edges.size == 0:
+            closed += self._close(self._offset)
         self._offset += bits.size
         return closed
 
     def finish(self) -> list[Event]:
         """Return the event that is open at the end of the drive."""
-        return [self._close(self._offset)] if self._open is not None else []
+        return self._close(self._offset)
 
-    def _gather(self, part: slice, statistic: FloatArray, evidence: Evidence) -> None:
-        opened = self._open
-        assert opened is not None
-        values = statistic[part]
-        values = values[~np.isnan(values)]
-        if values.size:
-            opened.peak = max(opened.peak, float(values.max()))
-        for name, (how, array) in evidence.items():
-            piece = array[part]
-            if how == "any":
-                opened.evidence[name] = bool(opened.evidence.get(name, False) or piece.any())
-                continue
-            if how == "at_start":
-                opened.evidence.setdefault(name, bool(piece[0]))
-                continue
-            piece = piece[~np.isnan(piece)]
-            if piece.size == 0:
-                continue
-            old = opened.evidence.get(name)
-            if how == "first":
-                opened.evidence.setdefault(name, float(piece[0]))
-            else:
-                new = float(piece.min() if how == "min" else piece.max())
-                opened.evidence[name] = new if old is None else (min(old, new) if how == "min" else max(old, new))
-
-    def _close(self, end: int) -> Event:
-        opened = self._open
-        assert opened is not None
-        self._open = None
-        return Event(
-            detector=self._detector,
-            wheel=self._wheel,
-            side=self._side,
-            start_s=opened.start * self._dt_ns / 1e9,
-            end_s=end * self._dt_ns / 1e9,
-            severity=self._severity(opened.evidence),
-            peak=opened.peak,
-            threshold=self._threshold,
-            evidence=self._explain(opened.evidence),
-        )
+    def _close(self, end: int) -> list[Event]:
+        if self._open is None:
+            return []
+        opened, self._open = self._open, None
+        return [
+            Event(
+                **self._place, start_s=opened.start * self._dt_ns / 1e9, end_s=end * self._dt_ns / 1e9,
+                severity=self._severity(opened.evidence), peak=opened.peak, threshold=self._threshold,
+                evidence=self._explain(opened.evidence),
+            )
+        ]  # fmt: skip
 
 
 class EventBook:
-    """Build all events of a drive, with one builder per detector and place."""
+    """Build all events of a drive, with one builder per detector and place; `dt_ns` sample time. [ns]"""
 
     def __init__(self, dt_ns: int) -> None:
         self._dt_ns = dt_ns
-        self._builders: dict[tuple[str, str | None, str | None], EventBuilder] = {}
+        self._builders: dict[tuple[str, str | None, str | None], _Builder] = {}
 
-    def take(
-        self,
-        track: Track,
-        evidence: Evidence,
-        severity: Callable[[Mapping[str, Any]], str],
-        explain: Callable[[dict[str, Any]], dict[str, Any]] = as_they_are,
-    ) -> list[Event]:
-        """Return events of a track that end within this piece; severity and words are those of the first piece."""
+    def take(self, track: Track, evidence: Evidence, severity: Severity, explain: Explain = as_they_are) -> list[Event]:
+        """Return events of a track that end within this piece.
+
+        `severity` (evidence -> `partial` or `full`) and `explain` (gathered evidence -> that of the event, where bits
+        and values become words) are those of the first piece.
+        """
         key = (track.detector, track.wheel, track.side)
         if key not in self._builders:
-            self._builders[key] = EventBuilder(
-                track.detector, wheel=track.wheel, side=track.side, threshold=track.threshold, dt_ns=self._dt_ns,
-                severity=severity, explain=explain,
-            )  # fmt: skip
+            self._builders[key] = _Builder(track, self._dt_ns, severity, explain)
         return self._builders[key].push(track.active, track.statistic, evidence)
 
     def finish(self) -> tuple[Event, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from aqualog.core.errors import FitError
@@ -118,44 +118,31 @@ def notes_on(places: Sequence[PlaceSlope], vehicle: Vehicle, way: Way, *, has_br
         notes.append(f"{', '.join(lacking)} not in the vehicle file: wheel loads, and the slope with them, are a guess")
     if way.method == "differential":
         notes.append("differential slip only: recursive estimate, no regression and no interval from the data")
-    corrected = [p for p in places if p.line.is_corrected]
-    if corrected:
-        shares = ", ".join(f"{p.place} {100 * p.line.attenuation:.1f} %" for p in corrected)
-        notes.append(f"noise of the traction lowers 1 / slope, which is corrected: {shares}")
-    late = [p for p in places if abs(p.lag_s) > LAG_NOTED]
-    if late:
-        shares = ", ".join(f"{p.place} {p.lag_s:+.2f} s" for p in late)
-        notes.append(
-            f"the slip follows the traction best with a delay of {shares}: check the clocks of wheels and "
-            "traction (`aqualog align`, [sources] offset_s in the map)"
-        )
-    notes += _notes_on_reference(places)
-    changed = [p for p in places if p.recursion.alarms]
-    if changed:
-        counts = ", ".join(f"{p.place} {p.recursion.alarms}" for p in changed)
-        notes.append(f"the recursive estimator found sudden changes of the slope: {counts}")
+    for applies, said, sentence in _ON_PLACES:
+        found = [p for p in places if applies(p)]
+        if found:
+            notes.append(sentence.format(", ".join(said(p) for p in found)))
     return notes
 
 
-def _notes_on_reference(places: Sequence[PlaceSlope]) -> list[str]:
-    notes = []
-    odd = [p for p in places if p.line.told and abs(p.line.offset) > OFFSET_NOTED]
-    if odd:
-        shares = ", ".join(f"{p.place} {100 * p.line.offset:+.1f} %" for p in odd)
-        notes.append(f"slip without traction: {shares}; the radii in the vehicle file do not fit")
-    delayed = [p for p in places if p.line.told and _is_noted(p.line)]
-    if delayed:
-        shares = ", ".join(f"{p.place} {p.line.delay:+.3f} s" for p in delayed)
-        notes.append(f"v_x is late against the wheels, which is corrected: {shares}")
-    wide = [p.place for p in places if p.line.told and p.line.shared > SHARED_NOTED]
-    if wide:
-        notes.append(
-            f"{', '.join(wide)}: traction and acceleration over speed go together, so the delay of v_x widens the "
-            "interval of the slope; narrower with other speeds or grades, or --delay where it is known"
-        )
-    return notes
+def _has_delay(p: PlaceSlope) -> bool:
+    low, high = p.line.delay_ci
+    return p.line.told and abs(p.line.delay) > DELAY_NOTED and (low > 0.0 or high < 0.0)
 
 
-def _is_noted(line: Line) -> bool:
-    low, high = line.delay_ci
-    return abs(line.delay) > DELAY_NOTED and (low > 0.0 or high < 0.0)
+# of which places, what is said of each, and the sentence
+_ON_PLACES: tuple[tuple[Callable[[PlaceSlope], bool], Callable[[PlaceSlope], str], str], ...] = (
+    (lambda p: p.line.is_corrected, lambda p: f"{p.place} {100 * p.line.attenuation:.1f} %",
+     "noise of the traction lowers 1 / slope, which is corrected: {}"),
+    (lambda p: abs(p.lag_s) > LAG_NOTED, lambda p: f"{p.place} {p.lag_s:+.2f} s",
+     "the slip follows the traction best with a delay of {}: check the clocks of wheels and "
+     "traction (`aqualog align`, [sources] offset_s in the map)"),
+    (lambda p: p.line.told and abs(p.line.offset) > OFFSET_NOTED, lambda p: f"{p.place} {100 * p.line.offset:+.1f} %",
+     "slip without traction: {}; the radii in the vehicle file do not fit"),
+    (_has_delay, lambda p: f"{p.place} {p.line.delay:+.3f} s", "v_x is late against the wheels, which is corrected: {}"),
+    (lambda p: p.line.told and p.line.shared > SHARED_NOTED, lambda p: p.place,
+     "{}: traction and acceleration over speed go together, so the delay of v_x widens the "
+     "interval of the slope; narrower with other speeds or grades, or --delay where it is known"),
+    (lambda p: p.recursion.alarms > 0, lambda p: f"{p.place} {p.recursion.alarms}",
+     "the recursive estimator found sudden changes of the slope: {}"),
+)  # fmt: skip
