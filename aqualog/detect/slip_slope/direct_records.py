@@ -139,7 +139,8 @@ _ON_PLACES: tuple[tuple[Callable[[PlaceSlope], bool], Callable[[PlaceSlope], str
      "traction (`aqualog align`, [sources] offset_s in the map)"),
     (lambda p: p.line.told and abs(p.line.offset) > OFFSET_NOTED, lambda p: f"{p.place} {100 * p.line.offset:+.1f} %",
      "slip without traction: {}; the radii in the vehicle file do not fit"),
-    (_has_delay, lambda p: f"{p.place} {p.line.delay:+.3f} s", "v_x is late against the wheels, which is corrected: {}"),
+    (_has_delay, lambda p: f"{p.place} {p.line.delay:+.3f} s",
+     "v_x is late against the wheels, which is corrected: {}"),
     (lambda p: p.line.told and p.line.shared > SHARED_NOTED, lambda p: p.place,
      "{}: traction and acceleration over speed go together, so the delay of v_x widens the "
      "interval of the slope; narrower with other speeds or grades, or --delay where it is known"),
