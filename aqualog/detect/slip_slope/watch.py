@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -332,8 +332,8 @@ def _remarks(slope: SlopeSummary) -> Iterator[str]:
     # slip that hardly grows with the traction: then no drop can be found either
     if slope.stiff_s >= max(LEAST, TOO_STIFF * driven):
         yield (
-            f"stiffer than any tyre for {slope.stiff_s:.0f} s, so that no drop can be found there: braking that neither "
-            "torque nor brake_pressure shows, a wrong drivetrain, or swapped wheels?"
+            f"stiffer than any tyre for {slope.stiff_s:.0f} s, so that no drop can be found there: braking that "
+            "neither torque nor brake_pressure shows, a wrong drivetrain, or swapped wheels?"
         )
     # a drive that is its own reference cannot know what it began on
     if slope.reference_from == "this drive" and slope.judged_s >= LEAST:
