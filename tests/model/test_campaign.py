@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import tomllib
 from collections import Counter
 from dataclasses import replace
@@ -31,6 +32,22 @@ def small():
 @pytest.fixture
 def programme(monkeypatch):
     monkeypatch.setitem(PROGRAMMES, "small", small)
+
+
+@pytest.fixture(scope="module")
+def complete(tmp_path_factory):
+    """A folder in which the small programme is complete, and its outcome; not to be changed."""
+    folder = tmp_path_factory.mktemp("small") / "c"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(PROGRAMMES, "small", small)
+        return folder, run(folder, jobs=2)
+
+
+@pytest.fixture
+def copied(complete, tmp_path):
+    """The same to work on."""
+    shutil.copytree(complete[0], tmp_path / "c")
+    return tmp_path / "c"
 
 
 def run(folder, jobs=1, force=False, seen=None):
@@ -80,26 +97,27 @@ def test_names_tell_drives_apart_and_old_ones_stay():
     assert 387 < len(names) < 900
 
 
-def test_campaign_is_what_the_contract_says(tmp_path, programme):
-    outcome = run(tmp_path / "c", jobs=2)
+def test_campaign_is_what_the_contract_says(complete):
+    folder, outcome = complete
     assert (outcome.made, outcome.kept, outcome.failed) == (3, 0, {})
-    document = tomllib.loads((tmp_path / "c/campaign.toml").read_text())
+    document = tomllib.loads((folder / "campaign.toml").read_text())
     assert set(document) == {"name", "vehicle", "runs"}
-    rows = list(csv.DictReader((tmp_path / "c" / document["runs"]).open()))
+    rows = list(csv.DictReader((folder / document["runs"]).open()))
     assert len(rows) == 3
     for row in rows:
         assert {c for c in row if not c.startswith("x_")} <= CONTRACT
-        assert (tmp_path / "c" / row["log"]).is_file()
-        assert load_vehicle(tmp_path / "c" / row["vehicle"]).name == "sedan RWD"
+        assert (folder / row["log"]).is_file()
+        assert load_vehicle(folder / row["vehicle"]).name == "sedan RWD"
         assert 3.9 < float(row["lane_start_s"]) < 4.1
-    with open_log(tmp_path / "c" / rows[0]["log"]) as log:
+    with open_log(folder / rows[0]["log"]) as log:
         names = {c.name for c in log.channels()}
     assert {"omega_fl", "torque_rr", "on_water", "true_contact_fl"} <= names
+    lines = [json.loads(x) for x in (folder / campaign.STATE).read_text().splitlines()]
+    assert {x["name"] for x in lines} == {r.name for r in small()}
 
 
-def test_a_broken_run_goes_on_where_it_stopped(tmp_path, programme):
-    folder = tmp_path / "c"
-    run(folder)
+def test_a_broken_run_goes_on_where_it_stopped(copied, programme):
+    folder = copied
     logs = sorted((folder / "logs").iterdir())
     before = {p.name: p.stat().st_mtime_ns for p in logs}
     logs[0].unlink()
@@ -115,13 +133,12 @@ def test_a_broken_run_goes_on_where_it_stopped(tmp_path, programme):
     assert run(folder, force=True).made == 3
 
 
-def test_another_scenario_is_made_again(tmp_path, programme, monkeypatch):
-    run(tmp_path / "c")
+def test_another_scenario_is_made_again(copied, monkeypatch):
     changed = tuple(
         replace(r, scenario=replace(r.scenario, load_rear=50.0)) if i == 0 else r for i, r in enumerate(small())
     )
     monkeypatch.setitem(PROGRAMMES, "small", lambda: changed)
-    assert run(tmp_path / "c").made == 1
+    assert run(copied).made == 1
 
 
 def test_a_run_that_fails_leaves_the_others_alone(tmp_path, monkeypatch):
@@ -146,12 +163,6 @@ def test_foreign_folders_are_left_alone(tmp_path, programme):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.txt"]
 
 
-def test_state_is_one_line_per_log(tmp_path, programme):
-    run(tmp_path / "c")
-    lines = [json.loads(x) for x in (tmp_path / "c" / campaign.STATE).read_text().splitlines()]
-    assert {x["name"] for x in lines} == {r.name for r in small()}
-
-
 def test_vehicle_file_comes_back(tmp_path):
     car = Vehicle(name='the "car"', drivetrain="awd", torque_split_rear=0.6, mass=1900.0, tie_rod={"c_y": (0.1, 1e-5)})
     (tmp_path / "v.toml").write_text(vehicle_toml(car))
@@ -162,9 +173,8 @@ def test_vehicle_file_comes_back(tmp_path):
         assert getattr(back, name) == getattr(car, name)
 
 
-def test_a_damaged_log_or_state_is_made_again(tmp_path, programme):
-    folder = tmp_path / "c"
-    run(folder)
+def test_a_damaged_log_or_state_is_made_again(copied, programme):
+    folder = copied
     log = sorted((folder / "logs").iterdir())[0]
     log.write_bytes(log.read_bytes()[:1000])
     assert run(folder).made == 1

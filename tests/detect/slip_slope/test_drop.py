@@ -325,32 +325,36 @@ def test_text_and_page_of_a_drive():
 
 
 def test_history_of_the_command(tmp_path):
+    from typer.testing import CliRunner
+
+    from aqualog.cli.main import app
+
     samples = Path(__file__).parents[3] / "sample_logs"
     path = tmp_path / "slopes.json"
     save_history(path, History().with_periods("worn, 1.9 bar", "left", [Period(62.0, 60.0, 30.0)]))
     args = ["--vehicle", samples / "vehicle.toml", "--history", path, "--configuration", "worn, 1.9 bar", "--json"]
 
     def run(*more):
-        command = [sys.executable, "-m", "aqualog", "detect", samples / "lane_drive.mf4", *args, *more]
-        return subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+        command = ["detect", samples / "lane_drive.mf4", *args, *more]
+        return CliRunner().invoke(app, [str(c) for c in command])
 
     result = run()
-    assert result.returncode == 0, result.stderr
+    assert result.exit_code == 0, result.stderr
     left, right = json.loads(result.stdout)["slip_slope"]
     assert left["reference"] == pytest.approx(60.0)
     assert right["reference"] == pytest.approx(31.0)  # the vehicle file's
     assert "worn, 1.9 bar" in json.loads(path.read_text())["slip_slope_history"]
     kept = json.loads(path.read_text())["slip_slope_history"]["worn, 1.9 bar"]
-    assert run().returncode == 0
+    assert run().exit_code == 0
     assert json.loads(path.read_text())["slip_slope_history"]["worn, 1.9 bar"] == kept
-    assert run("--reference", "median").returncode == 2
+    assert run("--reference", "median").exit_code == 2
     for bad in ("a\nb", 201 * "x"):
-        assert run("--configuration", bad).returncode == 2
+        assert run("--configuration", bad).exit_code == 2
     failed = run("-o", path / "out")
-    assert failed.returncode == 2
+    assert failed.exit_code == 2
     assert "slopes.json" in failed.stderr
     path.write_text("{}")
     failed = run()
-    assert failed.returncode == 2
+    assert failed.exit_code == 2
     assert "slopes.json" in failed.stderr
     assert path.read_text() == "{}"
