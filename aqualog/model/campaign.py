@@ -125,8 +125,8 @@ def _finished(folder: Path, digests: dict[str, str]) -> dict[str, Done]:
     for line in (folder / STATE).read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             raw = json.loads(line)
-            kinds = {"name": str, "digest": str, "size": int, "lane_start_s": float, "lane_end_s": float}
-            entry = Done(**{key: kind(raw[key]) for key, kind in kinds.items()})
+            texts, size = (str(raw["name"]), str(raw["digest"])), int(raw["size"])
+            entry = Done(*texts, size, float(raw["lane_start_s"]), float(raw["lane_end_s"]))
         except (ValueError, TypeError, KeyError, RecursionError):
             continue
         log = _log(folder, entry.name)

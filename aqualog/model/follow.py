@@ -137,9 +137,10 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
 def _undriven(n: int, **given: Any) -> kernel.Controls:
     """Return controls of `n` time steps without a driver: nothing acts but what is given."""
     still = np.zeros(n)
-    series = dict.fromkeys(("v_target", "a_target", "drive", "brake", "steer", "exc", "grade", "wind"), still)
-    base = {"split_rear": still + 0.5, "gain": still + 1.0, "has_driver": False, "keeps_lane": False}
-    return kernel.Controls(**{**series, **base, "exc_kind": 0, "exc_amplitude": 0.0, "scatter": 0.0, **given})
+    names = ("v_target", "a_target", "drive", "brake", "steer", "exc", "grade", "wind")
+    fields: dict[str, Any] = dict.fromkeys(names, still) | {"split_rear": still + 0.5, "gain": still + 1.0}
+    fields |= {"has_driver": False, "keeps_lane": False, "exc_kind": 0, "exc_amplitude": 0.0, "scatter": 0.0}
+    return kernel.Controls(**fields | given)
 
 
 def _undone(t: FloatArray, x: FloatArray, sensors: Sensors, name: str, at: FloatArray) -> FloatArray:

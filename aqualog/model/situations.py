@@ -33,9 +33,8 @@ class Situation:
 
 
 SITUATIONS: dict[str, Situation] = {
-    n: Situation(n, title, kind, make)
-    for kind, makers in (("aquaplaning", WATER), ("nuisance", DRY), ("nuisance", FAULTS))
-    for n, (title, make) in makers.items()
+    **{n: Situation(n, title, "aquaplaning", make) for n, (title, make) in WATER.items()},
+    **{n: Situation(n, title, "nuisance", make) for n, (title, make) in (DRY | FAULTS).items()},
 }
 
 
