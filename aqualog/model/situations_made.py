@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,8 @@ from aqualog.model.term import Model
 from aqualog.physics.load import G
 
 __all__ = ["DRY", "FAULTS", "WATER"]
+
+Makers = dict[str, tuple[str, Callable[[Drawing], Taken]]]  # name -> title, and what makes the drive of a drawing
 
 V_FULL = (70.0 * KMH, 145.0 * KMH)  # [m/s] tyre, water and pressure that a road car can aquaplane on
 LANE_S = (1.5, 10.0)  # [s]
@@ -131,7 +134,7 @@ def _foot_off(k: Drawing) -> Taken:
     return Taken(replace(scenario, drive_share=share, extra_torque=engine), Model(), f"{note}, foot off")
 
 
-WATER = {
+WATER: Makers = {
     "lane_constant": ("constant speed through a watered lane", _constant),
     "lane_accelerating": ("accelerating into and on the lane", _accelerating),
     "lane_coasting": ("slowing down through the lane", _coasting),
@@ -301,7 +304,7 @@ def _trailer(k: Drawing) -> Taken:
     return Taken(replace(taken.scenario, load_rear=60.0), model, f"{taken.note}, {mass:.0f} kg in tow")
 
 
-DRY = {
+DRY: Makers = {
     "dry_cruise": ("dry country road", lambda k: _cruise(k, 60.0, 110.0, spread=0.15)),
     "motorway": (
         # gusts of 3 m/s rms behind lorries, faster than those of the weather (K)
@@ -396,7 +399,7 @@ def _accelerometer(k: Drawing) -> Taken:
     return Taken(k.drive(duration, k.cruise(duration, v)), model, f"{note} by {error:+.2f} m/s^2")
 
 
-FAULTS = {
+FAULTS: Makers = {
     "kerbs_and_holes": ("kerbs and holes", _kerbs),
     "pressure_loss": ("a tyre loses its air", _pressure_loss),
     "dropouts": ("sensors and buses that fail for a while", _dropouts),
