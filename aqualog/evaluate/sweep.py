@@ -6,12 +6,12 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS, all_of
+from aqualog.detect.registry import BY_NAME, DETECTORS, RIVALS
 from aqualog.detect.thresholds import DEFAULT, Thresholds
 from aqualog.evaluate.drives import Drive
 from aqualog.evaluate.judge import record_of, run_detectors
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.score import Rate, Recall, detector_names, score
+from aqualog.evaluate.score import JOINT, Rate, Recall, detector_names, score
 
 __all__ = [
     "FACTORS", "JOINT", "LIMIT_PER_HOUR", "Choice", "RocPoint", "Split", "applied", "choose", "curve_points",
@@ -20,8 +20,6 @@ __all__ = [
 
 FACTORS = tuple(2.0 ** (k / 2.0) for k in range(-4, 5))
 """Factors on each detector's own threshold: a quarter to four, in steps of a factor of 1.41."""
-
-JOINT = tuple(d.name for d in all_of("joint"))
 
 
 @dataclass(frozen=True, slots=True)

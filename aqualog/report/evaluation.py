@@ -8,11 +8,20 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.detect.registry import RIVALS
-from aqualog.evaluate.compare import better_rivals, coverage, situation_scores
 from aqualog.evaluate.records import Cell as Counts
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
-from aqualog.evaluate.score import Rate, Recall, Score, confusion, grouped, score_all
+from aqualog.evaluate.score import (
+    Rate,
+    Recall,
+    Score,
+    better_rivals,
+    confusion,
+    coverage,
+    grouped,
+    score_all,
+    situation_scores,
+)
 from aqualog.evaluate.sweep import RocPoint
 from aqualog.report.evaluation_figures import evaluation_figures
 from aqualog.report.evaluation_words import (

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from aqualog.detect.registry import RIVALS
-from aqualog.evaluate.compare import situation_scores
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation
-from aqualog.evaluate.score import Score, score_all
+from aqualog.evaluate.score import Score, score_all, situation_scores
 from aqualog.evaluate.sweep import RocPoint
 from aqualog.report.axes import axis, layout
 from aqualog.report.evaluation_words import short

@@ -6,11 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 
 from aqualog.detect.registry import RIVALS
-from aqualog.evaluate.compare import TARGETS, Better, better_rivals, coverage, situation_scores
 from aqualog.evaluate.judge import LIMITS_S
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
-from aqualog.evaluate.score import HOUR_S, Rate, Recall, Score, score_all
+from aqualog.evaluate.score import (
+    HOUR_S,
+    TARGETS,
+    Better,
+    Rate,
+    Recall,
+    Score,
+    better_rivals,
+    coverage,
+    score_all,
+    situation_scores,
+)
 from aqualog.evaluate.sweep import JOINT
 
 __all__ = [

@@ -10,11 +10,10 @@ from aqualog.core.errors import ConfigError, LogError
 from aqualog.detect.thresholds import DEFAULT
 from aqualog.evaluate import judge as judge_module
 from aqualog.evaluate import run
-from aqualog.evaluate.compare import better_rivals, coverage, situation_scores
 from aqualog.evaluate.drives import Drive, labels_in
 from aqualog.evaluate.judge import judge
 from aqualog.evaluate.records import DetectorRun, Hit, RunRecord
-from aqualog.evaluate.score import Rate, Recall
+from aqualog.evaluate.score import Rate, Recall, better_rivals, coverage, situation_scores
 from aqualog.evaluate.sweep import RocPoint, choose, records_at, split_runs
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate

@@ -14,11 +14,10 @@ from aqualog.core.records import Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import joint_cusum
 from aqualog.detect.joint_cusum import JointCusumParams
-from aqualog.evaluate.compare import Coverage, coverage, situation_scores
 from aqualog.evaluate.drives import Drive, labels_in
 from aqualog.evaluate.judge import judge as judge_drive
 from aqualog.evaluate.records import RunRecord
-from aqualog.evaluate.score import Score, score
+from aqualog.evaluate.score import Coverage, Score, coverage, score, situation_scores
 from aqualog.evaluate.sweep import JOINT
 from aqualog.model.drawing import SCORING_POOL, Pool
 from aqualog.model.log import as_signals
