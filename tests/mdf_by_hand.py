@@ -47,8 +47,9 @@ class Blocks:
         self.add(name, "CG", [following, channel, None, None, None, None], body)
 
     def channel(self, name, following, offset, bits=64, *, text, kind=0, data_type=4, conversion=None, values=None,
-                part=None, comment=None, sync=0, flags=0):  # fmt: skip
-        body = struct.pack("<BBBBIIIIBBH6d", kind, sync, data_type, 0, offset, bits, flags, 0, 0, 0, 0, *[0.0] * 6)
+                part=None, comment=None, sync=0, flags=0, shift=0, invalid=0):  # fmt: skip
+        head = kind, sync, data_type, shift, offset, bits, flags, invalid
+        body = struct.pack("<BBBBIIIIBBH6d", *head, 0, 0, 0, *[0.0] * 6)
         self.add(name, "CN", [following, part, text, None, conversion, values, None, comment], body)
 
     def conversion(self, name, kind, links=(), numbers=(), unit=None):

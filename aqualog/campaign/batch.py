@@ -23,9 +23,8 @@ from aqualog.core.errors import AqualogError, ConfigError, FitError, LogError, S
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
-from aqualog.guard.limits import VARIABLES, limits_from, size_of
-from aqualog.guard.pool import WorkOn, work_on
-from aqualog.guard.worker import NO_LIMITS, Crashed, Limits
+from aqualog.guard.reading import VARIABLES, limits_from, size_of
+from aqualog.guard.worker import NO_LIMITS, Crashed, Limits, WorkOn, work_on
 from aqualog.io.fingerprint import Contents, Seen, change_since
 
 __all__ = ["BatchOutcome", "Compared", "Fault", "compared", "measure_one", "run_batch"]

@@ -16,8 +16,7 @@ from aqualog.campaign.batch import CRASHED, Fault, measure_one, run_batch
 from aqualog.campaign.jobs import Configured, Job
 from aqualog.campaign.store import Store
 from aqualog.core.compiled import kept_code
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed
+from aqualog.guard.worker import Crashed, work_on
 
 __all__ = ["BatchCost", "LogCost", "measure_cost", "peak_memory"]
 

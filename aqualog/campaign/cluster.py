@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.guard.limits import limits_from
-from aqualog.guard.pool import WorkOn, kept_worker
-from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
+from aqualog.guard.reading import limits_from
+from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits, WorkOn, kept_worker
 
 __all__ = ["bounds_here", "on_cluster"]
 
@@ -33,7 +32,7 @@ _LOOK_S = 0.02
 def on_cluster(
     address: str, *, limits: Limits = NO_LIMITS, tell: Callable[[str], None] = lambda _: None
 ) -> Iterator[WorkOn]:
-    """Workers behind a scheduler in place of `aqualog.guard.pool.work_on`.
+    """Workers behind a scheduler in place of `aqualog.guard.worker.work_on`.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def guarded(*, debug: bool) -> Iterator[None]:
 
 
 def _memory_told() -> str:
-    from aqualog.guard.limits import VARIABLES
+    from aqualog.guard.reading import VARIABLES
     from aqualog.guard.system import memory_bound
 
     most = memory_bound()

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from aqualog.campaign.place import Address
     from aqualog.campaign.records import Shard
     from aqualog.campaign.samples import CampaignData
-    from aqualog.guard.pool import WorkOn
-    from aqualog.guard.worker import Limits
+    from aqualog.guard.worker import Limits, WorkOn
 
 __all__ = ["bring_up_to_date", "is_campaign", "refuse_in_store", "split"]
 
@@ -58,7 +57,7 @@ def bring_up_to_date(
 ) -> tuple[CampaignData, BatchOutcome]:
     """Bring the store up to date and load it; with `shard` the campaign is that shard's already."""
     from aqualog.core.user_folders import has_kept_code
-    from aqualog.guard.pool import most_processes
+    from aqualog.guard.worker import most_processes
 
     if jobs is not None and jobs > most_processes():
         hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")

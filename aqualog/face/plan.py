@@ -126,7 +126,7 @@ def plan(
     from aqualog.campaign.batch_cost import measure_cost
     from aqualog.campaign.plan import choose, foretell, shards_within, work_of
     from aqualog.campaign.store import Store
-    from aqualog.guard.pool import most_processes
+    from aqualog.guard.worker import most_processes
 
     place = Store(campaign.store)
     place.check()

@@ -19,9 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 if TYPE_CHECKING:
-    from aqualog.guard.limits import ReadLimits
-    from aqualog.guard.page import StatePage
-    from aqualog.guard.reading import ReadingState
+    from aqualog.guard.reading import ReadingState, ReadLimits, StatePage
     from aqualog.guard.streams import ForeignStderr
 
 __all__ = ["begin_command", "is_command", "supervised", "unsupervised"]
@@ -69,22 +67,20 @@ def supervised(*, debug: bool) -> Iterator[None]:
     """
     global _is_awaited
     is_awaited, _is_awaited = _is_awaited, False
-    if not is_awaited or os.environ.get(_SWITCH, "").strip().lower() == "off" or not _is_possible():
+    from threading import active_count
+
+    has_means = all(hasattr(os, n) for n in ("fork", "wait4")) and hasattr(signal, "sigtimedwait")
+    is_off = os.environ.get(_SWITCH, "").strip().lower() == "off"
+    if not (is_awaited and has_means) or is_off or active_count() > 1:
         yield
         return
-    from aqualog.guard.limits import limits_from
+    from aqualog.guard.reading import limits_from
 
     page = _in_worker(limits_from(os.environ), debug=debug)
     try:
         yield
     finally:
         page.finish()
-
-
-def _is_possible() -> bool:
-    from threading import active_count
-
-    return all(hasattr(os, n) for n in ("fork", "wait4")) and hasattr(signal, "sigtimedwait") and active_count() == 1
 
 
 class _End(NamedTuple):
@@ -98,7 +94,7 @@ class _End(NamedTuple):
 
 def _in_worker(limits: ReadLimits, *, debug: bool) -> StatePage:
     """Returns in the worker only."""
-    from aqualog.guard.page import StatePage
+    from aqualog.guard.reading import StatePage
     from aqualog.guard.scratch import Scratch, use_folder
     from aqualog.guard.streams import ForeignStderr
 
@@ -254,7 +250,6 @@ def _leave(code: int, text: str) -> NoReturn:
 
 
 def _clear_away(state: ReadingState) -> None:
-    """Remove what the worker has not finished."""
     import shutil
 
     for name in state.temporary:

@@ -17,7 +17,7 @@ __all__ = ["only_here", "write_text", "write_whole"]
 _ASKING = Lock()
 
 
-def write_whole(path: Path, write: Callable[[Path], None], *, makes_folder: bool = True) -> None:
+def write_whole(path: Path, write: Callable[[Path], object], *, makes_folder: bool = True) -> None:
     """Let `write` make a file under a temporary name beside its place, then rename it.
 
     Whatever goes wrong, the old file is still there or the new one is complete. The folder is made if it is not there,
@@ -33,7 +33,10 @@ def write_whole(path: Path, write: Callable[[Path], None], *, makes_folder: bool
             write(temporary)
             with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
-            temporary.chmod(0o666 & ~_umask())
+            with _ASKING:  # to ask is to set it for a moment
+                mask = os.umask(0)
+                os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -41,7 +44,7 @@ def write_whole(path: Path, write: Callable[[Path], None], *, makes_folder: bool
 
 def write_text(path: Path, text: str) -> None:
     """A text file, there whole or not at all."""
-    write_whole(path, lambda temporary: _put(temporary, text))
+    write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 @contextmanager
@@ -91,14 +94,3 @@ def _made_here(lock: Path) -> int:
     except FileExistsError as error:
         holder = lock.read_text(encoding="ascii", errors="replace").strip()
         raise BlockingIOError(errno.EAGAIN, f"{holder}; if it has ended, remove {lock}", str(lock)) from error
-
-
-def _put(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
-
-
-def _umask() -> int:
-    with _ASKING:  # to ask is to set it for a moment
-        mask = os.umask(0)
-        os.umask(mask)
-    return mask

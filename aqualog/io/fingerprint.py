@@ -25,9 +25,10 @@ class Contents:
 
     def __init__(self, known: Any = None) -> None:
         # it comes from a file: what is not as it should be is not known
-        self.known: dict[str, list[int | str]] = (
-            {k: v for k, v in known.items() if _is_entry(v)} if isinstance(known, dict) else {}
-        )
+        entries = known.items() if isinstance(known, dict) else ()
+        self.known: dict[str, list[int | str]] = {
+            k: v for k, v in entries if isinstance(v, list) and [type(x) for x in v] == [int, int, str]
+        }
         self.has_changed = False
 
     def of(self, path: Path) -> str:
@@ -140,7 +141,3 @@ def _digest(path: Path, size: int) -> str:
 
 def _files(path: Path) -> list[Path]:
     return [p for p in sorted(path.rglob("*")) if p.is_file()] if path.is_dir() else [path]
-
-
-def _is_entry(entry: Any) -> bool:
-    return isinstance(entry, list) and [type(x) for x in entry] == [int, int, str]

@@ -7,25 +7,25 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults
 from aqualog.guard.reading import reading
-from aqualog.io.reader import Part, Reader, ReadOptions, csv_hint, format_of
+from aqualog.io.reader import Closing, Part, Reader, ReadOptions, csv_hint, format_of
 
 __all__ = ["DriveLog", "open_log", "read_readable", "sniff"]
 
 
+_HEAD = 4096
+_MCAP = b"\x89MCAP0\r\n"
 _NAMED = 3  # channels of a lost group that are named
 
 
 # Each reader's libraries are imported when a file of its format is opened, not before.
 _READERS = {
     "mdf": ("aqualog.io.mdf.reader", "MdfReader"),
-    "mcap": ("aqualog.io.messages.mcap", "McapReader"),
-    "ros": ("aqualog.io.messages.ros", "RosReader"),
+    "mcap": ("aqualog.io.messages.reader", "McapReader"),
+    "ros": ("aqualog.io.messages.reader", "RosReader"),
     "csv": ("aqualog.io.tables.csv", "CsvReader"),
     "parquet": ("aqualog.io.tables.parquet", "ParquetReader"),
 }
@@ -47,7 +47,7 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
     return _Watched(path, reader)
 
 
-class _Watched:
+class _Watched(Closing):
     """A reader each of whose steps is a step of `reading`."""
 
     def __init__(self, path: Path, reader: Reader) -> None:
@@ -86,17 +86,9 @@ class _Watched:
     def close(self) -> None:
         self._reader.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-class DriveLog:
-    """The files of one drive as one reader; a context manager.
+class DriveLog(Closing):
+    """The files of one drive as one reader.
 
     If one file cannot be opened, those opened before it are closed again.
     """
@@ -164,14 +156,6 @@ class DriveLog:
         """Close all files."""
         self._stack.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
 
 def read_readable(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[Channel], list[str]]:
     """Decode channels of one file; of an MDF, group by group, with a note on each group that cannot be decoded.
@@ -188,7 +172,9 @@ def read_readable(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[C
     LogError
         If nothing of it can be decoded.
     """
-    groups = _groups(reader, wanted)
+    groups = [list(wanted)]
+    if reader.format == "mdf":  # channels of one group stand in the same records
+        groups = [[w for w in wanted if (w.file, w.path) in part.channels] for part in reader.parts(wanted)]
     if len(groups) < 2:
         return reader.read(wanted), []
     found: dict[str, Channel] = {}
@@ -199,27 +185,12 @@ def read_readable(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[C
             found |= {c.info.path: c for c in reader.read(infos)}
         except LogError as error:
             errors.append(error)
-            lost.append(_sentence(infos, error))
+            names = ", ".join(i.path for i in infos[:_NAMED])
+            more = f" and {len(infos) - _NAMED} more" if len(infos) > _NAMED else ""
+            lost.append(f"{names}{more}: {error.what}")
     if errors and not found:
         raise errors[0]
     return [found[w.path] for w in wanted if w.path in found], lost
-
-
-def _groups(reader: Reader, wanted: Sequence[ChannelInfo]) -> list[list[ChannelInfo]]:
-    """Channels that stand in the same records; only in MDF a file is more than one such group."""
-    if reader.format != "mdf":
-        return [list(wanted)]
-    return [[w for w in wanted if (w.file, w.path) in part.channels] for part in reader.parts(wanted)]
-
-
-def _sentence(infos: Sequence[ChannelInfo], error: LogError) -> str:
-    names = ", ".join(i.path for i in infos[:_NAMED])
-    more = f" and {len(infos) - _NAMED} more" if len(infos) > _NAMED else ""
-    return f"{names}{more}: {error.what}"
-
-
-_HEAD = 4096
-_MCAP = b"\x89MCAP0\r\n"
 
 
 def sniff(path: Path, *, any_text: bool = False) -> str:

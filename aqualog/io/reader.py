@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
 from aqualog.core.records import Channel, ChannelInfo, Drift, FileFaults
 
 __all__ = [
-    "CsvFormat", "FaultLog", "OpenFile", "Part", "ReadOptions", "Reader", "csv_hint", "format_fault", "format_of",
-    "one_piece", "part_of",
+    "Closing", "CsvFormat", "FaultLog", "OpenFile", "Part", "ReadOptions", "Reader", "csv_hint", "format_fault",
+    "format_of", "one_piece", "part_of",
 ]  # fmt: skip
 
 _DECIMALS = (".", ",")
@@ -143,9 +142,7 @@ class Reader(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    def __exit__(self, *_: object) -> None: ...
 
 
 @dataclass(slots=True)
@@ -164,8 +161,21 @@ class FaultLog:
         return FileFaults(self.truncated, self.lost_samples, notes, self.unfinalised, drifts)
 
 
-class OpenFile:
-    """What all readers have in common: a context manager for one file, and what was lost of it.
+class Closing:
+    """A context manager that closes itself."""
+
+    def close(self) -> None:
+        """Release what is open; nothing by itself."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class OpenFile(Closing):
+    """What all readers have in common: one file, and what was lost of it.
 
     Parameters
     ----------
@@ -179,21 +189,9 @@ class OpenFile:
         self._faults = faults or FaultLog()
 
     def _note(self, text: str) -> None:
-        """A note that names the file."""
         self._faults.notes.append(f"{self._path.name}: {text}")
 
     @property
     def faults(self) -> FileFaults:
         """What was lost so far; complete after `read`."""
         return self._faults.freeze()
-
-    def close(self) -> None:
-        """Release the file; nothing is held open."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

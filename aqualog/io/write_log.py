@@ -77,7 +77,8 @@ def write_log(
     if suffix == ".mf4":
         from aqualog.io.write_mdf import MdfGroup, write_mf4
 
-        mdf_groups = [MdfGroup(g.name, _seconds(g, t_ns), g.columns) for g in groups]
+        seconds = [(t_ns if g.t_ns is None else g.t_ns).astype(np.float64) * 1e-9 for g in groups]
+        mdf_groups = [MdfGroup(g.name, t, g.columns) for g, t in zip(groups, seconds, strict=True)]
         write_mf4(path, mdf_groups, start_ns, comment, written_ns=written_ns)
         return
     if suffix == ".mcap":
@@ -96,7 +97,3 @@ def write_log(
         write_csv(path, columns, decimal_comma=decimal_comma)
     else:
         write_parquet(path, columns, start_ns=start_ns)
-
-
-def _seconds(group: LogGroup, t_ns: TimeArray) -> FloatArray:
-    return (t_ns if group.t_ns is None else group.t_ns).astype(np.float64) * 1e-9

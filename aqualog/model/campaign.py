@@ -12,8 +12,7 @@ import numpy as np
 
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.core.vehicle import Vehicle, vehicle_toml
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed
+from aqualog.guard.worker import Crashed, work_on
 from aqualog.io.atomic_write import write_text, write_whole
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import PROGRAMMES, WEAR, Run

@@ -10,8 +10,7 @@ from importlib import import_module
 
 from aqualog.campaign.samples import CampaignData
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed
+from aqualog.guard.worker import Crashed, work_on
 from aqualog.thesis.catalogue import NUMBERS, OF_CAMPAIGN, needs_campaign, rows
 from aqualog.thesis.claims import Check, Checks, Conclusion, claims, combined, number_of
 from aqualog.thesis.evidence.campaign import Evidence

@@ -2,9 +2,11 @@
 
 import ast
 import re
+import sys
 
 import pytest
 
+import aqualog as aq
 from tests.book import decisions
 from tests.conftest import ROOT
 
@@ -28,3 +30,27 @@ def test_the_table_of_layers_is_that_of_the_tests():
     text = (ROOT / "aqualog" / "docs" / "architecture.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", text, re.M)
     assert re.findall(r"`(\w+)`", " ".join(rows)) == [e.value for e in order.elts]
+
+
+def test_the_way_of_a_channel_is_the_one_that_it_takes():
+    text = (ROOT / "aqualog" / "docs" / "architecture.md").read_text(encoding="utf-8")
+    way = text.split("## An MDF channel")[1].split("\n## ")[0]
+    package = ROOT / "aqualog"
+    assert all((package / name).exists() for name in re.findall(r"`([\w/]+\.py)`", way))
+    steps = re.findall(r"^\d+\. `([\w/]+\.py)`: `(\w+)`", way, re.M)
+    assert 10 <= len(steps) <= 15
+    called: dict[tuple[str, str], int] = {}
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code.co_filename.startswith(str(package)):
+            name = frame.f_code.co_filename.removeprefix(f"{package}/")
+            called.setdefault((name, frame.f_code.co_name), len(called))
+
+    samples = ROOT / "sample_logs"
+    sys.setprofile(note)
+    try:
+        aq.detect(samples / "lane_drive.mf4", samples / "vehicle.toml")
+    finally:
+        sys.setprofile(None)
+    order = [called[step] for step in steps]
+    assert order == sorted(order)

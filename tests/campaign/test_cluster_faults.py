@@ -25,7 +25,7 @@ from aqualog.campaign.cluster import bounds_here, on_cluster
 from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
 from aqualog.cli.main import app
 from aqualog.core.errors import AqualogError, ConfigError
-from aqualog.guard.limits import ReadLimits
+from aqualog.guard.reading import ReadLimits
 from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
 from tests.campaign.dask_here import cluster, with_children
 from tests.campaign.made import make_campaign

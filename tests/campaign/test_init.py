@@ -20,7 +20,7 @@ from aqualog.config.campaign import load_campaign
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
-from aqualog.io.write_mdf import CanMessage, write_can_mf4
+from tests.can_log import CanMessage, write_can_mf4
 from tests.conftest import ROOT
 
 SAMPLE = ROOT / "sample_logs" / "lane_drive.mf4"

@@ -20,7 +20,7 @@ from aqualog.campaign.samples import load_results
 from aqualog.campaign.store import MARK, Store
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError
-from aqualog.guard.pool import most_processes
+from aqualog.guard.worker import most_processes
 from aqualog.io.fingerprint import Contents
 from tests.campaign.made import make_campaign
 from tests.commands import run

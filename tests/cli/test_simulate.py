@@ -269,7 +269,7 @@ def test_a_log_that_cannot_be_written_leaves_nothing(folder, tmp_path):
 def test_a_writer_that_fails_leaves_the_old_log(folder, tmp_path, monkeypatch):
     target = tmp_path / "x.mf4"
     target.write_text("old")
-    monkeypatch.setattr("aqualog.io.write_mdf._save", lambda *a: a[1].write_text("half") and 1 / 0)
+    monkeypatch.setattr("aqualog.io.write_mdf.write_mf4", lambda *a, **_: a[0].write_text("half") and 1 / 0)
     result = CliRunner().invoke(app, ["simulate", str(folder / "wet.toml"), "-o", str(target), "--force"])
     assert result.exit_code == 1
     assert target.read_text() == "old"

@@ -14,8 +14,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed, Limits
+from aqualog.guard.worker import Crashed, Limits, work_on
 from tests.damaged.damage import DAMAGES, bombs
 from tests.damaged.judge import LEGEND, OUTCOMES, Seen, attempt, outcome, samples_of, verdict
 from tests.damaged.logs import FORMATS, folder_of

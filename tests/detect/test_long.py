@@ -17,7 +17,7 @@ from aqualog.detect.stream import detect_drive
 from aqualog.io.mdf import reader as mdf
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
-from aqualog.io.tables import csv_rows, parquet
+from aqualog.io.tables import csv, parquet
 from aqualog.io.tables import csv_text as text_file
 from aqualog.report.drive.document import document
 
@@ -42,7 +42,7 @@ def test_the_document_is_that_of_the_whole_drive(suffix, rows, monkeypatch):
     monkeypatch.setattr(parquet, "_PIECE", 2000)
     monkeypatch.setattr(batches, "_ENOUGH", 2000)
     monkeypatch.setattr(text_file, "LARGE", 1)
-    monkeypatch.setattr(csv_rows, "PIECE", 5000)
+    monkeypatch.setattr(csv, "PIECE", 5000)
     path, signal_map = inputs(suffix)
     whole = detect_drive(load_signals([path], vehicle=CAR, signal_map=signal_map), CAR)
     loaded = load_drive([path], vehicle=CAR, signal_map=signal_map, least=1)

@@ -17,14 +17,14 @@ from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
 from aqualog.io.reader import ReadOptions
-from aqualog.io.tables import csv_rows, parquet
+from aqualog.io.tables import csv, parquet
 from aqualog.io.tables import csv_text as text_file
 
 T0_NS = 1_700_000_000 * 10**9
 LONGEST_LINE = 2000
 _SMALL = (
     (messages, "_PIECE", 50), (batches, "_ENOUGH", 1000), (mdf, "_PIECE", 25), (mdf_columns, "_PIECE", 400),
-    (parquet, "_PIECE", 60), (text_file, "LARGE", 1), (text_file, "_BLOCK", 333), (csv_rows, "PIECE", 200),
+    (parquet, "_PIECE", 60), (text_file, "LARGE", 1), (text_file, "_BLOCK", 333), (csv, "PIECE", 200),
 )  # fmt: skip
 
 

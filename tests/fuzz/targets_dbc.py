@@ -4,7 +4,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from aqualog.io.write_mdf import CanFrames, write_frames_mf4
+from tests.can_log import CanFrames, write_frames_mf4
 from tests.fuzz.readers import outcome
 from tests.fuzz.registry import Target, add
 

@@ -16,8 +16,8 @@ import asammdf
 import numpy as np
 from asammdf.blocks.conversion_utils import from_dict
 
-from aqualog.io.write_mdf import CanFrames, write_frames_mf4
 from tests import mdf_by_hand
+from tests.can_log import CanFrames, write_frames_mf4
 from tests.fuzz.readers import Outcome, outcome
 from tests.fuzz.registry import Target, add
 

@@ -14,7 +14,7 @@ from aqualog.doctor.examine import examine
 from aqualog.io.clock_drift import DriftWatch
 from aqualog.io.open_log import open_log
 from aqualog.io.reader import ReadOptions
-from aqualog.io.tables import csv_rows, parquet
+from aqualog.io.tables import csv, parquet
 from aqualog.io.tables import csv_text as text_file
 
 S = 1_000_000_000
@@ -129,7 +129,7 @@ def test_every_log_with_two_clocks(tmp_path, monkeypatch, name):
     assert [(f.level, f.kind, f.count) for f in found] == [("doubt", "drifts", 1)]
     if name != "b.csv":  # text is read as a whole
         monkeypatch.setattr(parquet, "_PIECE", 4000)
-        monkeypatch.setattr(csv_rows, "PIECE", 40_000)
+        monkeypatch.setattr(csv, "PIECE", 40_000)
         monkeypatch.setattr(text_file, "LARGE", 1000)
         with open_log(path, ReadOptions()) as reader:
             for part in reader.parts(reader.channels()):

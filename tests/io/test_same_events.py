@@ -22,8 +22,9 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import SYMBOLS, WHEELS
 from aqualog.detect.stream import detect_drive
 from aqualog.io.write_mcap import McapTopic, write_mcap
-from aqualog.io.write_mdf import CanMessage, MdfGroup, write_can_mf4, write_mf4
+from aqualog.io.write_mdf import MdfGroup, write_mf4
 from aqualog.io.write_table import TableColumn, write_csv, write_parquet
+from tests.can_log import CanMessage, write_can_mf4
 
 T, S = sample_drive()
 CAR = load_vehicle(HERE / "vehicle.toml")

@@ -1,16 +1,19 @@
 """Read raw samples of a group of records straight from its data blocks.
 
 Blocks are read, unpacked and cut into columns without a copy of whole records. Of a transposed block only the bytes of
-the wanted channels are touched.
+the wanted channels are touched. Records of several kinds in a row are sorted into a file of our own first, where each
+kind is read like any other.
 """
 
 from __future__ import annotations
 
 import os
 import zlib
-from collections import deque
+from array import array
+from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -18,18 +21,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.records import BoolArray
-from aqualog.io.mdf.records import Field, Group, Stored
+from aqualog.io.mdf.blocks import Field, Group, Stored
+from aqualog.io.messages.batches import rows_of
 
 try:
     from deflate import zlib_decompress as _libdeflate  # comes along with another library where it can
 except ImportError:
     _libdeflate = None
 
-__all__ = ["Raw", "damaged_blocks", "is_sound_field", "raw_columns", "raw_pieces", "unpacked_blocks"]
+__all__ = [
+    "Kind", "Raw", "damaged_blocks", "is_sound_field", "raw_pieces", "sorted_groups", "unpacked_blocks",
+]  # fmt: skip
 
 _LARGEST_BLOCK = 1 << 28  # [bytes] stored or unpacked; the standard allows 4 MiB
 _PIECE = 1 << 21  # [bytes] read at a time where nothing is packed: what the cache still holds when it is cut
-_DZ_HEAD = 48
 _WHOLE_BITS = {"u": (8, 16, 32, 64), "i": (8, 16, 32, 64), "f": (16, 32, 64)}
 
 _Array = NDArray[Any]
@@ -76,8 +81,8 @@ def is_sound_field(field: Field, size: int) -> bool:
     return field.octets <= 8
 
 
-def raw_columns(path: Path, group: Group, wanted: Sequence[int]) -> Raw:
-    """Raw samples of channels of a group, all of its records.
+def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) -> Iterator[Raw]:
+    """Raw samples of channels of a group, none of them virtual, in pieces of whole blocks, in order.
 
     Parameters
     ----------
@@ -85,26 +90,15 @@ def raw_columns(path: Path, group: Group, wanted: Sequence[int]) -> Raw:
         The file with the records.
     group : Group
     wanted : sequence of int
-        Channels of the group, none of them virtual.
+        Channels of the group.
+    records : int
+        Least number of records of a piece but for the last one.
 
     Raises
     ------
     OSError, zlib.error, ...
         If a block cannot be read or unpacked to the size that it declares.
     """
-    pieces = list(raw_pieces(path, group, wanted, 1 << 62))
-    if len(pieces) == 1:
-        return pieces[0]
-    return Raw(
-        {i: np.concatenate([p.samples[i] for p in pieces]) if pieces else np.zeros(0) for i in wanted},
-        {i: np.concatenate([p.invalid[i] for p in pieces]) for i in (pieces[0].invalid if pieces else ())},
-        0,
-        sum(p.records for p in pieces),
-    )
-
-
-def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) -> Iterator[Raw]:
-    """The same in pieces of whole blocks with at least so many records, in order."""
     size = group.record
     if not 0 < size <= _LARGEST_BLOCK:
         return
@@ -118,29 +112,29 @@ def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) ->
     plan = _Plan(fields, invalid, blocks, size)
     for run in _runs(blocks, size, records):
         raw = _decoded(path, plan, run)
-        yield raw if raw.first + raw.records <= group.cycles else _head_of(raw, group.cycles - raw.first)
-
-
-def _head_of(raw: Raw, count: int) -> Raw:
-    """The first records of some."""
-    return Raw(
-        {i: x[:count] for i, x in raw.samples.items()}, {i: x[:count] for i, x in raw.invalid.items()}, raw.first, count
-    )
+        count = group.cycles - raw.first
+        if count < raw.records:
+            cut = {i: x[:count] for i, x in raw.samples.items()}
+            raw = Raw(cut, {i: x[:count] for i, x in raw.invalid.items()}, raw.first, count)
+        yield raw
 
 
 def unpacked_blocks(path: Path, blocks: Iterable[Stored]) -> Iterator[_Bytes]:
     """Content of blocks in turn, no longer transposed; of a plain one in pieces."""
     with path.open("rb", buffering=0) as file:
         for block in blocks:
-            for part in _in_pieces(block):
+            step = block.size if block.packing else _PIECE
+            for at in range(0, max(block.size, 1), step or 1):
+                size = min(step, block.size - at)
+                part = block if block.packing else Stored(block.address + at, size, size)
                 data = _unpacked(_stored(file, (part,), np.empty(part.size, dtype=np.uint8).data), part)
                 if len(data) != part.unpacked:
                     raise OSError(f"a data block inflates to {len(data)} bytes, not {part.unpacked}")
                 yield _turned_back(data, part.columns) if part.columns else data
 
 
-def damaged_blocks(path: Path, blocks: Iterable[int]) -> frozenset[int]:
-    """Return the packed blocks at these addresses that do not unpack to the size that they declare.
+def damaged_blocks(path: Path, blocks: Mapping[int, Stored]) -> frozenset[int]:
+    """Return the addresses of the packed blocks that do not unpack to the size that they declare.
 
     Raises
     ------
@@ -149,52 +143,25 @@ def damaged_blocks(path: Path, blocks: Iterable[int]) -> frozenset[int]:
     """
     found = set()
     with path.open("rb") as file:
-        for at in blocks:
-            file.seek(at)
-            head = file.read(_DZ_HEAD)
-            kind, unpacked, size = (
-                head[26],
-                int.from_bytes(head[32:40], "little"),
-                int.from_bytes(head[40:48], "little"),
-            )
-            data = file.read(size)
+        for at, block in blocks.items():
+            file.seek(block.address)
+            data = memoryview(file.read(block.size))
             try:
-                if kind // 2:
-                    _unpacked(memoryview(data), Stored(at, size, unpacked, ("zstd", "lz4")[kind // 2 - 1]))
-                elif _inflated_size(data) != unpacked:
-                    found.add(at)
+                is_right = len(_unpacked(data, block)) == block.unpacked
             except Exception:  # what its library raises is of no one kind
+                is_right = False
+            if not is_right:
                 found.add(at)
     return frozenset(found)
-
-
-def _inflated_size(data: bytes) -> int:
-    """Return the size of deflated data, a piece at a time; the declared size may be far more than there is. [bytes]"""
-    inflater, size = zlib.decompressobj(), 0
-    while not inflater.eof:
-        piece = inflater.decompress(data, 1 << 20)
-        data = inflater.unconsumed_tail
-        if not piece and not data:
-            return -1  # its end is missing
-        size += len(piece)
-    return size
 
 
 # --- what lies where ---
 
 
-def _in_pieces(block: Stored) -> Iterator[Stored]:
-    if block.packing or block.size <= _PIECE:
-        yield block
-        return
-    for at in range(0, block.size, _PIECE):
-        size = min(_PIECE, block.size - at)
-        yield Stored(block.address + at, size, size)
-
-
 def _blocks(stored: Sequence[Stored], size: int, cycles: int) -> list[_Block] | None:
     """Blocks of whole records, up to the declared number of them; None if a packed one ends inside a record."""
     out: list[_Block] = []
+    done = 0  # records
     plain: list[Stored] = []  # stored one behind the other; a record may begin in one and end in the next
     for block in stored:
         if not block.packing:
@@ -204,18 +171,18 @@ def _blocks(stored: Sequence[Stored], size: int, cycles: int) -> list[_Block] | 
             return None
         if block.columns not in (0, size) or sum(s.size for s in plain) % size:
             return None
-        _put_plain(out, plain, size)
-        out.append(_Block((block,), block.unpacked, _records(out, size)))
-    _put_plain(out, plain, size)
+        done = _put_plain(out, plain, size, done)
+        out.append(_Block((block,), block.unpacked, done))
+        done += block.unpacked // size
+    _put_plain(out, plain, size, done)
     return [b for b in out if b.first < cycles]
 
 
-def _records(blocks: Sequence[_Block], size: int) -> int:
-    return blocks[-1].first + blocks[-1].size // size if blocks else 0
+def _put_plain(out: list[_Block], plain: list[Stored], size: int, done: int) -> int:
+    """Cut consecutive stored bytes into pieces of whole records behind `done` ones, and forget them.
 
-
-def _put_plain(out: list[_Block], plain: list[Stored], size: int) -> None:
-    """Cut consecutive stored bytes into pieces of whole records, and forget them; an incomplete record is left out."""
+    An incomplete record is left out. Returns how many there are now.
+    """
     left = sum(s.size for s in plain) // size * size
     piece = max(_PIECE // size, 1) * size
     parts: list[Stored] = []
@@ -226,9 +193,11 @@ def _put_plain(out: list[_Block], plain: list[Stored], size: int) -> None:
             parts.append(Stored(address, taken, taken))
             address, length, missing, left = address + taken, length - taken, missing - taken, left - taken
             if not missing:
-                out.append(_Block(tuple(parts), sum(p.size for p in parts), _records(out, size)))
+                out.append(_Block(tuple(parts), sum(p.size for p in parts), done))
+                done += out[-1].size // size
                 parts, missing = [], min(piece, left)
     plain.clear()
+    return done
 
 
 def _runs(blocks: Sequence[_Block], size: int, records: int) -> Iterator[list[_Block]]:
@@ -246,7 +215,6 @@ def _runs(blocks: Sequence[_Block], size: int, records: int) -> Iterator[list[_B
 
 
 def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> Raw:
-    """Raw samples of consecutive blocks."""
     begin = blocks[0].first
     out = _empty(plan, begin, sum(b.size for b in blocks) // plan.size)
     pending = deque(blocks)
@@ -355,7 +323,7 @@ def _unpacked(data: memoryview, block: Stored) -> _Bytes:
     if not block.packing:
         return data
     if block.packing == "deflate":
-        return inflated(data, block.unpacked)
+        return _inflated(data, block.unpacked)
     if block.packing == "lz4":
         import lz4.frame
 
@@ -369,14 +337,8 @@ def _unpacked(data: memoryview, block: Stored) -> _Bytes:
     return out
 
 
-def inflated(data: bytes | memoryview, size: int) -> bytes | bytearray:
-    """A deflated block, whose checksum is right, of at most so many bytes; it may be shorter.
-
-    Raises
-    ------
-    OSError, zlib.error, deflate.DeflateError
-        If it is damaged or would be longer.
-    """
+def _inflated(data: bytes | memoryview, size: int) -> bytes | bytearray:
+    """A deflated block, whose checksum is right, of at most so many bytes; it may be shorter."""
     if _libdeflate is not None:
         found: bytearray = _libdeflate(data, size)
         return found
@@ -423,3 +385,78 @@ def _gather(here: _Array, f: Field, planes: NDArray[np.uint8]) -> None:
         # the highest bit to the top, then the lowest to the bottom: spreads the sign, and whatever lay above is gone
         here <<= 8 * width - f.shift - f.bits
         here >>= 8 * width - f.bits
+
+
+# --- records of several kinds in a row ---
+
+
+class Kind(NamedTuple):
+    """What was sorted of a group: where it is now, how many records or values, and their bytes without ids."""
+
+    stored: tuple[Stored, ...]
+    records: int
+    size: int
+
+
+def sorted_groups(path: Path, groups: Sequence[Group], into: BinaryIO) -> list[tuple[Group, Kind]]:
+    """Sort the records of all groups of a data group of the log `path` to the end of a binary file.
+
+    What follows a record of no known kind is left out.
+
+    Raises
+    ------
+    OSError, zlib.error, ...
+        If a block cannot be read or unpacked.
+    """
+    sizes = {g.record_id: -1 if g.is_variable else g.record + g.behind for g in groups}
+    taken = {g.record_id: g.record for g in groups}
+    id_size = groups[0].id_size
+    stored: dict[int, list[Stored]] = defaultdict(list)
+    counts: dict[int, int] = defaultdict(int)
+    rest = b""
+    for block in unpacked_blocks(path, groups[0].data):
+        data = rest + bytes(block)
+        starts, end, is_known = _starts(data, sizes, id_size)
+        ids = np.zeros(len(starts), dtype=np.uint64)
+        for k in range(id_size):
+            ids |= np.frombuffer(data, dtype=np.uint8)[starts + k].astype(np.uint64) << np.uint64(8 * k)
+        for kind, size in sizes.items():
+            at = starts[ids == kind] + id_size
+            if not at.size:
+                continue
+            counts[kind] += at.size
+            if size < 0:
+                rows = b"".join(data[a : a + 4 + int.from_bytes(data[a : a + 4], "little")] for a in at.tolist())
+            else:
+                rows = rows_of(data, at, taken[kind]).tobytes() if taken[kind] else b""
+            stored[kind].append(Stored(into.tell(), len(rows), len(rows)))
+            into.write(rows)
+        if not is_known:
+            break
+        rest = data[end:]
+    into.flush()
+    kinds = {k: Kind(tuple(stored[k]), counts[k], sum(s.size for s in stored[k])) for k in sizes}
+    return [(replace(g, data=kinds[g.record_id].stored), kinds[g.record_id]) for g in groups]
+
+
+def _starts(data: bytes, sizes: Mapping[int, int], id_size: int) -> tuple[NDArray[np.int64], int, bool]:
+    """Where the whole records begin with their ids; where the last one ends; whether all kinds are known.
+
+    A size below 0 is that of values of variable length, each behind its length in 4 bytes.
+    """
+    steps = {kind: id_size + size if size >= 0 else 0 for kind, size in sizes.items()}
+    found = array("q")
+    add, at, size, is_known = found.append, 0, len(data), True
+    try:
+        while at <= size - id_size:  # what stands here is paid for each record of a log
+            step = steps[data[at] if id_size == 1 else int.from_bytes(data[at : at + id_size], "little")]
+            if not step:
+                head = data[at + id_size : at + id_size + 4]
+                step = id_size + 4 + int.from_bytes(head, "little") if len(head) == 4 else size + 1
+            add(at)
+            at += step
+    except KeyError:
+        is_known = False
+    if at > size:  # the last one goes on in the next block
+        at = found.pop()
+    return np.array(found, dtype=np.int64), at, is_known

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.io.mdf.records import Conversion
+from aqualog.io.mdf.blocks import Conversion
 
 __all__ = ["Formula", "converted", "physical", "refusal"]
 

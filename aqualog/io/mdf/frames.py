@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from aqualog.core.records import TimeArray
 from aqualog.io.can import Dbc, pgn
+from aqualog.io.mdf.blocks import Group, Stored
 from aqualog.io.mdf.columns import is_sound_field, unpacked_blocks
-from aqualog.io.mdf.records import Group, Stored
 
 __all__ = [
     "FRAME", "FrameGroup", "bus_of", "buses_of", "census_of", "codes_of", "frame_key", "frame_members", "frame_notes",
@@ -140,7 +140,6 @@ def _variable(stored: _Octets, at: TimeArray) -> tuple[_Octets, NDArray[np.int64
 
 
 def _stacked(parts: Sequence[_Array]) -> _Array:
-    """Payload matrices below each other, filled up to the widest."""
     width = max((p.shape[1] for p in parts), default=0)
     return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1]))) for p in parts])
 

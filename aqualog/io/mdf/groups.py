@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, ChannelInfo, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.mdf import columns as blocks
+from aqualog.io.mdf.blocks import Group, Survey, mapped
+from aqualog.io.mdf.columns import Kind, Raw, raw_pieces, sorted_groups
 from aqualog.io.mdf.conversion import converted, physical
-from aqualog.io.mdf.records import Group
-from aqualog.io.mdf.sorting import Kind, sorted_groups
-from aqualog.io.mdf.walk import Survey, mapped
 from aqualog.io.mdf.walk3 import survey3
 from aqualog.io.mdf.walk4 import survey4
 from aqualog.io.reader import OpenFile
@@ -156,12 +154,7 @@ class GroupReader(OpenFile):
                 "record of no known kind"
             )
 
-    def _file_of(self, group: Group) -> Path:
-        """Where the records of a group are."""
-        return self._sorted if group.id_size else self._path
-
     def _clock_of(self, index: int) -> int | None:
-        """The group that has the time of a group."""
         at = self._groups[index].master_at
         return self._index.get(at) if at else index
 
@@ -185,11 +178,11 @@ class GroupReader(OpenFile):
             stamps[: len(there)] = there
             yield stamps, self._values(index, wanted, raw)
 
-    def _raw(self, index: int, wanted: Sequence[int], records: int) -> Iterator[blocks.Raw]:
+    def _raw(self, index: int, wanted: Sequence[int], records: int) -> Iterator[Raw]:
         """Raw samples; those of virtual channels are the numbers of their records."""
         group = self._groups[index]
         stored = [i for i in dict.fromkeys(wanted) if not group.channels[i].is_virtual]
-        for raw in blocks.raw_pieces(self._file_of(group), group, stored, records):
+        for raw in raw_pieces(self._sorted if group.id_size else self._path, group, stored, records):
             numbers = np.arange(raw.first, raw.first + raw.records)
             yield raw._replace(samples=raw.samples | dict.fromkeys(set(wanted) - set(stored), numbers))
 
@@ -205,7 +198,7 @@ class GroupReader(OpenFile):
         exact = conversion.kind in ("ranges", "texts", "texts of ranges")
         return np.asarray(physical(conversion, raw) if exact else converted(conversion, raw), dtype=np.float64)
 
-    def _values(self, index: int, wanted: Sequence[int], raw: blocks.Raw) -> dict[int, _Array]:
+    def _values(self, index: int, wanted: Sequence[int], raw: Raw) -> dict[int, _Array]:
         found = {}
         for i in wanted:
             channel = self._groups[index].channels[i]

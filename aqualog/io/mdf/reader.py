@@ -17,11 +17,10 @@ from aqualog.core.records import BoolArray, Channel, ChannelInfo, TimeArray
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, selected
 from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf import frames as can
+from aqualog.io.mdf.blocks import Channel as MdfChannel
+from aqualog.io.mdf.blocks import Group, Survey, short
 from aqualog.io.mdf.conversion import refusal
 from aqualog.io.mdf.groups import Columns, GroupReader
-from aqualog.io.mdf.records import Channel as MdfChannel
-from aqualog.io.mdf.records import Group
-from aqualog.io.mdf.walk import Survey, short
 from aqualog.io.reader import FaultLog, Part, ReadOptions, one_piece, part_of
 
 __all__ = ["MdfReader"]
@@ -78,16 +77,12 @@ _SHOWN = 8  # attachments listed in a note
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
-    """Address of a measured channel."""
-
     group: int
     index: int
 
 
 @dataclass(frozen=True, slots=True)
 class _Signal:
-    """Address of a DBC signal on one bus."""
-
     code: int
     message: Any
     name: str
@@ -204,9 +199,9 @@ class MdfReader(GroupReader):
 
     def _find_damaged(self, error: LogError) -> None:
         """Seek packed blocks that make the file unreadable; raise the error if there is no such block."""
-        if self._damaged or not self._survey.deflated:
+        if self._damaged or not self._survey.packed:
             raise error
-        self._damaged = blocks.damaged_blocks(self._path, self._survey.deflated)
+        self._damaged = blocks.damaged_blocks(self._path, self._survey.packed)
         if not self._damaged:
             raise error
 
@@ -314,7 +309,6 @@ class MdfReader(GroupReader):
     # --- raw CAN frames ---
 
     def _codes(self, index: int, members: dict[str, int]) -> NDArray[np.uint64]:
-        """Code of each frame of a group."""
         heads = [members[m] for m in ("ID", "IDE", "BusChannel") if m in members]
         self._check_memory(index, len(heads))
         codes, empty = can.codes_of(self._groups[index], members, self._columns(index, heads))
@@ -381,7 +375,6 @@ class MdfReader(GroupReader):
             )
 
     def _payloads(self, wanted: set[int]) -> dict[int, tuple[TimeArray, _Array, _Array]]:
-        """Time stamps, payloads and payload lengths of the wanted frames."""
         parts: dict[int, list[tuple[TimeArray, _Array, _Array]]] = defaultdict(list)
         codes = np.array(sorted(wanted), dtype=np.uint64)
         for group in self._frames:
@@ -427,17 +420,15 @@ class MdfReader(GroupReader):
         values, path = channel.values, self._path
         if isinstance(values, int):
             owner = self._index.get(values)
-            values, path = (() if owner is None else self._groups[owner].data), self._file_of(group)
+            values, path = (() if owner is None else self._groups[owner].data), self._sorted if group.id_size else path
         return can.variable_payloads(path, values, raw.astype(np.int64))
 
 
 def _fits(group: Group, channel: MdfChannel) -> bool:
-    """Whether a channel lies inside its record."""
     return channel.is_virtual or blocks.is_sound_field(channel.field, group.size)
 
 
 def _behind(pieces: Iterator[Columns], records: int) -> Iterator[Columns]:
-    """Pieces without the first so many records."""
     for t, columns in pieces:
         new = slice(min(records, len(t)), None)
         records -= min(records, len(t))

@@ -9,8 +9,19 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.io.mdf.records import Channel, Conversion, ConversionKind, Field, Group, Stored
-from aqualog.io.mdf.walk import BlockError, Survey, Walk, plain_text, short
+from aqualog.io.mdf.blocks import (
+    BlockError,
+    Channel,
+    Conversion,
+    ConversionKind,
+    Field,
+    Group,
+    Stored,
+    Survey,
+    Walk,
+    plain_text,
+    short,
+)
 
 __all__ = ["survey3"]
 
@@ -71,7 +82,6 @@ class _Walk(Walk):
     def __init__(self, data: Any, path: Path) -> None:
         super().__init__(data, path)
         self._declared: list[_Declared] = []
-        self._conversions: dict[int, Conversion | str] = {}
 
     def run(self) -> Survey:
         try:
@@ -87,7 +97,6 @@ class _Walk(Walk):
         return self._found
 
     def _start(self, length: int) -> int:
-        """Start in ns since 1970; 0 where it is not known."""
         start = 0
         if length > _HD_WITH_NANOSECONDS and self._size >= _HD + _HD_WITH_NANOSECONDS + 8:
             start = self._numbers("<Q", _HD + _HD_WITH_NANOSECONDS)[0]
@@ -109,13 +118,9 @@ class _Walk(Walk):
         return length
 
     def _once(self, at: int, kind: bytes) -> int:
-        """The same, of which there must be one link only."""
         length = self._block(at, kind)
         self._link_once(kind.decode(), at)
         return length
-
-    def _numbers(self, layout: str, at: int) -> tuple[Any, ...]:
-        return struct.unpack_from(layout, self._data, at)
 
     def _link(self, at: int) -> int:
         return int(self._numbers("<I", at)[0])
@@ -135,7 +140,6 @@ class _Walk(Walk):
         return found
 
     def _text(self, at: int) -> str:
-        """The text at a place; empty without one."""
         if not at or at + 4 > self._size or self._data[at : at + 2] != b"TX":
             return ""
         raw = bytes(self._data[at + 4 : at + self._numbers("<H", at + 2)[0]])
@@ -278,7 +282,7 @@ class _Walk(Walk):
         is_name_lost = self._texts(at, tuple(names), "the name of a channel") is not None
         if is_name_lost:
             refused = "its name is lost"
-        conversion = self._conversion_of(self._link(at + 8))
+        conversion = self._converted(self._link(at + 8))
         if isinstance(conversion, str):
             refused, conversion = conversion, None
         kind, name, description, begin, bits, values = self._numbers("<H32s128s3H", at + 24)
@@ -300,21 +304,11 @@ class _Walk(Walk):
         )  # fmt: skip
 
     def _source(self, at: int) -> tuple[str, ...]:
-        """Name of a source, or its path; nothing without one."""
         layout = _SOURCES.get(self._numbers("<H", at + 4)[0]) if at and at + 128 <= self._size else None
         if layout is None:
             return ()
         name, path = (t.decode("latin-1").strip(_BLANKS) for t in self._numbers(layout, at + 6))
         return (name or path,)
-
-    def _conversion_of(self, at: int) -> Conversion | str | None:
-        """A conversion, or why raw numbers of a channel cannot be converted; None without one."""
-        if at and at not in self._conversions:
-            try:
-                self._conversions[at] = self._conversion(at)
-            except BlockError as broken:
-                self._conversions[at] = f"its conversion cannot be read, {broken}"
-        return self._conversions[at] if at else None
 
     def _conversion(self, at: int) -> Conversion:
         length = self._block(at, b"CC")

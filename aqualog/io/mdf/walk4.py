@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 
 from aqualog.core.errors import LogError
 from aqualog.guard.system import bytes_text
-from aqualog.io.mdf.chains4 import HEAD, Block, Chain
-from aqualog.io.mdf.describe4 import DescriptionWalk
-from aqualog.io.mdf.records import Channel, Conversion, Field, Group
-from aqualog.io.mdf.walk import BlockError, Survey, plain_text, short
+from aqualog.io.mdf.blocks import BlockError, Channel, Field, Group, Survey, plain_text, short
+from aqualog.io.mdf.blocks4 import HEAD, Block, BlockWalk, Chain
 
 __all__ = ["LARGEST_BLOCK", "survey4"]
 
@@ -70,10 +68,9 @@ def survey4(data: Any, path: Path, damaged: Collection[int] = ()) -> Survey:
     return _Walk(data, path, frozenset(damaged)).run()
 
 
-class _Walk(DescriptionWalk):
+class _Walk(BlockWalk):
     def __init__(self, data: Any, path: Path, damaged: frozenset[int]) -> None:
-        super().__init__(data, path)
-        self.damaged = damaged
+        super().__init__(data, path, damaged)
         self._chains: dict[int, Chain] = {}  # of groups that were gone through before the others
         self._extent, self._has_invalidation = 0, False  # what the channels of a group take of a record
         self._invalidation_bits = 0  # that records of the group have
@@ -130,7 +127,6 @@ class _Walk(DescriptionWalk):
         self._described(header, 5, "the file's comment")
 
     def _attached(self, at: int) -> str:
-        """A name for a list."""
         try:
             block = self._block(at, b"TX", 0, HEAD)
         except BlockError:
@@ -200,7 +196,6 @@ class _Walk(DescriptionWalk):
         return found
 
     def _with_channels(self, group: Group, block: Block) -> Group:
-        """The group with what its block describes."""
         self._described(block, 2, "a group's name")
         self._described(block, 5, "a group's comment")
         source = self._source(block, 3)
@@ -270,7 +265,9 @@ class _Walk(DescriptionWalk):
             self._refused[block.at] = "its unit is lost"
         self._described(block, 7, f"the comment of the channel at byte {block.at}")
         source = self._source(block, 3)
-        conversion = self._conversion_of(block)
+        conversion = self._converted(block.links[4])
+        if isinstance(conversion, str):
+            self._refused[block.at], conversion = conversion, None
         stored = self._signal_data(block) if block.links[5] else ()
         place = len(into)
         if values < _MOST_TYPES:
@@ -280,8 +277,9 @@ class _Walk(DescriptionWalk):
             del into[place:]
             return
         refused = self._refused.get(block.at, "")
+        unit = (conversion.unit if conversion is not None else "") or self._text(block.links[6])
         into[place] = Channel(
-            self._text(block.links[2]), _unit(conversion, self._text(block.links[6])),
+            self._text(block.links[2]), plain_text(unit).strip("\0 \t\r\n"),
             short(plain_text(self._text(block.links[7]))),
             (*((source[0] or source[1],) if source else ()), *self._group_source),
             kind in (_MASTER, _VIRTUAL_MASTER), sync in (0, 1), is_virtual,
@@ -412,7 +410,3 @@ def _is_layout(values: int, shift: int, bits: int) -> bool:
         return shift < 8 and (bits > 64 or 1 <= bits <= 64 - shift)  # longer ones are bytes
     known = {**dict.fromkeys(_REALS, _REAL_BITS), **dict.fromkeys(_COMPLEX, _COMPLEX_BITS)}.get(values)
     return known is None or (shift == 0 and bits in known)
-
-
-def _unit(conversion: Conversion | None, own: str) -> str:
-    return plain_text((conversion.unit if conversion is not None else "") or own).strip("\0 \t\r\n")

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import BinaryIO, Literal
 
 from aqualog.core.errors import LogError
-from aqualog.io.decompress import LONGEST, Allowance, DamagedError, unpack
-from aqualog.io.messages.batches import Message, batched, first_of_each
-from aqualog.io.messages.codecs import UndecodableError, codec_for
-from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
+from aqualog.io.decompress import LONGEST, DamagedError, unpack
+from aqualog.io.messages.batches import Message
+from aqualog.io.messages.codecs import codec_for
+from aqualog.io.messages.streams import Stream
 from aqualog.io.messages.walk import ChunkSource, RecordWalk
 
 __all__ = ["CHUNK", "INDEX", "MAGIC", "BagSource", "BagWalk", "kind_of"]
@@ -57,7 +57,6 @@ class BagWalk(RecordWalk[Head]):
         return None if is_long or end > (self._size if known is None else known) else (head, start, end)
 
     def _sought(self, offset: int) -> int | None:
-        """The first place from `offset` on that looks like a chunk."""
         while offset < self._size:
             self._file.seek(offset)
             block = self._file.read(_BLOCK)
@@ -90,7 +89,7 @@ class BagSource(ChunkSource[Head]):
         If it is encrypted.
     """
 
-    stream_name = "connection"
+    missing = "connection records"
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -100,22 +99,13 @@ class BagSource(ChunkSource[Head]):
         """All connections with messages that can be decoded."""
         with self.path.open("rb") as file:
             chunks = self._index(file)
-            samples = self._scan(file) if chunks is None else self._sample(file, chunks)
-        found = []
-        for connection, (topic, msgtype, definition) in sorted(self._connections.items()):
-            if not self._counts.get(connection):
-                continue
-            try:
-                codec = codec_for("ros1", "ros1msg", msgtype, definition)
-                known = samples.get(connection, [])
-                found.append(make_stream(connection, topic, self._counts[connection], codec, known))
-            except UndecodableError as error:
-                self._notes.append(f'topic "{topic}" is left out: {error}')
-        return found
+            samples = self._scan(file) if chunks is None else self._sample(file, chunks, 1)
+        topics = ((i, topic) for i, (topic, _, _) in sorted(self._connections.items()))
+        return self._listed(topics, lambda i: codec_for("ros1", "ros1msg", *self._connections[i][1:]), samples)
 
     def _index(self, file: BinaryIO) -> dict[int, frozenset[int]] | None:
         """Return the chunks and the connections in them by the index at the end; None without a whole index."""
-        _, head, _ = next(iter(BagWalk(file, self._size, len(MAGIC))), (0, {}, b""))
+        _, head, _ = next(iter(self._records(file)), (0, {}, b""))
         start = number(head, b"index_pos", 8)
         if head.get(b"encryptor"):
             raise LogError("is encrypted", where=str(self.path), expected="a plain bag", hint="rosbag decrypt")
@@ -123,7 +113,7 @@ class BagSource(ChunkSource[Head]):
             return None
         chunks: dict[int, frozenset[int]] = {}
         counts: dict[int, int] = {}
-        records = BagWalk(file, self._size, start)
+        records = self._records(file, start)
         is_pure = True
         for _, record, data in records:
             is_pure &= kind_of(record) in (CONNECTION, CHUNK_INFO)
@@ -137,38 +127,18 @@ class BagSource(ChunkSource[Head]):
                     counts[connection] = counts.get(connection, 0) + count
         is_whole = is_pure and not records.gaps and len(chunks) == number(head, b"chunk_count")
         # bytes too many or too few before it move the last chunk at least
-        is_whole = is_whole and all(self._is_chunk(file, at) for at in {min(chunks, default=0), max(chunks, default=0)})
+        is_whole = is_whole and all(self._chunk_at(file, at) for at in {min(chunks, default=0), max(chunks, default=0)})
         if not is_whole or len(self._connections) != number(head, b"conn_count") or counts.keys() - self._connections:
             self._connections = {}
             return None
         self._counts, self._chunks, self._indexed = counts, tuple(chunks), True
         return chunks
 
-    def _is_chunk(self, file: BinaryIO, at: int) -> bool:
-        offset, head, _ = next(iter(BagWalk(file, self._size, at)), (-1, {}, b""))
-        return offset == at and kind_of(head) == CHUNK
-
-    def _sample(self, file: BinaryIO, chunks: dict[int, frozenset[int]]) -> dict[int, list[bytes]]:
-        """First messages of each connection, from as few chunks as hold them all."""
-        missing = {connection for connection, count in self._counts.items() if count}
-        samples: dict[int, list[bytes]] = {}
-        self._allowance = Allowance()
-        for position in sorted(chunks):
-            if missing.isdisjoint(chunks[position]):
-                continue
-            offset, head, data = next(iter(BagWalk(file, self._size, position, self._chunks)), (0, {}, b""))
-            if offset != position or kind_of(head) != CHUNK:
-                continue
-            for batch in batched(self._chunk(offset, head, data, frozenset(missing))):
-                first_of_each(samples, batch, SAMPLES)
-            missing.difference_update(samples)
-        return samples
-
     def _is_described(self, stream_id: int) -> bool:
         return stream_id in self._connections
 
-    def _records(self, file: BinaryIO) -> BagWalk:
-        return BagWalk(file, self._size, len(MAGIC), self._chunks)
+    def _records(self, file: BinaryIO, start: int = len(MAGIC)) -> BagWalk:
+        return BagWalk(file, self._size, start, self._chunks)
 
     def _kind(self, head: Head) -> Literal["chunk", "index", "other"]:
         kind = kind_of(head)

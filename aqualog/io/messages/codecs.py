@@ -6,9 +6,10 @@ import dataclasses
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from operator import attrgetter, itemgetter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from google.protobuf.message import Message as ProtobufMessage
@@ -19,8 +20,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
 
-from aqualog.io.messages.layout import Layout, ros_layout
-from aqualog.io.messages.ros_types import MAX_TEXT, RefusedError, checked
+from aqualog.io.messages.ros_types import MAX_TEXT, Layout, RefusedError, checked, ros_layout
 
 __all__ = ["Codec", "FieldPath", "Getter", "Leaf", "UndecodableError", "brief", "codec_for"]
 
@@ -55,32 +55,30 @@ class Leaf:
         return self.text.rpartition(".")[2]
 
 
-class Codec(Protocol):
-    """How the bytes of one message type become numbers."""
+class Codec:
+    """How the bytes of one message type become numbers; `decode` makes an object of one message."""
 
-    def decode(self, data: bytes, /) -> Any:
-        """One message as an object."""
-        ...
+    decode: Callable[[bytes], Any]
 
     def children(self, value: Any) -> Iterable[tuple[str | int, Any]]:
         """Fields of an object or elements of an array; empty for anything else."""
-        ...
+        raise NotImplementedError
 
     def getter(self, path: FieldPath) -> Getter:
         """Fast access to one field. Raises an error of Python or gives None if a message lacks it."""
-        ...
+        raise NotImplementedError
 
     def declared(self) -> Iterable[Leaf]:
         """Leaves that the schema names, before any message is seen."""
-        ...
+        return ()
 
     def describe(self, path: FieldPath) -> tuple[str, str]:
         """Unit and comment of a leaf."""
-        ...
+        return "", ""
 
     def layout(self, data: bytes, /) -> Layout | None:
         """Where the fields of messages like this one lie; None if that cannot be said without decoding each."""
-        ...
+        return None
 
 
 def _elements(value: Any) -> Iterable[tuple[int, Any]]:
@@ -88,7 +86,7 @@ def _elements(value: Any) -> Iterable[tuple[int, Any]]:
     return enumerate(value) if len(value) <= _MAX_ELEMENTS else ()
 
 
-class _JsonCodec:
+class _JsonCodec(Codec):
     def __init__(self, schema: Mapping[str, Any]) -> None:
         self._schema = schema
         self.decode = json.loads
@@ -99,7 +97,15 @@ class _JsonCodec:
         return _elements(value) if isinstance(value, list) else ()
 
     def getter(self, path: FieldPath) -> Getter:
-        return itemgetter(path[0]) if len(path) == 1 else _walker(path)
+        if len(path) == 1:
+            return itemgetter(path[0])
+
+        def get(value: Any) -> Any:
+            for step in path:
+                value = value[step]
+            return value
+
+        return get
 
     def declared(self) -> Iterable[Leaf]:
         for path, _ in _schema_leaves(self._schema, (), 0):
@@ -113,9 +119,6 @@ class _JsonCodec:
         comment = comment if isinstance(comment, str) else ""
         unit = node.get("unit")
         return (unit if isinstance(unit, str) else _bracket_unit(comment)), comment
-
-    def layout(self, data: bytes, /) -> Layout | None:
-        return None
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:
@@ -146,24 +149,13 @@ def _bracket_unit(comment: str) -> str:
     return found[1]
 
 
-def _walker(path: FieldPath) -> Getter:
-    def get(value: Any) -> Any:
-        for step in path:
-            value = value[step]
-        return value
-
-    return get
-
-
-class _RosCodec:
+class _RosCodec(Codec):
     def __init__(self, store: Typestore, msgtype: str, *, cdr: bool) -> None:
-        self._deserialize = store.deserialize_cdr if cdr else store.deserialize_ros1
+        decode = store.deserialize_cdr if cdr else store.deserialize_ros1
+        self.decode = lambda data: decode(data, msgtype)
         self._types = store.fielddefs
         self._msgtype = msgtype
         self._cdr = cdr
-
-    def decode(self, data: bytes, /) -> Any:
-        return self._deserialize(data, self._msgtype)
 
     def children(self, value: Any) -> Iterable[tuple[str | int, Any]]:
         if dataclasses.is_dataclass(value):
@@ -171,31 +163,21 @@ class _RosCodec:
         return _elements(value) if isinstance(value, list | np.ndarray) else ()
 
     def getter(self, path: FieldPath) -> Getter:
-        return _attribute_getter(path)
+        if all(isinstance(step, str) for step in path):
+            return attrgetter(".".join(str(step) for step in path))
 
-    def declared(self) -> Iterable[Leaf]:
-        return ()
+        def get(value: Any) -> Any:
+            for step in path:
+                value = value[step] if isinstance(step, int) else getattr(value, step)
+            return value
 
-    def describe(self, path: FieldPath) -> tuple[str, str]:
-        return "", ""
+        return get
 
     def layout(self, data: bytes, /) -> Layout | None:
         return ros_layout(self._types, self._msgtype, data, cdr=self._cdr)
 
 
-def _attribute_getter(path: FieldPath) -> Getter:
-    if all(isinstance(step, str) for step in path):
-        return attrgetter(".".join(str(step) for step in path))
-
-    def get(value: Any) -> Any:
-        for step in path:
-            value = value[step] if isinstance(step, int) else getattr(value, step)
-        return value
-
-    return get
-
-
-class _ProtobufCodec:
+class _ProtobufCodec(Codec):
     def __init__(self, decode: Callable[[bytes], Any]) -> None:
         self.decode = decode
 
@@ -217,15 +199,6 @@ class _ProtobufCodec:
             return value
 
         return get
-
-    def declared(self) -> Iterable[Leaf]:
-        return ()
-
-    def describe(self, path: FieldPath) -> tuple[str, str]:
-        return "", ""
-
-    def layout(self, data: bytes, /) -> Layout | None:
-        return None
 
 
 def _protobuf_fields(message: Any) -> Iterator[tuple[str, Any]]:
@@ -265,9 +238,16 @@ def codec_for(
     """
     try:
         if encoding == "json" and schema_encoding in ("jsonschema", ""):
-            return _JsonCodec(_mapping(_json_or_none(definition)))
+            with suppress(ValueError, RecursionError):  # messages say what they hold without a schema too
+                return _JsonCodec(_mapping(json.loads(definition)))
+            return _JsonCodec({})
         if encoding == "protobuf" and schema_encoding == "protobuf":
-            return _protobuf_codec(name, definition)
+            decode = DecoderFactory().decoder_for(
+                "protobuf", Schema(id=1, name=name, encoding="protobuf", data=definition)
+            )
+            if decode is None:
+                raise UndecodableError(f'protobuf type "{name}" is not in its own schema')
+            return _ProtobufCodec(decode)
         if encoding == "ros1" and schema_encoding in ("ros1msg", ""):
             return _ros_codec(name, schema_encoding, definition, Stores.ROS1_NOETIC)
         if encoding == "cdr" and schema_encoding in ("ros2msg", "ros2idl", "omgidl", ""):
@@ -279,21 +259,6 @@ def codec_for(
     except Exception as error:  # the parsers run on the file's text and raise whatever it leads them to
         raise UndecodableError(f'the definition of type "{name}" cannot be read ({brief(error)})') from error
     raise UndecodableError(f'encoding "{encoding}" with schema "{schema_encoding}" is not supported')
-
-
-def _json_or_none(text: bytes) -> Any:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return None  # messages say what they hold without a schema too
-
-
-def _protobuf_codec(name: str, definition: bytes) -> _ProtobufCodec:
-    schema = Schema(id=1, name=name, encoding="protobuf", data=definition)
-    decode = DecoderFactory().decoder_for("protobuf", schema)
-    if decode is None:
-        raise UndecodableError(f'protobuf type "{name}" is not in its own schema')
-    return _ProtobufCodec(decode)
 
 
 def _ros_codec(name: str, schema_encoding: str, definition: bytes, fallback: Stores) -> _RosCodec:

@@ -19,8 +19,9 @@ from rosbags.typesys import Stores
 from aqualog.core.errors import LogError
 from aqualog.io.decompress import Allowance, DamagedError, unpack
 from aqualog.io.messages.batches import Batch, Message, batched
-from aqualog.io.messages.codecs import UndecodableError, codec_for
-from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
+from aqualog.io.messages.codecs import Codec, codec_for
+from aqualog.io.messages.streams import SAMPLES, Stream
+from aqualog.io.messages.walk import MessageSource
 
 __all__ = ["Db3Source", "release_of"]
 
@@ -36,18 +37,14 @@ def release_of(distro: str) -> Stores:
     return Stores.__members__.get(f"ROS2_{distro.upper()}", Stores.ROS2_HUMBLE)
 
 
-class Db3Source:
+class Db3Source(MessageSource):
     """One sqlite3 file of a ROS 2 recording as a source of messages."""
 
+    missing = "topics"
+
     def __init__(self, path: Path, release: Stores) -> None:
-        self.path = path
-        self.truncated = False
-        self.unassigned = 0
-        self.unfinalised = False
+        super().__init__(path)
         self._release = release
-        self._notes: list[str] = []
-        self._counts: dict[int, int] = {}
-        self._lost: dict[int, int] = {}
         log = path.with_name(path.name + "-wal")
         if log.exists() and log.stat().st_size:
             # Reading it would write to the folder, and a log is never changed.
@@ -78,22 +75,15 @@ class Db3Source:
         except sqlite3.Error as error:
             what = f"is damaged ({error})"
             raise LogError(what, where=str(self.path), hint="sqlite3 .recover on a copy of the file") from error
-        topics = sorted((t for t in topics if isinstance(t[0], int)), key=lambda t: t[0])
-        strays = sum(n for i, n in self._counts.items() if i not in {t[0] for t in topics})
-        if strays:
-            self.unassigned += strays
-            self._notes.append(f"{self.path.name}: {strays} messages are left out, their topics are lost")
-        found = []
-        for topic_id, name, msgtype, serialization in topics:
-            if not self._counts.get(topic_id):
-                continue
-            try:
-                encoding, definition = definitions.get(str(msgtype), ("", b""))
-                codec = codec_for(str(serialization), encoding, str(msgtype), definition, release)
-                found.append(make_stream(topic_id, str(name), self._counts[topic_id], codec, samples.get(topic_id, [])))
-            except UndecodableError as error:
-                self._notes.append(f'topic "{name}" is left out: {error}')
-        return found
+        known = {t[0]: t[1:] for t in sorted((t for t in topics if isinstance(t[0], int)), key=lambda t: t[0])}
+        self._count_strays(known.__contains__)
+
+        def codec(topic_id: int) -> Codec:
+            _, msgtype, serialization = known[topic_id]
+            encoding, definition = definitions.get(str(msgtype), ("", b""))
+            return codec_for(str(serialization), encoding, str(msgtype), definition, release)
+
+        return self._listed(((i, str(name)) for i, (name, _, _) in known.items()), codec, samples)
 
     def _scan(self, base: sqlite3.Connection) -> dict[int, list[bytes]]:
         """Count the messages of each topic and get its first ones."""
@@ -130,14 +120,6 @@ class Db3Source:
             self.unassigned += following - last - 1
             what = f"is damaged ({error}); {following - last - 1} messages are left out, what stands behind is read"
         self._notes.append(f"{self.path.name}: {what}")
-
-    def lost(self, stream_id: int) -> int:
-        """Messages of a topic that were counted and could not be read in the last pass."""
-        return self._lost.get(stream_id, 0)
-
-    def notes(self) -> Sequence[str]:
-        """What was left out so far."""
-        return self._notes
 
 
 def _is_plain(base: sqlite3.Connection, table: str) -> bool:

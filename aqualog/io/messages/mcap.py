@@ -2,7 +2,11 @@
 
 The reader walks the data section record by record. It unpacks every chunk within its declared size and checks it
 against its checksum. A file that was cut off, or that has lost its index, therefore gives all messages before the cut.
-A damaged chunk or a wrong length costs that chunk only. An intact summary at the end saves a pass over the file.
+A damaged chunk costs that chunk only. An intact summary at the end saves a pass over the file.
+
+A wrong length leads anywhere. It shows if it leads beyond the file, over the place where the summary knows a chunk, or
+to bytes that are no record. Without a summary reading resumes at the next place whose lengths agree with each other as
+those of a chunk do.
 
 Format: https://mcap.dev/spec [mcap2022]
 """
@@ -11,10 +15,11 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -26,29 +31,53 @@ from mcap.summary import Summary
 
 from aqualog.core.errors import LogError
 from aqualog.io.decompress import LONGEST, Allowance, DamagedError, unpack
-from aqualog.io.messages.batches import Batch, Message, batched, first_of_each
-from aqualog.io.messages.codecs import UndecodableError, codec_for
-from aqualog.io.messages.mcap_records import HEAD, MAGIC, McapWalk, scanned
-from aqualog.io.messages.reader import MessageReader
-from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
-from aqualog.io.messages.walk import ChunkSource
-from aqualog.io.reader import FaultLog, ReadOptions
+from aqualog.io.messages.batches import Batch, Message, rows_of
+from aqualog.io.messages.codecs import Codec, UndecodableError, codec_for
+from aqualog.io.messages.streams import SAMPLES, Stream
+from aqualog.io.messages.walk import ChunkSource, RecordWalk
 
-__all__ = ["McapReader", "McapSource"]
+__all__ = ["McapSource", "scanned"]
 
+
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = struct.Struct("<BQ")  # opcode and length of a record
+
+_WITH_BODY = frozenset(
+    {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END}
+)
+_BEHIND_DATA = frozenset(
+    {
+        Opcode.FOOTER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX,
+        Opcode.METADATA_INDEX, Opcode.STATISTICS, Opcode.SUMMARY_OFFSET,
+    }
+)  # fmt: skip
+_FOOTER_LENGTH, _DATA_END_LENGTH = 20, 4
+_U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
+_ATTACHMENT = 2 * 8 + 2 * 4 + 8 + 4  # bytes of an attachment beside its name, its type and its data
+
+_BLOCK = 1 << 20
+_NAMES = {0: "plain", 3: "lz4", 4: "zstd"}  # length of the compression's name: where the length of the data stands
+_FIXED = 40  # bytes of a chunk beside that name and the data
+_CHUNK_HEAD = np.dtype({
+    "names": ["length", "name", *_NAMES.values()],
+    "formats": ["<u8", "<u4", *["<u8"] * len(_NAMES)],
+    "offsets": [1, 37, *(41 + n for n in _NAMES)],
+    "itemsize": 53,
+})  # fmt: skip
+
+
+_PRIVATE = 0x80  # from there on opcodes are private and skipped
+_STRETCH = 1 << 14  # records
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_RECORD = np.dtype({
+    "names": ["length", "channel", "log_time"],
+    "formats": ["<u8", "<u2", "<u8"],
+    "offsets": [1, HEAD.size, HEAD.size + 6],
+    "itemsize": HEAD.size + _MESSAGE.size,
+})  # fmt: skip
 _CHUNK = struct.Struct("<QQQII")  # start, end, unpacked size, crc, length of the compression's name
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offsets start, crc
 _TAIL = _FOOTER.size + len(MAGIC)
-
-
-class McapReader(MessageReader):
-    """Reader of one MCAP file."""
-
-    format = "mcap"
-
-    def __init__(self, path: Path, options: ReadOptions) -> None:
-        super().__init__(path, [McapSource(path)], FaultLog())
 
 
 class McapSource(ChunkSource[int]):
@@ -71,58 +100,43 @@ class McapSource(ChunkSource[int]):
         """All connections with messages that can be decoded, in the order of their ids."""
         with self.path.open("rb") as file:
             summary = _sound_summary(file, self._size)
-            if not _is_ended(file, self._size):
+            file.seek(max(self._size - len(MAGIC), 0))
+            if file.read() != MAGIC:
                 self.unfinalised = True
                 self._notes.append("file was not finalised by the recorder: it has no index; read from its beginning")
-            samples = self._scan(file) if summary is None else self._sample(file, summary)
-        return [s for i in sorted(self._channels) if (s := self._stream(i, samples.get(i, []))) is not None]
+            if summary is None:
+                samples = self._scan(file)
+            else:
+                self._take_over(summary)
+                chunks = {c.chunk_start_offset: c.message_index_offsets.keys() for c in summary.chunk_indexes}
+                samples = self._sample(file, chunks, SAMPLES)
+        channels = ((i, self._channels[i].topic) for i in sorted(self._channels))
+        return self._listed(channels, lambda i: self._codec(i, samples), samples)
 
-    def _stream(self, channel_id: int, samples: Sequence[bytes]) -> Stream | None:
-        channel, count = self._channels[channel_id], self._counts.get(channel_id, 0)
-        if not count:
-            return None
-        try:
-            if not samples:
-                self.unassigned += count
-                raise UndecodableError("none of its messages can be read")
-            schema = self._schemas.get(channel.schema_id)
-            if schema is None and channel.schema_id:
-                raise UndecodableError("its schema is missing")
-            described = (schema.encoding, schema.name, schema.data) if schema else ("", "", b"")
-            codec = codec_for(channel.message_encoding, *described)
-            return make_stream(channel_id, channel.topic, count, codec, samples)
-        except UndecodableError as error:
-            self._notes.append(f'topic "{channel.topic}" is left out: {error}')
-            return None
+    def _codec(self, channel_id: int, samples: Mapping[int, Sequence[bytes]]) -> Codec:
+        channel = self._channels[channel_id]
+        if not samples.get(channel_id):
+            self.unassigned += self._counts[channel_id]
+            raise UndecodableError("none of its messages can be read")
+        schema = self._schemas.get(channel.schema_id)
+        if schema is None and channel.schema_id:
+            raise UndecodableError("its schema is missing")
+        described = (schema.encoding, schema.name, schema.data) if schema else ("", "", b"")
+        return codec_for(channel.message_encoding, *described)
 
-    def _sample(self, file: BinaryIO, summary: Summary) -> dict[int, list[bytes]]:
-        """First messages of each channel, from as few chunks as hold them all."""
+    def _take_over(self, summary: Summary) -> None:
         assert summary.statistics is not None
         self._schemas, self._channels = dict(summary.schemas), dict(summary.channels)
         self._counts = dict(summary.statistics.channel_message_counts)
         self._indexed = True
         self._chunks = tuple(c.chunk_start_offset for c in summary.chunk_indexes)
-        self._allowance = Allowance()
-        missing = {i for i, n in self._counts.items() if n and i in self._channels}
-        samples: dict[int, list[bytes]] = {}
-        for chunk in sorted(summary.chunk_indexes, key=lambda c: c.chunk_start_offset):
-            here = frozenset(missing.intersection(chunk.message_index_offsets))
-            if not here:
-                continue
-            file.seek(chunk.chunk_start_offset)
-            opcode, length = HEAD.unpack(file.read(HEAD.size))
-            if opcode == Opcode.CHUNK and length <= min(self._size, LONGEST):
-                for batch in batched(self._chunk(chunk.chunk_start_offset, opcode, file.read(length), here)):
-                    first_of_each(samples, batch, SAMPLES)
-            missing = {i for i in missing if len(samples.get(i, ())) < min(SAMPLES, self._counts[i])}
-        return samples
 
     def _is_described(self, stream_id: int) -> bool:
         return stream_id in self._channels
 
-    def _records(self, file: BinaryIO) -> McapWalk:
+    def _records(self, file: BinaryIO, start: int = len(MAGIC)) -> McapWalk:
         self._unproven = False
-        return McapWalk(file, self._size, len(MAGIC), self._chunks)
+        return McapWalk(file, self._size, start, self._chunks)
 
     def _kind(self, head: int) -> Literal["chunk", "index", "other"]:
         return "chunk" if head == Opcode.CHUNK else "index" if head == Opcode.MESSAGE_INDEX else "other"
@@ -145,10 +159,11 @@ class McapSource(ChunkSource[int]):
         try:
             data, is_proven = _unpacked(body, self._allowance)
             self._unproven |= not is_proven
-            if (scan := scanned(data)) is None:
-                return list(_split(data, ids, self._note_record))
+            scan = scanned(data)
             for opcode, record in scan.records:
                 self._note_record(opcode, record)
+            if scan.fault:
+                raise DamagedError(scan.fault)
             batch = scan.messages
             if ids is not None:
                 batch = batch.only(np.isin(batch.ids, list(ids)))
@@ -196,25 +211,6 @@ def _check_magic(path: Path) -> None:
         raise LogError(what, where=str(path), expected="a file that begins with \\x89MCAP0", hint="record it again")
 
 
-def _split(data: bytes, ids: frozenset[int] | None, on_record: Callable[[int, bytes], None]) -> Iterator[Message]:
-    """Messages of an unpacked chunk."""
-    position, size = 0, len(data)
-    while position < size:
-        opcode, length = HEAD.unpack_from(data, position)
-        start = position + HEAD.size
-        position = start + length
-        if position > size:
-            raise DamagedError("a record is longer than its chunk")
-        if opcode == Opcode.MESSAGE:
-            channel_id, _, log_time, _ = _MESSAGE.unpack_from(data, start)
-            if ids is None or channel_id in ids:
-                yield channel_id, log_time, data[start + _MESSAGE.size : position]
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            on_record(opcode, data[start:position])
-        elif opcode < 0x80:  # from there on opcodes are private and skipped
-            raise DamagedError(f"a record of kind {opcode} stands in a chunk")
-
-
 def _unpacked(body: bytes, allowance: Allowance) -> tuple[bytes, bool]:
     """Content of a chunk record, checked against its size and checksum, and whether it has one."""
     _, _, size, crc, name_length = _CHUNK.unpack_from(body)
@@ -228,11 +224,6 @@ def _unpacked(body: bytes, allowance: Allowance) -> tuple[bytes, bool]:
     if crc and zlib.crc32(data) != crc:
         raise DamagedError("its checksum is wrong")
     return data, crc != 0
-
-
-def _is_ended(file: BinaryIO, size: int) -> bool:
-    file.seek(max(size - len(MAGIC), 0))
-    return file.read() == MAGIC
 
 
 def _sound_summary(file: BinaryIO, size: int) -> Summary | None:
@@ -278,3 +269,123 @@ def _crc(file: BinaryIO, start: int, end: int) -> int:
         crc = zlib.crc32(block, crc)
         start += len(block)
     return crc
+
+
+class McapWalk(RecordWalk[int]):
+    """One pass over the data section; the head of a record is its opcode."""
+
+    has_end_record = True
+
+    def _record_at(self, offset: int) -> tuple[int, int, int] | None:
+        opcode, length = self._head(offset)
+        end = offset + HEAD.size + length
+        if opcode == 0 or end > self._size:
+            return None
+        if opcode == Opcode.FOOTER and (length != _FOOTER_LENGTH or end + len(MAGIC) != self._size):
+            return None
+        if opcode == Opcode.DATA_END and (length != _DATA_END_LENGTH or self._head(end)[0] not in _BEHIND_DATA):
+            return None
+        if opcode in _WITH_BODY and length > LONGEST:
+            return None
+        if opcode == Opcode.ATTACHMENT and not self._is_attachment(offset + HEAD.size, length):
+            return None
+        known = self._known(offset + 1)
+        return None if known is not None and end > known else (opcode, offset + HEAD.size, end)
+
+    def _head(self, offset: int) -> tuple[int, int]:
+        """Opcode and length; zeros if there is no room for them."""
+        self._file.seek(offset)
+        head = self._file.read(HEAD.size)
+        return HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
+
+    def _has_body(self, head: int) -> bool:
+        return head in _WITH_BODY
+
+    def _is_last(self, head: int) -> bool:
+        return head in (Opcode.DATA_END, Opcode.FOOTER)
+
+    def _is_attachment(self, start: int, length: int) -> bool:
+        """Whether the sizes of its parts fill it: nothing else of it is read."""
+        left, at = length - _ATTACHMENT, start + 16
+        for size in (_U32, _U32, _U64):  # name, type, data
+            self._file.seek(at)
+            raw = self._file.read(size.size)
+            if len(raw) < size.size:
+                return False
+            part = int(size.unpack(raw)[0])
+            left -= part
+            at += size.size + part
+            if left < 0:
+                return False
+        return left == 0
+
+    def _sought(self, offset: int) -> int | None:
+        while offset + _CHUNK_HEAD.itemsize <= self._size:
+            self._file.seek(offset)
+            block = self._file.read(_BLOCK)
+            if len(block) < _CHUNK_HEAD.itemsize:
+                return None
+            found = _chunks_in(block, self._size - offset)
+            if found.size:
+                return offset + int(found[0])
+            offset += len(block) - _CHUNK_HEAD.itemsize + 1
+        return None
+
+
+def _chunks_in(block: bytes, room: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Where in a block the lengths are those of a chunk that ends within `room`."""
+    at = np.flatnonzero(np.frombuffer(block, np.uint8)[: len(block) - _CHUNK_HEAD.itemsize + 1] == Opcode.CHUNK)
+    if not at.size:
+        return at
+    heads = rows_of(block, at, _CHUNK_HEAD.itemsize).view(_CHUNK_HEAD)
+    length = heads["length"].astype(np.float64)
+    agrees = np.zeros(at.size, dtype=np.bool_)
+    for size, name in _NAMES.items():
+        agrees |= (heads["name"] == size) & (length == heads[name].astype(np.float64) + (_FIXED + size))
+    return at[agrees & (length <= room - at - HEAD.size)]
+
+
+class Scan(NamedTuple):
+    """What a chunk holds: its messages, opcode and body of each schema and channel, and what ends it before its end."""
+
+    messages: Batch
+    records: tuple[tuple[int, bytes], ...]
+    fault: str
+
+
+def scanned(data: bytes) -> Scan:
+    """Records of a chunk, none of them copied, up to the first one that cannot stand there."""
+    found = array("q")  # a list would hold ten times the chunk where its records are empty
+    position, size, fault = 0, len(data), ""
+    add, length_at = found.append, _U64.unpack_from
+    try:
+        while position < size:
+            # zeros are records without an end to it: no further than the first stretch of them
+            for _ in range(_STRETCH):
+                add(position)
+                position += HEAD.size + length_at(data, position + 1)[0]
+                if position >= size:
+                    break
+            if not data[found[-1]]:
+                break
+    except struct.error:
+        fault, position = "a record has no length", found.pop()
+    if position > size:
+        fault, position = "a record is longer than its chunk", found.pop()
+    at = np.array(found, dtype=np.int64)
+    ends = np.append(at[1:], position)
+    opcodes = np.frombuffer(data, np.uint8)[at]
+    is_schema = (opcodes == Opcode.SCHEMA) | (opcodes == Opcode.CHANNEL)
+    strange = np.flatnonzero((opcodes != Opcode.MESSAGE) & ~is_schema & (opcodes < _PRIVATE))
+    if strange.size:
+        fault = f"a record of kind {opcodes[strange[0]]} stands in a chunk"
+        at, is_schema = at[: strange[0]], is_schema[: strange[0]]
+    of_messages = np.flatnonzero(opcodes[: at.size] == Opcode.MESSAGE)
+    if of_messages.size and at[of_messages[-1]] + _RECORD.itemsize > size:
+        fault, of_messages = fault or "a message is shorter than its head", of_messages[:-1]
+    starts, ends_message = at[of_messages], ends[of_messages]
+    heads = rows_of(data, starts, _RECORD.itemsize).view(_RECORD) if starts.size else np.zeros(0, _RECORD)
+    contents = np.minimum(starts + _RECORD.itemsize, ends_message)
+    batch = Batch(heads["channel"].astype(np.int64), heads["log_time"], contents, ends_message, data)
+    schemas = np.flatnonzero(is_schema).tolist()
+    return Scan(batch, tuple((int(opcodes[i]), data[found[i] + HEAD.size : int(ends[i])]) for i in schemas), fault)

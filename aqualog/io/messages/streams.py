@@ -18,7 +18,7 @@ from aqualog.core.records import ChannelInfo, Drift, FloatArray, TimeArray
 from aqualog.io.clock_drift import DriftWatch
 from aqualog.io.messages.batches import Batch, rows_of
 from aqualog.io.messages.codecs import MAX_DEPTH, Codec, FieldPath, Getter, Leaf, UndecodableError, brief
-from aqualog.io.messages.layout import Layout
+from aqualog.io.messages.ros_types import Layout
 
 __all__ = ["SAMPLES", "Sink", "Stream", "make_stream", "sinks_of", "taker_of"]
 

@@ -1,4 +1,4 @@
-"""Walk through a file of records that hold messages in chunks, as MCAP and ROS 1 bags do.
+"""Sources of messages, and the walk through files of records with chunks of messages, as MCAP and ROS 1 bags are.
 
 A damaged chunk or a wrong length costs that chunk only: behind it the walk goes on at the next chunk that the index
 knows, or at the next place that looks like one.
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO, Generic, Literal, TypeVar
 
 from aqualog.io.decompress import Allowance
 from aqualog.io.messages.batches import Batch, Message, batched, counted, first_of_each
-from aqualog.io.messages.streams import SAMPLES
+from aqualog.io.messages.codecs import Codec, UndecodableError
+from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
 
-__all__ = ["ChunkSource", "RecordWalk"]
+__all__ = ["ChunkSource", "MessageSource", "RecordWalk"]
 
 Head = TypeVar("Head")
 
@@ -92,25 +93,73 @@ class RecordWalk(ABC, Generic[Head]):
         return self._chunks[at] if at < len(self._chunks) else None
 
 
-class ChunkSource(ABC, Generic[Head]):
-    """One file of such records as a source of messages.
+class MessageSource(ABC):
+    """One file of recorded messages.
+
+    `truncated`: an unknown amount is lost; `unassigned`: lost messages of no known topic;
+    `unfinalised`: the recorder has not written the index that ends a file.
 
     Parameters
     ----------
     path : Path
     """
 
-    stream_name = "channel"
+    missing = "channel records"
+    """What a message lacks that belongs to no stream."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.truncated = False  # an unknown amount is lost
-        self.unassigned = 0  # messages that belong to no stream
-        self.unfinalised = False
+        self.truncated = self.unfinalised = False
+        self.unassigned = 0
         self._notes: list[str] = []
-        self._damaged: dict[int, str] = {}  # chunks, and why
-        self._lost: dict[int, int] = {}
         self._counts: dict[int, int] = {}
+        self._lost: dict[int, int] = {}
+
+    @abstractmethod
+    def streams(self) -> Sequence[Stream]:
+        """All connections with messages that can be decoded, in file order."""
+
+    @abstractmethod
+    def batches(self, ids: frozenset[int]) -> Iterator[Batch]:
+        """Messages of these streams, in file order."""
+
+    def lost(self, stream_id: int) -> int:
+        """Messages of a stream that the last pass of `batches` could not get at."""
+        return self._lost.get(stream_id, 0)
+
+    def notes(self) -> Sequence[str]:
+        """What was left out so far, as sentences."""
+        return self._notes
+
+    def _listed(
+        self,
+        topics: Iterable[tuple[int, str]],
+        codec_of: Callable[[int], Codec],
+        samples: Mapping[int, Sequence[bytes]],
+    ) -> list[Stream]:
+        """Streams by id and topic, as far as they have messages that can be decoded."""
+        found = []
+        for stream_id, topic in topics:
+            if count := self._counts.get(stream_id):
+                try:
+                    found.append(make_stream(stream_id, topic, count, codec_of(stream_id), samples.get(stream_id, [])))
+                except UndecodableError as error:
+                    self._notes.append(f'topic "{topic}" is left out: {error}')
+        return found
+
+    def _count_strays(self, is_known: Callable[[int], bool]) -> None:
+        strays = sum(n for i, n in self._counts.items() if not is_known(i))
+        if strays:
+            self.unassigned += strays
+            self._notes.append(f"{self.path.name}: {strays} messages are left out, their {self.missing} are lost")
+
+
+class ChunkSource(MessageSource, Generic[Head]):
+    """One file of such records as a source of messages."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._damaged: dict[int, str] = {}  # chunks, and why
         self._chunks: tuple[int, ...] = ()  # by the index
         self._indexed = False
         self._allowance = Allowance()
@@ -127,17 +176,32 @@ class ChunkSource(ABC, Generic[Head]):
         if self._indexed:
             self._lost = {i: max(0, self._counts.get(i, 0) - n) for i, n in seen.items()}
 
-    def lost(self, stream_id: int) -> int:
-        """Messages of a stream that the last pass could not get at."""
-        return self._lost.get(stream_id, 0)
-
     def notes(self) -> Sequence[str]:
-        """What was left out so far."""
+        """What was left out so far, as sentences."""
         if not self._damaged:
             return self._notes
         offset, reason = min(self._damaged.items())
         many = f"{len(self._damaged)} damaged chunk{'s are' if len(self._damaged) > 1 else ' is'} left out"
         return [*self._notes, f"{self.path.name}: {many} (first at byte {offset}: {reason})"]
+
+    def _chunk_at(self, file: BinaryIO, position: int) -> tuple[Head, bytes] | None:
+        """Head and body of the chunk that the index knows at a place, if there is one."""
+        for offset, head, body in self._records(file, position):
+            return (head, body) if offset == position and self._kind(head) == "chunk" else None
+        return None
+
+    def _sample(self, file: BinaryIO, chunks: Mapping[int, Collection[int]], enough: int) -> dict[int, list[bytes]]:
+        """First messages of each stream, from as few chunks (position -> streams) as hold enough of all."""
+        missing = {i for i, n in self._counts.items() if n and self._is_described(i)}
+        samples: dict[int, list[bytes]] = {}
+        self._allowance = Allowance()
+        for position in sorted(chunks):
+            here = frozenset(missing.intersection(chunks[position]))
+            if here and (chunk := self._chunk_at(file, position)) is not None:
+                for batch in batched(self._chunk(position, *chunk, here)):
+                    first_of_each(samples, batch, SAMPLES)
+                missing = {i for i in missing if len(samples.get(i, ())) < min(enough, self._counts[i])}
+        return samples
 
     def _scan(self, file: BinaryIO) -> dict[int, list[bytes]]:
         """Count all messages and keep the first ones of each stream: for a file without a sound index."""
@@ -145,10 +209,7 @@ class ChunkSource(ABC, Generic[Head]):
         for batch in batched(self._walk(file, None)):
             counted(self._counts, batch)
             first_of_each(samples, batch, SAMPLES)
-        self.unassigned = sum(n for i, n in self._counts.items() if not self._is_described(i))
-        if self.unassigned:
-            what = f"{self.unassigned} messages are left out, their {self.stream_name} records are lost"
-            self._notes.append(f"{self.path.name}: {what}")
+        self._count_strays(self._is_described)
         return samples
 
     def _walk(self, file: BinaryIO, ids: frozenset[int] | None) -> Iterator[Batch | Message]:
@@ -185,8 +246,8 @@ class ChunkSource(ABC, Generic[Head]):
         return f"{name}: {what}; what stands before is read"
 
     @abstractmethod
-    def _records(self, file: BinaryIO) -> RecordWalk[Head]:
-        """The pass over all records."""
+    def _records(self, file: BinaryIO, start: int = ...) -> RecordWalk[Head]:
+        """The pass over all records, or over those from a place on."""
 
     @abstractmethod
     def _kind(self, head: Head) -> Literal["chunk", "index", "other"]: ...

@@ -1,10 +1,12 @@
-"""Columns of a table: their names and units, which one is the time, and its stamps in nanoseconds."""
+"""Columns of a table: names and units, which one is the time, its stamps in nanoseconds; what CSV and Parquet share."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -14,11 +16,12 @@ from numpy.typing import NDArray
 from aqualog.core.errors import ConfigError, LogError
 from aqualog.core.records import BoolArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
-from aqualog.io.reader import ReadOptions
+from aqualog.io.clock_drift import DriftWatch, drift_note
+from aqualog.io.reader import OpenFile, ReadOptions
 
 __all__ = [
-    "Stamps", "TableField", "TimeChoice", "choose_time", "from_dates", "from_numbers", "judged_unit", "no_unit_note",
-    "split_unit", "text_to_ns", "unique_names",
+    "FieldKind", "Stamps", "TableField", "TableReader", "TimeChoice", "choose_time", "from_dates", "from_numbers",
+    "judged_unit", "no_unit_note", "split_unit", "text_to_ns", "unique_names",
 ]  # fmt: skip
 
 # Loggers do write `max. SoC [%)`: either closing bracket ends the group.
@@ -148,7 +151,9 @@ def choose_time(fields: Sequence[TableField], options: ReadOptions, *, where: st
             hint = f"look for lines with another separator or decimal mark; {_NAME.format(text.name)} reads the others"
             raise LogError(what, where=where, expected="times as numbers or dates", hint=hint)
         raise LogError(f"no time column{asked} among: {listed}", where=where, expected="t [s] or time", hint=_HINT)
-    unit = _given_unit(options.time_unit, where) if options.time_unit else _own_unit(fields[found])
+    unit = options.time_unit or _own_unit(fields[found])
+    if options.time_unit and not (is_unit(unit) and parse_unit(unit).dimension == "time"):
+        raise ConfigError(f'"{unit}" is no unit of time', where=where, expected="s, ms, us or ns", hint="[time] unit")
     day = next((k for k, f in enumerate(fields) if f.kind == "date" and k != found), None)
     other = _second_clock(fields, found)
     other_unit = "" if other is None else _own_unit(fields[other])
@@ -187,12 +192,6 @@ def _rank(field: TableField) -> int | None:
     return _STEMS.index(stem) if stem in _STEMS else None
 
 
-def _given_unit(unit: str, where: str) -> str:
-    if not is_unit(unit) or parse_unit(unit).dimension != "time":
-        raise ConfigError(f'"{unit}" is no unit of time', where=where, expected="s, ms, us or ns", hint="[time] unit")
-    return unit
-
-
 def _own_unit(field: TableField) -> str:
     """Return the unit of the header, or of the end of the name; empty without a unit of time."""
     if is_unit(field.unit) and parse_unit(field.unit).dimension == "time":
@@ -221,7 +220,7 @@ def from_numbers(
     notes: tuple[str, ...] = ()
     valid: BoolArray = np.isfinite(values)
     if unit:
-        factor = _ns_per(unit)
+        factor = round(parse_unit(unit).factor * 1e9)
     else:
         name, reason = judged_unit(values)
         factor, notes = _NS[name], (no_unit_note(name, reason),)
@@ -259,10 +258,6 @@ def text_to_ns(cells: pl.Series, factor: int) -> pl.Series:
     return frame.select((whole + fraction).alias("t"))["t"]
 
 
-def _ns_per(unit: str) -> int:
-    return round(parse_unit(unit).factor * 1e9)
-
-
 def no_unit_note(name: str, reason: str) -> str:
     """Return the note on a time whose unit was inferred."""
     return f"the time has no unit; taken as {name} ({reason})"
@@ -279,16 +274,13 @@ def judged_unit(stamps: NDArray[np.float64] | NDArray[np.int64]) -> tuple[str, s
     middle = float(np.median(values))
     for name, factor in _NS.items():
         per_s = 1e9 / factor
-        if _EPOCH_S[0] < middle / per_s < _EPOCH_S[1] and _is_plausible(step / per_s):
+        is_plausible = not step or _PLAUSIBLE_STEP_S[0] <= step / per_s <= _PLAUSIBLE_STEP_S[1]
+        if _EPOCH_S[0] < middle / per_s < _EPOCH_S[1] and is_plausible:
             return name, "it counts from 1970"
     if (np.rint(values) == values).all() and step >= 1 and float(np.ptp(values)) > _ABSURD_S:
         name = "ms" if step <= 1e3 else "us" if step <= 1e6 else "ns"
         return name, f"whole numbers, {step:g} apart"
     return "s", "its steps are those of seconds"
-
-
-def _is_plausible(step_s: float) -> bool:
-    return step_s == 0.0 or _PLAUSIBLE_STEP_S[0] <= step_s <= _PLAUSIBLE_STEP_S[1]
 
 
 def from_dates(cells: pl.Series, day: pl.Series | None, kind: FieldKind) -> Stamps:
@@ -347,3 +339,34 @@ def _to_ns(text: pl.Expr, cells: pl.Series) -> pl.Series:
 def _stamps(t: pl.Series, *, absolute: bool, notes: tuple[str, ...]) -> Stamps:
     valid: BoolArray = t.is_not_null().to_numpy().copy()
     return Stamps(t.fill_null(0).to_numpy().astype(np.int64), valid, absolute, notes)
+
+
+class TableReader(OpenFile):
+    """What readers of tables have in common: which columns are times, and the comparison of two clocks."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._stamps: Stamps | None = None
+        self._drift = DriftWatch()
+
+    def _choose_time(self, fields: Sequence[TableField], options: ReadOptions) -> None:
+        self._fields = fields
+        self._time = time = choose_time(fields, options, where=str(self._path))
+        self._times = [k for k in (time.index, time.day, time.other) if k is not None]
+        if time.note:
+            self._note(time.note)
+
+    @contextmanager
+    def _located(self) -> Iterator[None]:
+        """Name the file in an error of a function that does not know it."""
+        try:
+            yield
+        except LogError as error:
+            raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
+
+    def _tell_drift(self) -> None:
+        """Note how the second clock runs against the time."""
+        drift = self._drift.finish(*(f'"{self._fields[k].name}"' for k in (self._time.index, self._time.other or 0)))
+        if drift is not None:
+            self._faults.drifts = [drift]
+            self._note(drift_note(drift))

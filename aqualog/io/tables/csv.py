@@ -3,41 +3,274 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, FloatArray
-from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.reader import OpenFile, Part, ReadOptions, csv_hint, format_of, one_piece, part_of
+from aqualog.io.reader import Part, ReadOptions, csv_hint, format_of, one_piece, part_of
 from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,
     TableField,
-    TimeChoice,
-    choose_time,
+    TableReader,
     from_dates,
     from_numbers,
     judged_unit,
     no_unit_note,
 )  # fmt: skip
 from aqualog.io.tables.csv_cells import STYLES, numbers, plain
-from aqualog.io.tables.csv_dialect import Column, find_layout
-from aqualog.io.tables.csv_rows import RowFaults, Rows, behind, bodies, find_rows, rows_of
+from aqualog.io.tables.csv_dialect import Column, Layout, find_layout, is_comment, split_line
 from aqualog.io.tables.csv_text import TextFile, open_text, read_text
 
 __all__ = ["CsvReader"]
 
+
 # Above this share of short rows the writer leaves out blank cells at the end; below it rows are damaged.
 _HABIT = 0.1
 _TAIL = 1 << 16  # [bytes]
+Text = bytes | TextFile
+
+PIECE = 1 << 24  # [bytes]
+_ABOVE = 20  # lines
+_JOIN = "\x1f"  # unit separator: in no cell
+_ALL, _COMMENT = bytes(range(256)), b"#%!/"
 
 
-class CsvReader(OpenFile):
+@dataclass(frozen=True, slots=True)
+class RowFaults:
+    """Lines, counted from 1, that do not fit the header; `cut_line` is the last one if the file ends inside it.
+
+    `doubtful_line` is the last one if it is whole, but may have lost the end of its last number. `empty` are lines with
+    NUL bytes in them, as a page of a file that was never written has, each with their number.
+    """
+
+    short: tuple[int, ...] = ()
+    long: tuple[int, ...] = ()
+    comments: tuple[int, ...] = ()
+    cut_line: int = 0
+    doubtful_line: int = 0
+    empty: tuple[tuple[int, int], ...] = ()
+
+    def __add__(self, other: RowFaults) -> RowFaults:
+        return RowFaults(
+            self.short + other.short, self.long + other.long, self.comments + other.comments,
+            self.cut_line or other.cut_line, self.doubtful_line or other.doubtful_line, self.empty + other.empty,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The rows below the header: `text` has one row per line, `lines` (n,) are their line numbers in the file."""
+
+    text: bytes
+    separator: str
+    names: int
+    lines: NDArray[np.int64]
+    faults: RowFaults
+
+    def cells(self, columns: Sequence[int], *, where: str, numbers: Collection[int] = ()) -> dict[int, pl.Series]:
+        """Cells of these columns as text, null where blank; as numbers those of `numbers`, if all of them are.
+
+        Raises
+        ------
+        LogError
+            If the library finds another number of rows.
+        """
+        if not self.text or not columns:
+            return {k: pl.Series(f"c{k}", [], dtype=pl.String) for k in columns}
+        try:
+            frame = self._split(columns, numbers)
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            if numbers:  # a cell is no number: its text shows what it is
+                return self.cells(columns, where=where)
+            reason = str(error).splitlines()[0]
+            raise LogError(f"cannot be split into cells ({reason})", where=where, hint="check its quotes") from error
+        if frame.height != len(self.lines):
+            what = f"{frame.height} rows in {len(self.lines)} lines"
+            raise LogError(what, where=where, expected="one row per line", hint="check its quotes")
+        return {k: frame[f"c{k}"] for k in columns}
+
+    def blank(self, which: BoolArray) -> BoolArray:
+        """Those of some rows (n,) that hold nothing but separators, as spreadsheets leave them behind a table."""
+        found = np.zeros(len(self.lines), dtype=np.bool_)
+        if which.any():
+            lines = self.text.split(b"\n")
+            separator = self.separator.encode()
+            for k in np.flatnonzero(which):
+                found[k] = not lines[k].replace(separator, b"").strip()
+        return found
+
+    def _split(self, columns: Sequence[int], numbers: Collection[int]) -> pl.DataFrame:
+        return pl.read_csv(
+            self.text,
+            has_header=False,
+            schema={f"c{k}": pl.Float64 if k in numbers else pl.String for k in range(self.names)},
+            columns=sorted(set(columns)),
+            separator=self.separator,
+            quote_char='"' if self.separator != _JOIN and b'"' in self.text else None,
+        )
+
+
+def find_rows(data: bytes, layout: Layout) -> Rows:
+    """Find the rows below the header; see `rows_of`."""
+    body = data[behind(data, layout.first_line - 1) : _end(data)]
+    return rows_of(body, layout, layout.first_line, is_cut=not data.endswith((b"\n", b"\r")))
+
+
+def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Rows:
+    """Rows of lines below the header.
+
+    Parameters
+    ----------
+    body : bytes
+        Whole lines, without the end of the last one.
+    layout : Layout
+    first_line : int
+        Number of the first of them in the file.
+    is_cut : bool
+        Whether the file ends behind them without the end of a line.
+
+    Nearly all files are regular: every line has the separators of a whole row. Only such a file is passed to the
+    library unchanged, because it silently drops the cells of longer rows and fills up shorter ones.
+    """
+    lines = None if b"\0" in body else _regular(body, layout)
+    if lines is not None:
+        numbers = first_line + np.arange(lines, dtype=np.int64)
+        doubtful = int(numbers[-1]) if is_cut and lines and _ends_short(body, layout.separator) else 0
+        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful))
+        if b'"' not in body or _is_quoted_plainly(rows):
+            return rows
+    return _irregular(body, layout, first_line, is_cut=is_cut)
+
+
+def _ends_short(body: bytes, separator: str) -> bool:
+    """Whether the last cell is shorter than those above it: it may be half a number."""
+    tail = body[-_TAIL:].split(b"\n")[-_ABOVE - 1 :]
+    *above, last = (len(line.rpartition(separator.encode())[2].strip()) for line in tail)
+    return len(above) == _ABOVE and 0 < last < min(above)
+
+
+def behind(data: Text, lines: int) -> int:
+    """Where the text goes on behind so many lines."""
+    at = 0
+    for _ in range(lines):
+        at = data.find(b"\n", at) + 1
+    return at
+
+
+def bodies(text: TextFile, at: int, line: int) -> Iterator[tuple[bytes, int, bool]]:
+    """Pieces of whole lines from a place on, each with the number of its first line and whether it is the last.
+
+    As of the whole file, what ends no line at its end is no line.
+    """
+    rest, place, size = b"", at, len(text)
+    for block in text.blocks(at, PIECE):
+        place += len(block)
+        data = rest + block
+        last = place >= size
+        end = _end(data) if last else _end(data[: data.rfind(b"\n") + 1])
+        if not end and not last:
+            rest = data
+            continue
+        body, rest = data[:end], data[end:]
+        if body or last:
+            yield body, line, last
+        if not last:
+            line += body.count(b"\n") + 1
+            # the end of this body's last line
+            rest = rest.removeprefix(b"\r").removeprefix(b"\n")
+
+
+def _end(data: bytes) -> int:
+    """Position behind the last character that ends no line; a file may be large, so it is not copied for this."""
+    end = len(data)
+    while end and data[end - 1] in b"\r\n":
+        end -= 1
+    return end
+
+
+def _regular(body: bytes, layout: Layout) -> int | None:
+    """Number of lines if each has exactly the separators of a whole row and none is a comment."""
+    if not body:
+        return 0
+    separator = layout.separator.encode()
+    if layout.width > len(layout.columns):
+        return None
+    signs = body.translate(None, _ALL.translate(None, separator + b"\n" + _COMMENT)) + b"\n"
+    comments = [sign for sign in _COMMENT if sign in signs and sign != separator[0]]
+    if comments:
+        if body[0] in comments or any(b"\n%c" % sign in body for sign in comments):
+            return None
+        signs = signs.translate(None, bytes(comments))
+    row = separator * (layout.width - 1) + b"\n"
+    lines, rest = divmod(len(signs), len(row))
+    return lines if not rest and signs == row * lines else None
+
+
+def _is_quoted_plainly(rows: Rows) -> bool:
+    """Return whether the library also finds one row per line: then no quotes hold a separator or a line's end.
+
+    A line with an odd quote is a row of its own to the library only if it is the last one. A quoted cell that goes on
+    behind its quote is lost.
+    """
+    octets = np.frombuffer(b"\n" + rows.text + b"\n", dtype=np.uint8)
+    quotes = np.flatnonzero(octets == ord('"'))
+    before = np.searchsorted(quotes, np.flatnonzero(octets == ord("\n")))  # quotes up to the end of each line
+    if (before % 2).any():
+        return False
+    around = np.frombuffer(f'\r\n"{rows.separator}'.encode(), dtype=np.uint8)
+    if not (np.isin(octets[quotes - 1], around) | np.isin(octets[quotes + 1], around)).all():
+        return False
+    try:
+        rows.cells([0], where="")
+    except LogError:
+        return False
+    return True
+
+
+def _irregular(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Rows:
+    """Line by line: rows that fit are kept, the lines of the others remembered. No cell spans lines."""
+    names = len(layout.columns)
+    kept: list[list[str]] = []
+    lines: list[int] = []
+    short, long, comments, empty = [], [], [], []
+    has_nul = b"\0" in body
+    for line, text in enumerate(body.decode("utf-8").split("\n"), start=first_line):
+        if has_nul and (count := text.count("\0")):
+            empty.append((line, count))
+        cells = _split(text, layout.separator)
+        if not any(cells):
+            continue
+        if is_comment(text):
+            comments.append(line)
+        elif any(cells[names:]):
+            long.append(line)
+        else:
+            if len(cells) < names:
+                short.append(line)
+            kept.append(cells[:names])
+            lines.append(line)
+    cut = short[-1] if is_cut and short and lines[-1] == short[-1] else 0
+    if cut:
+        kept[-1] = kept[-1][:-1]  # it may be half a number
+    joined = "\n".join(_JOIN.join(c + [""] * (names - len(c))) for c in kept).encode()
+    faults = RowFaults(tuple(short), tuple(long), tuple(comments), cut, empty=tuple(empty))
+    return Rows(joined, _JOIN, names, np.array(lines, dtype=np.int64), faults)
+
+
+def _split(text: str, separator: str) -> list[str]:
+    if '"' in text:
+        return [c.replace(_JOIN, " ").replace("\n", " ") for c in split_line(text, separator)]
+    return [c.strip() for c in text.split(separator)]
+
+
+class CsvReader(TableReader):
     """Reader of one CSV file.
 
     A blank cell is no sample of its channel; a cell that stands for a bad sample, or that cannot be understood, is NaN.
@@ -49,9 +282,7 @@ class CsvReader(OpenFile):
     def __init__(self, path: Path, options: ReadOptions) -> None:
         super().__init__(path)
         self._rows: Rows | None = None
-        self._stamps: Stamps | None = None
         self._counted: set[int] = set()
-        self._drift = DriftWatch()
         self._lost: dict[tuple[int, tuple[str, str]], tuple[int, int]] = {}
         self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
@@ -59,10 +290,10 @@ class CsvReader(OpenFile):
         ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
         self._count = max(0, ends - self._layout.first_line + 1)
         self._size = len(self._data)
-        self._time = choose_time([_field(c) for c in self._layout.columns], options, where=str(path))
+        kinds: list[FieldKind] = ["text" if c.kind == "blank" else c.kind for c in self._layout.columns]
+        columns = zip(self._layout.columns, kinds, strict=True)
+        self._choose_time([TableField(c.name, c.unit, kind) for c, kind in columns], options)
         self._refuse_two_times(options)
-        if self._time.note:
-            self._note(self._time.note)
         self._note_columns()
 
     def _text(self) -> bytes | TextFile:
@@ -90,16 +321,14 @@ class CsvReader(OpenFile):
         return [
             ChannelInfo(c.name, c.header, c.unit, self._count, self._path.name, key=c.index)
             for c in self._layout.columns
-            if _is_channel(c, self._time)
+            if c.kind in ("number", "blank") and c.index != self._time.index
         ]
 
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         """Parse these columns only."""
         asked = list(wanted)
         rows = self._found_rows()
-        choice = self._time
-        times = [k for k in (choice.index, choice.day, choice.other) if k is not None and self._stamps is None]
-        needed = list({w.key for w in asked}.union(times))
+        needed = list({w.key for w in asked}.union(self._times if self._stamps is None else ()))
         cells = rows.cells(needed, where=str(self._path), numbers=self._plain(asked)) if needed else {}
         if self._stamps is None:
             self._stamps = self._read_time(cells, rows)
@@ -120,8 +349,7 @@ class CsvReader(OpenFile):
 
     def _plain(self, asked: Sequence[ChannelInfo]) -> frozenset[int]:
         """Columns that the library reads as numbers as they stand: three times faster than by their text."""
-        times = {self._time.index, self._time.day, self._time.other}
-        return frozenset(w.key for w in asked if self._layout.columns[w.key].style == STYLES[0]) - times
+        return frozenset(w.key for w in asked if self._layout.columns[w.key].style == STYLES[0]) - {*self._times}
 
     def _pieces(self, asked: Sequence[ChannelInfo], text: TextFile) -> Iterator[Sequence[Channel]]:
         columns, choice = self._layout.columns, self._time
@@ -193,23 +421,13 @@ class CsvReader(OpenFile):
             return
         self._drift.push(stamps.t_ns, found.t_ns, stamps.valid & found.valid)
 
-    def _tell_drift(self) -> None:
-        other = self._time.other
-        names = [self._layout.columns[k].name for k in (self._time.index, other or 0)]
-        drift = self._drift.finish(*(f'"{n}"' for n in names))
-        if drift is not None:
-            self._faults.drifts = [drift]
-            self._note(drift_note(drift))
-
     def _no_time(self, column: Column) -> tuple[str, str]:
         return f'time column "{column.name}": ', " without a time, the row is left out"
 
     def _as_stamps(self, column: Column, cells: pl.Series, day: pl.Series | None) -> Stamps:
         if column.kind in ("stamp", "clock"):
-            try:
+            with self._located():
                 return from_dates(cells, day, "clock" if column.kind == "clock" else "stamp")
-            except LogError as error:  # it does not know the file
-                raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
         values = numbers(cells, column.style).values
         return from_numbers(values, self._time.unit, cells=plain(cells, column.style))
 
@@ -274,15 +492,6 @@ class CsvReader(OpenFile):
         if isinstance(self._data, TextFile):
             self._data.close()
         self._data, self._rows = b"", None
-
-
-def _field(column: Column) -> TableField:
-    kind: FieldKind = "text" if column.kind == "blank" else column.kind
-    return TableField(column.name, column.unit, kind)
-
-
-def _is_channel(column: Column, time: TimeChoice) -> bool:
-    return column.kind in ("number", "blank") and column.index != time.index
 
 
 def _lines(lines: Sequence[int], what: str) -> str:

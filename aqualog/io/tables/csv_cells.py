@@ -30,12 +30,6 @@ class Style:
     decimal: str
     thousands: str = ""
 
-    @property
-    def name(self) -> str:
-        """For messages."""
-        signs = {".": "point", ",": "comma"}
-        return f"decimal {signs[self.decimal]}" + (f", thousands {signs[self.thousands]}" if self.thousands else "")
-
 
 # In the order of preference: a style is taken only if it explains more columns than those before it.
 STYLES = (Style("."), Style(","), Style(",", "."), Style(".", ","))
@@ -92,9 +86,11 @@ class Numbers:
 def numbers(cells: pl.Series, style: Style) -> Numbers:
     """Convert the cells of one column, which are text or read as numbers already; a cell is never guessed at."""
     if cells.dtype == pl.Float64:
-        return _read(cells)
+        values: FloatArray = cells.fill_null(np.nan).to_numpy().astype(np.float64)
+        values[~np.isfinite(values)] = np.nan
+        return Numbers(values, cells.is_null().to_numpy().copy(), np.zeros(len(cells), dtype=np.bool_))
     found = plain(cells, style).cast(pl.Float64, strict=False)
-    values: FloatArray = found.fill_null(np.nan).to_numpy().astype(np.float64)
+    values = found.fill_null(np.nan).to_numpy().astype(np.float64)
     blank = cells.is_null().to_numpy().copy()
     unreadable = np.zeros(len(cells), dtype=np.bool_)
     left: NDArray[np.int64] = (found.is_null() & cells.is_not_null()).arg_true().to_numpy().astype(np.int64)
@@ -102,12 +98,6 @@ def numbers(cells: pl.Series, style: Style) -> Numbers:
         _second_look(cells.gather(left), left, style, Numbers(values, blank, unreadable))
     values[~np.isfinite(values)] = np.nan
     return Numbers(values, blank, unreadable)
-
-
-def _read(cells: pl.Series) -> Numbers:
-    values: FloatArray = cells.fill_null(np.nan).to_numpy().astype(np.float64)
-    values[~np.isfinite(values)] = np.nan
-    return Numbers(values, cells.is_null().to_numpy().copy(), np.zeros(len(cells), dtype=np.bool_))
 
 
 def _second_look(cells: pl.Series, rows: NDArray[np.int64], style: Style, into: Numbers) -> None:

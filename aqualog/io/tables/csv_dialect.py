@@ -190,19 +190,12 @@ def _with_separator(head: Sequence[str], spread: Sequence[str], separator: str, 
         header, units, body_at = _header_block(head, rows, k)
         body = [r for line, r in zip(head[body_at:], rows[body_at:], strict=True) if any(r) and not is_comment(line)]
         body = body[:_BODY_ROWS] + [split_line(line, separator) for line in spread if line and not is_comment(line)]
-        found = _prove(header, units, body, separator, _first_data(head, rows, body_at) + 1, decimal)
+        is_data = (k for k in range(body_at, len(rows)) if any(rows[k]) and not is_comment(head[k]))
+        found = _prove(header, units, body, separator, next(is_data, body_at) + 1, decimal)
         if not isinstance(found, str):
             return found
         reason = reason or found
     return reason or "no header line above the data"
-
-
-def _first_data(head: Sequence[str], rows: Sequence[Row], at: int) -> int:
-    """Index of the first line from `at` that is neither blank nor a comment."""
-    for k in range(at, len(rows)):
-        if any(rows[k]) and not is_comment(head[k]):
-            return k
-    return at
 
 
 def _is_header_like(row: Row) -> bool:
@@ -210,11 +203,7 @@ def _is_header_like(row: Row) -> bool:
     filled = [c for c in row if c and not is_bad(c)]
     if len(filled) < 2:
         return False
-    return not any(_is_datum(c) for c in filled)
-
-
-def _is_datum(cell: str) -> bool:
-    return any(is_number(cell, s) for s in STYLES[:2]) or is_stamp(cell) or is_clock(cell) or is_date(cell)
+    return not any(any(is_number(c, s) for s in STYLES[:2]) or is_stamp(c) or is_clock(c) or is_date(c) for c in filled)
 
 
 def _is_units(row: Row) -> bool:
@@ -244,16 +233,10 @@ def _header_block(head: Sequence[str], rows: Sequence[Row], first: int) -> tuple
     names = [k for k in block if not is_comment(head[k])] or block[-1:]
     units_at = next((k for k in names[1:] if _is_units(rows[k])), None)
     if units_at is None:
-        header = rows[names[-1]]
-        return [_uncommented(header[0]), *header[1:]], [], names[-1] + 1
+        first_name, *others = rows[names[-1]]
+        sign = next((c for c in _COMMENTS if first_name.startswith(c)), "")
+        return [first_name.removeprefix(sign).strip(), *others], [], names[-1] + 1
     return rows[names[names.index(units_at) - 1]], [_bare(c) if c != "-" else c for c in rows[units_at]], names[-1] + 1
-
-
-def _uncommented(cell: str) -> str:
-    for sign in _COMMENTS:
-        if cell.startswith(sign):
-            return cell.removeprefix(sign).strip()
-    return cell
 
 
 def _prove(
@@ -280,7 +263,6 @@ def _prove(
 
 
 def _trimmed(row: Row) -> Row:
-    """A row without the blank cells at its end."""
     blank = sum(1 for _ in takewhile(lambda c: not c, reversed(row)))
     return row[: len(row) - blank]
 
@@ -294,7 +276,8 @@ def _columns(
     """
     cells = [_Cells(tuple(r[k] for r in body if k < len(r) and r[k])) for k in range(len(names))]
     order = _told_styles(cells, decimal) if decimal else _preferred(cells, separator)
-    split = [split_unit(n.removeprefix("'") if _is_defused(n) else n) for n in names]
+    # an apostrophe stands before a name only to keep a spreadsheet from running it
+    split = [split_unit(n[1:] if n[:1] == "'" and n[1:2] in ("=", "+", "-", "@", "\t") else n) for n in names]
     paths = unique_names([name for name, _ in split])
     below = units + [""] * len(names)
     columns = []
@@ -378,11 +361,6 @@ def _has_leading_zero(cell: str, thousands: str) -> bool:
     """Whether a cell such as `0.250` is no group of thousands."""
     whole, sign, _ = cell.lstrip("+-").partition(thousands)
     return bool(sign) and whole.startswith("0")
-
-
-def _is_defused(header: str) -> bool:
-    """Whether an apostrophe stands before the name only to keep a spreadsheet from running it."""
-    return header[:1] == "'" and header[1:2] in ("=", "+", "-", "@", "\t")
 
 
 def _kind(column: _Cells, style: Style) -> tuple[ColumnKind, float, str]:

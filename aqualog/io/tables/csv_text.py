@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import codecs
 import os
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,13 +25,12 @@ __all__ = ["LARGE", "LONGEST_LINE", "LogText", "TextFile", "check_lines", "open_
 LARGE = 1 << 28  # [bytes] from which a file is not held as a whole
 LONGEST_LINE = 1 << 24  # [bytes] beyond, a file is no table
 _BLOCK = 1 << 24  # not above the longest line
-_ORDER_MARKS = (
-    codecs.BOM_UTF8,
-    codecs.BOM_UTF16_LE,
-    codecs.BOM_UTF16_BE,
-    codecs.BOM_UTF32_LE,
-    codecs.BOM_UTF32_BE,
-)
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)  # fmt: skip
+_CODE_PAGES = ("cp1252", "cp1250", "mac_roman", "cp850", "cp1251", "gb18030", "cp932", "cp949")
+_HEAD = 1 << 16
 
 
 class TextFile:
@@ -143,7 +144,7 @@ def open_text(path: Path) -> TextFile | None:
     lines, lengths = False, _LineLengths(str(path))
     try:
         for k, block in enumerate(text.blocks()):
-            if k == 0 and block.startswith(_ORDER_MARKS):
+            if k == 0 and block.startswith((codecs.BOM_UTF8, *(mark for mark, _ in _MARKS))):
                 break
             lines |= b"\n" in block
             lengths.add(block)
@@ -160,16 +161,6 @@ def open_text(path: Path) -> TextFile | None:
         raise
     text.close()
     return None
-
-
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF32_BE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-_CODE_PAGES = ("cp1252", "cp1250", "mac_roman", "cp850", "cp1251", "gb18030", "cp932", "cp949")
-_HEAD = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,16 +235,12 @@ def _marked(raw: bytes, encoding: str, path: Path) -> bytes:
 def _is_damaged_utf8(raw: bytes) -> bool:
     """Whether the head's lines beyond ASCII are mostly UTF-8: chance does not produce its sequences of bytes."""
     beyond = [line for line in raw[:_HEAD].split(b"\n")[:-1] if not line.isascii()]
-    sound = sum(_is_utf8(line) for line in beyond)
+    sound = 0
+    for line in beyond:
+        with suppress(UnicodeDecodeError):
+            line.decode("utf-8")
+            sound += 1
     return sound > 0 and 2 * sound >= len(beyond)
-
-
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _code_page(raw: bytes, path: Path) -> LogText:
@@ -278,15 +265,9 @@ def _known_units(beyond: bytes, encoding: str) -> int:
         text = beyond.decode(encoding)
     except UnicodeDecodeError:
         return -1
-    cells = [c.strip().strip('"') for line in text.splitlines()[:20] for c in _cells(line)]
+    cells = [c.strip().strip('"') for line in text.splitlines()[:20] for c in re.split(r"[,;\t|]", line)]
     units = [split_unit(c)[1] or c.strip("[]()") for c in cells if not c.isascii()]
     return sum(not u.isascii() and is_unit(u) for u in units)
-
-
-def _cells(line: str) -> list[str]:
-    for separator in (";", "\t", "|"):
-        line = line.replace(separator, ",")
-    return line.split(",")
 
 
 def _guessed(beyond: bytes, usable: list[str]) -> str:

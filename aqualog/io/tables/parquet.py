@@ -18,22 +18,21 @@ import polars as pl
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FloatArray, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
-from aqualog.io.clock_drift import DriftWatch, drift_note
-from aqualog.io.reader import OpenFile, Part, ReadOptions, one_piece, part_of
+from aqualog.io.reader import Part, ReadOptions, one_piece, part_of
 from aqualog.io.tables.columns import (
     FieldKind,
     Stamps,
     TableField,
-    choose_time,
+    TableReader,
     from_dates,
     from_numbers,
     judged_unit,
     no_unit_note,
     split_unit,
     unique_names,
-)
+)  # fmt: skip
 from aqualog.io.tables.csv_cells import is_clock, is_stamp
-from aqualog.io.tables.parquet_groups import SoundRows, reason_of
+from aqualog.io.tables.parquet_groups import LIBRARY_ERRORS, SoundRows, reason_of, unreadable
 from aqualog.io.write_table import METADATA_KEY
 
 __all__ = ["ParquetReader", "field_metadata"]
@@ -97,21 +96,16 @@ def field_metadata(encoded: str, key: str) -> dict[str, str]:
     """
     try:
         message = base64.b64decode(encoded)
-        if message.startswith(_CONTINUATION):
-            message = message[8:]
-        else:
-            message = message[4:]
+        message = message[8 if message.startswith(_CONTINUATION) else 4 :]
         schema = _Table(message, _int(message, "<I", 0)).table(_MESSAGE_HEADER)
-        return {} if schema is None else dict(_values(schema, key))
+        return {
+            field.text(_FIELD_NAME): pair.text(_VALUE)
+            for field in (() if schema is None else schema.tables(_SCHEMA_FIELDS))
+            for pair in field.tables(_FIELD_METADATA)
+            if pair.text(_KEY).casefold() == key
+        }
     except (binascii.Error, struct.error, UnicodeDecodeError, ValueError):
         return {}
-
-
-def _values(schema: _Table, key: str) -> Iterator[tuple[str, str]]:
-    for field in schema.tables(_SCHEMA_FIELDS):
-        for pair in field.tables(_FIELD_METADATA):
-            if pair.text(_KEY).casefold() == key:
-                yield field.text(_FIELD_NAME), pair.text(_VALUE)
 
 
 def _int(data: bytes, code: str, at: int) -> int:
@@ -155,7 +149,7 @@ class _Lost:
             self.rows += bad.size
 
 
-class ParquetReader(OpenFile):
+class ParquetReader(TableReader):
     """Reader of one Parquet file.
 
     A null is no sample of its channel; a NaN is a bad sample. Units stand in the metadata of the file (as aqualog
@@ -166,7 +160,6 @@ class ParquetReader(OpenFile):
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         super().__init__(path)
-        self._stamps: Stamps | None = None
         self._unit: str | None = None
         schema, metadata = self._wrapped(lambda: _head(path))
         self._rows: int = self._wrapped(
@@ -179,11 +172,10 @@ class ParquetReader(OpenFile):
         about = _about(metadata)
         start = about.get("start_ns")
         self._start_ns = start if isinstance(start, int) else None
-        self._columns = self._listed(schema, _units(about) or field_metadata(metadata.get("ARROW:schema", ""), "unit"))
-        fields = [TableField(c.path, c.unit, c.kind) for c in self._columns]
-        self._time = choose_time(fields, options, where=str(path))
-        if self._time.note:
-            self._note(self._time.note)
+        units = about.get("units")
+        known = {str(k): str(v) for k, v in units.items()} if isinstance(units, dict) else {}
+        self._columns = self._listed(schema, known or field_metadata(metadata.get("ARROW:schema", ""), "unit"))
+        self._choose_time([TableField(c.path, c.unit, c.kind) for c in self._columns], options)
 
     def channels(self) -> Sequence[ChannelInfo]:
         """All numeric columns but the time."""
@@ -196,8 +188,7 @@ class ParquetReader(OpenFile):
     def read(self, wanted: Iterable[ChannelInfo]) -> list[Channel]:
         """Read these columns only."""
         asked = list(wanted)
-        choice = self._time
-        times = [k for k in (choice.index, choice.day, choice.other) if k is not None and self._stamps is None]
+        times = self._times if self._stamps is None else []
         stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
         if not stored:
             return []
@@ -205,10 +196,12 @@ class ParquetReader(OpenFile):
         unit = self._time_unit()
         frame = self._sound.collect(stored, 0, self._rows)
         if self._stamps is None:
-            self._stamps = self._read_time(frame, unit)
-            drift = DriftWatch()
-            self._compare_clocks(drift, self._stamps, frame)
-            self._tell_drift(drift)
+            self._stamps = self._stamps_of(frame, unit)
+            lost = _Lost()
+            lost.add(self._stamps, partial(self._sound.row_of, 0))
+            self._tell_lost(lost)
+            self._compare_clocks(self._stamps, frame)
+            self._tell_drift()
         elif frame.height != len(self._stamps.t_ns):  # another row group turned out to be damaged
             self._stamps = None
             return self.read(asked)
@@ -223,12 +216,11 @@ class ParquetReader(OpenFile):
         return [part_of(asked, self._pieces(asked))]
 
     def _pieces(self, asked: Sequence[ChannelInfo]) -> Iterator[Sequence[Channel]]:
-        times = [k for k in (self._time.index, self._time.day, self._time.other) if k is not None]
-        stored = list(dict.fromkeys(self._columns[k].stored for k in [*times, *(w.key for w in asked)]))
+        stored = list(dict.fromkeys(self._columns[k].stored for k in [*self._times, *(w.key for w in asked)]))
         rows = max(1, _PIECE // len(stored))
         unit = self._time_unit()
         absolute: bool | None = None
-        lost, drift = _Lost(), DriftWatch()
+        lost = _Lost()
         for at in range(0, self._rows, rows):
             frame = self._sound.collect(stored, at, rows)
             if frame.is_empty():
@@ -238,10 +230,10 @@ class ParquetReader(OpenFile):
                 absolute = stamps.absolute
             stamps = replace(stamps, absolute=bool(absolute))
             lost.add(stamps, partial(self._sound.row_of, at))
-            self._compare_clocks(drift, stamps, frame)
+            self._compare_clocks(stamps, frame)
             yield [self._channel(w, frame[self._columns[w.key].stored], stamps) for w in asked]
         self._tell_lost(lost)
-        self._tell_drift(drift)
+        self._tell_drift()
         self._sound.tell()
 
     def _check_memory(self, columns: int) -> None:
@@ -275,40 +267,24 @@ class ParquetReader(OpenFile):
         values[~np.isfinite(values)] = np.nan
         return Channel(info, stamps.t_ns[keep], values, stamps.absolute)
 
-    def _read_time(self, frame: pl.DataFrame, unit: str) -> Stamps:
-        stamps = self._stamps_of(frame, unit)
-        lost = _Lost()
-        lost.add(stamps, partial(self._sound.row_of, 0))
-        self._tell_lost(lost)
-        return stamps
-
     def _stamps_of(self, frame: pl.DataFrame, unit: str) -> Stamps:
         column, choice = self._columns[self._time.index], self._time
         day = None if choice.day is None else frame[self._columns[choice.day].stored].cast(pl.String)
-        try:
+        with self._located():
             stamps = _stamps(frame[column.stored], day, unit, column.kind)
-        except LogError as error:  # it does not know the file
-            raise LogError(error.what, where=str(self._path), expected=error.expected, hint=error.hint) from error
         if self._start_ns is not None and not stamps.absolute:
             stamps = replace(stamps, t_ns=stamps.t_ns + self._start_ns, absolute=True)
         for note in stamps.notes:
             self._note(note)
         return stamps
 
-    def _compare_clocks(self, drift: DriftWatch, stamps: Stamps, frame: pl.DataFrame) -> None:
+    def _compare_clocks(self, stamps: Stamps, frame: pl.DataFrame) -> None:
         """Compare the second clock of these rows with their stamps; not if it is text, which needs the whole column."""
         other = None if self._time.other is None else self._columns[self._time.other]
         if other is None or other.dtype == pl.String:
             return
         found = _stamps(frame[other.stored], None, self._time.other_unit, other.kind)
-        drift.push(stamps.t_ns, found.t_ns, stamps.valid & found.valid)
-
-    def _tell_drift(self, watch: DriftWatch) -> None:
-        names = [self._columns[k].path for k in (self._time.index, self._time.other or 0)]
-        drift = watch.finish(*(f'"{n}"' for n in names))
-        if drift is not None:
-            self._faults.drifts = [drift]
-            self._note(drift_note(drift))
+        self._drift.push(stamps.t_ns, found.t_ns, stamps.valid & found.valid)
 
     def _tell_lost(self, lost: _Lost) -> None:
         if lost.rows:
@@ -336,7 +312,6 @@ class ParquetReader(OpenFile):
         return self._text_kind(stored) if dtype == pl.String else "text"
 
     def _text_kind(self, stored: str) -> FieldKind:
-        """Whether a column of text holds times."""
         frame = self._sound.collect([stored], 0, min(self._rows, _LOOKED_AT))
         cells = [c.strip() for c in frame[stored].drop_nulls().to_list()]
         if cells and all(map(is_stamp, cells)):
@@ -347,10 +322,8 @@ class ParquetReader(OpenFile):
         """Result of a call into the library, whose errors of all kinds become ours."""
         try:
             return action()
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError) as error:
-            reason = reason_of(error)
-            hint = "check whether it was written to its end: the index stands there"
-            raise LogError(f"cannot be read as Parquet ({reason})", where=str(self._path), hint=hint) from error
+        except LIBRARY_ERRORS as error:
+            raise unreadable(self._path, reason_of(error)) from error
 
 
 def _about(metadata: dict[str, str]) -> dict[str, Any]:
@@ -361,29 +334,17 @@ def _about(metadata: dict[str, str]) -> dict[str, Any]:
     return about if isinstance(about, dict) else {}
 
 
-def _units(about: dict[str, Any]) -> dict[str, str]:
-    units = about.get("units")
-    return {str(k): str(v) for k, v in units.items()} if isinstance(units, dict) else {}
-
-
 def _floats(column: pl.Series) -> FloatArray:
     if isinstance(column.dtype, pl.Duration):
-        column = _duration_ns(column).cast(pl.Float64) * 1e-9
+        column = (column.to_physical().cast(pl.Int64) * _UNIT_NS[column.dtype.time_unit]).cast(pl.Float64) * 1e-9
     values: FloatArray = column.cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64)
     return values
 
 
-def _duration_ns(column: pl.Series) -> pl.Series:
-    unit = column.dtype.time_unit if isinstance(column.dtype, pl.Duration) else "ns"
-    return column.to_physical().cast(pl.Int64) * _UNIT_NS[str(unit)]
-
-
 def _stamps(column: pl.Series, day: pl.Series | None, unit: str, kind: FieldKind) -> Stamps:
     dtype = column.dtype
-    if isinstance(dtype, pl.Datetime):
-        return _whole(column, _UNIT_NS[dtype.time_unit], absolute=True)
-    if isinstance(dtype, pl.Duration):
-        return _whole(column, _UNIT_NS[dtype.time_unit], absolute=False)
+    if isinstance(dtype, pl.Datetime | pl.Duration):
+        return _whole(column, _UNIT_NS[dtype.time_unit], absolute=isinstance(dtype, pl.Datetime))
     if kind in ("stamp", "clock"):
         # a cast of a time of day to text drops the fraction of the second
         text = column.dt.to_string("%H:%M:%S%.9f") if dtype == pl.Time else column.cast(pl.String)

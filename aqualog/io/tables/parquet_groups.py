@@ -14,15 +14,15 @@ from aqualog.core.errors import LogError
 from aqualog.io.reader import FaultLog
 from aqualog.io.tables.parquet_pages import Group, Index, MalformedError, is_of, page_fault, read_index
 
-__all__ = ["SoundRows", "reason_of"]
+__all__ = ["LIBRARY_ERRORS", "SoundRows", "reason_of", "unreadable"]
 
 _CODES: dict[type[pl.DataType], str] = {
     pl.Float64: "d", pl.Float32: "f", pl.Int64: "q", pl.UInt64: "Q", pl.Int32: "i", pl.Int16: "i", pl.Int8: "i",
     pl.UInt32: "I", pl.UInt16: "I", pl.UInt8: "I",
 }  # fmt: skip
-_LIBRARY = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError)
+LIBRARY_ERRORS = (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, TypeError, ValueError)
 _TRIED = 1 << 20  # values decoded at once where none is handed out
-_HINT = "check whether it was written to its end: the index stands there"
+"""What the library raises for the content of a file."""
 
 
 class SoundRows:
@@ -47,7 +47,7 @@ class SoundRows:
         try:
             self._index: Index | None = read_index(path)
         except (MalformedError, OSError) as error:
-            raise LogError(f"cannot be read as Parquet ({error})", where=str(path), hint=_HINT) from error
+            raise unreadable(path, str(error)) from error
         if self._index is None:
             self._note("the index is too large to hold the pages against it")
         elif self._index.unowned:
@@ -79,23 +79,24 @@ class SoundRows:
         """
         touched = [k for k, g in enumerate(self._groups) if g.first < at + rows and at < g.first + g.rows]
         self._check(touched, columns)
-        self._go_through([k for k in touched if not self._is_within(k, at, rows)], columns, rows)
+        inner = [k for k in touched if at <= self._groups[k].first <= at + rows - self._groups[k].rows]
+        self._go_through([k for k in touched if k not in inner], columns, rows)
         try:
             return self._frame(columns, at, rows, touched)
-        except _LIBRARY as error:
+        except LIBRARY_ERRORS as error:
             if len(self._groups) == 1:
-                raise _unreadable(self._path, reason_of(error)) from error
+                raise unreadable(self._path, reason_of(error)) from error
         for k in touched:  # which of them cannot be decoded
             if k not in self._bad:
                 group = self._groups[k]
                 try:
                     self._slice(columns, group.first, group.rows)
-                except _LIBRARY as error:
+                except LIBRARY_ERRORS as error:
                     self._leave_out(k, reason_of(error))
         try:
             return self._frame(columns, at, rows, touched)
-        except _LIBRARY as error:
-            raise _unreadable(self._path, reason_of(error)) from error
+        except LIBRARY_ERRORS as error:
+            raise unreadable(self._path, reason_of(error)) from error
 
     def row_of(self, at: int, k: int) -> int:
         """Row of the file that is the k-th of those collected from row `at` on."""
@@ -146,10 +147,6 @@ class SoundRows:
             if fault:
                 self._leave_out(k, fault)
 
-    def _is_within(self, group: int, at: int, rows: int) -> bool:
-        first = self._groups[group].first
-        return at <= first and first + self._groups[group].rows <= at + rows
-
     def _go_through(self, groups: Sequence[int], columns: Sequence[str], rows: int) -> None:
         """Decode row groups to their ends before a part of them is handed out: the rest may be none."""
         for k in groups:
@@ -162,13 +159,13 @@ class SoundRows:
             try:
                 for at in range(group.first, group.first + group.rows, step):
                     self._slice(columns, at, min(step, group.first + group.rows - at))
-            except _LIBRARY as error:
+            except LIBRARY_ERRORS as error:
                 self._leave_out(k, reason_of(error))
 
     def _leave_out(self, group: int, reason: str) -> None:
         self._bad[group] = reason
         if len(self._bad) == len(self._groups):
-            raise _unreadable(self._path, next(iter(self._bad.values())))
+            raise unreadable(self._path, next(iter(self._bad.values())))
 
     def _frame(self, columns: Sequence[str], at: int, rows: int, touched: Sequence[int]) -> pl.DataFrame:
         spans = list(self._spans(at, rows, touched))
@@ -211,13 +208,10 @@ class SoundRows:
             which = np.searchsorted(starts, np.arange(len(values)), side="right") - 1
             strange = column.is_not_null().to_numpy() & ((values < low[which]) | (values > high[which]))
             if strange.any():
-                self._count(name, at + np.flatnonzero(strange))
+                rows = at + np.flatnonzero(strange)  # each once: the ends of a time are looked at before it is read
+                self._left_out[name] = np.union1d(self._left_out.get(name, rows), rows)
                 frame = frame.with_columns(pl.when(pl.Series(~strange)).then(column).alias(name))
         return frame
-
-    def _count(self, column: str, rows: NDArray[np.int64]) -> None:
-        """Values that are left out, each once: the ends of a time are looked at before it is read."""
-        self._left_out[column] = np.union1d(self._left_out.get(column, rows), rows)
 
     def _note(self, text: str) -> None:
         self._faults.notes.append(f"{self._path.name}: {text}")
@@ -244,5 +238,7 @@ def reason_of(error: BaseException) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def _unreadable(path: Path, reason: str) -> LogError:
-    return LogError(f"cannot be read as Parquet ({reason})", where=str(path), hint=_HINT)
+def unreadable(path: Path, reason: str) -> LogError:
+    """Return the error for a file without any sound row."""
+    hint = "check whether it was written to its end: the index stands there"
+    return LogError(f"cannot be read as Parquet ({reason})", where=str(path), hint=hint)

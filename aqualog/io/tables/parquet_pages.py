@@ -50,14 +50,48 @@ def decode(data: bytes, at: int = 0) -> tuple[Struct, int]:
         If the bytes hold no such structure.
     """
     try:
-        return _struct(data, at, 0)
+        return _value(data, at, _STRUCT, 0)
     except (IndexError, struct.error) as error:
         raise MalformedError("it goes on behind its end", is_short=True) from error
 
 
-def _struct(data: bytes, at: int, depth: int) -> tuple[Struct, int]:
+def _value(data: bytes, at: int, kind: int, depth: int) -> tuple[Any, int]:
+    """A value: a number, bytes, a structure, or a list; of a map keys and values by turns."""
+    if kind in (_I16, _I32, _I64):
+        return _zigzag(data, at)
+    if kind == _BINARY:
+        size, at = _varint(data, at)
+        if at + size > len(data):
+            raise MalformedError("a text in it goes on behind its end", is_short=True)
+        return data[at : at + size], at + size
+    if kind == _DOUBLE:
+        return struct.unpack_from("<d", data, at)[0], at + 8
+    if kind in (_BYTE, _TRUE, _FALSE):  # the latter two in lists
+        return data[at], at + 1
+    if kind not in (_STRUCT, _LIST, _SET, _MAP):
+        raise MalformedError(f"type {kind} is not known")
     if depth > _DEEPEST:
         raise MalformedError("it is nested without end")
+    if kind == _STRUCT:
+        return _struct(data, at, depth)
+    if kind == _MAP:
+        count, at = _varint(data, at)
+        kinds: tuple[int, ...] = (data[at] >> 4, data[at] & 15) if count else ()
+        at += 1 if count else 0
+    else:
+        count, kinds = data[at] >> 4, (data[at] & 15,)
+        at += 1
+        if count == 15:
+            count, at = _varint(data, at)
+    out = []
+    for _ in range(count):
+        for inner in kinds:
+            value, at = _value(data, at, inner, depth + 1)
+            out.append(value)
+    return out, at
+
+
+def _struct(data: bytes, at: int, depth: int) -> tuple[Struct, int]:
     out: Struct = {}
     number = 0
     while head := data[at]:
@@ -70,58 +104,8 @@ def _struct(data: bytes, at: int, depth: int) -> tuple[Struct, int]:
         if kind in (_TRUE, _FALSE):
             out[number] = kind == _TRUE
         else:
-            out[number], at = _value(data, at, kind, depth)
+            out[number], at = _value(data, at, kind, depth + 1)
     return out, at + 1
-
-
-def _value(data: bytes, at: int, kind: int, depth: int) -> tuple[Any, int]:
-    if kind in (_I16, _I32, _I64):
-        return _zigzag(data, at)
-    if kind == _BINARY:
-        size, at = _varint(data, at)
-        if at + size > len(data):
-            raise MalformedError("a text in it goes on behind its end", is_short=True)
-        return data[at : at + size], at + size
-    if kind == _STRUCT:
-        return _struct(data, at, depth + 1)
-    if kind in (_LIST, _SET):
-        return _list(data, at, depth + 1)
-    if kind == _DOUBLE:
-        return struct.unpack_from("<d", data, at)[0], at + 8
-    if kind in (_BYTE, _TRUE, _FALSE):  # the latter two in lists
-        return data[at], at + 1
-    if kind == _MAP:
-        return _map(data, at, depth + 1)
-    raise MalformedError(f"type {kind} is not known")
-
-
-def _list(data: bytes, at: int, depth: int) -> tuple[list[Any], int]:
-    if depth > _DEEPEST:
-        raise MalformedError("it is nested without end")
-    count, kind = data[at] >> 4, data[at] & 15
-    at += 1
-    if count == 15:
-        count, at = _varint(data, at)
-    out = []
-    for _ in range(count):
-        value, at = _value(data, at, kind, depth)
-        out.append(value)
-    return out, at
-
-
-def _map(data: bytes, at: int, depth: int) -> tuple[list[Any], int]:
-    """Keys and values by turns."""
-    if depth > _DEEPEST:
-        raise MalformedError("it is nested without end")
-    count, at = _varint(data, at)
-    kinds = data[at] if count else 0
-    at += 1 if count else 0
-    out = []
-    for _ in range(count):
-        for kind in (kinds >> 4, kinds & 15):
-            value, at = _value(data, at, kind, depth)
-            out.append(value)
-    return out, at
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
@@ -308,7 +292,8 @@ def _check_chunk(handle: int, index: Index, group: Group, chunk: Chunk) -> None:
             raise MalformedError(f"the page at byte {at} declares {packed} bytes, and {end - body} are left")
         count = _count(header, at)
         _check_size(header, plain, packed, count, chunk, at)
-        _check_sum(handle, header, body, packed, at)
+        if (told := header.get(4)) is not None and zlib.crc32(_read(handle, body, packed)) != told & 0xFFFFFFFF:
+            raise MalformedError(f"the page at byte {at} does not fit to its checksum")
         values += count if header[1] in (_DATA, _DATA_V2) else 0
         at = body + packed
     if values != chunk.values:
@@ -316,7 +301,6 @@ def _check_chunk(handle: int, index: Index, group: Group, chunk: Chunk) -> None:
 
 
 def _header(handle: int, at: int, end: int) -> tuple[Struct, int]:
-    """Header of a page and where its content begins."""
     size = _HEADER
     while True:
         data = _read(handle, at, min(size, end - at))
@@ -333,7 +317,6 @@ def _header(handle: int, at: int, end: int) -> tuple[Struct, int]:
 
 
 def _count(header: Struct, at: int) -> int:
-    """Values of a page."""
     kind = header[1]
     if kind == _INDEX:
         return 0
@@ -353,12 +336,6 @@ def _check_size(header: Struct, plain: int, packed: int, count: int, chunk: Chun
         most = min(most, _MOST_PER_VALUE * count + _LEVELS)
     if packed > MAX_UNPACKED or not 0 <= plain <= most:
         raise MalformedError(f"the page at byte {at} would unpack to {plain} bytes, more than {count} values need")
-
-
-def _check_sum(handle: int, header: Struct, body: int, packed: int, at: int) -> None:
-    told = header.get(4)
-    if told is not None and zlib.crc32(_read(handle, body, packed)) != told & 0xFFFFFFFF:
-        raise MalformedError(f"the page at byte {at} does not fit to its checksum")
 
 
 def _read(handle: int, at: int, size: int) -> bytes:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from aqualog.core.errors import ConfigError
 from aqualog.core.intervals import wilson
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed
+from aqualog.guard.worker import Crashed, work_on
 from aqualog.thesis.claims import Check, Checks
 from aqualog.thesis.evidence.passes import Pass, PassFigures, figures_of
 

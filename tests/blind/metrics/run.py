@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from aqualog.face.progress import lasting
-from aqualog.guard.pool import work_on
-from aqualog.guard.worker import Crashed
+from aqualog.guard.worker import Crashed, work_on
 from tests.blind.metrics.plan import Job
 from tests.blind.metrics.rows import Row
 from tests.blind.metrics.store import Store

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import struct
-import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from tests.mdf_by_hand import Blocks
 
 UNSIGNED, UNSIGNED_BIG, SIGNED, SIGNED_BIG, FLOAT, FLOAT_BIG = range(6)
 
@@ -43,88 +44,63 @@ class Layout:
     has_header: bool = False
 
 
-@dataclass
-class _File:
-    octets: bytearray = field(default_factory=lambda: bytearray(64))
-
-    def block(self, mark: bytes, links: list[int], data: bytes) -> int:
-        self.octets += bytes(-len(self.octets) % 8)
-        at = len(self.octets)
-        self.octets += struct.pack("<4s4xQQ", mark, 24 + 8 * len(links) + len(data), len(links))
-        self.octets += struct.pack(f"<{len(links)}Q", *links) + data
-        return at
-
-    def text(self, text: str) -> int:
-        return self.block(b"##TX", [], text.encode() + bytes(8 - len(text) % 8))
-
-
-def _data_block(file: _File, data: bytes, packing: str | None, size: int) -> int:
-    if packing is None:
-        return file.block(b"##DT", [], data)
-    turned = data
-    if packing == "transpose":
-        whole = len(data) // size * size
-        turned = np.frombuffer(data[:whole], np.uint8).reshape(-1, size).T.tobytes() + data[whole:]
-    packed = zlib.compress(turned)
-    head = struct.pack(
-        "<2sBxIQQ", b"DT", packing == "transpose", size if packing == "transpose" else 0, len(data), len(packed)
-    )
-    return file.block(b"##DZ", [], head + packed)
-
-
-def _data(file: _File, data: bytes, layout: Layout, size: int) -> int:
+def _data(b: Blocks, name: str, data: bytes, layout: Layout, size: int) -> str:
     edges = [0, *sorted({c for c in layout.cuts if 0 < c < len(data)}), len(data)]
-    pieces = [data[a:b] for a, b in itertools.pairwise(edges)]
-    blocks = [_data_block(file, p, layout.packing[k % len(layout.packing)], size) for k, p in enumerate(pieces)]
-    if len(blocks) == 1 and not layout.is_listed:
-        return blocks[0]
+    names = [f"{name}_{k}" for k in range(len(edges) - 1)]
+    for k, (block, (begin, end)) in enumerate(zip(names, itertools.pairwise(edges), strict=True)):
+        piece, packing = data[begin:end], layout.packing[k % len(layout.packing)]
+        if packing is None:
+            b.add(block, "DT", [], piece)
+        elif packing == "transpose":
+            whole = len(piece) // size * size
+            turned = np.frombuffer(piece[:whole], np.uint8).reshape(-1, size).T.tobytes() + piece[whole:]
+            b.deflated(block, turned, kind=1, width=size)
+        else:
+            b.deflated(block, piece)
+    if len(names) == 1 and not layout.is_listed:
+        return names[0]
     # two lists, so that a list has a next one
-    half = (len(blocks) + 1) // 2
-    at = 0
-    for part, first in ((blocks[half:], half), (blocks[:half], 0)):
-        if part:
-            offsets = struct.pack(f"<{len(part)}Q", *edges[first : first + len(part)])
-            at = file.block(b"##DL", [at, *part], struct.pack("<B3xI", 0, len(part)) + offsets)
-    return file.block(b"##HL", [at], struct.pack("<HB5x", 0, 0)) if layout.has_header else at
+    half = (len(names) + 1) // 2
+    following = None
+    for first, end in ((half, len(names)), (0, half)):
+        if first < end:
+            offsets = struct.pack(f"<{end - first}Q", *edges[first:end])
+            head = struct.pack("<B3xI", 0, end - first)
+            b.add(f"{name}_list{first}", "DL", [following, *names[first:end]], head + offsets)
+            following = f"{name}_list{first}"
+    if layout.has_header:
+        b.add(f"{name}_hl", "HL", [following], struct.pack("<HB5x", 0, 0))
+    return f"{name}_hl" if layout.has_header else following
 
 
 def written(path: Path, groups: list[Group], layout: Layout, *, is_unsorted: bool = False) -> Path:
     """A file with a data group for each group; unsorted: one for all, their records in turns behind an id."""
-    file = _File()
-    head = file.block(b"##HD", [0] * 6, bytes(32))
-    heads = [_group(file, g, k) for k, g in enumerate(groups)]
+    b = Blocks()
+    b.header()
+    for k, group in enumerate(groups):
+        n, size = group.records.shape
+        names = [f"g{k}c{j}" for j in range(len(group.channels))]
+        for name, following, c in zip(names, [*names[1:], None], group.channels, strict=True):
+            b.text(f"{name}_name", f"c{k}_{name.rpartition('c')[2]}")
+            b.channel(
+                name, following, 8 + c.at, c.bits, text=f"{name}_name", data_type=c.kind, shift=c.shift,
+                flags=0 if c.invalid is None else 2, invalid=c.invalid or 0,
+            )  # fmt: skip
+        b.text(f"g{k}_time", "t")
+        b.channel(f"g{k}t", names[0] if names else None, 0, text=f"g{k}_time", kind=2, sync=1)
+        following = f"g{k + 1}" if is_unsorted and k + 1 < len(groups) else None
+        own = size - group.invalidation
+        b.channel_group(f"g{k}", f"g{k}t", n, own, following=following, record_id=k + 1, invalid=group.invalidation)
     if is_unsorted:
-        for a, b in itertools.pairwise(heads):
-            struct.pack_into("<Q", file.octets, a + 24, b)
         mixed = [(i / len(g.records), k, r) for k, g in enumerate(groups) for i, r in enumerate(g.records)]
         data = b"".join(bytes([k + 1]) + r.tobytes() for _, k, r in sorted(mixed, key=lambda m: m[:2]))
-        first = file.block(b"##DG", [0, heads[0], _data(file, data, layout, 1), 0], struct.pack("<B7x", 1))
+        b.group("dg0", None, "g0", _data(b, "data", data, layout, 1), 1)
     else:
-        first = 0
-        for group, at in reversed(list(zip(groups, heads, strict=True))):
-            data = _data(file, group.records.tobytes(), layout, group.records.shape[1])
-            first = file.block(b"##DG", [first, at, data, 0], bytes(8))
-    struct.pack_into("<Q", file.octets, head + 24, first)
-    struct.pack_into("<8s8s8s4xH", file.octets, 0, b"MDF     ", b"4.10    ", b"bytes   ", 410)
-    path.write_bytes(file.octets)
+        for k, group in enumerate(groups):
+            data = _data(b, f"data{k}", group.records.tobytes(), layout, group.records.shape[1])
+            b.group(f"dg{k}", f"dg{k + 1}" if k + 1 < len(groups) else None, f"g{k}", data)
+    path.write_bytes(b.bytes())
     return path
-
-
-def _group(file: _File, group: Group, number: int) -> int:
-    channel = 0
-    for k, c in reversed(list(enumerate(group.channels))):
-        facts = struct.pack("<BBBBIII", 0, 0, c.kind, c.shift, 8 + c.at, c.bits, 0 if c.invalid is None else 2)
-        name = file.text(f"c{number}_{k}")
-        channel = file.block(
-            b"##CN", [channel, 0, name, *[0] * 5], facts + struct.pack("<IBBH", c.invalid or 0, 0, 0, 0) + bytes(48)
-        )
-    facts = struct.pack("<BBBBIII", 2, 1, FLOAT, 0, 0, 64, 0) + bytes(56)
-    channel = file.block(b"##CN", [channel, 0, file.text("t"), *[0] * 5], facts)
-    n, size = group.records.shape
-    return file.block(
-        b"##CG", [0, channel, 0, 0, 0, 0],
-        struct.pack("<QQHHIII", number + 1, n, 0, 0, 0, size - group.invalidation, group.invalidation),
-    )  # fmt: skip
 
 
 def expected(group: Group, k: int) -> np.ndarray:

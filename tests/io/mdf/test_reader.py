@@ -18,14 +18,15 @@ from asammdf.blocks.conversion_utils import from_dict
 
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
-from aqualog.core.errors import ConfigError, LogError, SignalError
+from aqualog.core.errors import LogError, SignalError
 from aqualog.core.records import Channel, FileFaults
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.mdf.conversion import Formula
 from aqualog.io.mdf.frames import _variable
 from aqualog.io.mdf.reader import MdfReader
 from aqualog.io.reader import ReadOptions
-from aqualog.io.write_mdf import CanFrames, CanMessage, MdfGroup, _rows, write_can_mf4, write_frames_mf4, write_mf4
+from aqualog.io.write_mdf import MdfGroup, write_mf4
+from tests.can_log import CanFrames, CanMessage, frame_rows, write_can_mf4, write_frames_mf4
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real_logs"
 START = 1_700_000_000_123_456_789
@@ -409,7 +410,7 @@ def test_attachments_are_never_opened(tmp_path: Path, dbc: Path, monkeypatch: py
     attached = (dbc.read_bytes(), Path("car.dbc"), hashlib.md5(dbc.read_bytes()).digest())
     frames = CanFrames(np.array([0]), [256], [False], [bytes(8)], [1])
     bus = asammdf.Source("CAN", "CAN", "", 2, 2)
-    raw = asammdf.Signal(_rows(frames), T[:1], name="CAN_DataFrame", source=bus, attachment=attached)
+    raw = asammdf.Signal(frame_rows(frames), T[:1], name="CAN_DataFrame", source=bus, attachment=attached)
     path = save(tmp_path / "a.mf4", [raw], [signal("x", T, attachment=attached)])
     opened.clear()
     channels, faults = read_all(path)
@@ -504,16 +505,6 @@ def test_short_foreign_and_fd_frames(tmp_path: Path, dbc: Path):
     assert "ESP_19.Tail: 1 frames are shorter than the 8 bytes it needs" in notes
     assert "same J1939 parameter group but another sender or priority, not decoded: 0x18FEF125x (Truck)" in notes
     assert "other id length: 0x100x" in notes
-
-
-def test_writer_names_what_does_not_fit(tmp_path: Path, dbc: Path):
-    for message, text in [
-        (CanMessage("ESP_20", T, {}), "no message ESP_20"),
-        (CanMessage("ESP_19", T, {"Speed": T}), "no signal Speed"),
-        (CanMessage("ESP_19", T, {"Speed_FL": T + 1e6}), "cannot be sent"),
-    ]:
-        with pytest.raises(ConfigError, match=text):
-            write_can_mf4(tmp_path / "a.mf4", dbc, [message], START, "")
 
 
 @pytest.mark.parametrize("compression", [0, 2])

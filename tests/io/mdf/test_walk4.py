@@ -9,16 +9,17 @@ import zlib
 from pathlib import Path
 
 import asammdf
+import charset_normalizer
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.core.errors import LogError
-from aqualog.io.mdf import columns, describe4, groups, reader, walk4
+from aqualog.io.mdf import columns, groups, reader, walk4
 from aqualog.io.mdf.reader import MdfReader
 from aqualog.io.reader import ReadOptions
-from aqualog.io.write_mdf import CanFrames, write_frames_mf4
+from tests.can_log import CanFrames, write_frames_mf4
 from tests.mdf_by_hand import Blocks, describe, records, streamed, unsorted
 
 K = np.arange(200)
@@ -540,7 +541,7 @@ def deflated(raw, *, size=None, invalidation=0, kind=0):
 
 @pytest.mark.parametrize("size", [2**40, walk4.LARGEST_BLOCK + 1])
 def test_a_block_of_no_sensible_size_is_refused_before_it_is_inflated(tmp_path, monkeypatch, size):
-    monkeypatch.setattr(columns, "inflated", None)
+    monkeypatch.setattr(columns, "_inflated", None)
     line = refused(tmp_path, deflated(records(200), size=size))
     assert "a data block of it declares" in line
     assert ("1.1e+03 GB" if size == 2**40 else "268 MB") in line
@@ -555,14 +556,14 @@ def test_inflating_ends_at_the_size_that_is_told(tmp_path, monkeypatch, library,
     if library == "zlib":
         monkeypatch.setattr(columns, "_libdeflate", None)
     taken = []
-    original = columns.inflated
+    original = columns._inflated
 
     def watched(data, size):
         out = original(data, size)
         taken.append(len(out))
         return out
 
-    monkeypatch.setattr(columns, "inflated", watched)
+    monkeypatch.setattr(columns, "_inflated", watched)
     monkeypatch.setattr(zlib, "decompress", None)
     line = refused(tmp_path, deflated(bytes(1 << 23), size=200 * RECORD, invalidation=invalidation, kind=kind))
     assert "cannot be decoded" in line
@@ -687,7 +688,8 @@ def test_names_in_any_encoding(tmp_path, text, name):
 
 def test_an_encoding_is_guessed_from_the_beginning(tmp_path, monkeypatch):
     seen = []
-    monkeypatch.setattr(describe4, "_encoding", lambda text: seen.append(len(text)) or "cp1252")
+    guess = charset_normalizer.from_bytes
+    monkeypatch.setattr(charset_normalizer, "from_bytes", lambda text: seen.append(len(text)) or guess(text))
     read_bytes(tmp_path, commented(bytes([200, 201, 32, 230] * 400_000), "TX"))
     assert seen == [512]
 

@@ -26,9 +26,9 @@ from aqualog.core.errors import LogError, SignalError
 from aqualog.core.records import Channel
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.decompress import FREE, Allowance, DamagedError
-from aqualog.io.messages import mcap_records
-from aqualog.io.messages.mcap import McapReader, McapSource
-from aqualog.io.messages.mcap_records import scanned
+from aqualog.io.messages import mcap
+from aqualog.io.messages.mcap import McapSource, scanned
+from aqualog.io.messages.reader import McapReader
 from aqualog.io.reader import ReadOptions
 from aqualog.io.write_mcap import McapTopic, write_mcap
 
@@ -429,7 +429,7 @@ def test_bomb_is_refused_and_the_rest_is_read(tmp_path, compression, declared, r
 def test_zeros_are_not_walked_to_their_end():
     zeros = bytes(1 << 22)
     tracemalloc.start()
-    assert scanned(zeros) is None
+    assert scanned(zeros).fault
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2e6
@@ -467,7 +467,7 @@ def test_a_length_that_lies_costs_that_chunk_only(tmp_path, compression, indexed
 @pytest.mark.parametrize("at_end", [False, True])
 def test_a_record_that_tells_of_more_than_there_is_costs_no_memory(tmp_path, monkeypatch, opcode, length, at_end):
     """Before a chunk, or in front of a hole as large as it tells of."""
-    monkeypatch.setattr(mcap_records, "LONGEST", LONGEST)
+    monkeypatch.setattr(mcap, "LONGEST", LONGEST)
     path = write_json(tmp_path / "a.mcap", numbered(500), chunk_size=4000)
     raw = path.read_bytes()
     start = chunk_offsets(path)[2][0]

@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel
 from aqualog.io.messages.bag import CHUNK, INDEX, MAGIC, BagWalk, kind_of
-from aqualog.io.messages.ros import RosReader
+from aqualog.io.messages.reader import RosReader
 from aqualog.io.reader import ReadOptions
 
 T0 = 1_700_000_000 * 10**9

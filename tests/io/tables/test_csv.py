@@ -98,12 +98,6 @@ def test_tab_units_row_t_ms_utf16(read, encoding):
     assert log["Druck"] == [2.1, 2.2]
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "mac_roman", "cp850", "utf-8-sig"])
-def test_unit_proves_the_code_page(read, encoding):
-    log = read("t [s],Öltemperatur [°C]\n" + table(), encoding)
-    assert log.units == {"Öltemperatur": "°C"}
-
-
 def test_one_damaged_byte_does_not_change_the_names(read):
     raw = ("t [s],Öl [°C],v\n" + table(200, line=lambda k: (f"{k / 100:.2f}", "80", "7"))).encode()
     damaged = raw.replace(b"0.77,80", b"0.77,8\xff")
@@ -133,54 +127,96 @@ def test_preamble_of_a_logger(read):
     )
 
 
-def test_header_in_a_comment_as_numpy_writes_it(read):
-    log = read("# t [s],v [m/s]\n0.0,1\n0.1,2\n")
-    assert log["v"] == [1, 2]
+LONG = [f"{k},5;{k};0,5\n" for k in range(5000)]
+PROVEN = [f"{k},5;{1 + k / 1000:.3f}\n" for k in range(200)]
+LAYOUTS = {  # text, units, values, times [ns]
+    "header in a comment, as numpy writes it": ("# t [s],v [m/s]\n0.0,1\n0.1,2\n", {"v": "m/s"}, {"v": [1, 2]}),
+    "groups above the names": (
+        "ESP,ESP,MOT\nt,v,M\ns,km/h,Nm\nfloat,float,float\n0.0,1,2\n0.1,2,3\n",
+        {"v": "km/h", "M": "Nm"}, {"M": [2, 3]},
+    ),
+    "a preamble as wide as the table": (
+        "Vehicle,Golf,dry\nDate,today,noon\nt [s],v [m/s],w\n" + "".join(f"{k},{k},{k}\n" for k in range(200)),
+        {"v": "m/s", "w": ""}, {},
+    ),
+    "quotes": (
+        '"t [s]","v, filtered [m/s]"\n"0.0","1.5"\n"0.1","2.5"\n', {"v, filtered": "m/s"}, {"v, filtered": [1.5, 2.5]},
+    ),
+    "a quoted decimal comma between commas": (
+        't,v,name\n"0,0","1,5","a ""b"", c"\n"0,1","2,5",d\n"0,2","3,5",e\n', {}, {"v": [1.5, 2.5, 3.5]},
+        [0, 10**8, 2 * 10**8],
+    ),
+    "separators at the ends of rows": ("t,v\n0.0,1,\n0.1,2,\n0.2,3,\n", {"v": ""}, {"v": [1, 2, 3]}),
+    "separators at all ends": ("t,v,\n0.0,1,\n0.1,2,\n0.2,3,\n", {"v": ""}, {"v": [1, 2, 3]}),
+    "blanks around cells": ("t [s], v [m/s] , w\n 0.0, 1.5 , 2\n 0.1, 2.5 ,\n", {}, {"v": [1.5, 2.5], "w": [2]}),
+    "thousands that are proven": (
+        "t;m;n\n0,5;1.234,5;1.000\n1,5;12.345.678,25;999\n2,5;0,25;1.234\n", {},
+        {"m": [1234.5, 12345678.25, 0.25], "n": [1000, 999, 1234]},
+    ),
+    "a decimal sign for each column": (
+        "t;a;m\n0;1.5;1.234,5\n1;2.5;1.235,5\n2;3.25;1.236,5\n", {},
+        {"a": [1.5, 2.5, 3.25], "m": [1234.5, 1235.5, 1236.5]},
+    ),
+    "a column of points in a file of commas": (
+        "t [s];v;n;p\n0,00;50,5;3;1.234\n0,01;51,5;4;5.678\n", {}, {"p": [1.234, 5.678], "n": [3, 4]},
+    ),
+    "integers of a file of commas that turn into fractions": (
+        "t [s];n;v\n" + "".join([*LONG[:700], "700,5;700,25;0,5\n", *LONG[701:]]), {},
+        {"n": [*range(700), 700.25, *range(701, 5000)]},
+    ),
+    "thousands proven in one column hold in the others": (
+        "t [s];v;n;p\n0;1.234,5;1.234;0.250\n1;2,5;2.345;1.234\n", {}, {"n": [1234, 2345], "p": [0.25, 1.234]},
+    ),
+    "one damaged cell proves no thousands": (
+        "t [s];p\n" + "".join([*PROVEN[:7], "1.234.007,5;1.007\n", *PROVEN[8:]]), {},
+        {"p": [round(1 + k / 1000, 3) for k in range(200) if k != 7]},
+    ),
+    "a late change of type": (
+        "t [s],v\n" + "".join(f"{k},{k}\n" for k in range(5000)) + "5000,1.25\n", {}, {"v": [*range(5000), 1.25]},
+    ),
+    "truth values": (
+        "t [s],on_water,b\n0,true,False\n1,false,TRUE\n2,True,false\n", {}, {"on_water": [1, 0, 1], "b": [0, 1, 0]},
+    ),
+    "a column that starts late": (
+        "t [s],v,late\n" + "".join(f"{k},1,{'' if k < 4000 else '5.5'}\n" for k in range(5000)), {},
+        {"late": [5.5] * 1000},
+    ),
+    "no end of the last line": ("t [s],v\n0,1\n1,2", {}, {"v": [1, 2]}),
+    "dates beside times of day": (
+        "Date;Time;v\n28.02.2026;23:59:59,5;1,5\n01.03.2026;00:00:00,5;2,5\n", {}, {"v": [1.5, 2.5]},
+        [1772323199500000000, 1772323200500000000],
+    ),
+    "German dates beside times of day": (
+        "Datum;Uhrzeit;v\n01.03.2026;12:00:00,00;1,5\n01.03.2026;12:00:00,01;2,5\n", {}, {"v": [1.5, 2.5]},
+        [1772366400000000000, 1772366400010000000],
+    ),
+    "times out of order and twice": (
+        "t [s],v\n2,1\n1,2\n1,3\n0,4\n", {}, {"v": [1, 2, 3, 4]}, [2 * 10**9, 10**9, 10**9, 0],
+    ),
+    "the logger's clock before UTC": (
+        "utc [ms],t [s],v\n1.53322649e+12,46408.655,1\n1.53322649e+12,46408.7445,2\n", {}, {"v": [1, 2]},
+        [46408655000000, 46408744500000],
+    ),
+    "whole seconds": ("time,v\n" + "".join(f"{k},1\n" for k in range(600)), {}, {}, [k * 10**9 for k in range(600)]),
+}  # fmt: skip
 
 
-def test_groups_above_the_names(read):
-    log = read("ESP,ESP,MOT\nt,v,M\ns,km/h,Nm\nfloat,float,float\n0.0,1,2\n0.1,2,3\n")
-    assert log.units == {"v": "km/h", "M": "Nm"}
-    assert log["M"] == [2, 3]
+@pytest.mark.parametrize("case", LAYOUTS)
+def test_layouts(read, case):
+    text, units, values, *times = LAYOUTS[case]
+    log = read(text)
+    assert {name: log.units[name] for name in units} == units
+    assert {name: log[name] for name in values} == values
+    assert not times or log.t("v") == times[0]
+    assert not times or log.channels["v"].absolute == (times[0][-1] > 10**18)
+    assert log.faults.lost_samples == (case == "one damaged cell proves no thousands")
+    assert not log.faults.truncated
+    assert not log.noted("line") or log.faults.lost_samples
 
 
-def test_quotes(read):
-    log = read('"t [s]","v, filtered [m/s]"\n"0.0","1.5"\n"0.1","2.5"\n')
-    assert log.units == {"v, filtered": "m/s"}
-    assert log["v, filtered"] == [1.5, 2.5]
-
-
-def test_quoted_decimal_comma_between_commas(read):
-    log = read('t,v,name\n"0,0","1,5","a ""b"", c"\n"0,1","2,5",d\n"0,2","3,5",e\n')
-    assert log["v"] == [1.5, 2.5, 3.5]
-    assert log.t("v") == [0, 100_000_000, 200_000_000]
-
-
-@pytest.mark.parametrize("header", ["t,v,", "t,v"])
-def test_trailing_separators(read, header):
-    log = read(f"{header}\n0.0,1,\n0.1,2,\n0.2,3,\n")
-    assert [i.path for i in log.infos] == ["v"]
-    assert log["v"] == [1, 2, 3]
-    assert log.faults.lost_samples == 0
-    assert not log.noted("line")
-
-
-def test_blanks_around_cells(read):
-    log = read("t [s], v [m/s] , w\n 0.0, 1.5 , 2\n 0.1, 2.5 ,\n")
-    assert log["v"] == [1.5, 2.5]
-    assert log["w"] == [2]
-
-
-def test_thousands_that_are_proven(read):
-    log = read("t;m;n\n0,5;1.234,5;1.000\n1,5;12.345.678,25;999\n2,5;0,25;1.234\n")
-    assert log["m"] == [1234.5, 12345678.25, 0.25]
-    assert log["n"] == [1000, 999, 1234]
-
-
-def test_each_column_has_its_own_decimal_sign(read):
-    log = read("t;a;m\n0;1.5;1.234,5\n1;2.5;1.235,5\n2;3.25;1.236,5\n")
-    assert log["a"] == [1.5, 2.5, 3.25]
-    assert log["m"] == [1234.5, 1235.5, 1236.5]
+@pytest.mark.parametrize("encoding", ["cp1252", "mac_roman", "cp850", "utf-8-sig"])
+def test_unit_proves_the_code_page(read, encoding):
+    assert read("t [s],Öltemperatur [°C]\n" + table(), encoding).units == {"Öltemperatur": "°C"}
 
 
 @pytest.mark.parametrize(
@@ -208,30 +244,6 @@ def test_decimal_and_thousands(read, separator, cells, expected):
     assert log.faults.lost_samples == 0
 
 
-def test_column_of_points_in_a_file_of_commas_keeps_its_points(read):
-    log = read("t [s];v;n;p\n0,00;50,5;3;1.234\n0,01;51,5;4;5.678\n")
-    assert log["p"] == [1.234, 5.678]
-    assert log["n"] == [3, 4]
-
-
-def test_integers_of_a_file_of_commas_may_turn_into_fractions(read):
-    lines = [f"{k},5;{k};0,5\n" for k in range(5000)]
-    lines[700] = "700,5;700,25;0,5\n"
-    assert read("t [s];n;v\n" + "".join(lines))["n"][699:702] == [699, 700.25, 701]
-
-
-def test_thousands_proven_in_one_column_hold_in_the_others(read):
-    log = read("t [s];v;n;p\n0;1.234,5;1.234;0.250\n1;2,5;2.345;1.234\n")
-    assert log["n"] == [1234, 2345]
-    assert log["p"] == [0.25, 1.234], "0.250 is no group of thousands"
-
-
-def test_one_damaged_cell_proves_no_thousands(read):
-    lines = [f"{k},5;{1 + k / 1000:.3f}\n" for k in range(200)]
-    lines[7] = "1.234.007,5;1.007\n"
-    assert read("t [s];p\n" + "".join(lines))["p"][7:] == [round(1 + k / 1000, 3) for k in range(8, 200)]
-
-
 def test_both_decimal_signs_in_one_column_are_not_guessed_at(read):
     log = read("t [s];v\n0;1,5\n1;1.234\n2;2,5\n3;3,5\n")
     assert nan_as_none(log["v"]) == [1.5, None, 2.5, 3.5]
@@ -248,12 +260,6 @@ def test_point_is_no_decimal_sign_beside_decimal_commas(read):
     assert log.noted('"v"', "line 152")
 
 
-def test_a_late_change_of_type_is_no_error(read):
-    log = read("t [s],v\n" + "".join(f"{k},{k}\n" for k in range(5000)) + "5000,1.25\n")
-    assert log["v"][-1] == 1.25
-    assert len(log["v"]) == 5001
-
-
 # cells
 
 
@@ -263,16 +269,6 @@ def test_blank_is_no_sample_and_bad_is_nan(read):
     assert nan_as_none(log["a"]) == [1] + [None] * 6
     assert log["b"] == [5, 6, 7, 8, 9, 1, 2]
     assert log.faults.lost_samples == 0
-
-
-def test_text_in_a_numeric_column(read):
-    lines = [f"{k / 100:.2f},{k},7\n" for k in range(300)]
-    lines[41] = "0.41,oops,7\n"
-    lines[222] = "2.22,1_0,7\n"
-    log = read("t [s],v,w\n" + "".join(lines))
-    assert np.flatnonzero(np.isnan(log["v"])).tolist() == [41, 222]
-    assert log.faults.lost_samples == 2
-    assert log.noted("log.csv", '"v"', "2 cells", "line 43")
 
 
 def test_faults_are_counted_once(tmp_path):
@@ -296,23 +292,11 @@ def test_read_keeps_the_order_asked_for(tmp_path):
         assert reader.read([]) == []
 
 
-def test_truth_values(read):
-    log = read("t [s],on_water,b\n0,true,False\n1,false,TRUE\n2,True,false\n")
-    assert log["on_water"] == [1, 0, 1]
-    assert log["b"] == [0, 1, 0]
-
-
 def test_text_columns_are_no_channels(read):
     log = read("t [s],v,state,gear\n" + table(40, line=lambda k: (str(k), "1", "OK", "P" if k % 4 == 0 else "3")))
     assert [i.path for i in log.infos] == ["v"]
     assert log.noted('"gear"', "25 %", '"P"')
     assert not log.noted('"state"')
-
-
-def test_column_that_starts_late(read):
-    rows = [f"{k},1,{'' if k < 4000 else '5.5'}\n" for k in range(5000)]
-    log = read("t [s],v,late\n" + "".join(rows))
-    assert log["late"] == [5.5] * 1000
 
 
 def test_duplicate_names(read):
@@ -393,13 +377,6 @@ def test_file_that_ends_inside_a_row(read):
     assert log.noted("line 42")
 
 
-def test_file_without_a_last_line_end_is_whole(read):
-    log = read("t [s],v\n0,1\n1,2")
-    assert log["v"] == [1, 2]
-    assert log.faults.notes == ()
-    assert log.infos[0].count == 2
-
-
 def test_zeros_behind_a_power_cut(read):
     log = read(b"t [s],v\n" + table(200).encode() + b"\0" * 100)
     assert len(log["v"]) == 200
@@ -456,28 +433,10 @@ def test_whole_numbers_over_an_absurd_time_are_milliseconds(read, step):
     assert log.noted("no unit", "ms")
 
 
-def test_whole_seconds_stay_seconds(read):
-    log = read("time,v\n" + "".join(f"{k},1\n" for k in range(600)))
-    assert log.t("v")[1] == 10**9
-    assert log.noted("no unit", "taken as s")
-
-
-def test_date_and_time_columns(read):
-    log = read("Date;Time;v\n28.02.2026;23:59:59,5;1,5\n01.03.2026;00:00:00,5;2,5\n")
-    assert log.t("v") == [1772323199500000000, 1772323200500000000]
-    assert log.channels["v"].absolute
-
-
 def test_a_date_that_can_be_read_two_ways(read):
     with pytest.raises(LogError, match="day and month"):
         read("time,v\n03/01/2026 12:00:00,1\n03/01/2026 12:00:01,2\n")
     assert read("time,v\n02/28/2026 12:00:00,1\n03/01/2026 12:00:01,2\n").t("v")[0] == 1772280000000000000
-
-
-def test_order_and_duplicates_are_kept(read):
-    log = read("t [s],v\n2,1\n1,2\n1,3\n0,4\n")
-    assert log.t("v") == [2 * 10**9, 10**9, 10**9, 0]
-    assert log["v"] == [1, 2, 3, 4]
 
 
 def test_rows_without_a_time(read):
@@ -498,11 +457,6 @@ def test_the_users_time(read):
     assert read(text, time_channel="other").noted('"other"')
     with pytest.raises(ConfigError, match="km/h"):
         read(text, time_unit="km/h")
-
-
-def test_the_loggers_clock_before_utc(read):
-    log = read("utc [ms],t [s],v\n1.53322649e+12,46408.655,1\n1.53322649e+12,46408.7445,2\n")
-    assert log.t("v") == [46408655000000, 46408744500000]
 
 
 # what the user says
@@ -739,6 +693,13 @@ def test_toyota_rav4(real_logs):
 # lines and rows
 
 
+def test_words_for_a_bad_sample(read):
+    words = ["NaN", "-nan", "inf", "-Inf", "-", "--", "null", "None", "#N/A", "N/A", "#VALUE!"]
+    log = read("t [s],v,w\n" + "".join(f"{k},{x},{k}\n" for k, x in enumerate(["1", *words, *["3"] * 20])))
+    assert nan_as_none(log["v"]) == [1, *[None] * len(words), *[3] * 20]
+    assert log.faults.lost_samples == 0
+
+
 def test_line_numbers_count_every_line_of_the_file(read):
     text = "Logger x\n\nt,v,w\ns,m/s,m\n\n0,1,1\n\n\n1,2,2,9\n# note\n2,3,3\n3\n4,fault,4\n5,6,6\nx,7,7\n6,8,8\n"
     log = read(text)
@@ -756,13 +717,6 @@ def test_line_numbers_of_a_regular_file(read):
     assert log.noted('"v"', "line 2003")
     assert log.noted('"t"', "line 2503")
     assert log.faults.lost_samples == 2
-
-
-@pytest.mark.parametrize("word", ["NaN", "-nan", "inf", "-Inf", "-", "--", "null", "None", "#N/A", "N/A", "#VALUE!"])
-def test_words_for_a_bad_sample(read, word):
-    log = read(f"t [s],v,w\n0,1,1\n1,{word},2\n2,3,3\n")
-    assert nan_as_none(log["v"]) == [1, None, 3]
-    assert log.faults.lost_samples == 0
 
 
 @pytest.mark.parametrize("text", ["fault", "1.2.3", "0x1F", "1 2", "1_000", "\u0663", "12:30"])
@@ -798,18 +752,6 @@ def test_number_that_is_no_time_costs_its_row(read, bad):
 def test_steps_are_exact_over_a_long_drive(read):
     log = read("t [s],v\n" + "".join(f"{k / 100:.2f},1\n" for k in range(0, 400_000, 7)))
     assert (np.diff(log.t("v")) == 70_000_000).all()
-
-
-def test_german_date_and_time_of_day(read):
-    log = read("Datum;Uhrzeit;v\n01.03.2026;12:00:00,00;1,5\n01.03.2026;12:00:00,01;2,5\n")
-    assert log.t("v") == [1772366400000000000, 1772366400010000000]
-    assert log["v"] == [1.5, 2.5]
-    assert log.channels["v"].absolute
-
-
-def test_preamble_as_wide_as_the_table(read):
-    text = "Vehicle,Golf,dry\nDate,today,noon\nt [s],v [m/s],w\n" + "".join(f"{k},{k},{k}\n" for k in range(200))
-    assert read(text).units == {"v": "m/s", "w": ""}
 
 
 def test_unnamed_index_does_not_shift_the_names(read):

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aqualog.io.tables.csv import Rows, find_rows
 from aqualog.io.tables.csv_cells import STYLES, numbers
 from aqualog.io.tables.csv_dialect import find_layout
-from aqualog.io.tables.csv_rows import Rows, find_rows
 
 SIGNS = st.sampled_from(["", "-", "+"])
 DIGITS = st.text("0123456789", min_size=0, max_size=22)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aqualog.io.reader import ReadOptions
-from aqualog.io.tables import csv_rows
+from aqualog.io.tables import csv
 from aqualog.io.tables import csv_text as text_file
 from aqualog.io.tables.csv import CsvReader
 from aqualog.io.tables.csv_text import TextFile, open_text
@@ -54,7 +54,7 @@ def test_pieces_are_the_whole(name, size, tmp_path, monkeypatch):
         whole, faults = reader.read(infos), reader.faults
     monkeypatch.setattr(text_file, "LARGE", 1)
     monkeypatch.setattr(text_file, "_BLOCK", 777)
-    monkeypatch.setattr(csv_rows, "PIECE", size)
+    monkeypatch.setattr(csv, "PIECE", size)
     with CsvReader(path, ReadOptions()) as reader:
         assert isinstance(reader._data, TextFile)
         assert reader.channels() == infos

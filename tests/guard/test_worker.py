@@ -7,11 +7,9 @@ from pathlib import Path
 import pytest
 
 from aqualog.core.errors import AqualogError
-from aqualog.guard import pool
-from aqualog.guard.limits import ReadLimits
-from aqualog.guard.pool import kept_worker, work_on
-from aqualog.guard.reading import reading
-from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits
+from aqualog.guard import worker as pool
+from aqualog.guard.reading import ReadLimits, reading
+from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits, kept_worker, work_on
 
 WRITES = "reading it writes a file of more than 5 MB. Try: a higher AQUALOG_LIMIT_FILE_MB"
 

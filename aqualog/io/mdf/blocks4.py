@@ -1,15 +1,18 @@
-"""Chains of data blocks of MDF 4: what there is of them, in the order in which they are read."""
+"""Blocks of MDF 4 and what they say of others: chains of data, texts, sources and conversions."""
 
 from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
-from aqualog.io.mdf.records import Stored
-from aqualog.io.mdf.walk import BlockError, Walk
+from aqualog.core.errors import LogError
+from aqualog.guard.system import bytes_text
+from aqualog.io.mdf.blocks import BlockError, Conversion, ConversionKind, Stored, Walk
 
 __all__ = ["HEAD", "Block", "BlockWalk", "Chain"]
+
 
 HEAD = 24
 """Bytes of every block before its links."""
@@ -19,6 +22,16 @@ _PLAIN = (b"DT", b"DV", b"SD", b"DI", b"RD", b"RV", b"RI")
 _ZEROS_AT_ONCE = 1 << 20
 _DL_EQUAL, _LD_INVALIDATION = 0x1, 0x80
 _PACKINGS: tuple[Literal["deflate", "zstd", "lz4"], ...] = ("deflate", "zstd", "lz4")  # odd kinds are turned round too
+_LARGEST_TEXT = 1 << 24
+_MOST_TEXT = 1 << 28  # [bytes] of all texts together, as often as they are linked
+_ENCODING_SAMPLE = 512  # [bytes] of a text by which its encoding is guessed; all of it would take minutes
+_DEEPEST = 16  # conversions in conversions
+_MOST_CONVERSIONS = 10_000  # that one channel leads to
+_RANGES, _ALGEBRAIC = 8, 3  # types of conversions
+_CONVERSIONS: tuple[ConversionKind, ...] = (
+    "same", "linear", "rational", "formula", "interpolated", "nearest", "ranges", "texts", "texts of ranges",
+    "from text", "from text", "same",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +62,18 @@ class Chain:
 
 
 class BlockWalk(Walk):
-    """Blocks of MDF 4, and chains of those that hold data. `unfinished` are the flags of an unfinished file."""
+    """A walk that knows the texts and conversions it has seen, and why channels are refused, by address.
 
-    unfinished = 0
-    damaged: frozenset[int] = frozenset()
+    `unfinished` are the flags of an unfinished file, `damaged` packed blocks that are known not to unpack.
+    """
+
+    def __init__(self, data: Any, path: Path, damaged: frozenset[int] = frozenset()) -> None:
+        super().__init__(data, path)
+        self.unfinished, self.damaged = 0, damaged
+        self._refused: dict[int, str] = {}
+        self._sizes: dict[int, int] = {}  # of texts
+        self._decoded: dict[int, str] = {}
+        self._text_bytes = 0
 
     def _block(self, at: int, kind: bytes, links: int, length: int) -> Block:
         """A block of this kind with at least so many links and bytes, inside the file."""
@@ -64,7 +85,6 @@ class BlockWalk(Walk):
         return Block(name, at, size, struct.unpack_from(f"<{count}Q", self._data, at + HEAD), at + HEAD + 8 * count)
 
     def _once(self, block: Block) -> Block:
-        """The same, of which there must be one link only."""
         self._link_once(block.kind, block.at)
         return block
 
@@ -73,9 +93,6 @@ class BlockWalk(Walk):
             raise BlockError("data", at, f"is missing, the file ends at byte {self._size}", is_cut=True)
         mark: bytes = self._data[at : at + 4]
         return mark[2:] if mark[:2] == b"##" else b""
-
-    def _numbers(self, layout: str, at: int) -> tuple[Any, ...]:
-        return struct.unpack_from(layout, self._data, at)
 
     def _chain(self, at: int, record: int, *, is_last: bool = False) -> Chain:
         """Follow a link to data. A plain block ends with a whole record."""
@@ -169,8 +186,9 @@ class BlockWalk(Walk):
         if mark not in _PLAIN:
             raise BlockError("data", at, f"is not there, the file holds {self._data[at : at + 4]!r}")
         length = self._numbers("<Q", at + 8)[0]
-        if is_end and self.unfinished & _LAST_DT:
-            length = self._open_end(at, length)
+        if is_end and self.unfinished & _LAST_DT:  # it was still being written: to the next block, or to the file's end
+            end = min((b for b in self._begins if b > at), default=self._size)
+            length = length if HEAD < length <= end - at and end < self._size else end - at
         if length < HEAD:
             raise BlockError(mark.decode(), at, f"is damaged, it has {length} bytes")
         if at + length > self._size:
@@ -194,12 +212,6 @@ class BlockWalk(Walk):
                 break
         return self._size - end
 
-    def _open_end(self, at: int, length: int) -> int:
-        """Length of a block that was still being written: to the next block, or to the end of the file."""
-        end = min((b for b in self._begins if b > at), default=self._size)
-        is_right = HEAD < length <= end - at and end < self._size
-        return length if is_right else end - at
-
     def _packed(self, at: int, out: Chain) -> None:
         if at + 48 > self._size:
             raise BlockError("DZ", at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
@@ -211,7 +223,114 @@ class BlockWalk(Walk):
             raise BlockError("DZ", at, f"is incomplete, the file ends at byte {self._size}", is_cut=True)
         if at in self.damaged:
             raise BlockError("DZ", at, "is damaged, or not of the size that it declares")
-        self._found.deflated.append(at)
         out.inflated += unpacked
         out.largest = max(out.largest, unpacked)
         out.blocks.append(Stored(at + 48, size, unpacked, _PACKINGS[kind // 2], width if kind % 2 else 0))
+        self._found.packed[at] = out.blocks[-1]
+
+    # --- texts, sources, conversions ---
+
+    def _described(self, block: Block, index: int, what: str) -> BlockError | None:
+        """Look at the text that a link leads to; one that is damaged or without measure is not followed."""
+        at = block.links[index]
+        if not at:
+            return None
+        if at in self._sizes:
+            size = self._sizes[at]
+        else:
+            try:
+                mark = self._mark(at)
+                if mark not in (b"TX", b"MD"):
+                    raise BlockError("TX", at, "is no text block")
+                size = self._block(at, mark, 0, HEAD).length
+                if size > _LARGEST_TEXT:
+                    raise BlockError(mark.decode(), at, f"has {bytes_text(size)} of text")
+            except BlockError as broken:
+                self._found.remark(f"{what} is left out: {broken}")
+                self._found.truncated |= broken.is_cut
+                return broken
+            self._sizes[at] = size
+        self._text_bytes += size
+        if self._text_bytes > _MOST_TEXT:
+            raise LogError(
+                f"its names and comments take more than {bytes_text(_MOST_TEXT)} as often as they are linked",
+                where=str(self._path), hint="check it with the logger's own tool",
+            )  # fmt: skip
+        return None
+
+    def _text(self, at: int) -> str:
+        """The text at a place, which `_described` has found sound; empty for any other."""
+        if at not in self._sizes:
+            return ""
+        if at not in self._decoded:
+            raw = bytes(self._data[at + HEAD : at + self._sizes[at]]).split(b"\0", 1)[0].strip(b" \r\t\n")
+            try:
+                self._decoded[at] = raw.decode("utf-8")
+            except UnicodeDecodeError:
+                from charset_normalizer import from_bytes
+
+                best = from_bytes(raw[:_ENCODING_SAMPLE]).best()
+                self._decoded[at] = raw.decode("latin-1" if best is None else best.encoding, "ignore")
+        return self._decoded[at]
+
+    def _source(self, block: Block, index: int) -> tuple[str, ...]:
+        """Name and path of a source; nothing without one."""
+        at = block.links[index]
+        if not at:
+            return ()
+        try:
+            source = self._block(at, b"SI", 3, 56)
+        except BlockError as broken:
+            self._found.remark(f"the description of a source is left out: {broken}")
+            return ()
+        for text in range(3):
+            self._described(source, text, "the name of a source")
+        return self._text(source.links[0]), self._text(source.links[1])
+
+    def _conversion(self, at: int, depth: int = 0, budget: list[int] | None = None) -> Conversion:
+        budget = [_MOST_CONVERSIONS] if budget is None else budget
+        block = self._block(at, b"CC", 4, HEAD + 32 + 24)
+        budget[0] -= 1
+        if depth > _DEEPEST or budget[0] < 0:
+            raise BlockError("CC", at, "leads to conversions without end")
+        kind, numbers = self._conversion_numbers(block)
+        if self._described(block, 1, f"the unit of the conversion at byte {at}") is not None:
+            raise BlockError("CC", at, "has lost its unit")
+        for link in (0, 2):
+            self._described(block, link, f"a text of the conversion at byte {at}")
+        if kind == _RANGES and any(a and self._mark(a) == b"CC" for a in block.links[4:]):
+            ranges = list(zip(numbers[::2], numbers[1::2], strict=True))
+            if len(set(ranges)) < len(ranges):
+                raise BlockError("CC", at, "is damaged, it has a range twice")
+        references: list[Conversion | bytes | None] = []
+        for index in range(4, len(block.links)):
+            link = block.links[index]
+            if not link:
+                references.append(None)
+            elif self._mark(link) == b"CC" and kind != _ALGEBRAIC:
+                references.append(self._conversion(link, depth + 1, budget))
+            elif self._described(block, index, f"a text of the conversion at byte {at}") is not None:
+                raise BlockError("CC", at, "has lost one of its texts")
+            else:
+                references.append(b"")
+        formula = self._text(block.links[4]) if kind == _ALGEBRAIC else ""
+        return Conversion(_CONVERSIONS[kind], self._text(block.links[1]), numbers, tuple(references), formula)
+
+    def _conversion_numbers(self, block: Block) -> tuple[int, tuple[float, ...]]:
+        """Type of a conversion and its numbers, of which there must be as many as its type needs."""
+        if block.data + 24 > block.at + block.length:
+            raise BlockError("CC", block.at, f"is damaged, it has {len(block.links)} links")
+        kind, references, count = self._numbers("<B3xHH", block.data)
+        if len(block.links) != 4 + references or block.data + 24 + 8 * count > block.at + block.length:
+            what = f"is damaged, it has {len(block.links)} links for {references} references"
+            raise BlockError("CC", block.at, what)
+        is_whole = {
+            0: True, 1: count == 2, 2: count == 6, 3: references == 1, 4: count >= 2 and count % 2 == 0,
+            5: count >= 2 and count % 2 == 0, 6: count % 3 == 1, 7: references == count + 1,
+            8: 2 * (references - 1) == count, 9: count == references + 1, 10: references % 2 == 1,
+            11: references == count,
+        }.get(kind)  # fmt: skip
+        if not is_whole:
+            what = f"is damaged, type {kind} has {count} numbers and {references} references"
+            raise BlockError("CC", block.at, what)
+        return kind, self._numbers(f"<{count}d", block.data + 24)
