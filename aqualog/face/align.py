@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from aqualog.align.clock import ClockFit
     from aqualog.align.quantity import Quantity
+    from aqualog.report.sections import Report
 
 __all__ = ["Alignment", "align", "check_quantity"]
 
@@ -80,9 +81,14 @@ class Alignment(Result):
 
     def text(self) -> str:
         """Return offset, drift, scale and match of each source."""
-        from aqualog.report.alignment import alignment_text
+        from aqualog.report.text import report_text
 
-        return alignment_text(self.compared, {**self.fits, **self.refused}, self.quantity)
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.alignment import alignment_report
+
+        return alignment_report(self.compared, {**self.fits, **self.refused}, self.quantity)
 
     def headline(self) -> str:
         """Return the offset of each source with its interval."""
@@ -97,11 +103,11 @@ class Alignment(Result):
     def plot(self) -> go.Figure:
         """Return the quantity of all sources on the clock of the reference, and each source less the reference."""
         from aqualog.report.alignment import alignment_figures
-        from aqualog.report.standalone import figure, side_by_side
+        from aqualog.report.figures import plotly_figure, side_by_side
 
         if not self.fits:
             sentence = {"text": "; ".join(e.what for e in self.refused.values()), "showarrow": False}
-            return figure({"data": [], "layout": {"annotations": [sentence]}})
+            return plotly_figure({"data": [], "layout": {"annotations": [sentence]}})
         found = [(c, self.fits[c.file]) for c in self.compared[1:] if c.file in self.fits]
         return side_by_side(alignment_figures(self.compared[0], found, self.quantity), columns=1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from aqualog.campaign.spin_downs import SpinDownRow
     from aqualog.face.campaign_runs import CampaignRuns
     from aqualog.report.campaign.findings import Curve
+    from aqualog.report.sections import Report
 
 __all__ = ["BinnedResistance", "BinnedSlopes", "binned_resistance", "binned_slopes", "check_table"]
 
@@ -65,6 +67,16 @@ class _Binned(Result):
     def rows(self) -> pl.DataFrame:
         """The rows of the document; an interval `x_ci95` stands in two columns, `x_low` and `x_high`."""
         return _frame(self.document["rows"])
+
+    def text(self) -> str:
+        """Return the tables that the command prints."""
+        from aqualog.report.text import report_text
+
+        return report_text(self._report())
+
+    @abstractmethod
+    def _report(self) -> Report:
+        """The sections of text and notebook."""
 
     def headline(self) -> str:
         """Return the first lines of the table."""
@@ -115,11 +127,10 @@ class BinnedSlopes(_Binned):
         names = ("dry", "full_aquaplaning", "spin_ups", "minor_spin_downs")
         return {"rows": self.rows, **{n: _frame(self.document[n]) for n in names}}
 
-    def text(self) -> str:
-        """Return the tables that the command prints."""
-        from aqualog.report.campaign.bins import slope_text
+    def _report(self) -> Report:
+        from aqualog.report.campaign.bins import slope_report
 
-        return slope_text(self.slopes, self.speeds, self.spin_ups, self.spin_downs)
+        return slope_report(self.slopes, self.speeds, self.spin_ups, self.spin_downs)
 
     def plot(self) -> go.Figure:
         """Return slip slope over speed with 95 % intervals, a line for each configuration and wheel."""
@@ -148,11 +159,10 @@ class BinnedResistance(_Binned):
         """`rows`."""
         return {"rows": self.rows}
 
-    def text(self) -> str:
-        """Return the table that the command prints."""
-        from aqualog.report.campaign.bins import resistance_text
+    def _report(self) -> Report:
+        from aqualog.report.campaign.bins import resistance_report
 
-        return resistance_text(self.table)
+        return resistance_report(self.table)
 
     def plot(self) -> go.Figure:
         """Return the resistance measure over speed with 95 % intervals, a line for each configuration."""

@@ -117,7 +117,7 @@ class Calibration(Result):
     def plot(self) -> go.Figure:
         """Return the residual of the force balance before and after, over speed and over wheel force."""
         from aqualog.report.calibration import balance_residuals
-        from aqualog.report.standalone import side_by_side
+        from aqualog.report.figures import side_by_side
 
         return side_by_side(balance_residuals(self.found))
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from aqualog.detect.slip_slope.watch import Memory
     from aqualog.detect.stream import Settings
     from aqualog.model.term import Model
+    from aqualog.report.sections import Report
 
 __all__ = ["DETECT_FILES", "Detection", "detect", "model_of"]
 
@@ -127,13 +128,18 @@ class Detection(Result):
 
     def text(self) -> str:
         """Return the table of events, and what could not be judged."""
-        from aqualog.report.drive.words import event_table
+        from aqualog.report.text import report_text
 
-        return event_table(self.drive_result)
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.drive.report import drive_report
+
+        return drive_report(self.drive_result)
 
     def headline(self) -> str:
         """Return the verdict: how many events, the most important ones, and which detectors could not judge."""
-        from aqualog.report.drive.words import verdict
+        from aqualog.report.drive.report import verdict
 
         found, signals = verdict(self.drive_result), self.drive_result.signals
         rate = 1e9 / signals.step_ns
@@ -149,7 +155,7 @@ class Detection(Result):
     def plot(self) -> go.Figure:
         """Return the panels of the page: speeds, detectors, differences, accelerations, statistics, slopes."""
         from aqualog.report.drive.panels import drive_rows
-        from aqualog.report.standalone import rows_figure
+        from aqualog.report.drive.stack import rows_figure
 
         self._check_samples()
         signals = self.drive_result.signals
@@ -160,7 +166,7 @@ class Detection(Result):
 
         The table only of a drive that was read whole; without samples only the events.
         """
-        from aqualog.report.drive.page import drive_page
+        from aqualog.report.drive.report import drive_page
 
         files = {
             "events.json": self._json_file(),

@@ -128,8 +128,7 @@ class Diagnosis(Result):
     def headline(self) -> str:
         """Return the verdict, the causes with their intervals, and the next drive if one is proposed."""
         from aqualog.report.diagnosis.words import effect_title, sentences
-        from aqualog.report.numbers import interval_text, ordinary
-        from aqualog.report.wording import pretty_unit
+        from aqualog.report.values import interval_text, ordinary, pretty_unit
 
         d = self.document
         said = sentences(d)
@@ -146,7 +145,7 @@ class Diagnosis(Result):
         """Return residuals before and after, errors of each channel, and what is not explained."""
         from aqualog.report.diagnosis.figures import plots
         from aqualog.report.diagnosis.views import view_figures
-        from aqualog.report.standalone import side_by_side
+        from aqualog.report.figures import side_by_side
 
         explained = [x for c in self.found.causes for x in c.explains]
         found = plots(self.document)

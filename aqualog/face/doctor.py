@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from aqualog.doctor.findings import Examination
     from aqualog.face.drive import Drive
+    from aqualog.report.sections import Report
 
 __all__ = ["Health", "doctor", "exit_code"]
 
@@ -66,9 +67,14 @@ class Health(Result):
 
     def text(self) -> str:
         """Return what the command prints."""
-        from aqualog.report.examination import examination_text
+        from aqualog.report.text import report_text
 
-        return examination_text(self.examination)
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.examination import examination_report
+
+        return examination_report(self.examination)
 
     def headline(self) -> str:
         """Return the most serious findings."""

@@ -94,7 +94,7 @@ class Comparison(Result):
     def plot(self) -> go.Figure:
         """Return the recall of each detector; curves over the threshold where they were asked for."""
         from aqualog.report.evaluation_figures import evaluation_figures
-        from aqualog.report.standalone import side_by_side
+        from aqualog.report.figures import side_by_side
 
         return side_by_side(list(evaluation_figures(self.evaluation).values()))
 

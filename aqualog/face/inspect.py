@@ -85,7 +85,7 @@ class Contents(Result):
     def text(self) -> str:
         """Return the tables that the command prints."""
         from aqualog.report.text import table
-        from aqualog.report.wording import CELL, NOTE, cut
+        from aqualog.report.values import CELL, NOTE, cut
 
         lines = []
         by_channel = {p.entry.channel[0]: s for s, p in self.proposals.items()}
@@ -102,7 +102,7 @@ class Contents(Result):
         return "\n".join(lines) + "\n"
 
     def _proposed(self) -> list[str]:
-        from aqualog.report.wording import CELL, cut
+        from aqualog.report.values import CELL, cut
 
         if not self.proposals:
             return ["no channel looks like a signal that aqualog knows"]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.campaign.records import Campaign
+    from aqualog.report.sections import Report
 
 __all__ = ["Matrix", "matrix"]
 
@@ -44,9 +45,14 @@ class Matrix(Result):
 
     def text(self) -> str:
         """Return the matrix as the command prints it."""
-        from aqualog.report.campaign.matrix import matrix_text
+        from aqualog.report.text import report_text
 
-        return matrix_text(self.campaign, *self.parts)
+        return report_text(self._report())
+
+    def _report(self) -> Report:
+        from aqualog.report.campaign.matrix import matrix_report
+
+        return matrix_report(self.campaign, *self.parts)
 
     def headline(self) -> str:
         """Return the first lines of the matrix."""

@@ -141,7 +141,7 @@ def page_file(page: Callable[[], str]) -> Callable[[Path], None]:
     """Return a writer of a page; the page is made when it is written."""
 
     def write(path: Path) -> None:
-        from aqualog.report.offline import write_page
+        from aqualog.report.page import write_page
 
         write_page(path, page())
 

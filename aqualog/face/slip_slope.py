@@ -114,8 +114,8 @@ class SlipSlope(Result):
 
     def plot(self) -> go.Figure:
         """Return slip over traction of each place, the slope over the session, and the time used."""
+        from aqualog.report.figures import side_by_side
         from aqualog.report.slope_figures import slope_plots
-        from aqualog.report.standalone import side_by_side
 
         return side_by_side(list(slope_plots(self.slopes).values()))
 

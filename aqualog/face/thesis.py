@@ -116,7 +116,7 @@ class Figures(Result):
 
     def plot(self) -> go.Figure:
         """Return all panels in one figure."""
-        from aqualog.report.standalone import side_by_side
+        from aqualog.report.figures import side_by_side
         from aqualog.thesis.draw import panel_figure
 
         return side_by_side([panel_figure(p) for f in self.made for p in f.panels])

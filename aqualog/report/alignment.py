@@ -1,4 +1,4 @@
-"""Clocks of sources against a reference for a reader: the JSON document, text, and figures on one clock."""
+"""Clocks of sources against a reference for a reader: the JSON document, sections, and figures on one clock."""
 
 from __future__ import annotations
 
@@ -14,20 +14,49 @@ from aqualog.align.clock import ClockFit
 from aqualog.align.quantity import QUANTITIES, Quantity
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FloatArray, TimeArray
-from aqualog.report.axes import axis, layout, rounded
-from aqualog.report.plain import plain
+from aqualog.report.figures import axis, figure, line
 from aqualog.report.reduce import ALL_SAMPLES, reduce_indices
+from aqualog.report.sections import Lines, Para, Report, Section, Table
 from aqualog.report.theme import INK, WHEEL_COLOURS
-from aqualog.report.wording import plot_text
+from aqualog.report.values import plain
 
-__all__ = ["alignment_document", "alignment_figures", "alignment_text"]
+__all__ = ["alignment_document", "alignment_figures", "alignment_report"]
 
 Fits = Mapping[str, ClockFit | AqualogError]
 
 
-def alignment_text(compared: Sequence[Quantity], fits: Fits, quantity: str) -> str:
-    """Return offset, drift, scale and match of each source; the first source is the reference."""
-    return "".join(_text(compared[0], c, fits[c.file], quantity) for c in compared[1:])
+def alignment_report(compared: Sequence[Quantity], fits: Fits, quantity: str) -> Report:
+    """Offset, drift, scale and match of each source; the first source is the reference."""
+    sections = [_section(compared[0], c, fits[c.file], quantity) for c in compared[1:]]
+    return Report("clocks", "clocks of several loggers", sections)
+
+
+def _section(reference: Quantity, source: Quantity, fit: ClockFit | AqualogError, quantity: str) -> Section:
+    head = f"{source.file} ({source.label}) against {reference.file} ({reference.label})"
+    notes = [f"{c.file}: {c.note}" for c in (reference, source) if c.note]
+    if isinstance(fit, AqualogError):
+        return Section("", [Para(head, "everywhere"), Lines([*notes, f"refused: {fit.what}"])])
+    offset, drift, scale = ([f"{x:{form}}" for x in ci] for ci, form in (
+        (fit.offset_ci95, "+.4f"), (fit.drift_ppm_ci95, "+.0f"), (fit.ratio_ci95, ".5f")
+    ))  # fmt: skip
+    rows = [
+        ("offset", f"{fit.offset_s:+.4f} s", " ... ".join(offset),
+         f"the source is {'late' if fit.offset_s >= 0 else 'early'}"),
+        ("drift", f"{fit.drift_ppm:+.0f} ppm", " ... ".join(drift),
+         "" if fit.drift_significant else "not significant, not applied"),
+        ("scale", f"{fit.ratio:.5f}", " ... ".join(scale), "source over reference"),
+    ]  # fmt: skip
+    if quantity == "speed" and not math.isnan(fit.slip_offset_s):
+        low, high = fit.slip_offset_ci95
+        is_slip = low > fit.offset_ci95[1] or high < fit.offset_ci95[0]
+        remark = "with tyre slip in the model" + (": part of the offset is tyre slip, not time" if is_slip else "")
+        rows.insert(1, ("", f"{fit.slip_offset_s:+.4f} s", f"{low:+.4f} ... {high:+.4f}", remark))
+    match = (
+        f"correlation {fit.peak:.3f} (limit {fit.peak_limit:.3f}, next best {fit.runner_up:.3f}) over "
+        f"{fit.overlap_s:.0f} s, residual {fit.rms:.3g} {QUANTITIES[quantity]}"
+    )
+    table = Table(("Clock", "Value", "95 %", "Remark"), rows, words=(0, 3), wide=(3,))
+    return Section("", [Para(head, "everywhere"), table, Lines([("match", match), *notes])])
 
 
 def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) -> dict[str, Any]:
@@ -50,30 +79,6 @@ def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) 
     }
 
 
-def _text(reference: Quantity, source: Quantity, fit: ClockFit | AqualogError, quantity: str) -> str:
-    unit = QUANTITIES[quantity]
-    head = f"{source.file} ({source.label}) against {reference.file} ({reference.label})\n"
-    head += "".join(f"  {c.file}: {c.note}\n" for c in (reference, source) if c.note)
-    if isinstance(fit, AqualogError):
-        return f"{head}  refused: {fit.what}\n"
-    side = "late" if fit.offset_s >= 0 else "early"
-    offset_low, offset_high = fit.offset_ci95
-    lines = [
-        f"offset  {fit.offset_s:+.4f} s  95 % [{offset_low:+.4f}, {offset_high:+.4f}]  the source is {side}",
-        f"drift   {fit.drift_ppm:+.0f} ppm  95 % [{fit.drift_ppm_ci95[0]:+.0f}, {fit.drift_ppm_ci95[1]:+.0f}]"
-        + ("" if fit.drift_significant else "  not significant, not applied"),
-        f"scale   source = {fit.ratio:.5f} * reference  95 % [{fit.ratio_ci95[0]:.5f}, {fit.ratio_ci95[1]:.5f}]",
-        f"match   correlation {fit.peak:.3f} (limit {fit.peak_limit:.3f}, next best {fit.runner_up:.3f}) over "
-        f"{fit.overlap_s:.0f} s, residual {fit.rms:.3g} {unit}",
-    ]
-    if quantity == "speed" and not math.isnan(fit.slip_offset_s):
-        low, high = fit.slip_offset_ci95
-        lines.append(f"        with tyre slip in the model: {fit.slip_offset_s:+.4f} s  95 % [{low:+.4f}, {high:+.4f}]")
-        if low > offset_high or high < offset_low:
-            lines.append("        the two do not agree: part of the offset is tyre slip, not time")
-    return head + "".join(f"  {line}\n" for line in lines)
-
-
 def alignment_figures(
     reference: Quantity, sources: Sequence[tuple[Quantity, ClockFit]], quantity: str
 ) -> list[dict[str, Any]]:  # fmt: skip
@@ -83,17 +88,17 @@ def alignment_figures(
     """
     start, unit = int(reference.t_ns[0]), QUANTITIES[quantity]
     t_ref = _seconds(reference.t_ns, start)
-    curves = [_curve(t_ref, reference.x, reference.file, INK)]
-    rests = []
-    for (source, fit), colour in zip(sources, _colours(len(sources)), strict=True):
+    curves, rests = [_curve(t_ref, reference.x, reference.file, INK)], []
+    for i, (source, fit) in enumerate(sources):
+        colour = list(WHEEL_COLOURS.values())[i % len(WHEEL_COLOURS)]
         t, x = _seconds(fit.to_reference(source.t_ns), start), source.x / fit.ratio
         curves.append(_curve(t, x, source.file, colour))
         inside = (t >= t_ref[0]) & (t <= t_ref[-1])
         rests.append(_curve(t[inside], x[inside] - np.interp(t[inside], t_ref, reference.x), source.file, colour))
     name = quantity.replace("_", " ")
     return [
-        {"data": curves, "layout": layout(f"{name}, aligned", axis("time [s]"), axis(f"{name} [{unit}]"))},
-        {"data": rests, "layout": layout("source less reference", axis("time [s]"), axis(f"difference [{unit}]"))},
+        figure(curves, f"{name}, aligned", axis("time [s]"), axis(f"{name} [{unit}]")),
+        figure(rests, "source less reference", axis("time [s]"), axis(f"difference [{unit}]")),
     ]
 
 
@@ -101,14 +106,6 @@ def _seconds(t_ns: TimeArray, start: int) -> FloatArray:
     return (t_ns - start).astype(np.float64) * 1e-9
 
 
-def _colours(n: int) -> list[str]:
-    known = list(WHEEL_COLOURS.values())
-    return [known[i % len(known)] for i in range(n)]
-
-
 def _curve(t: FloatArray, x: FloatArray, name: str, colour: str) -> dict[str, Any]:
     index = np.arange(x.size) if x.size <= ALL_SAMPLES else reduce_indices(x)
-    return {
-        "type": "scatter", "mode": "lines", "name": plot_text(name), "x": rounded(t[index]), "y": rounded(x[index]),
-        "line": {"color": colour, "width": 1.5},
-    }  # fmt: skip
+    return line(name, t[index], x[index], colour, width=1.5)

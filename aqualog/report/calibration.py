@@ -13,11 +13,10 @@ from aqualog.calibrate.records import Calibration, DriveFit, Parameter, TieRodFi
 from aqualog.calibrate.words import left_out
 from aqualog.core.records import FloatArray
 from aqualog.core.units import displayed_text
-from aqualog.report.axes import axis, layout, rounded
-from aqualog.report.plain import fields_of, plain
+from aqualog.report.figures import axis, dots, figure
 from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
 from aqualog.report.theme import MUTED, wheel_colour
-from aqualog.report.wording import pretty_unit
+from aqualog.report.values import KMH, fields_of, plain, pretty_unit
 
 __all__ = ["balance_residuals", "calibration_document", "calibration_report", "parameter_cells"]
 
@@ -44,26 +43,27 @@ def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence
         "logs": list(logs),
         "fixed": dict(c.fixed),
         "parameters": [fields_of(p, *parameters, digits=None) for p in c.parameters],
-        "drives": [_drive(d) for d in c.drives],
+        "drives": [
+            {
+                **fields_of(d, "name", "mass", "mass_sd", digits=None),
+                "against_others": {
+                    "value": plain(d.against_others[0], None), "ci95": plain(d.against_others[1:], None), "unit": "kg",
+                },
+                **fields_of(
+                    d, digits=None, accelerometer_offset="offset", accelerometer_offset_sd="offset_sd",
+                    accelerometer_drift="drift", torque_lag_s="torque_lag_s", velocity_lag_s="v_lag_s",
+                    used_s="used_s", driven_s="driven_s", left_out_s="left_out", rmse_before="rmse_before",
+                    rmse_after="rmse_after",
+                ),
+            }
+            for d in c.drives
+        ],
         "transfers": {
             section: fields_of(fit, "coefficients", "ci95", "sigma", "explained", "seconds", digits=None)
             for section, fit in c.transfers.items()
         },
         "cannot_tell": list(c.cannot_tell),
         "notes": [*notes, *c.notes],
-    }
-
-
-def _drive(d: DriveFit) -> dict[str, Any]:
-    difference, low, high = plain(d.against_others, None)
-    return {
-        **fields_of(d, "name", "mass", "mass_sd", digits=None),
-        "against_others": {"value": difference, "ci95": [low, high], "unit": "kg"},
-        **fields_of(
-            d, digits=None, accelerometer_offset="offset", accelerometer_offset_sd="offset_sd",
-            accelerometer_drift="drift", torque_lag_s="torque_lag_s", velocity_lag_s="v_lag_s", used_s="used_s",
-            driven_s="driven_s", left_out_s="left_out", rmse_before="rmse_before", rmse_after="rmse_after",
-        ),
     }  # fmt: skip
 
 
@@ -89,7 +89,12 @@ def calibration_report(c: Calibration, notes: Sequence[str] = ()) -> Report:
             Table(_DRIVES, [_drive_cells(d) for d in c.drives], "drives"),
             Lines([f"{d.name}: left out {why}" for d in c.drives if (why := left_out(d.left_out))]),
         ], "drives-section"),
-        *(_transfer(name, fit) for name, fit in c.transfers.items()),
+        *(
+            Section(f"{name}: explains {fit.explained:.1%} of the variance in {fit.seconds:.0f} s", [
+                Table(("Coefficient", "Value", "95 %"), [*_coefficients(fit), ("sigma", _short(fit.sigma), "")]),
+            ])
+            for name, fit in c.transfers.items()
+        ),
         Section("Notes", [Lines([*notes, *c.notes], most=1000)], "notes", look="problems", where="page"),
         Section("Balance of forces", [Figures(list(plots)), Para(_DOTS)], "plot-section"),
     ]  # fmt: skip
@@ -114,14 +119,12 @@ def _drive_cells(d: DriveFit) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _transfer(name: str, fit: TieRodFit) -> Section:
-    rows = [
+def _coefficients(fit: TieRodFit) -> list[tuple[str, str, str]]:
+    return [
         (key if len(values) == 1 else f"{key}[{i}]", _short(x), _interval(fit.ci95[key][i]))
         for key, values in fit.coefficients.items()
         for i, x in enumerate(values)
     ]
-    title = f"{name}: explains {fit.explained:.1%} of the variance in {fit.seconds:.0f} s"
-    return Section(title, [Table(("Coefficient", "Value", "95 %"), [*rows, ("sigma", _short(fit.sigma), "")])])
 
 
 def _short(x: float) -> str:
@@ -141,7 +144,7 @@ def balance_residuals(c: Calibration) -> list[dict[str, Any]]:
         np.concatenate([getattr(d, name) for d in c.drives]) for name in ("v", "force", "before", "after")
     )
     return [
-        _residual(3.6 * v, before, after, "residual over speed", "speed [km/h]"),
+        _residual(KMH * v, before, after, "residual over speed", "speed [km/h]"),
         _residual(1e-3 * force, before, after, "residual over wheel force", "force of the wheel torques [kN]"),
     ]
 
@@ -149,10 +152,7 @@ def balance_residuals(c: Calibration) -> list[dict[str, Any]]:
 def _residual(x: FloatArray, before: FloatArray, after: FloatArray, title: str, label: str) -> dict[str, Any]:
     step = max(1, -(-x.size // _MOST_DOTS))
     data = [
-        {
-            "type": "scatter", "mode": "markers", "name": name, "x": rounded(x[::step]), "y": rounded(y[::step]),
-            "marker": {"color": colour, "size": 5, "opacity": 0.5}, "hoverinfo": "skip",
-        }
+        dots(name, x[::step], y[::step], colour, style={"opacity": 0.5})
         for name, y, colour in (("vehicle file", before, MUTED), ("calibrated", after, wheel_colour("fl")))
-    ]  # fmt: skip
-    return {"data": data, "layout": layout(title, axis(label), axis("measured minus expected [m/s²]"))}
+    ]
+    return figure(data, title, axis(label), axis("measured minus expected [m/s²]"))

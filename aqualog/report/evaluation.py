@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,6 +12,7 @@ from aqualog.evaluate.records import Cell as Counts
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
 from aqualog.evaluate.score import (
+    HOUR_S,
     Rate,
     Recall,
     Score,
@@ -37,9 +38,8 @@ from aqualog.report.evaluation_words import (
     tuning_sentences,
     verdicts,
 )
-from aqualog.report.plain import fields_of, plain
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
-from aqualog.report.wording import number
+from aqualog.report.values import fields_of, number, plain
 
 __all__ = ["evaluation_document", "evaluation_report"]
 
@@ -76,10 +76,14 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Repo
     records, tuning = evaluation.records, evaluation.tuning
     scores, situations = score_all(records), situation_scores(records)
     plots, answers = evaluation_figures(evaluation), verdicts(records)
+    groups = [
+        (", ".join(f"{k} {v}" for k, v in zip(by, key, strict=True)), some)
+        for key, some in (grouped(records, by).items() if by else ())
+    ]
     tuned = tuning_sentences(tuning, score_all(tuning.before), scores) if tuning else []
     sections = [
         Section("", [
-            Para(f"{len(records)} drives, {sum(r.duration_s for r in records) / 3600.0:.3g} h", where="text"),
+            Para(f"{len(records)} drives, {sum(r.duration_s for r in records) / HOUR_S:.3g} h", where="text"),
             Lines(answers or [headline(evaluation)]),
         ], where="text"),
         Section("", [Headline(headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
@@ -87,13 +91,16 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Repo
                 where="page"),
         Section("All drives", [Table(_SCORES, _score_rows(scores), "detectors"), Para(_LEGEND, where="text")]),
         *(
-            Section(f"{_group(by, key)} ({len(some)} drives)", [Table(_SCORES, _score_rows(score_all(some)))])
-            for key, some in (grouped(records, by).items() if by else ())
+            Section(f"{name} ({len(some)} drives)", [Table(_SCORES, _score_rows(score_all(some)))])
+            for name, some in groups
         ),
         Section("Confusion: episodes with an event, and events per hour", [_confusion(records)], "confusion-section"),
         Section("Situations, thresholds, latency", [Figures(list(plots))], "plot-section"),
         *_situation_sections(records, situations),
-        Section("Over thresholds", [Table(_ROC, [_point_row(p) for p in evaluation.roc])], where="text"),
+        Section("Over thresholds", [Table(_ROC, [
+            (title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", recall_text(p.full), recall_text(p.partial),
+             str(p.false_alarms.count), rate_text(p.false_alarms)) for p in evaluation.roc
+        ])], where="text"),
         Section("Rivals", [Lines(better_sentences(records), most=1000)], "rivals"),
         Section("Thresholds proposed", [Lines(tuned, most=1000)], "tuning"),
         Section("Notes", [Lines(notes_of(records), most=1000)], "notes", where="page"),
@@ -106,14 +113,10 @@ def _facts(evaluation: Evaluation) -> list[tuple[str, str]]:
     hours, dry, km = (sum(getattr(r, n) for r in records) for n in ("duration_s", "dry_s", "dry_m"))
     facts = [
         ("drives", str(len(records))),
-        ("driving", f"{number(hours / 3600.0)} h"),
-        ("outside water", f"{number(dry / 3600.0)} h, {number(km / 1e3)} km"),
+        ("driving", f"{number(hours / HOUR_S)} h"),
+        ("outside water", f"{number(dry / HOUR_S)} h, {number(km / 1e3)} km"),
     ]
     return [*facts, ("not readable", str(len(evaluation.failed)))] if evaluation.failed else facts
-
-
-def _group(by: Sequence[str], key: Sequence[str]) -> str:
-    return ", ".join(f"{k} {v}" for k, v in zip(by, key, strict=True))
 
 
 def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
@@ -136,22 +139,18 @@ def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
     ]
 
 
-def _point_row(p: RocPoint) -> tuple[str, ...]:
-    return (
-        title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", recall_text(p.full), recall_text(p.partial),
-        str(p.false_alarms.count), rate_text(p.false_alarms),
-    )  # fmt: skip
-
-
 def _confusion(records: Sequence[RunRecord]) -> Table:
+    def counted(c: Counts | None) -> str:
+        return "–" if c is None else f"{c.hit}/{c.episodes} · {short(_per_hour(c))}/h"
+
     cells = confusion(records)
     names = list(dict.fromkeys(n for row in cells.values() for n in row))
-    rows = [(row, *(_counted(columns.get(n)) for n in names)) for row, columns in cells.items()]
+    rows = [(row, *(counted(columns.get(n)) for n in names)) for row, columns in cells.items()]
     return Table(("Label", *(title_of(n) for n in names)), rows, "confusion")
 
 
-def _counted(c: Counts | None) -> str:
-    return "–" if c is None else f"{c.hit}/{c.episodes} · {short(Rate(c.events, c.seconds, 0.0).per_hour)}/h"
+def _per_hour(c: Counts) -> float:
+    return Rate(c.events, c.seconds, 0.0).per_hour
 
 
 def _situation_sections(records: Sequence[RunRecord], situations: Mapping[str, Mapping[str, Score]]) -> list[Section]:
@@ -159,23 +158,23 @@ def _situation_sections(records: Sequence[RunRecord], situations: Mapping[str, M
     if len(situations) < 2:
         return []
     names = [n for n in next(iter(situations.values())) if any(s[n].runs for s in situations.values())]
-    header = ("Situation", *map(title_of, names))
+
+    def recall(s: Score) -> str:
+        return f"{100 * s.partial.share:.0f} % of {s.partial.episodes}" if s.runs and s.partial.episodes else "–"
+
+    def alarms(s: Score) -> str:
+        return short(s.false_alarms.per_hour) if s.runs and s.false_alarms.seconds > 0.0 else "–"
+
+    def table(text: Callable[[Score], str], rows: Sequence[str]) -> Table:
+        header = ("Situation", *map(title_of, names))
+        return Table(header, [(row, *(text(situations[row][n]) for n in names)) for row in rows])
+
     wet = [row for row, scores in situations.items() if any(s.partial.episodes for s in scores.values())]
-    recall = [(row, *(_recall_cell(situations[row][n]) for n in names)) for row in wet]
-    alarms = [(row, *(_alarm_cell(scores[n]) for n in names)) for row, scores in situations.items()]
     return [
-        Section("Recall of partial aquaplaning by situation", [Table(header, recall)], where="text"),
-        Section("False alarms per hour by situation", [Table(header, alarms)], where="text"),
+        Section("Recall of partial aquaplaning by situation", [table(recall, wet)], where="text"),
+        Section("False alarms per hour by situation", [table(alarms, list(situations))], where="text"),
         Section("Situations that meet the targets", [Lines(coverage_sentences(records), "coverage")]),
     ]
-
-
-def _recall_cell(s: Score) -> str:
-    return f"{100 * s.partial.share:.0f} % of {s.partial.episodes}" if s.runs and s.partial.episodes else "–"
-
-
-def _alarm_cell(s: Score) -> str:
-    return short(s.false_alarms.per_hour) if s.runs and s.false_alarms.seconds > 0.0 else "–"
 
 
 # --- JSON ------------------------------------------------------------------------------------------------------------
@@ -221,11 +220,7 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
         ],
         "confusion": {
             row: {
-                n: {
-                    "episodes": c.episodes,
-                    "with_event": c.hit,
-                    "events_per_hour": plain(Rate(c.events, c.seconds, 0.0).per_hour),
-                }
+                n: {"episodes": c.episodes, "with_event": c.hit, "events_per_hour": plain(_per_hour(c))}
                 for n, c in cells.items()
             }
             for row, cells in confusion(records).items()
@@ -234,14 +229,17 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
         "coverage": [asdict(c) for c in coverage(situation_scores(records)).values()],
         "roc": [_point(p) for p in evaluation.roc],
         "better_rivals": [
-            {"rival": b.rival, "against": b.against, "situation": b.situation or None, "measure": b.measure,
-             "rival_value": plain(b.rival_value), "own_value": plain(b.own_value), "beyond_chance": b.is_sure,
-             "at_a_price": b.at_a_price}
+            {**fields_of(b, "rival", "against"), "situation": b.situation or None,
+             **fields_of(b, "measure", "rival_value", "own_value", beyond_chance="is_sure", at_a_price="at_a_price")}
             for b in better_rivals(records)
         ],
         "sentences": [*verdicts(records), *better_sentences(records)],
         "tuning": None if tuning is None else _tuning(tuning),
-        "runs": [_run(r) for r in records],
+        "runs": [
+            {"name": r.name, "groups": dict(r.groups), "seconds": plain(r.duration_s),
+             "false_alarms_s": {n: list(d.false_alarms) for n, d in r.detectors.items() if d.false_alarms},
+             "unavailable": list(r.unavailable)} for r in records
+        ],
         "notes": notes_of(records),
     }  # fmt: skip
 
@@ -256,52 +254,32 @@ def _tuning(t: Tuning) -> dict[str, Any]:
 
 def _recall(r: Recall) -> dict[str, Any]:
     return {
-        "episodes": r.episodes,
-        "found": r.found,
-        "recall": plain(r.share),
-        "ci95": plain(r.ci95),
-        "warned_before": plain(r.before_share),
+        **fields_of(r, "episodes", "found", recall="share", ci95="ci95", warned_before="before_share"),
         "latency_median_s": plain(r.latency(0.5)),
         "latency_95_s": plain(r.latency(0.95)),
     }
 
 
-def _rate(r: Rate) -> dict[str, Any]:
-    rates = fields_of(r, "per_hour", "per_hour_ci95", "per_100km", "per_100km_ci95")
-    return {"count": r.count, "hours": plain(r.seconds / 3600.0), **rates}
-
-
 def _scores(scores: Mapping[str, Score]) -> dict[str, Any]:
     return {
         n: {
-            "drives": s.runs,
-            "unavailable": s.unavailable,
+            **fields_of(s, drives="runs", unavailable="unavailable"),
             **{k: _recall(getattr(s, k)) for k in ("full", "partial", "wheel_full", "wheel_partial", "own")},
-            "false_alarms": _rate(s.false_alarms),
-            "on_water": {"count": s.on_water.count, "per_hour": plain(s.on_water.per_hour)},
+            "false_alarms": {
+                "count": s.false_alarms.count, "hours": plain(s.false_alarms.seconds / HOUR_S),
+                **fields_of(s.false_alarms, "per_hour", "per_hour_ci95", "per_100km", "per_100km_ci95"),
+            },
+            "on_water": fields_of(s.on_water, "count", "per_hour"),
         }
         for n, s in scores.items()
-    }
+    }  # fmt: skip
 
 
 def _point(p: RocPoint) -> dict[str, Any]:
     return {
-        "detector": p.detector,
-        "factor": plain(p.factor),
-        "threshold": plain(p.threshold),
+        **fields_of(p, "detector", "factor", "threshold"),
         "full": plain(p.full.share),
         "partial": plain(p.partial.share),
-        "per_hour": plain(p.false_alarms.per_hour),
-        "count": p.false_alarms.count,
-        "hours": plain(p.false_alarms.seconds / 3600.0),
-    }
-
-
-def _run(r: RunRecord) -> dict[str, Any]:
-    return {
-        "name": r.name,
-        "groups": dict(r.groups),
-        "seconds": plain(r.duration_s),
-        "false_alarms_s": {n: list(d.false_alarms) for n, d in r.detectors.items() if d.false_alarms},
-        "unavailable": list(r.unavailable),
+        **fields_of(p.false_alarms, "per_hour", "count"),
+        "hours": plain(p.false_alarms.seconds / HOUR_S),
     }

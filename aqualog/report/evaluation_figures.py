@@ -11,15 +11,12 @@ from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation
 from aqualog.evaluate.score import Score, score_all, situation_scores
 from aqualog.evaluate.sweep import RocPoint
-from aqualog.report.axes import axis, layout
 from aqualog.report.evaluation_words import short
-from aqualog.report.wording import plot_text
+from aqualog.report.figures import GOOD_TO_BAD, PALETTE, axis, figure, heat, line
+from aqualog.report.values import plot_text
 
 __all__ = ["alarm_matrix", "evaluation_figures", "latency_curves", "recall_matrix", "roc_curves"]
 
-# Okabe and Ito's palette again, thesis' detectors drawn through, rivals dotted
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6BB3", "#8C6D31")
-_GOOD_TO_BAD = [[0.0, "#B2182B"], [0.5, "#F4D9A8"], [1.0, "#2B7A4B"]]
 _MANY = 10.0  # [1/h] false alarms from which on a cell is as red as can be
 
 
@@ -68,20 +65,15 @@ def roc_curves(points: Sequence[RocPoint], effect: str) -> dict[str, Any] | None
     data = []
     for name in names:
         own = [p for p in shown if p.detector == name]
-        data.append(
-            {
-                **_line(name, names),
-                "mode": "lines+markers",
-                "x": [float(f"{max(p.false_alarms.per_hour, floor):.4g}") for p in own],
-                "y": [float(f"{getattr(p, effect).share:.4g}") for p in own],
-                "customdata": [_about(p) for p in own],
-                "hovertemplate": "%{y:.3f} at %{customdata[2]} per h; threshold %{customdata[0]} "
-                "(%{customdata[1]} times)<extra>%{fullData.name}</extra>",
-            }
-        )
-    x = {**axis(f"false alarms per hour (zero is drawn at {floor:.2g})"), "type": "log"}
-    figure = layout(f"{effect} aquaplaning over thresholds", x, axis("recall", [-0.02, 1.02]))
-    return {"data": data, "layout": figure}
+        about = [[f"{p.threshold:.3g}", f"{p.factor:.2g}", f"{p.false_alarms.per_hour:.3g}"] for p in own]
+        x, y = [max(p.false_alarms.per_hour, floor) for p in own], [getattr(p, effect).share for p in own]
+        data.append(_line(
+            name, names, x, y, mode="lines+markers", customdata=about,
+            hovertemplate="%{y:.3f} at %{customdata[2]} per h; threshold %{customdata[0]} (%{customdata[1]} times)"
+            "<extra>%{fullData.name}</extra>",
+        ))  # fmt: skip
+    alarms = axis(f"false alarms per hour (zero is drawn at {floor:.2g})", type="log")
+    return figure(data, f"{effect} aquaplaning over thresholds", alarms, axis("recall", [-0.02, 1.02]))
 
 
 def latency_curves(records: Sequence[RunRecord], effect: str) -> dict[str, Any] | None:
@@ -93,23 +85,12 @@ def latency_curves(records: Sequence[RunRecord], effect: str) -> dict[str, Any] 
     data = []
     for name, s in scores.items():
         recall = getattr(s, effect)
-        late = sorted(x for x in recall.latencies if x <= longest)
-        x = [0.0, *late, longest]
-        y = [0.0, *((i + 1) / recall.episodes for i in range(len(late))), len(late) / recall.episodes]
-        data.append(
-            {
-                **_line(name, list(scores)), "mode": "lines", "x": [round(v, 3) for v in x],
-                "y": [round(v, 4) for v in y],
-            }
-        )  # fmt: skip
-        data[-1]["line"]["shape"] = "hv"
-    x_axis = axis("after the beginning [s]", [0.0, longest])
-    figure = layout(f"{effect} aquaplaning: share of episodes found", x_axis, axis("share", [-0.02, 1.02]))
-    return {"data": data, "layout": figure}
-
-
-def _about(p: RocPoint) -> list[str]:
-    return [f"{p.threshold:.3g}", f"{p.factor:.2g}", f"{p.false_alarms.per_hour:.3g}"]
+        found = sorted(x for x in recall.latencies if x <= longest)
+        x = [0.0, *found, longest]
+        y = [0.0, *((i + 1) / recall.episodes for i in range(len(found))), len(found) / recall.episodes]
+        data.append(_line(name, list(scores), x, y, style={"shape": "hv"}))
+    late = axis("after the beginning [s]", [0.0, longest])
+    return figure(data, f"{effect} aquaplaning: share of episodes found", late, axis("share", [-0.02, 1.02]))
 
 
 def _matrix(records: Sequence[RunRecord], value: Any, title: str) -> dict[str, Any] | None:
@@ -120,30 +101,23 @@ def _matrix(records: Sequence[RunRecord], value: Any, title: str) -> dict[str, A
     if not rows:
         return None
     z = [[None if math.isnan(v) else round(v, 4) for v, _ in cells[row]] for row in rows]
-    figure = layout(title, axis(""), axis(""), height=130 + 24 * len(rows) + 60)
-    figure["xaxis"] |= {"side": "bottom", "tickangle": -35, "type": "category"}
-    figure["yaxis"] |= {"autorange": "reversed", "type": "category", "automargin": True}
-    figure["margin"] |= {"b": 120}
-    return {
-        "data": [
-            {
-                "type": "heatmap", "x": [n.replace("_", " ") for n in names], "y": [plot_text(r, 40) for r in rows],
-                "z": z, "zmin": 0.0, "zmax": 1.0, "text": [[t for _, t in cells[r]] for r in rows],
-                "texttemplate": "%{text}", "colorscale": _GOOD_TO_BAD, "showscale": False, "xgap": 1, "ygap": 1,
-                "hoverongaps": False, "hovertemplate": "%{y}, %{x}: %{text}<extra></extra>",
-            }
-        ],
-        "layout": figure,
-    }  # fmt: skip
+    texts = [[t for _, t in cells[r]] for r in rows]
+    found = heat(
+        [n.replace("_", " ") for n in names], [plot_text(r, 40) for r in rows], z, texts,
+        (0.0, 1.0), GOOD_TO_BAD, texttemplate="%{text}", showscale=False,
+        hovertemplate="%{y}, %{x}: %{text}<extra></extra>",
+    )  # fmt: skip
+    return figure(
+        [found], title, axis(side="bottom", tickangle=-35, type="category"),
+        axis(autorange="reversed", type="category", automargin=True), height=190 + 24 * len(rows), margin={"b": 120},
+    )  # fmt: skip
 
 
-def _line(name: str, names: Sequence[str]) -> dict[str, Any]:
-    """Style of a detector's line: its colour within its kind, dotted for a rival."""
+def _line(name: str, names: Sequence[str], x: Sequence[float], y: Sequence[float], **more: Any) -> dict[str, Any]:
+    """A detector's line: its colour within its kind, dotted for a rival."""
     is_rival = name in RIVALS
     kind = [n for n in names if (n in RIVALS) == is_rival]
-    colour = _COLOURS[kind.index(name) % len(_COLOURS)]
-    return {
-        "type": "scatter", "name": name.replace("_", " "),
-        "line": {"color": colour, "width": 1.6, "dash": "dot" if is_rival else "solid"},
-        "marker": {"color": colour, "size": 5},
-    }  # fmt: skip
+    colour = PALETTE[kind.index(name) % len(PALETTE)]
+    style = {"dash": "dot" if is_rival else "solid", **more.pop("style", {})}
+    marker = {"color": colour, "size": 5}
+    return line(name.replace("_", " "), x, y, colour, width=1.6, style=style, marker=marker, **more)

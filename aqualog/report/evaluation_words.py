@@ -22,6 +22,7 @@ from aqualog.evaluate.score import (
     situation_scores,
 )
 from aqualog.evaluate.sweep import JOINT
+from aqualog.report.values import upper_first
 
 __all__ = [
     "better_sentences", "coverage_sentences", "headline", "notes_of", "percent", "rate_text", "recall_text",
@@ -94,35 +95,33 @@ def headline(evaluation: Evaluation) -> str:
     if not ran:
         return "No detector could run."
     best = max(joint or list(ran.values()), key=_merit)
-    return f"{title_of(best.detector)[:1].upper()}{title_of(best.detector)[1:]} {_did(best)}."
+    return f"{upper_first(title_of(best.detector))} {_did(best)}."
 
 
 def verdicts(records: Sequence[RunRecord]) -> list[str]:
     """A sentence for each joint detector: its result against the targets."""
     scores = score_all(records)
-    out = []
-    for name in JOINT:
-        s = scores.get(name)
-        if s is None or not s.runs:
-            continue
-        lacks = [
-            f"{effect} {percent(r.share)}, target {percent(TARGETS[effect])}"
-            for effect, r in (("full", s.full), ("partial", s.partial))
-            if r.episodes and r.share < TARGETS[effect]
-        ]
-        if s.false_alarms.seconds > 0.0 and s.false_alarms.per_hour > TARGETS["per_hour"]:
-            lacks.append(f"{s.false_alarms.per_hour:.3g} false alarms per hour, target {TARGETS['per_hour']:g}")
-        end = "; all targets are met"
-        if s.false_alarms.seconds > 0.0 and s.false_alarms.per_hour_ci95[1] > TARGETS["per_hour"]:
-            most, hours = s.false_alarms.per_hour_ci95[1], 3.7 / TARGETS["per_hour"]
-            end = (
-                f"; targets met, but so few hours only show that false alarms are below {most:.2g} per hour "
-                f"({hours:.0f} h without one would show {TARGETS['per_hour']:g})"
-            )
-        if lacks:
-            end = f"; targets missed: {', '.join(lacks)}"
-        out.append(f"{title_of(name)} {_did(s)}{end}.")
-    return out
+    return [f"{title_of(n)} {_did(scores[n])}; {_against(scores[n])}." for n in JOINT if n in scores and scores[n].runs]
+
+
+def _against(s: Score) -> str:
+    """A result against the targets."""
+    lacks = [
+        f"{effect} {percent(r.share)}, target {percent(TARGETS[effect])}"
+        for effect, r in (("full", s.full), ("partial", s.partial))
+        if r.episodes and r.share < TARGETS[effect]
+    ]
+    target, alarms = TARGETS["per_hour"], s.false_alarms
+    if alarms.seconds > 0.0 and alarms.per_hour > target:
+        lacks.append(f"{alarms.per_hour:.3g} false alarms per hour, target {target:g}")
+    if lacks:
+        return f"targets missed: {', '.join(lacks)}"
+    if alarms.seconds > 0.0 and alarms.per_hour_ci95[1] > target:
+        return (
+            "targets met, but so few hours only show that false alarms are below "
+            f"{alarms.per_hour_ci95[1]:.2g} per hour ({3.7 / target:.0f} h without one would show {target:g})"
+        )
+    return "all targets are met"
 
 
 def _did(s: Score) -> str:
@@ -170,20 +169,14 @@ def better_sentences(records: Sequence[RunRecord]) -> list[str]:
 def _better(key: tuple[str, str, str], some: Sequence[Better]) -> str:
     rival, against, situation = key
     where = f" in {situation}" if situation else " over all drives"
-    things = [
-        f"{_value(b, b.rival_value)} against {_value(b, b.own_value)} {_MEASURES[b.measure]}{_sure(b)}" for b in some
-    ]
+    things = []
+    for b in some:
+        value = short if b.measure == "false alarms" else percent
+        sure = "" if b.is_sure else " (within chance)"
+        things.append(f"{value(b.rival_value)} against {value(b.own_value)} {_MEASURES[b.measure]}{sure}")
     price = ", but worse in another measure" if some[0].at_a_price else ""
     verb = "is better" if any(b.is_sure for b in some) else "came out better, but within chance,"
     return f"{title_of(rival)} {verb} than {title_of(against)}{where}: {'; '.join(things)}{price}."
-
-
-def _value(b: Better, x: float) -> str:
-    return short(x) if b.measure == "false alarms" else percent(x)
-
-
-def _sure(b: Better) -> str:
-    return "" if b.is_sure else " (within chance)"
 
 
 def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping[str, Score]) -> list[str]:
@@ -193,10 +186,9 @@ def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping
         f"{f', {len(tuning.unused)} unused' if tuning.unused else ''}: {tuning.rule}"
     ]
     for name, choice in tuning.choices.items():
-        p = choice.point
-        old, new = before.get(name), after.get(name)
-        told = ""
-        if old is not None and new is not None:
+        p, told = choice.point, ""
+        if name in before and name in after:
+            old, new = before[name], after[name]
             told = (
                 f"; on the others partial {recall_text(old.partial)} -> {recall_text(new.partial)}, false alarms "
                 f"{old.false_alarms.count} -> {new.false_alarms.count}"

@@ -1,4 +1,4 @@
-"""An examination as text and as a document."""
+"""An examination as sections and as a document."""
 
 from __future__ import annotations
 
@@ -7,51 +7,49 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.doctor.findings import Examination, Finding
-from aqualog.report.wording import CELL, NOTE, cut, lacking
+from aqualog.report.sections import Lines, Para, Report, Section
+from aqualog.report.values import CELL, NOTE, cut
+from aqualog.report.wording import not_judged
 
-__all__ = ["examination_document", "examination_text"]
+__all__ = ["examination_document", "examination_report"]
 
 _MAP = "`aqualog inspect LOG --write-map map.toml` proposes which channel is which signal; then --signals map.toml"
 _HEADS = {
-    "unreadable": "cannot be read",
-    "lost": "lost or not used",
-    "mended": "mended",
-    "doubt": "worth checking",
+    "unreadable": "Cannot be read:",
+    "lost": "Lost or not used:",
+    "mended": "Mended:",
+    "doubt": "Worth checking:",
 }
 
 
-def examination_text(found: Examination) -> str:
-    """Terminal text: the files, problems by weight, and the detectors that can run."""
-    lines = []
+def examination_report(found: Examination) -> Report:
+    """The files, problems by weight, and the detectors that can run."""
+    files = []
     for f in found.files:
-        if f.format:
-            size = f"{f.size:,} bytes, {f.channels} channels, {f.samples:,} samples, {f.end_s or 0.0:.1f} s"
-            lines.append(f"{cut(f.file, CELL)}: {f.format.upper()}, {size}")
-        else:
-            lines.append(f"{cut(f.file, CELL)}: {f.size:,} bytes")
-    for level, head in _HEADS.items():
-        own = [x for x in found.findings if x.level == level]
-        if own:
-            lines += ["", f"{head}:", *(line for x in own for line in _lines(x))]
-    if not found.findings:
-        lines += ["", "no problem found"]
-    if found.ready:
-        lines += ["", f"detectors that can run: {', '.join(found.ready)}"]
+        read = f", {f.channels} channels, {f.samples:,} samples, {f.end_s or 0.0:.1f} s" if f.format else ""
+        files.append(f"{cut(f.file, CELL)}: {f'{f.format.upper()}, ' if f.format else ''}{f.size:,} bytes{read}")
     lacks = [(name, signals) for name, signals in found.missing if signals]
+    closing = "no problem found" if not found.findings else ""
+    able = f"detectors that can run: {', '.join(found.ready)}" if found.ready else ""
     if lacks and not found.ready:
-        lines += ["", "no detector can run", f"    try: {_MAP}"]
-    none = [f"  {name}: missing {lacking(signals)}" for name, signals in lacks if name not in found.ready]
-    part = [f"  {name}: without {lacking(signals)}" for name, signals in lacks if name in found.ready]
-    for head, block in (("not judged:", none), ("judged in part:", part)):
-        lines += ["", head, *block] if block else []
-    return "\n".join(lines) + "\n"
+        able = f"no detector can run\n    try: {_MAP}"
+    sections = [
+        Section("", [Para("\n".join(files), "everywhere")]),
+        *(Section(head, [Lines([_line(x) for x in found.findings if x.level == level], most=1000)])
+          for level, head in _HEADS.items()),
+        Section("", [Para(closing, "everywhere")]),
+        Section("", [Para(able, "everywhere")]),
+        *not_judged(
+            [x for x in lacks if x[0] not in found.ready], [x for x in lacks if x[0] in found.ready]
+        ),
+    ]  # fmt: skip
+    return Report("examination", "what is wrong with a log", sections)
 
 
-def _lines(finding: Finding) -> list[str]:
-    where = ": ".join(cut(x, CELL) for x in (finding.file, finding.channel) if x)
-    what = cut(finding.what, NOTE)
-    first = f"  {where}: {what}" if where else f"  {what}"
-    return [first, f"    try: {cut(finding.advice, NOTE)}"] if finding.advice else [first]
+def _line(finding: Finding) -> str:
+    where = [cut(x, CELL) for x in (finding.file, finding.channel) if x]
+    advice = f"\ntry: {cut(finding.advice, NOTE)}" if finding.advice else ""
+    return ": ".join([*where, cut(finding.what, NOTE)]) + advice
 
 
 def examination_document(found: Examination) -> dict[str, Any]:

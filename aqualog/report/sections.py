@@ -3,33 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 __all__ = [
-    "Bar", "Bars", "Beside", "Cell", "Figures", "Headline", "Line", "Lines", "Para", "Part", "Report", "Residuals",
-    "Section", "Table", "shown",
+    "Bar", "Bars", "Beside", "Cell", "Code", "Figures", "Headline", "Line", "Lines", "Para", "Part", "Report",
+    "Residuals", "Section", "Stack", "Table", "shown",
 ]  # fmt: skip
 
 Where = Literal["everywhere", "text", "page"]
 Line = str | tuple[str, str]
-"""A sentence, or a short head and a sentence."""
+"""A sentence, or a short head and a sentence. What follows a line break is advice, on a line of its own."""
 
 
 class Cell(NamedTuple):
-    """A table's cell: `dot` is a colour before the text (`ink`: that of the text), `note` stands behind it in grey."""
+    """A table's cell.
+
+    `dot` is a colour before the text (`ink`: that of the text), `note` stands behind it in grey. `tag` is a class of
+    the page's style for a word in a frame. A sortable table goes by `key`, or else by the text.
+    """
 
     text: str
     dot: str = ""
     note: str = ""
+    tag: str = ""
+    key: float | str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows under a header. A head that is a pair has a shorter form for a terminal.
+    """Rows under a header. A head that is a pair has a shorter form for a terminal; empty: a column of pages alone.
 
-    `words` are the columns that hold words; all others are numbers, to the right. `below` are lines under rows, by
-    index.
+    `words` are the columns that hold words; all others are numbers, to the right. `wide` columns hold sentences.
+    `below` are lines under rows, by index. `more` rows are not in the page's text: its script fills the table by pages.
+    With `is_choice` the page's script acts when the reader picks a row.
     """
 
     header: Sequence[str | tuple[str, str]]
@@ -37,6 +44,11 @@ class Table:
     id: str = ""
     words: Sequence[int] = (0,)
     below: Mapping[int, str] = field(default_factory=dict)
+    wide: Sequence[int] = ()
+    is_sortable: bool = False
+    is_choice: bool = False
+    more: Sequence[Sequence[str | Cell]] = ()
+    where: Where = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +69,13 @@ class Para:
 
     text: str
     where: Where = "page"
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """A command for the reader to run."""
+
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +126,20 @@ class Residuals:
     """Residuals before and after, which the page's script draws."""
 
 
-Part = Table | Lines | Para | Headline | Bars | Figures | Beside | Residuals
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Panels over one time axis, which the page's script draws.
+
+    `toggles` are groups of lines with label and colour, `shades` classes of the page's style and what they mean;
+    `has_steps` for buttons that go from event to event.
+    """
+
+    toggles: Sequence[tuple[str, str, str]] = ()
+    shades: Sequence[tuple[str, str]] = ()
+    has_steps: bool = False
+
+
+Part = Code | Table | Lines | Para | Headline | Bars | Figures | Beside | Residuals | Stack
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +159,7 @@ class Report:
     """One result for a reader.
 
     `kind` and `about` name what it is, `facts` are label and value of what it is of, `figures` plotly's `data` and
-    `layout` by name. `islands` and `scripts` are data and scripts that a page needs beside them.
+    `layout` by name. `islands` are data for the page's `scripts`.
     """
 
     kind: str
@@ -137,7 +169,7 @@ class Report:
     figures: Mapping[str, Any] = field(default_factory=dict)
     footer: str = ""
     islands: Mapping[str, Any] = field(default_factory=dict)
-    scripts: Sequence[str] = ()
+    scripts: Sequence[str] = ("figures.js",)
 
 
 def shown(sections: Sequence[Section], place: Where) -> list[Section]:
@@ -146,20 +178,16 @@ def shown(sections: Sequence[Section], place: Where) -> list[Section]:
     for s in sections:
         parts = [p for p in (_shown_part(p, place) for p in s.parts) if p is not None]
         if s.where in ("everywhere", place) and any(not isinstance(p, Para) or not s.title for p in parts):
-            made.append(Section(s.title, parts, s.id, s.hint, s.look))
+            made.append(replace(s, parts=parts))
     return made
 
 
 def _shown_part(part: Part, place: Where) -> Part | None:
     match part:
-        case Lines(lines, where=where):
-            return part if lines and where in ("everywhere", place) else None
-        case Para(text, where):
-            return part if text and where in ("everywhere", place) else None
-        case Table(rows=rows):
-            return part if rows else None
-        case Bars(bars):
-            return part if bars else None
+        case Lines(content, where=where) | Para(content, where) | Table(rows=content, where=where):
+            return part if content and where in ("everywhere", place) else None
+        case Bars(content):
+            return part if content else None
         case Figures(names):
             return part if names and place == "page" else None
         case Beside(sections):

@@ -10,11 +10,10 @@ from aqualog import __version__
 from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
 from aqualog.detect.slip_slope.regression import Interval, Line
 from aqualog.detect.slip_slope.stability import percent
-from aqualog.report.plain import fields_of, plain
 from aqualog.report.sections import Cell, Figures, Lines, Para, Report, Section, Table
 from aqualog.report.slope_figures import slope_plots
 from aqualog.report.theme import WHEEL_COLOURS
-from aqualog.report.wording import number
+from aqualog.report.values import fields_of, number, plain
 
 __all__ = ["slope_csv", "slope_document", "slope_lines", "slope_report", "way_sentence"]
 
@@ -60,19 +59,25 @@ def slope_report(result: DirectResult, notes: Sequence[str] = ()) -> Report:
     """
     plots = slope_plots(result)
     head = f"{result.vehicle_name}: {result.duration_s:.1f} s at {result.rate_hz:.6g} Hz; {way_sentence(result)}"
-    places, recursions = result.places, result.recursions
-    estimated = (
-        Table(
-            _PLACES, [_row(p) for p in places], "slopes", below={i: x for i, p in enumerate(places) if (x := _below(p))}
-        )
-        if places
-        else Table(_RECURSIVE, [_recursive_row(r) for r in recursions], "slopes")
-    )
+    places = result.places
+    below = {i: x for i, p in enumerate(places) if (x := _below(p))}
+    estimated = Table(_PLACES, [_row(p) for p in places], "slopes", below=below)
+    if not places:
+        rows = [
+            (r.place, number(r.slope, 1), number(r.slope_sd, 1), number(r.seconds, 0), str(r.alarms))
+            for r in result.recursions
+        ]
+        estimated = Table(_RECURSIVE, rows, "slopes")
+    parts = [
+        (_name(p), f"{s.start_s / 60.0:.1f}", f"{s.end_s / 60.0:.1f}", f"{s.seconds:.1f}",
+         f"{s.line.slope:.1f}" if s.line.told else "–", _interval(s.line.slope_ci) if s.line.told else s.line.reason)
+        for p in places for s in p.segments
+    ]  # fmt: skip
     stability = [(_name(p), f"{p.stability.sentence}{_per_hour(p)}") for p in places]
     sections = [
         Section("Slip slope C_s/F_z", [Para(head, where="text"), estimated], "slopes-section"),
         Section("Over the session", [
-            Table(_PARTS, [_segment_row(p, i) for p in places for i in range(len(p.segments))], words=(0, 5)),
+            Table(_PARTS, parts, words=(0, 5)),
             Lines(stability, "stability", looks=[p.stability.verdict.replace(" ", "-") for p in places]),
             Para(_used(result), where="everywhere"),
         ]),
@@ -132,22 +137,6 @@ def _below(p: PlaceSlope) -> str:
     return f"v_x is late by {line.delay:+.3f} s{interval}; the slip is corrected for it"
 
 
-def _recursive_row(r: Recursion) -> tuple[str, ...]:
-    return r.place, number(r.slope, 1), number(r.slope_sd, 1), number(r.seconds, 0), str(r.alarms)
-
-
-def _segment_row(p: PlaceSlope, i: int) -> tuple[str, ...]:
-    s = p.segments[i]
-    return (
-        _name(p),
-        f"{s.start_s / 60.0:.1f}",
-        f"{s.end_s / 60.0:.1f}",
-        f"{s.seconds:.1f}",
-        f"{s.line.slope:.1f}" if s.line.told else "–",
-        _interval(s.line.slope_ci) if s.line.told else s.line.reason,
-    )
-
-
 def _per_hour(p: PlaceSlope) -> str:
     if math.isnan(p.stability.per_hour):
         return ""
@@ -194,7 +183,23 @@ def slope_document(result: DirectResult, *, log: str, notes: Sequence[str] = ())
             result, vehicle="vehicle_name", duration_s="duration_s", sample_rate_hz="rate_hz", method="method",
             traction="traction", mu_max="mu_max",
         ),
-        "slip_slope": [_place(p) for p in result.places],
+        "slip_slope": [
+            {
+                **fields_of(p, "place", "wheel"),
+                **_line(p.line),
+                **fields_of(p, used_s="seconds", mu_range="mu_range", lag_s="lag_s"),
+                "recursive": _recursion(p.recursion),
+                "left_out_s": plain(p.left_out),
+                "stability": fields_of(
+                    p.stability, "verdict", "sentence", "span_s", change="change", change_ci95="change_ci",
+                    change_per_hour="per_hour", change_per_hour_ci95="per_hour_ci",
+                ),
+                "segments": [
+                    {**fields_of(s, "start_s", "end_s", used_s="seconds"), **_line(s.line)} for s in p.segments
+                ],
+            }
+            for p in result.places
+        ],
         "recursive": [_recursion(r) for r in result.recursions],
         "notes": [*notes, *result.notes],
     }  # fmt: skip
@@ -216,44 +221,20 @@ def _recursion(r: Recursion) -> dict[str, Any]:
     return fields_of(r, "place", "slope", "slope_sd", changes="alarms", learnt_s="seconds")
 
 
-def _place(p: PlaceSlope) -> dict[str, Any]:
-    return {
-        "place": p.place,
-        "wheel": p.wheel,
-        **_line(p.line),
-        **fields_of(p, used_s="seconds", mu_range="mu_range", lag_s="lag_s"),
-        "recursive": _recursion(p.recursion),
-        "left_out_s": plain(p.left_out),
-        "stability": fields_of(
-            p.stability, "verdict", "sentence", "span_s", change="change", change_ci95="change_ci",
-            change_per_hour="per_hour", change_per_hour_ci95="per_hour_ci",
-        ),
-        "segments": [
-            {**fields_of(s, "start_s", "end_s", used_s="seconds"), **_line(s.line)} for s in p.segments
-        ],
-    }  # fmt: skip
-
-
 def slope_csv(result: DirectResult) -> str:
     """One line per place over the whole drive, and one per part of the session; an empty cell has no estimate."""
     rows = [",".join(_CSV)]
     for p in result.places:
         whole = (float(p.t[0]), float(p.t[-1])) if p.t.size else (math.nan, math.nan)
-        rows.append(_csv_row(p.place, *whole, p.seconds, p.line))
-        rows += [_csv_row(p.place, s.start_s, s.end_s, s.seconds, s.line) for s in p.segments]
+        spans = [(*whole, p.seconds, p.line), *((s.start_s, s.end_s, s.seconds, s.line) for s in p.segments)]
+        for start, end, seconds, line in spans:
+            offset = (line.offset, *line.offset_ci) if line.told else (math.nan,) * 3
+            numbers = (start, end, seconds, float(line.samples), line.slope, *line.slope_ci, *offset)
+            rows.append(",".join([p.place, *map(_cell, numbers), f'"{line.reason}"' if line.reason else ""]))
     for r in result.recursions:
         values = (r.place, "", "", _cell(r.seconds), "", _cell(r.slope), "", "", "", "", "", "recursive estimate")
         rows.append(",".join(values))
     return "\n".join(rows) + "\n"
-
-
-def _csv_row(place: str, start: float, end: float, seconds: float, line: Line) -> str:
-    told = line.told
-    numbers = (
-        start, end, seconds, float(line.samples), line.slope, *line.slope_ci,
-        *((line.offset, *line.offset_ci) if told else (math.nan,) * 3),
-    )  # fmt: skip
-    return ",".join([place, *(_cell(x) for x in numbers), f'"{line.reason}"' if line.reason else ""])
 
 
 def _cell(x: float) -> str:

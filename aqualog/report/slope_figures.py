@@ -8,7 +8,7 @@ import numpy as np
 
 from aqualog.detect.slip_slope.direct_inputs import LEFT_OUT
 from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
-from aqualog.report.axes import axis, layout, rounded, see_through
+from aqualog.report.figures import axis, band, bars, dots, error_bars, figure, line
 from aqualog.report.reduce import reduce_indices
 from aqualog.report.theme import INK, MUTED, wheel_colour
 
@@ -28,158 +28,104 @@ _COLOURS = (
 
 def slope_plots(result: DirectResult) -> dict[str, Any]:
     """The figures by name; those without content are left out."""
-    plots: dict[str, Any] = {f"scatter-{i}": figure for i, figure in enumerate(_scatters(result))}
-    plots |= {
-        "session": _over_session(result),
-        "recursive": _recursive(result),
-        "share": _time_share(result),
-    }
-    return {name: figure for name, figure in plots.items() if figure is not None}
+    plots = {f"scatter-{i}": _scatter(p) for i, p in enumerate(p for p in result.places if p.line.samples)}
+    recursions = [r for r in [p.recursion for p in result.places] or result.recursions if np.isfinite(r.slopes).any()]
+    if any(p.segments for p in result.places):
+        slopes = [s.line.slope for p in result.places for s in p.segments if s.line.told]
+        limits = [0.0, _MOST * float(np.median(slopes)) if slopes else 100.0]
+        parts = [_parts(p) for p in result.places if p.segments]
+        plots["session"] = figure(parts, "slope of parts of the session", axis("time [min]"), axis("slope", limits))
+    if recursions:
+        values = np.concatenate([r.slopes[np.isfinite(r.slopes)] for r in recursions])
+        limits = [0.0, 1.15 * float(np.quantile(values, 0.98))]
+        courses = [_course(r) for r in recursions]
+        plots["recursive"] = figure(courses, "recursive estimate", axis("time [min]"), axis("slope", limits))
+    return {**plots, "share": _time_share(result)} if result.places else plots
 
 
-def _scatters(result: DirectResult) -> list[dict[str, Any]]:
-    """One plotly figure per place."""
-    return [_figure(p) for p in result.places if p.line.samples]
+def _name(p: PlaceSlope | Recursion) -> str:
+    return p.place.upper() if p.wheel else p.place
 
 
-def _figure(p: PlaceSlope) -> dict[str, Any]:
+def _scatter(p: PlaceSlope) -> dict[str, Any]:
+    """Slip over traction: samples, means of classes, and the line with its band."""
     colour = wheel_colour(p.wheel)
     step = max(1, -(-p.mu.size // _MOST_DOTS))
     mu, slip = p.mu[::step], 100.0 * p.slip[::step]
     # the more dots, the lighter each: where they lie on top of each other it gets dark
     opacity = float(np.clip(120.0 / max(mu.size, 1), 0.08, 0.6))
-    data: list[dict[str, Any]] = [
-        {
-            "type": "scatter", "mode": "markers", "name": "samples", "x": rounded(mu), "y": rounded(slip),
-            "marker": {"color": colour, "size": 5, "opacity": opacity}, "hoverinfo": "skip",
-        },
-        _classes(p),
-    ]  # fmt: skip
+    data = [dots("samples", mu, slip, colour, style={"opacity": opacity}), _classes(p)]
+    title = _name(p) if p.wheel and p.line.told else p.place
     if p.line.told:
         data += _line_with_band(p, colour)
+        title += f": slope {p.line.slope:.1f}"
     low, high = np.quantile(p.slip, (0.002, 0.998)) * 100.0
     margin = 0.1 * (high - low) + 0.02
-    title = f"{p.place.upper() if p.wheel else p.place}: slope {p.line.slope:.1f}" if p.line.told else p.place
-    return {
-        "data": data,
-        "layout": layout(title, axis("traction coefficient μ"), axis("slip [%]", [low - margin, high + margin])),
-    }
+    return figure(data, title, axis("traction coefficient μ"), axis("slip [%]", [low - margin, high + margin]))
 
 
 def _line_with_band(p: PlaceSlope, colour: str) -> list[dict[str, Any]]:
-    line = p.line
-    ends = np.array([float(p.mu.min()), float(p.mu.max())])
-    x = np.linspace(ends[0], ends[1], 41)
+    fit = p.line
+    x = np.linspace(float(p.mu.min()), float(p.mu.max()), 41)
     # about the middle of the data the level is known best; there the lines of all slopes in the interval cross
     middle = float(p.mu.mean())
-    level = line.k * middle + line.offset
-    lower, upper = (level + k * (x - middle) for k in line.k_ci)
-    band = np.concatenate([np.maximum(lower, upper), np.minimum(lower, upper)[::-1]])
+    level = fit.k * middle + fit.offset
+    lower, upper = (100.0 * (level + k * (x - middle)) for k in fit.k_ci)
     return [
-        {
-            "type": "scatter", "mode": "lines", "name": "95 % of the slope", "x": rounded(np.concatenate([x, x[::-1]])),
-            "y": rounded(100.0 * band), "fill": "toself", "fillcolor": see_through(colour), "line": {"width": 0},
-            "hoverinfo": "skip",
-        },
-        {
-            "type": "scatter", "mode": "lines", "name": f"slope {line.slope:.1f}", "x": rounded(x),
-            "y": rounded(100.0 * (line.k * x + line.offset)), "line": {"color": INK, "width": 2},
-        },
-    ]  # fmt: skip
+        band("95 % of the slope", x, np.minimum(lower, upper), np.maximum(lower, upper), colour),
+        line(f"slope {fit.slope:.1f}", x, 100.0 * (fit.k * x + fit.offset), INK),
+    ]
 
 
 def _classes(p: PlaceSlope) -> dict[str, Any]:
     edges = np.linspace(float(p.mu.min()), float(p.mu.max()), _CLASSES + 1)
     which = np.clip(np.searchsorted(edges, p.mu, side="right") - 1, 0, _CLASSES - 1)
-    groups = [np.flatnonzero(which == i) for i in range(_CLASSES)]
-    groups = [g for g in groups if g.size >= _LEAST]
-    return {
-        "type": "scatter", "mode": "markers", "name": "means of classes",
-        "x": rounded(np.array([p.mu[g].mean() for g in groups])),
-        "y": rounded(np.array([100.0 * p.slip[g].mean() for g in groups])),
-        "customdata": [int(g.size) for g in groups],
-        "hovertemplate": "μ %{x:.3f}, slip %{y:.3f} %, %{customdata} samples<extra></extra>",
-        "marker": {"color": INK, "size": 8, "symbol": "diamond", "line": {"color": MUTED, "width": 1}},
-    }  # fmt: skip
+    groups = [g for g in (np.flatnonzero(which == i) for i in range(_CLASSES)) if g.size >= _LEAST]
+    return dots(
+        "means of classes", [p.mu[g].mean() for g in groups], [100.0 * p.slip[g].mean() for g in groups], INK, size=8,
+        style={"symbol": "diamond", "line": {"color": MUTED, "width": 1}}, customdata=[int(g.size) for g in groups],
+        hovertemplate="μ %{x:.3f}, slip %{y:.3f} %, %{customdata} samples<extra></extra>",
+    )  # fmt: skip
 
 
-def _over_session(result: DirectResult) -> dict[str, Any] | None:
-    """Slope of each part with its interval, over the middle of the part; None without parts."""
-    data = [t for p in result.places if p.segments for t in _parts(p)]
-    if not data:
-        return None
-    slopes = [s.line.slope for p in result.places for s in p.segments if s.line.told]
-    top = _MOST * float(np.median(slopes)) if slopes else 100.0
-    return {"data": data, "layout": layout("slope of parts of the session", _minutes(), axis("slope", [0.0, top]))}
-
-
-def _parts(p: PlaceSlope) -> list[dict[str, Any]]:
+def _parts(p: PlaceSlope) -> dict[str, Any]:
+    """Slope of each part with its interval, over the middle of the part."""
     told = [s for s in p.segments if s.line.told]
-    middle = np.array([(s.start_s + s.end_s) / 120.0 for s in told])
-    slope = np.array([s.line.slope for s in told])
-    low, high = (np.array([s.line.slope_ci[i] for s in told]) for i in (0, 1))
+    slope, low, high = (
+        np.array(x) for x in ([s.line.slope for s in told], *([s.line.slope_ci[i] for s in told] for i in (0, 1)))
+    )
     words = [[f"{a:.1f} ... {b:.1f}", f"{s.seconds:.0f} s used"] for a, b, s in zip(low, high, told, strict=True)]
-    return [
-        {
-            "type": "scatter", "mode": "lines+markers", "name": p.place.upper() if p.wheel else p.place,
-            "x": rounded(middle), "y": rounded(slope), "line": {"color": wheel_colour(p.wheel), "dash": "dot"},
-            "marker": {"color": wheel_colour(p.wheel), "size": 8},
-            "error_y": {"type": "data", "symmetric": False, "array": rounded(high - slope),
-                        "arrayminus": rounded(slope - low), "color": wheel_colour(p.wheel), "thickness": 1.5},
-            "customdata": words,
-            "hovertemplate": "%{y:.1f} (95 %: %{customdata[0]}), %{customdata[1]}<extra>%{fullData.name}</extra>",
-        }
-    ]  # fmt: skip
-
-
-def _recursive(result: DirectResult) -> dict[str, Any] | None:
-    """The recursive estimate over time; None if it never had a value."""
-    recursions = [p.recursion for p in result.places] or list(result.recursions)
-    data = [_course(r) for r in recursions if np.isfinite(r.slopes).any()]
-    if not data:
-        return None
-    values = np.concatenate([r.slopes[np.isfinite(r.slopes)] for r in recursions])
-    top = 1.15 * float(np.quantile(values, 0.98))
-    return {"data": data, "layout": layout("recursive estimate", _minutes(), axis("slope", [0.0, top]))}
+    colour = wheel_colour(p.wheel)
+    return line(
+        _name(p), [(s.start_s + s.end_s) / 120.0 for s in told], slope, colour, style={"dash": "dot"},
+        mode="lines+markers", marker={"color": colour, "size": 8}, error_y=error_bars(slope, low, high, colour),
+        customdata=words,
+        hovertemplate="%{y:.1f} (95 %: %{customdata[0]}), %{customdata[1]}<extra>%{fullData.name}</extra>",
+    )  # fmt: skip
 
 
 def _course(r: Recursion) -> dict[str, Any]:
+    """The recursive estimate over time."""
     # it holds its value between the stretches that are used: a line through them, not a dot here and there
     keep = np.flatnonzero(np.isfinite(r.slopes))
     keep = keep[reduce_indices(r.slopes[keep], _POINTS)]
-    return {
-        "type": "scatter", "mode": "lines", "name": r.place.upper() if r.wheel else r.place,
-        "x": rounded(r.t[keep] / 60.0), "y": rounded(r.slopes[keep]),
-        "line": {"color": wheel_colour(r.wheel), "width": 1.3, "shape": "hv"},
-    }  # fmt: skip
+    return line(_name(r), r.t[keep] / 60.0, r.slopes[keep], wheel_colour(r.wheel), width=1.3, style={"shape": "hv"})
 
 
-def _minutes() -> dict[str, Any]:
-    return axis("time [min]")
-
-
-def _time_share(result: DirectResult) -> dict[str, Any] | None:
-    """Bars of seconds per place; None without places."""
-    if not result.places:
-        return None
-    names = [p.place.upper() if p.wheel else p.place for p in result.places]
+def _time_share(result: DirectResult) -> dict[str, Any]:
+    """Bars of seconds per place."""
     parts = [("used", _USED, [p.seconds for p in result.places])]
     parts += [
         (reason, colour, [p.left_out[reason] for p in result.places])
         for reason, colour in zip(LEFT_OUT, _COLOURS, strict=True)
-        if any(p.left_out[reason] > 0.0 for p in result.places)
     ]
+    names = [_name(p) for p in result.places]
     data = [
-        {
-            "type": "bar", "orientation": "h", "name": name, "y": names, "x": [round(s, 2) for s in seconds],
-            "marker": {"color": colour},
-            "hovertemplate": "%{x:.0f} s<extra>" + name + "</extra>",
-        }
+        bars(name, names, seconds, colour, hovertemplate="%{x:.0f} s<extra>" + name + "</extra>")
         for name, colour, seconds in parts
-    ]  # fmt: skip
-    figure = layout("time used and left out [s]", axis(""), axis(""), height=150 + 34 * len(names))
-    figure["barmode"] = "stack"
-    figure["legend"]["y"] = -0.3
-    figure["legend"]["traceorder"] = "normal"
-    figure["yaxis"]["autorange"] = "reversed"
-    return {"data": data, "layout": figure}
+        if name == "used" or any(seconds)
+    ]
+    return figure(
+        data, "time used and left out [s]", axis(), axis(autorange="reversed"), height=150 + 34 * len(names),
+        barmode="stack", legend={"y": -0.3, "traceorder": "normal"},
+    )  # fmt: skip

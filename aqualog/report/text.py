@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aqualog.report.numbers import ordinary
 from aqualog.report.sections import Bars, Beside, Cell, Headline, Line, Lines, Para, Part, Report, Section, Table, shown
-from aqualog.report.wording import CELL, cut
+from aqualog.report.values import CELL, cut, ordinary
 
 __all__ = ["report_text", "table"]
 
 _MORE = "more: --json or --page"
+_BRIEF = 100  # characters of phrases
 
 
 def report_text(report: Report) -> str:
@@ -31,14 +31,16 @@ def _part(part: Part) -> list[str]:
         case Para(text):
             return text.splitlines()
         case Lines(lines, most_text=most):
-            return _listed([_line(x) for x in lines], most)
+            return _listed(lines, most)
         case Bars(bars, most_text=most):
             return _listed([f"{b.name} from {b.size}" for b in bars if b.width], most)
         case Beside(sections):
             return [line for s in sections for line in ("", *_section(s))]
-        case Table(header, rows, below=below):
-            heads = [h if isinstance(h, str) else h[1] for h in header]
-            text = table([_small(h) for h in heads], [[_cell(c) for c in row] for row in rows])
+        case Table(header, rows, below=below, wide=wide, more=more):
+            heads = [(i, h if isinstance(h, str) else h[1]) for i, h in enumerate(header)]
+            kept = [(i, _small(h)) for i, h in heads if h or isinstance(header[i], str)]
+            cells = [[_brief(_cell(row[i])) if i in wide else _cell(row[i]) for i, _ in kept] for row in (*rows, *more)]
+            text = table([h for _, h in kept], cells)
             return [*text.splitlines(), *(f"  {_cell(rows[i][0])}: {line}" for i, line in below.items() if line)]
     return []
 
@@ -48,16 +50,23 @@ def _small(title: str) -> str:
     return title if title[1:2].isupper() else title[:1].lower() + title[1:]
 
 
-def _listed(lines: Sequence[str], most: int) -> list[str]:
-    return [f"  {x}" for x in (lines if len(lines) <= most else [*lines[:most], _MORE])]
-
-
-def _line(line: Line) -> str:
-    return line if isinstance(line, str) else f"{line[0]}: {line[1]}"
+def _listed(lines: Sequence[Line], most: int) -> list[str]:
+    told = [line if isinstance(line, str) else f"{line[0]}: {line[1]}" for line in lines]
+    return ["  " + x.replace("\n", "\n    ") for x in (told if len(told) <= most else [*told[:most], _MORE])]
 
 
 def _cell(cell: str | Cell) -> str:
     return cell if isinstance(cell, str) else cell.text
+
+
+def _brief(text: str) -> str:
+    """The first phrases, as many as a line of a terminal has room for."""
+    first, *more = text.split("; ")
+    for phrase in more:
+        if len(first) + len(phrase) > _BRIEF:
+            return f"{first}; …"
+        first = f"{first}; {phrase}"
+    return first
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], most: int = CELL) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.core.units import displayed_text
 from aqualog.report.theme import GRID, INK, MUTED
-from aqualog.report.wording import plot_text
+from aqualog.report.values import plot_text
 from aqualog.thesis.record import Axis, Line, Note, Panel, Sheet
 
 __all__ = ["panel_figure", "rounded"]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from aqualog.report import offline
+from aqualog.report.page import render
 from aqualog.thesis.claims import KINDS, VERDICTS, Check, Conclusion
 from aqualog.thesis.draw import panel_figure
 from aqualog.thesis.export import counts_of
@@ -29,7 +29,7 @@ def render_figures(figures: Sequence[Figure], *, title: str) -> str:
     """The page as HTML; the same text for the same figures. More than one get a table of all claims first."""
     of = Counter(c.verdict for f in figures for c in f.checks)
     counts = ", ".join(f"{of[v]} {v}" for v in VERDICTS if of[v])
-    return offline.render(
+    return render(
         "figures.html.j2", folders=(_TEMPLATES,), css=("figures.css",), title=title, kind="",
         about="the thesis' figures, made again", facts=(), counts=counts, **_drawn(figures),
     )  # fmt: skip
@@ -49,7 +49,7 @@ def render_reproduction(
     facts : sequence of str
         Sentences on how it was made.
     """
-    return offline.render(
+    return render(
         "reproduction.html.j2", folders=(_TEMPLATES,), css=("figures.css", "reproduction.css"),
         scripts=("figures.js", "reproduction.js"),
         title=f"{len(figures)} figures and {len(conclusions)} claims of the thesis", kind="the thesis reproduced",

@@ -39,7 +39,7 @@ def lines_of(result: DriveResult) -> dict[str, np.ndarray]:
 
 def with_aqualog(result: DriveResult) -> str:
     """The page of `detect -o`."""
-    from aqualog.report.drive.page import drive_page
+    from aqualog.report.drive.report import drive_page
 
     return drive_page(result, title="drive")
 

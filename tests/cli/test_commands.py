@@ -19,7 +19,7 @@ MF4 = str(SAMPLES / "lane_drive.mf4")
 def test_table_of_events():
     result = run("detect", MF4, "--vehicle", CAR)
     assert result.exit_code == 0, result.stderr
-    assert "minor_spin_down" in result.stdout
+    assert "Minor spin-down" in result.stdout
     assert "not judged" in result.stdout
 
 

@@ -207,8 +207,7 @@ def main() -> None:
     from aqualog.evaluate.sweep import applied, choose, curve_points
     from aqualog.model.situations import SITUATIONS
     from aqualog.report.evaluation import evaluation_document, evaluation_report
-    from aqualog.report.offline import write_page
-    from aqualog.report.page import report_page
+    from aqualog.report.page import report_page, write_page
     from aqualog.report.text import report_text
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

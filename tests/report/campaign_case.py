@@ -24,7 +24,7 @@ drive = partial(pass_of, duration=5.0, lane=LANE)
 write = partial(write_simulation, suffix=".parquet", comment="made")
 
 
-def make_case(folder, *, hostile=True):
+def make_case(folder):
     """Campaign file of 2 depths x 2 speeds x 3 repeats, a dry run, a log that is none."""
     (folder / "logs").mkdir(parents=True)
     (folder / "car.toml").write_text(vehicle_toml(SEDAN))
@@ -39,11 +39,10 @@ def make_case(folder, *, hostile=True):
     rows.append(("logs/dry.parquet", "worn_summer", 0, 1.9, 1.9, "", "", "dry", FORMULA))
     (folder / "logs" / "bad.mf4").write_bytes(b"no log at all")
     rows.append(("logs/bad.mf4", "worn_summer", 1.3, 1.9, 1.9, *LANE, "constant", "n0"))
-    if hostile:
-        evil = "a<b>/script><img src=x onerror=alert(3)>' .parquet"
-        (folder / evil).parent.mkdir()
-        write(folder / evil, simulate(drive(80, 9)))
-        rows.append((evil, SCRIPT, 1.3, 1.9, 1.9, *LANE, IMAGE, LONG))
+    evil = "a<b>/script><img src=x onerror=alert(3)>' .parquet"
+    (folder / evil).parent.mkdir()
+    write(folder / evil, simulate(drive(80, 9)))
+    rows.append((evil, SCRIPT, 1.3, 1.9, 1.9, *LANE, IMAGE, LONG))
     with (folder / "runs.csv").open("w", newline="") as file:
         csv.writer(file).writerows([HEADING, *rows])
     (folder / "campaign.toml").write_text('name = "case <b>&amp;"\nvehicle = "car.toml"\nruns = "runs.csv"\n')

@@ -8,7 +8,6 @@ import polars as pl
 from aqualog.core.notation import WHEELS, side_of
 from aqualog.core.records import DriveResult, Event, Origin, Quality, Signals, TimeFaults, Track, Unavailable
 
-HOSTILE = ("</script><script>alert(1)</script>", "<img src=x onerror=alert(1)>", "[bold]")
 SPIKE = 0.371  # [m/s] an outlier of one sample
 
 
@@ -109,19 +108,3 @@ def _events(tracks, t, features):
                 track.detector, track.wheel, track.side, float(a * dt), float(b * dt), severity, peak, track.threshold,
                 evidence,
             )  # fmt: skip
-
-
-def hostile_result():
-    """Names that try to leave the page's markup, in every place that a log or a configuration can name."""
-    result = make_result()
-    script, image, bold = HOSTILE
-    origins = {s: replace(o, channel=script, file=image, unit=bold) for s, o in result.signals.origins.items()}
-    quality = replace(result.signals.quality, notes=(script, image, bold))
-    signals = replace(result.signals, origins=origins, files=(script, image), quality=quality)
-    tracks = tuple(replace(t, detector=image, unit=script) if t.detector == "resistance" else t for t in result.tracks)
-    events = tuple(replace(e, evidence={**e.evidence, script: image}, detector=image) for e in result.events)
-    missing = (Unavailable(image, (script, bold)),)
-    return replace(
-        result, signals=signals, tracks=tracks, events=events, unavailable=missing, limited=missing,
-        vehicle_name=script, notes=(image,),
-    )  # fmt: skip

@@ -21,7 +21,7 @@ from aqualog.report.campaign.folder import page_names
 from aqualog.report.campaign.page import campaign_page
 from aqualog.report.campaign.run_page import run_page
 from aqualog.report.diagnosis.sections import diagnosis_report
-from aqualog.report.drive.page import drive_page
+from aqualog.report.drive.report import drive_page
 from aqualog.report.evaluation import evaluation_report
 from aqualog.report.page import report_page
 from aqualog.report.slope import slope_report
@@ -30,8 +30,8 @@ from aqualog.thesis.page import render_figures, render_reproduction
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 from aqualog.thesis.run import Made, conclude
 from tests.report import fake_result as fake
+from tests.report.diagnosis.test_document import document_of
 from tests.report.diagnosis_case import views_of
-from tests.report.test_diagnosis_document import document_of
 
 NAMES = {
     "script": "</script><script>alert(1)</script>",

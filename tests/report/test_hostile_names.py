@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from aqualog.report.offline import plotly_js
+from aqualog.report.page import plotly_js
 from tests.headless import requests, severe, wait_for
 from tests.report.hostile_names import NAMES, PAGES
 
@@ -59,6 +59,8 @@ def test_a_name_is_text(page, tmp_path):
         # nothing that a name has brought in: no element, no attribute
         assert tags(elements) <= known, kind
         assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", text), kind
+        addresses = [v for _, a in elements.found for k, v in a.items() if k in ("src", "href", "action", "srcset")]
+        assert not [v for v in addresses if "//" in v], kind
         islands = [s for a, s in elements.scripts if a.get("type") == "application/json"]
         assert islands, kind
         assert not set("<>&") & set("".join(islands)), kind

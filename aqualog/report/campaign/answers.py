@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from aqualog.campaign.bins import Group
@@ -12,8 +11,8 @@ from aqualog.campaign.full_speed import FullSpeed
 from aqualog.campaign.samples import CampaignData
 from aqualog.report.campaign.findings import Curve, Findings, crossing
 from aqualog.report.campaign.labels import group_text
-from aqualog.report.campaign.runs import RunFacts
-from aqualog.report.wording import number, place
+from aqualog.report.campaign.run_page import RunFacts
+from aqualog.report.values import KMH, counted, number, place
 
 __all__ = ["RESISTANCE_LEVEL", "WAYS", "Answer", "Number", "answers_of", "headline", "off_water", "summaries"]
 
@@ -21,7 +20,6 @@ RESISTANCE_LEVEL = 0.2  # [m/s^2] resistance from which a driver feels it, after
 HALF = 0.5  # of the dry slip slope
 WAYS = ("slip_slope", "minor_spin_down", "spin_down")
 _WAY_NAMES = ("slip slope", "minor spin-downs", "spin-downs")
-_KMH = 3.6
 
 
 class Number(NamedTuple):
@@ -37,8 +35,7 @@ class Number(NamedTuple):
 NOTHING = Number(math.nan, math.nan, math.nan, "", "no values")
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """Speeds of one configuration: full aquaplaning by each method, resistance above its level, half of the dry slip
     slope lost. Where several wheels have a value, the lowest speed counts.
     """
@@ -49,37 +46,24 @@ class Answer:
     half: Number
 
 
-class _Own(NamedTuple):
-    """The speeds of one configuration."""
-
-    slopes: list[Curve]
-    resistance: list[Curve]
-    full: list[FullSpeed]
-
-
 def answers_of(findings: Findings) -> tuple[Answer, ...]:
     """The speeds of all configurations that have values on water."""
-    of: dict[Group, _Own] = {}
-    for curve in findings.slopes:
-        of.setdefault(curve.group, _Own([], [], [])).slopes.append(curve)
-    for curve in findings.resistance:
-        of.setdefault(curve.group, _Own([], [], [])).resistance.append(curve)
-    for speed in findings.full:
-        of.setdefault(speed.group, _Own([], [], [])).full.append(speed)
-    return tuple(
-        Answer(
-            group,
-            tuple(_full([f for f in of[group].full if f.way == way]) for way in WAYS),
-            _lowest([_crossed(c, RESISTANCE_LEVEL, rising=True) for c in of[group].resistance]),
-            _lowest([_crossed(c, HALF * c.dry, rising=False) for c in of[group].slopes if c.told]),
-        )
-        for group in findings.groups
-        if group in of
-    )
+    made = []
+    for group in findings.groups:
+        slopes, resistance = ([c for c in x if c.group == group] for x in (findings.slopes, findings.resistance))
+        full = [f for f in findings.full if f.group == group]
+        if slopes or resistance or full:
+            made.append(Answer(
+                group,
+                tuple(_lowest([_full(f) for f in full if f.way == way]) for way in WAYS),
+                _lowest([_crossed(c, RESISTANCE_LEVEL, rising=True) for c in resistance]),
+                _lowest([_crossed(c, HALF * c.dry, rising=False) for c in slopes if c.told]),
+            ))  # fmt: skip
+    return tuple(made)
 
 
-def _full(found: Sequence[FullSpeed]) -> Number:
-    return _lowest([Number(_KMH * f.v, _KMH * f.ci[0], _KMH * f.ci[1], f.place, f.reason or f.rests_on) for f in found])
+def _full(f: FullSpeed) -> Number:
+    return Number(KMH * f.v, KMH * f.ci[0], KMH * f.ci[1], f.place, f.reason or f.rests_on)
 
 
 def _crossed(curve: Curve, level: float, *, rising: bool) -> Number:
@@ -105,8 +89,8 @@ def headline(data: CampaignData, findings: Findings) -> str:
     logs = len({r.run.logs for r in data.runs})
     failed = sum(not r.is_done for r in data.runs)
     bad = f"{failed} without results" if failed else "all with results"
-    groups = _count(len(findings.groups), "configuration")
-    return f"{_count(len(data.runs), 'run')} of {_count(logs, 'log')}, {bad}, {groups}"
+    groups = counted(len(findings.groups), "configuration")
+    return f"{counted(len(data.runs), 'run')} of {counted(logs, 'log')}, {bad}, {groups}"
 
 
 class Summary(NamedTuple):
@@ -125,15 +109,14 @@ def summaries(answers: Sequence[Answer]) -> list[Summary]:
         (f"Resistance reaches {RESISTANCE_LEVEL:g} m/s²", [(a, a.resistance) for a in answers]),
         ("Half of the dry slip slope lost", [(a, a.half) for a in answers]),
     ]  # fmt: skip
-    return [_summary(what, found) for what, found in kinds if found]
-
-
-def _summary(what: str, found: Sequence[tuple[Answer, Number]]) -> Summary:
-    told = sorted((n.v, i) for i, (_, n) in enumerate(found) if math.isfinite(n.v))
-    nothing = ("–", "", "")
-    lowest = _one(*found[told[0][1]]) if told else nothing
-    highest = _one(*found[told[-1][1]]) if len(told) > 1 else nothing
-    return Summary(what, lowest, highest, f"{len(told)} of {len(found)}")
+    made = []
+    for what, found in kinds:
+        told = sorted((n.v, i) for i, (_, n) in enumerate(found) if math.isfinite(n.v))
+        nothing = ("–", "", "")
+        lowest = _one(*found[told[0][1]]) if told else nothing
+        highest = _one(*found[told[-1][1]]) if len(told) > 1 else nothing
+        made += [Summary(what, lowest, highest, f"{len(told)} of {len(found)}")] if found else []
+    return made
 
 
 def _one(answer: Answer, n: Number) -> tuple[str, str, str]:
@@ -154,8 +137,4 @@ def off_water(facts: Sequence[RunFacts | None]) -> str:
     known = [f for f in facts if f is not None and math.isfinite(f.dry_km)]
     way = sum(f.dry_km for f in known)
     count = sum(e.off for f in known for e in f.events)
-    return f"{_count(count, 'event')} off the water in {number(way, 1)} km" if way > 0.0 else ""
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"
+    return f"{counted(count, 'event')} off the water in {number(way, 1)} km" if way > 0.0 else ""

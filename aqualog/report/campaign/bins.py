@@ -1,4 +1,4 @@
-"""Regressions over a campaign for a reader: JSON documents of the contract, flat tables, and text."""
+"""Regressions over a campaign for a reader: JSON documents of the contract, flat tables, and sections."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from aqualog.campaign.resistance import MeanRow, ResistanceTable
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable
 from aqualog.campaign.spin_downs import SpinDownRow
 from aqualog.core.notation import SIDES
-from aqualog.report.plain import fields_of, plain
-from aqualog.report.text import table
+from aqualog.report.sections import Lines, Para, Report, Section, Table
+from aqualog.report.values import KMH, ends, fields_of, plain
 
-__all__ = ["flat_rows", "resistance_document", "resistance_text", "slope_document", "slope_text"]
+__all__ = ["flat_rows", "resistance_document", "resistance_report", "slope_document", "slope_report"]
 
 _DEFINITIONS = {
     "slope": "slope of the regression line of F_x / F_z over slip within mu_range (5 to 95 % of the traction driven). "
@@ -39,6 +39,19 @@ _WAYS = {
     "minor_spin_down": "minor spin-downs",
     "spin_down": "full spin-downs",
 }
+_LEGEND = (
+    "Slope: regression line of F_x/F_z over slip within mu (5 to 95 % of the traction driven).\n"
+    "C_s/F_z, the tangent at zero slip, is larger. Model slope: the model's line over the same mu.\n"
+    "Contact: share of the contact length with which a brush model has this slope.\n"
+    "Lost: bias of 1/slope from traction noise; it is corrected"
+)
+_SLOPE_HEADS = (
+    "wheel", "road", "km/h", "runs", "samples", "mu", "slope", "95 %", "/ dry", "contact", "95 %", "model slope",
+    "contact", "lost %",
+)  # fmt: skip
+_DOWN_HEADS = (
+    "wheel", "km/h", "passes", "events", "per s", "95 %", "per 100 m", "passes with", "full", "deepest slip %",
+)  # fmt: skip
 _UNKNOWN = "on or off the water is not known"
 
 
@@ -51,7 +64,7 @@ def slope_document(
 ) -> dict[str, Any]:
     """Slopes, dry references, delays of v_x, speeds of full aquaplaning, spin-ups, minor spin-downs."""
     return {
-        **_head(name, slopes.plan.keys, slopes.plan.width_kmh, slopes.left_out, robust=slopes.robust),
+        **_head(name, slopes.plan, slopes.left_out, robust=slopes.robust),
         "definitions": dict(_DEFINITIONS),
         "rows": [_slope_row(r) for r in slopes.rows],
         "dry": [_slope_row(r) for r in slopes.dry],
@@ -59,30 +72,43 @@ def slope_document(
             {"vehicle": d.vehicle, "delay_s": _number(d.value), "delay_s_ci95": _pair(d.ci), "runs": d.runs,
              "samples": d.samples, "reason": d.reason or None} for d in slopes.delays
         ],
-        "full_aquaplaning": [_speed(f) for f in speeds],
-        "spin_ups": [_spin_up(u, left) for u, left in spin_ups],
-        "minor_spin_downs": [_spin_down(r) for r in downs],
+        "full_aquaplaning": [
+            {**_place(f.group, f.place), "way": f.way, "event": f.event, "defines": f.defines,
+             "v_full_kmh": _number(KMH * f.v), "v_full_ci95_kmh": _pair((KMH * f.ci[0], KMH * f.ci[1])),
+             "exponent": _number(f.exponent), "rests_on": f.rests_on or None, "reason": f.reason or None}
+            for f in speeds
+        ],
+        "spin_ups": [
+            {**_place(u.group, u.place), **_bin(u), "mu": _number(u.value), "mu_ci95": _pair(u.ci),
+             "mu_residual": _number(left.value), "mu_residual_ci95": _pair(left.ci), "reliable": u.reliable,
+             "reason": u.reason or None} for u, left in spin_ups
+        ],
+        "minor_spin_downs": [
+            {**_place(r.group, r.wheel), "v_low_kmh": r.low_kmh, "v_high_kmh": r.high_kmh, "passes": r.passes,
+             "seconds": _number(r.seconds), "events": r.events, "per_s": _number(r.per_s),
+             "per_s_ci95": _pair(r.per_s_ci), "per_100_m": _number(r.per_100_m), "share": _number(r.share),
+             "share_ci95": _pair(r.share_ci), "passes_with_full_spin_down": r.full,
+             "deepest_slip_median": _number(r.deepest)} for r in downs
+        ],
     }  # fmt: skip
 
 
 def resistance_document(name: str, found: ResistanceTable) -> dict[str, Any]:
     """Mean resistance measures."""
     return {
-        **_head(name, found.plan.keys, found.plan.width_kmh, found.left_out, robust=found.robust),
+        **_head(name, found.plan, found.left_out, robust=found.robust),
         "less_own_dry_level": found.is_relative,
         "rows": [
-            {**_place(r.group, ""), **_bin(r.road, r.low_kmh, r.high_kmh, r.runs, r.samples, r.v_mean),
-             "delta_a_x": _number(r.value), "delta_a_x_ci95": _pair(r.ci), "scatter": _number(r.scatter),
-             "dof": _number(r.dof), "reliable": r.reliable, "reason": r.reason or None} for r in found.rows
+            {**_place(r.group, ""), **_bin(r), "delta_a_x": _number(r.value), "delta_a_x_ci95": _pair(r.ci),
+             "scatter": _number(r.scatter), "dof": _number(r.dof), "reliable": r.reliable, "reason": r.reason or None}
+            for r in found.rows
         ],
     }  # fmt: skip
 
 
 def flat_rows(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of a document for a table: a pair `x_ci95` becomes `x_low` and `x_high`, other pairs likewise."""
-    return [
-        {name: value for key, x in row.items() for name, value in _flat(key, x)} for row in rows
-    ]  # fmt: skip
+    return [{name: value for key, x in row.items() for name, value in _flat(key, x)} for row in rows]
 
 
 def _flat(key: str, x: Any) -> list[tuple[str, Any]]:
@@ -93,16 +119,16 @@ def _flat(key: str, x: Any) -> list[tuple[str, Any]]:
     return [(f"{stem}_low", low), (f"{stem}_high", high)]
 
 
-def _head(name: str, keys: Sequence[str], width: float, left_out: Mapping[str, int], *, robust: bool) -> dict[str, Any]:
+def _head(name: str, plan: Plan, left_out: Mapping[str, int], *, robust: bool) -> dict[str, Any]:
     return {
-        "schema_version": 1, "tool_version": __version__, "campaign": name, "by": list(keys),
-        "bin_width_kmh": width, "robust": robust, "left_out_samples": dict(left_out),
+        "schema_version": 1, "tool_version": __version__, "campaign": name, "by": list(plan.keys),
+        "bin_width_kmh": plan.width_kmh, "robust": robust, "left_out_samples": dict(left_out),
     }  # fmt: skip
 
 
 def _slope_row(r: SlopeRow) -> dict[str, Any]:
     return {
-        **_place(r.group, r.wheel), **_bin(r.road, r.low_kmh, r.high_kmh, r.runs, r.samples, r.v_mean),
+        **_place(r.group, r.wheel), **_bin(r),
         "slope": _number(r.slope), "slope_ci95": _pair(r.slope_ci), "intercept": _number(r.intercept),
         "intercept_ci95": _pair(r.intercept_ci), "r2": _number(r.r2), "mu_range": _pair(r.mu_range),
         **fields_of(r, "attenuation", "scatter", "dof", "reliable", digits=6), "reason": r.reason or None,
@@ -115,42 +141,15 @@ def _slope_row(r: SlopeRow) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _speed(f: FullSpeed) -> dict[str, Any]:
-    low, high = f.ci
-    return {
-        **_place(f.group, f.place), "way": f.way, "event": f.event, "defines": f.defines,
-        "v_full_kmh": _number(3.6 * f.v), "v_full_ci95_kmh": _pair((3.6 * low, 3.6 * high)),
-        "exponent": _number(f.exponent),
-        "rests_on": f.rests_on or None, "reason": f.reason or None,
-    }  # fmt: skip
-
-
-def _spin_up(u: MeanRow, left: MeanRow) -> dict[str, Any]:
-    return {
-        **_place(u.group, u.place), **_bin(u.road, u.low_kmh, u.high_kmh, u.runs, u.samples, u.v_mean),
-        "mu": _number(u.value), "mu_ci95": _pair(u.ci), "mu_residual": _number(left.value),
-        "mu_residual_ci95": _pair(left.ci), "reliable": u.reliable, "reason": u.reason or None,
-    }  # fmt: skip
-
-
-def _spin_down(r: SpinDownRow) -> dict[str, Any]:
-    return {
-        **_place(r.group, r.wheel), "v_low_kmh": r.low_kmh, "v_high_kmh": r.high_kmh, "passes": r.passes,
-        "seconds": _number(r.seconds), "events": r.events, "per_s": _number(r.per_s), "per_s_ci95": _pair(r.per_s_ci),
-        "per_100_m": _number(r.per_100_m), "share": _number(r.share), "share_ci95": _pair(r.share_ci),
-        "passes_with_full_spin_down": r.full, "deepest_slip_median": _number(r.deepest),
-    }  # fmt: skip
-
-
 def _place(group: Group, place: str) -> dict[str, Any]:
     head: dict[str, Any] = {k: v if isinstance(v, str) or v is None else _number(v) for k, v in group}
     return head | ({"side" if place in SIDES else "wheel": place} if place else {})
 
 
-def _bin(road: str, low: float, high: float, runs: int, samples: int, v_mean: float) -> dict[str, Any]:
+def _bin(r: SlopeRow | MeanRow) -> dict[str, Any]:
     return {
-        "road": road, "v_low_kmh": _number(low), "v_high_kmh": _number(high), "v_mean_kmh": _number(3.6 * v_mean),
-        "runs": runs, "samples": samples,
+        "road": r.road, "v_low_kmh": _number(r.low_kmh), "v_high_kmh": _number(r.high_kmh),
+        "v_mean_kmh": _number(KMH * r.v_mean), "runs": r.runs, "samples": r.samples,
     }  # fmt: skip
 
 
@@ -166,65 +165,83 @@ def _pair(ci: Interval) -> list[float | None] | None:
     return None if ends == [None, None] else ends
 
 
-# --- text ------------------------------------------------------------------------------------------------------------
+# --- sections --------------------------------------------------------------------------------------------------------
 
 
-def slope_text(
+def slope_report(
     slopes: SlopeTable,
     speeds: Sequence[FullSpeed],
     spin_ups: Sequence[tuple[MeanRow, MeanRow]],
     downs: Sequence[SpinDownRow],
-) -> str:
-    """Tables for a terminal."""
-    keys = _titles(slopes.plan.keys)
-    header = (
-        *keys, "wheel", "road", "km/h", "runs", "samples", "mu", "slope", "95 %", "/ dry", "contact", "95 %",
-        "model slope", "contact", "lost %",
-    )  # fmt: skip
-    blocks = [
-        "Slope: regression line of F_x/F_z over slip within mu (5 to 95 % of the traction driven).\n"
-        "C_s/F_z, the tangent at zero slip, is larger. Model slope: the model's line over the same mu.\n"
-        "Contact: share of the contact length with which a brush model has this slope.\n"
-        "Lost: bias of 1/slope from traction noise; it is corrected",
-        table(header, [_slope_cells(r, slopes.plan.keys) for r in slopes.rows])
-        if slopes.rows
-        else _nothing(slopes.plan, slopes.left_out),
+) -> Report:
+    """Tables of slopes, dry references, speeds of full aquaplaning, spin-ups and minor spin-downs."""
+    keys = slopes.plan.keys
+    dry_keys = tuple(k for k, _ in slopes.dry[0].group) if slopes.dry else ()
+    some = [r for r in downs if r.events or r.full]
+    sections = [
+        Section("", [Para(_LEGEND, "everywhere")]),
+        Section("", [
+            _table((*_titles(keys), *_SLOPE_HEADS), [_slope_cells(r, keys) for r in slopes.rows]),
+            Para("" if slopes.rows else _nothing(slopes.plan, slopes.left_out), "everywhere"),
+        ]),
         _reasons([(_where(r.group, r.wheel, r.road, r.low_kmh, r.high_kmh), r.reason) for r in slopes.rows]),
-        *_dry_block(slopes),
-        "\n".join(_delay_line(d.vehicle, d.value, d.ci, d.reason) for d in slopes.delays),
-    ]
-    if speeds:
-        rows = [_speed_cells(f) for f in speeds]
-        header = (*keys, "wheel", "from", "event", "km/h", "95 %", "based on")
-        blocks += ["Speed of full aquaplaning, estimated from three kinds of events", table(header, rows)]
-    if spin_ups:
-        header = (*keys, "wheel", "km/h", "runs", "samples", "mu", "95 %", "without resistance")
-        rows = [_spin_up_cells(u, left) for u, left in spin_ups]
-        blocks += ["Traction coefficient while driven wheels spin up", table(header, rows)]
-    if any(r.events or r.full for r in downs):
-        header = (
-            *keys, "wheel", "km/h", "passes", "events", "per s", "95 %", "per 100 m", "passes with", "full",
-            "deepest slip %",
-        )  # fmt: skip
-        rows = [_spin_down_cells(r) for r in downs if r.events or r.full]
-        blocks += ["Minor spin-downs of the free wheels, bins that have any", table(header, rows)]
-    blocks.append(_left_out(slopes.left_out))
-    return "\n\n".join(b for b in blocks if b) + "\n"
+        Section("", [
+            _table((*_titles(dry_keys), "wheel", "mu", "dry slope, all speeds", "95 %", "runs", "model slope"), [
+                (*_values(r.group), r.wheel, ends(r.mu_range, 2), _shown(r.slope), ends(r.slope_ci), str(r.runs),
+                 _shown(r.expected.slope)) for r in slopes.dry
+            ]),
+            Para("" if slopes.dry else "no dry driving in these configurations: no contact ratio", "everywhere"),
+        ]),
+        Section("", [Para("\n".join(
+            f"{d.vehicle}: the delay of v_x is not available: {d.reason}" if d.reason else
+            f"{d.vehicle}: v_x is late by {d.value:.3f} s ({ends(d.ci, 3)}), the slip is corrected for it"
+            for d in slopes.delays
+        ), "everywhere")]),
+        Section("Speed of full aquaplaning, estimated from three kinds of events", [
+            _table((*_titles(keys), "wheel", "from", "event", "km/h", "95 %", "based on"), [
+                (*_values(f.group), f.place, _WAYS[f.way], f.event, _shown(KMH * f.v, 0),
+                 ends((KMH * f.ci[0], KMH * f.ci[1]), 0), f.reason or f.rests_on) for f in speeds
+            ]),
+        ]),
+        Section("Traction coefficient while driven wheels spin up", [
+            _table((*_titles(keys), "wheel", "km/h", "runs", "samples", "mu", "95 %", "without resistance"), [
+                (*_values(u.group), u.place, _kmh(u.low_kmh, u.high_kmh), str(u.runs), str(u.samples),
+                 _shown(u.value, 3), ends(u.ci, 3), _shown(left.value, 3)) for u, left in spin_ups
+            ]),
+        ]),
+        Section("Minor spin-downs of the free wheels, bins that have any", [
+            _table((*_titles(keys), *_DOWN_HEADS), [
+                (*_values(r.group), r.wheel, _kmh(r.low_kmh, r.high_kmh), str(r.passes), str(r.events),
+                 f"{r.per_s:.2f}", ends(r.per_s_ci, 2), f"{r.per_100_m:.2f}", f"{r.share:.0%}", str(r.full),
+                 f"{100 * r.deepest:.1f}") for r in some
+            ]),
+        ]),
+        _left_out(slopes.left_out),
+    ]  # fmt: skip
+    return Report("slip slope", "slip slope over speed", sections)
 
 
-def resistance_text(found: ResistanceTable) -> str:
-    """Tables for a terminal."""
+def resistance_report(found: ResistanceTable) -> Report:
+    """Table of the mean resistance measures."""
     less = ", less each run's own level on dry road before the lane" if found.is_relative else ""
-    header = (*_titles(found.plan.keys), "road", "km/h", "runs", "samples", "m/s²", "95 %", "run to run")
-    rows = [(*_values(r.group, found.plan.keys), r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
-             _shown(r.value, 3), _ends(r.ci, 3), _shown(r.scatter, 3)) for r in found.rows]  # fmt: skip
-    blocks = [
-        f"Resistance measure (2.9){less}",
-        table(header, rows) if rows else _nothing(found.plan, found.left_out),
+    keys = found.plan.keys
+    sections = [
+        Section("", [Para(f"Resistance measure (2.9){less}", "everywhere")]),
+        Section("", [
+            _table((*_titles(keys), "road", "km/h", "runs", "samples", "m/s²", "95 %", "run to run"), [
+                (*_values(r.group, keys), r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
+                 _shown(r.value, 3), ends(r.ci, 3), _shown(r.scatter, 3)) for r in found.rows
+            ]),
+            Para("" if found.rows else _nothing(found.plan, found.left_out), "everywhere"),
+        ]),
         _reasons([(_where(r.group, "", r.road, r.low_kmh, r.high_kmh), r.reason) for r in found.rows]),
         _left_out(found.left_out),
-    ]
-    return "\n\n".join(b for b in blocks if b) + "\n"
+    ]  # fmt: skip
+    return Report("resistance", "resistance over speed", sections)
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    return Table(header, rows, words=range(len(header)))
 
 
 def _nothing(plan: Plan, left_out: Mapping[str, int]) -> str:
@@ -238,41 +255,13 @@ def _nothing(plan: Plan, left_out: Mapping[str, int]) -> str:
     return f"no samples on {' or '.join(plan.roads)} road" + (f"\ntry: --road {other[0]}" if other else "")
 
 
-def _dry_block(slopes: SlopeTable) -> list[str]:
-    if not slopes.dry:
-        return ["no dry driving in these configurations: no contact ratio"]
-    keys = tuple(k for k, _ in slopes.dry[0].group)
-    rows = [(*_values(r.group), r.wheel, _ends(r.mu_range, 2), _shown(r.slope), _ends(r.slope_ci), str(r.runs),
-             _shown(r.expected.slope)) for r in slopes.dry]  # fmt: skip
-    return [table((*_titles(keys), "wheel", "mu", "dry slope, all speeds", "95 %", "runs", "model slope"), rows)]
-
-
 def _slope_cells(r: SlopeRow, keys: Sequence[str]) -> tuple[str, ...]:
     ratio = r.slope / r.slope_dry if r.told else math.nan
     return (
         *_values(r.group, keys), r.wheel, r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
-        _ends(r.mu_range, 2), _shown(r.slope), _ends(r.slope_ci), _shown(ratio, 2), _shown(r.contact_ratio, 2),
-        _ends(r.contact_ratio_ci, 2), _shown(r.expected.slope), _shown(r.expected.contact, 2),
+        ends(r.mu_range, 2), _shown(r.slope), ends(r.slope_ci), _shown(ratio, 2), _shown(r.contact_ratio, 2),
+        ends(r.contact_ratio_ci, 2), _shown(r.expected.slope), _shown(r.expected.contact, 2),
         _shown(100 * r.attenuation),
-    )  # fmt: skip
-
-
-def _speed_cells(f: FullSpeed) -> tuple[str, ...]:
-    ends = _ends((3.6 * f.ci[0], 3.6 * f.ci[1]), 0)
-    return (*_values(f.group), f.place, _WAYS[f.way], f.event, _shown(3.6 * f.v, 0), ends, f.reason or f.rests_on)
-
-
-def _spin_up_cells(u: MeanRow, left: MeanRow) -> tuple[str, ...]:
-    return (
-        *_values(u.group), u.place, _kmh(u.low_kmh, u.high_kmh), str(u.runs), str(u.samples), _shown(u.value, 3),
-        _ends(u.ci, 3), _shown(left.value, 3),
-    )  # fmt: skip
-
-
-def _spin_down_cells(r: SpinDownRow) -> tuple[str, ...]:
-    return (
-        *_values(r.group), r.wheel, _kmh(r.low_kmh, r.high_kmh), str(r.passes), str(r.events), f"{r.per_s:.2f}",
-        _ends(r.per_s_ci, 2), f"{r.per_100_m:.2f}", f"{r.share:.0%}", str(r.full), f"{100 * r.deepest:.1f}",
     )  # fmt: skip
 
 
@@ -282,11 +271,8 @@ def _titles(keys: Sequence[str]) -> tuple[str, ...]:
 
 def _values(group: Group, keys: Sequence[str] | None = None) -> tuple[str, ...]:
     """Values of the keys; `-` where a run does not state one, empty where the row covers all values."""
-    found = dict(group)
-    return tuple(
-        "" if k not in found else "-" if found[k] is None else f"{found[k]:g}" if isinstance(found[k], float) else
-        str(found[k]) for k in (found if keys is None else keys)
-    )  # fmt: skip
+    found = {k: "-" if v is None else f"{v:g}" if isinstance(v, float) else str(v) for k, v in group}
+    return tuple(found.get(k, "") for k in (found if keys is None else keys))
 
 
 def _kmh(low: float, high: float) -> str:
@@ -297,41 +283,21 @@ def _shown(x: float, digits: int = 1) -> str:
     return f"{x:.{digits}f}" if math.isfinite(x) else "-"
 
 
-def _ends(ci: Interval, digits: int = 1) -> str:
-    if not any(math.isfinite(x) for x in ci):
-        return "-"
-    return " ... ".join(f"{x:.{digits}f}" if math.isfinite(x) else "open" for x in ci)
-
-
 def _where(group: Group, wheel: str, road: str, low: float, high: float) -> str:
     return " ".join(x for x in (*_values(group), wheel, road, _kmh(low, high)) if x)
 
 
-def _reasons(rows: Sequence[tuple[str, str]]) -> str:
+def _reasons(rows: Sequence[tuple[str, str]]) -> Section:
     """Rows without a reliable estimate, grouped by reason: a hundred rows of one kind are one line."""
     places: dict[str, list[str]] = {}
     for where, reason in rows:
         if reason:
-            places.setdefault(_kind(reason), []).append(f"{where}: {reason}")
-    if not places:
-        return ""
-    lines = [f"  {found[0]}" + (f" (and {len(found) - 1} more like it)" if len(found) > 1 else "")
-             for found in places.values()]  # fmt: skip
-    return "\n".join(["not available, or not reliable:", *lines])
+            kind = "".join(c for c in reason if not (c.isdigit() or c in ".-+"))[:40]
+            places.setdefault(kind, []).append(f"{where}: {reason}")
+    lines = [f"{x[0]}{f' (and {len(x) - 1} more like it)' if len(x) > 1 else ''}" for x in places.values()]
+    return Section("Not available, or not reliable:", [Lines(lines, most=1000)])
 
 
-def _kind(reason: str) -> str:
-    return "".join(c for c in reason if not (c.isdigit() or c in ".-+"))[:40]
-
-
-def _delay_line(vehicle: str, value: float, ci: Interval, reason: str) -> str:
-    if reason:
-        return f"{vehicle}: the delay of v_x is not available: {reason}"
-    return f"{vehicle}: v_x is late by {value:.3f} s ({_ends(ci, 3)}), the slip is corrected for it"
-
-
-def _left_out(left_out: Mapping[str, int]) -> str:
-    if not left_out:
-        return ""
-    ranked = sorted(left_out.items(), key=lambda item: -item[1])
-    return "samples left out: " + ", ".join(f"{name} {n}" for name, n in ranked)
+def _left_out(left_out: Mapping[str, int]) -> Section:
+    ranked = ", ".join(f"{name} {n}" for name, n in sorted(left_out.items(), key=lambda item: -item[1]))
+    return Section("", [Para(f"samples left out: {ranked}" if ranked else "", "everywhere")])

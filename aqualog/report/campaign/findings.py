@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from aqualog.campaign.bins import Group, Plan, group_of
 from aqualog.campaign.full_speed import FullSpeed, full_speeds
@@ -12,13 +13,14 @@ from aqualog.campaign.regress import NOWHERE, Interval
 from aqualog.campaign.resistance import MeanRow, ResistanceTable, resistances
 from aqualog.campaign.samples import CampaignData
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
+from aqualog.report.values import KMH
 
 __all__ = [
     "Crossing", "Curve", "Findings", "Point", "crossing", "find", "groups_of", "resistance_curves", "slope_curves",
 ]  # fmt: skip
 
-KMH = 3.6
 Report = Callable[[str], None]
+_Row = TypeVar("_Row", SlopeRow, MeanRow)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,12 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
     report("resistance")
     resistance = resistances(data, plan, robust=robust)
     report("speeds of full aquaplaning")
+    notes = [
+        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms later than the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
+        f"{1e3 * d.ci[1]:+.0f} ms); every slip is corrected for it"
+        if d.told else f"{d.vehicle}: delay of v_x not available ({d.reason})"
+        for d in sorted(slopes.delays, key=lambda d: not d.told)
+    ]  # fmt: skip
     return Findings(
         plan,
         groups_of(data, plan.keys),
@@ -95,69 +103,53 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
         resistance_curves(resistance),
         full_speeds(data, plan, slopes),
         {"slip slope": slopes.left_out, "resistance": resistance.left_out},
-        _delay_notes(slopes),
+        tuple(notes),
         robust,
     )
 
 
 def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
     """Configurations of all runs, sorted: numbers, then texts, then missing values."""
-    found = {group_of(info, keys) for info in data.runs}
-    return tuple(sorted(found, key=lambda g: [_rank(v) for _, v in g]))
 
+    def rank(value: float | str | None) -> tuple[int, float, str]:
+        if value is None:
+            return 2, 0.0, ""
+        return (1, 0.0, value) if isinstance(value, str) else (0, value, "")
 
-def _rank(value: float | str | None) -> tuple[int, float, str]:
-    if value is None:
-        return 2, 0.0, ""
-    return (1, 0.0, value) if isinstance(value, str) else (0, value, "")
+    return tuple(sorted({group_of(info, keys) for info in data.runs}, key=lambda g: [rank(v) for _, v in g]))
 
 
 def slope_curves(table: SlopeTable) -> tuple[Curve, ...]:
     """Rows on water as curves, each with the dry level of its configuration."""
-    rows: dict[tuple[Group, str], list[SlopeRow]] = {}
-    for r in table.rows:
-        if r.road == "wet":
-            rows.setdefault((r.group, r.wheel), []).append(r)
     return tuple(
-        Curve(group, place, tuple(_slope_point(r) for r in own), own[0].slope_dry, own[0].slope_dry_ci, own[0].runs_dry)
-        for (group, place), own in rows.items()
-    )
+        Curve(
+            group, place, tuple(_point(r, r.slope, r.slope_ci, r.expected.slope) for r in own), own[0].slope_dry,
+            own[0].slope_dry_ci, own[0].runs_dry,
+        )
+        for (group, place), own in _on_water(table.rows, lambda r: r.wheel).items()
+    )  # fmt: skip
 
 
 def resistance_curves(table: ResistanceTable) -> tuple[Curve, ...]:
     """Rows on water as curves."""
-    rows: dict[tuple[Group, str], list[MeanRow]] = {}
-    for r in table.rows:
+    return tuple(
+        Curve(group, place, tuple(_point(r, r.value, r.ci) for r in own))
+        for (group, place), own in _on_water(table.rows, lambda r: r.place).items()
+    )
+
+
+def _on_water(rows: Sequence[_Row], place_of: Callable[[_Row], str]) -> dict[tuple[Group, str], list[_Row]]:
+    found: dict[tuple[Group, str], list[_Row]] = {}
+    for r in rows:
         if r.road == "wet":
-            rows.setdefault((r.group, r.place), []).append(r)
-    return tuple(Curve(group, place, tuple(_mean_point(r) for r in own)) for (group, place), own in rows.items())
+            found.setdefault((r.group, place_of(r)), []).append(r)
+    return found
 
 
-def _slope_point(r: SlopeRow) -> Point:
-    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
-    return Point(
-        r.low_kmh, r.high_kmh, v, r.slope, r.slope_ci, r.runs, r.samples, r.reliable, r.reason, r.expected.slope
-    )  # fmt: skip
-
-
-def _mean_point(r: MeanRow) -> Point:
-    v = _speed(r.v_mean, r.low_kmh, r.high_kmh)
-    return Point(r.low_kmh, r.high_kmh, v, r.value, r.ci, r.runs, r.samples, r.reliable, r.reason)
-
-
-def _speed(v_mean: float, low_kmh: float, high_kmh: float) -> float:
-    """Mean speed of the bin's samples, or the middle of an empty bin. [km/h]"""
-    return KMH * v_mean if math.isfinite(v_mean) else 0.5 * (low_kmh + high_kmh)
-
-
-def _delay_notes(table: SlopeTable) -> tuple[str, ...]:
-    told = [
-        f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms later than the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
-        f"{1e3 * d.ci[1]:+.0f} ms); every slip is corrected for it"
-        for d in table.delays
-        if d.told
-    ]
-    return (*told, *(f"{d.vehicle}: delay of v_x not available ({d.reason})" for d in table.delays if not d.told))
+def _point(r: SlopeRow | MeanRow, value: float, ci: Interval, expected: float = math.nan) -> Point:
+    # an empty bin has no mean speed, but a middle
+    v_kmh = KMH * r.v_mean if math.isfinite(r.v_mean) else 0.5 * (r.low_kmh + r.high_kmh)
+    return Point(r.low_kmh, r.high_kmh, v_kmh, value, ci, r.runs, r.samples, r.reliable, r.reason, expected)
 
 
 # --- where a curve passes a level ------------------------------------------------------------------------------------

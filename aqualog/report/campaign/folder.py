@@ -20,9 +20,9 @@ from aqualog.io.atomic_write import write_text
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import file_name
 from aqualog.report.campaign.page import campaign_page
-from aqualog.report.campaign.run_page import run_page
-from aqualog.report.campaign.runs import RunFacts, facts_of
-from aqualog.report.offline import plotly_js
+from aqualog.report.campaign.run_page import RunFacts, facts_of, run_page
+from aqualog.report.page import plotly_js
+from aqualog.report.values import KMH
 
 __all__ = ["MARK", "check_folder", "page_names", "safe_cell", "tables_of", "targets_of", "write_report"]
 
@@ -128,50 +128,41 @@ def tables_of(
     data: CampaignData, findings: Findings, facts: Sequence[RunFacts | None], pages: Sequence[str]
 ) -> dict[str, str]:
     """File name -> text: runs, slip slope, resistance, full_aquaplaning."""
+    speeds: list[_Row] = [
+        [*_values(f.group), f.place, f.way, KMH * f.v, KMH * f.ci[0], KMH * f.ci[1], f.rests_on, f.reason]
+        for f in findings.full
+    ]
+    heads = [*findings.plan.keys, "place", "way", "v_kmh", "ci95_low_kmh", "ci95_high_kmh", "rests_on", "reason"]
     return {
-        "runs.csv": _csv(*_runs(data, facts, pages)),
-        "slip_slope.csv": _csv(*_curves(findings, findings.slopes, "slope")),
-        "resistance.csv": _csv(*_curves(findings, findings.resistance, "delta_a_x")),
-        "full_aquaplaning.csv": _csv(*_speeds(findings)),
+        "runs.csv": _runs(data, facts, pages),
+        "slip_slope.csv": _curves(findings, findings.slopes, "slope"),
+        "resistance.csv": _curves(findings, findings.resistance, "delta_a_x"),
+        "full_aquaplaning.csv": _csv(heads, speeds),
     }
 
 
-def _runs(data: CampaignData, facts: Sequence[RunFacts | None], pages: Sequence[str]) -> tuple[_Row, list[_Row]]:
-    keys = data.keys
-    heading = ["run", "log", "page", "state", "reason", *keys, "duration_s", "lane_v_kmh", "lane_s", "dry_km",
+def _runs(data: CampaignData, facts: Sequence[RunFacts | None], pages: Sequence[str]) -> str:
+    heading = ["run", "log", "page", "state", "reason", *data.keys, "duration_s", "lane_v_kmh", "lane_s", "dry_km",
                *(f"events_{d}" for d in DETECTORS)]  # fmt: skip
     rows: list[_Row] = []
     for info, fact, page in zip(data.runs, facts, pages, strict=True):
-        groups = info.run.groups
-        row = [info.index + 1, info.name, page, info.state, info.reason, *(groups.get(k, "") for k in keys)]
+        groups, found = info.run.groups, [e["detector"] for e in info.events]
+        row = [info.index + 1, info.name, page, info.state, info.reason, *(groups.get(k, "") for k in data.keys)]
         if fact is not None:
-            own = {d: sum(e["detector"] == d for e in info.events) for d in DETECTORS}
-            gone = info.about["unavailable"]
             row += [info.about["duration_s"], fact.lane_kmh, fact.lane_s, fact.dry_km]
-            row += ["" if d in gone else n for d, n in own.items()]
+            row += ["" if d in info.about["unavailable"] else found.count(d) for d in DETECTORS]
         rows.append([*row, *[""] * (len(heading) - len(row))])
-    return heading, rows
+    return _csv(heading, rows)
 
 
-def _curves(findings: Findings, curves: Sequence[Curve], name: str) -> tuple[_Row, list[_Row]]:
-    keys = findings.plan.keys
-    heading = [*keys, "place", "v_low_kmh", "v_high_kmh", "v_mean_kmh", name, "ci95_low", "ci95_high", "runs",
-               "samples", "reliable", "expected", "dry", "dry_ci95_low", "dry_ci95_high", "reason"]  # fmt: skip
-    rows: list[_Row] = [
+def _curves(findings: Findings, curves: Sequence[Curve], name: str) -> str:
+    heading = [*findings.plan.keys, "place", "v_low_kmh", "v_high_kmh", "v_mean_kmh", name, "ci95_low", "ci95_high",
+               "runs", "samples", "reliable", "expected", "dry", "dry_ci95_low", "dry_ci95_high", "reason"]  # fmt: skip
+    return _csv(heading, [
         [*_values(c.group), c.place, p.low_kmh, p.high_kmh, p.v_kmh, p.value, *p.ci, p.runs, p.samples,
          int(p.reliable), p.expected, c.dry, *c.dry_ci, p.reason]
         for c in curves for p in c.points
-    ]  # fmt: skip
-    return heading, rows
-
-
-def _speeds(findings: Findings) -> tuple[_Row, list[_Row]]:
-    heading = [*findings.plan.keys, "place", "way", "v_kmh", "ci95_low_kmh", "ci95_high_kmh", "rests_on", "reason"]
-    rows: list[_Row] = [
-        [*_values(f.group), f.place, f.way, 3.6 * f.v, 3.6 * f.ci[0], 3.6 * f.ci[1], f.rests_on, f.reason]
-        for f in findings.full
-    ]
-    return heading, rows
+    ])  # fmt: skip
 
 
 def _values(group: Group) -> list[object]:

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 
 from aqualog.campaign.bins import Group
-from aqualog.report.wording import cut, name_digest, number
+from aqualog.report.values import cut, name_digest, number
 
 __all__ = ["file_name", "group_text", "key_title", "value_text"]
 

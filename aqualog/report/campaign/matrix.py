@@ -1,8 +1,9 @@
-"""The test matrix of a campaign as text for a terminal and as a document."""
+"""The test matrix of a campaign as sections and as a document."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from aqualog import __version__
@@ -12,69 +13,62 @@ from aqualog.campaign.propose_files import NEEDED
 from aqualog.campaign.records import Campaign
 from aqualog.campaign.tables import StoredRun
 from aqualog.core.vehicle import Vehicle
-from aqualog.report.text import table
+from aqualog.report.sections import Lines, Para, Report, Section, Table
+from aqualog.report.values import counted
 
-__all__ = ["matrix_document", "matrix_text"]
+__all__ = ["matrix_document", "matrix_report"]
 
 MOST_ROWS = 200  # configurations that are printed; the document has all
 MOST_GAPS = 20
 _UNKNOWN = "?"
+_NOT_GIVEN = "not given"
 
 
-def matrix_text(
+def matrix_report(
     campaign: Campaign,
     matrix: Matrix,
     logs: Sequence[LogState],
     vehicles: Mapping[str, Vehicle],
     measured: Mapping[int, StoredRun],
     lanes: Sequence[str] = (),
-) -> str:
+) -> Report:
     """Summary of the campaign, its configurations, and missing combinations."""
-    lines = [
-        f"{campaign.name}: {_count(len(campaign.runs), 'run')} in {_count(len(matrix.configurations), 'configuration')}"
-    ]
-    lines.append(_logs(logs))
+    runs, configurations = counted(len(campaign.runs), "run"), counted(len(matrix.configurations), "configuration")
+    lines = [f"{campaign.name}: {runs} in {configurations}", _logs(logs)]
     if measured:
-        done = sum(m.state == "done" for m in measured.values())
-        lines.append(f"measured by a batch: {done} of {_count(len(campaign.runs), 'run')}")
-    lines += [f"vehicle {name}: {_vehicle(v)}" for name, v in vehicles.items()]
+        lines.append(f"measured by a batch: {sum(m.state == 'done' for m in measured.values())} of {runs}")
+    lines += [f"vehicle {name}: {v.name}, {v.drivetrain}, {v.mass:g} kg" for name, v in vehicles.items()]
     if matrix.constants:
         lines.append("same in all runs: " + ", ".join(f"{k} = {v}" for k, v in matrix.constants.items()))
     for factor in dict.fromkeys(matrix.together.values()):
         keys = ", ".join(k for k, f in matrix.together.items() if f == factor)
         lines.append(f"{factor} fixes {keys}: their effects cannot be distinguished")
     if matrix.others:
-        lines.append("further keys: " + ", ".join(f"{k} ({_count(n, 'value')})" for k, n in matrix.others.items()))
-    if matrix.factors:
-        lines += ["", "varied:"]
-        lines += [f"  {f.key}: {_levels(f.values, f.runs)}" for f in matrix.factors]
-    lines += ["", _table(matrix), ""]
-    missing = [*_missing(matrix, logs), *lanes[:10], *_failed(measured), *_unset(vehicles)] or [
-        "no configuration key in the campaign file"
+        lines.append("further keys: " + ", ".join(f"{k} ({counted(n, 'value')})" for k, n in matrix.others.items()))
+    varied = [
+        (f.key, ", ".join(f"{v or _NOT_GIVEN} ({counted(n, 'run')})" for v, n in zip(f.values, f.runs, strict=True)))
+        for f in matrix.factors
     ]
-    lines += ["missing:", *(f"  {m}" for m in missing)]
-    return "\n".join(lines) + "\n"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+    more = len(matrix.configurations) - MOST_ROWS
+    rest = f"and {counted(more, 'configuration')} more (--json has all)" if more > 0 else ""
+    missing = [*_missing(matrix, logs), *lanes[:10], *_failed(measured), *_unset(vehicles)]
+    sections = [
+        Section("", [Para("\n".join(lines), "everywhere")]),
+        Section("Varied:", [Lines(varied, most=1000)]),
+        Section("", [_table(matrix), Para(rest, "everywhere")]),
+        Section("Missing:", [Lines(missing or ["no configuration key in the campaign file"], most=1000)]),
+    ]
+    return Report("matrix", "test matrix of a campaign", sections)
 
 
 def _logs(logs: Sequence[LogState]) -> str:
     sizes = [s.size for s in logs if s.size is not None]
     size = sum(sizes)
     amount = f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
-    kinds: dict[str, int] = {}
-    for state in logs:
-        kind = state.path.suffix.lower().lstrip(".") or "folder"
-        kinds[kind] = kinds.get(kind, 0) + 1
+    kinds = Counter(state.path.suffix.lower().lstrip(".") or "folder" for state in logs)
     told = ", ".join(f"{n} {k}" for k, n in sorted(kinds.items()))
-    there = f"{len(sizes)} of {_count(len(logs), 'log')} there" if len(sizes) < len(logs) else "all there"
+    there = f"{len(sizes)} of {counted(len(logs), 'log')} there" if len(sizes) < len(logs) else "all there"
     return f"logs: {told}; {there}, {amount}"
-
-
-def _vehicle(vehicle: Vehicle) -> str:
-    return f"{vehicle.name}, {vehicle.drivetrain}, {vehicle.mass:g} kg"
 
 
 def _failed(measured: Mapping[int, StoredRun], most: int = 5) -> list[str]:
@@ -85,65 +79,48 @@ def _failed(measured: Mapping[int, StoredRun], most: int = 5) -> list[str]:
 
 def _unset(vehicles: Mapping[str, Vehicle]) -> list[str]:
     """Keys missing in the vehicle files, for which default values are used."""
-    unset = {name: [k for k in NEEDED if k not in v.given] for name, v in vehicles.items()}
     return [
         f"{name} does not give {', '.join(keys)}: a mid-size car with rear-wheel drive is assumed"
-        for name, keys in unset.items()
-        if keys
+        for name, v in vehicles.items()
+        if (keys := [k for k in NEEDED if k not in v.given])
     ]
 
 
-def _levels(values: Sequence[str], runs: Sequence[int]) -> str:
-    return ", ".join(f"{v or 'not given'} ({_count(n, 'run')})" for v, n in zip(values, runs, strict=True))
-
-
-def _table(matrix: Matrix) -> str:
-    has_speed = any(c.speeds for c in matrix.configurations)
-    has_manoeuvre = any(any(c.manoeuvres) for c in matrix.configurations)
-    header = [*(f.key for f in matrix.factors), "runs", *(["km/h"] if has_speed else [])]
-    header += ["manoeuvres"] if has_manoeuvre else []
-    rows = []
-    for c in matrix.configurations[:MOST_ROWS]:
-        row = [*(v or _UNKNOWN for v in c.values), f"{len(c.runs)}{_mark(c)}"]
-        row += [_speeds(c.speeds)] if has_speed else []
-        row += [", ".join(f"{m or 'not given'} {n}" for m, n in c.manoeuvres.items())] if has_manoeuvre else []
-        rows.append(row)
-    more = len(matrix.configurations) - len(rows)
-    text = table([*header, ""], [[*r, ""] for r in rows])
-    return f"{text}\nand {_count(more, 'configuration')} more (--json has all)" if more else text
-
-
-def _mark(configuration: Configuration) -> str:
-    runs = len(configuration.runs)
-    return " !" if runs < TOO_FEW else " ~" if runs < FEW else ""
+def _table(matrix: Matrix) -> Table:
+    configurations = matrix.configurations
+    columns: list[tuple[str, Callable[[Configuration], str]]] = [
+        ("runs", lambda c: f"{len(c.runs)}{' !' if len(c.runs) < TOO_FEW else ' ~' if len(c.runs) < FEW else ''}")
+    ]
+    if any(c.speeds for c in configurations):
+        columns.append(("km/h", lambda c: _speeds(c.speeds)))
+    if any(any(c.manoeuvres) for c in configurations):
+        columns.append(("manoeuvres", lambda c: ", ".join(f"{m or _NOT_GIVEN} {n}" for m, n in c.manoeuvres.items())))
+    rows = [[*(v or _UNKNOWN for v in c.values), *(text(c) for _, text in columns)] for c in configurations[:MOST_ROWS]]
+    heads = [*(f.key for f in matrix.factors), *(name for name, _ in columns)]
+    return Table(heads, rows, words=range(len(heads)))
 
 
 def _speeds(speeds: Sequence[float]) -> str:
-    if not speeds:
-        return _UNKNOWN
-    if len(speeds) <= 4:
-        return " ".join(f"{v:g}" for v in speeds)
-    return f"{speeds[0]:g}...{speeds[-1]:g} ({len(speeds)})"
+    if len(speeds) > 4:
+        return f"{speeds[0]:g}...{speeds[-1]:g} ({len(speeds)})"
+    return " ".join(f"{v:g}" for v in speeds) or _UNKNOWN
 
 
 def _missing(matrix: Matrix, logs: Sequence[LogState]) -> list[str]:
     lines = missing_lines(logs)
     too_few = sum(len(c.runs) < TOO_FEW for c in matrix.configurations)
     few = sum(TOO_FEW <= len(c.runs) < FEW for c in matrix.configurations)
-    total = len(matrix.configurations)
+    total = counted(len(matrix.configurations), "configuration")
     if too_few:
-        lines.append(
-            f"! {too_few} of {_count(total, 'configuration')} with fewer than {TOO_FEW} runs: no reliable interval"
-        )
+        lines.append(f"! {too_few} of {total} with fewer than {TOO_FEW} runs: no reliable interval")
     if few:
-        lines.append(f"~ {few} of {_count(total, 'configuration')} with fewer than {FEW} runs: wide intervals")
+        lines.append(f"~ {few} of {total} with fewer than {FEW} runs: wide intervals")
     lines += matrix.notes
     if matrix.gaps:
-        keys = ", ".join(f.key for f in matrix.factors)
-        lines.append(f"never driven although neighbours were ({keys}):")
-        lines += [f"  {', '.join(v or _UNKNOWN for v in g.values)}" for g in matrix.gaps[:MOST_GAPS]]
-        if len(matrix.gaps) > MOST_GAPS:
-            lines.append(f"  and {len(matrix.gaps) - MOST_GAPS} more (--json has all)")
+        gaps = [f"never driven although neighbours were ({', '.join(f.key for f in matrix.factors)}):"]
+        gaps += [", ".join(v or _UNKNOWN for v in g.values) for g in matrix.gaps[:MOST_GAPS]]
+        gaps += [f"and {len(matrix.gaps) - MOST_GAPS} more (--json has all)"] if len(matrix.gaps) > MOST_GAPS else []
+        lines.append("\n".join(gaps))
     return lines
 
 

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import TOO_FEW
 from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.core.records import TimeFaults
 from aqualog.report.campaign.labels import group_text
-from aqualog.report.wording import cut, detector_name
+from aqualog.report.values import counted, cut
+from aqualog.report.wording import detector_name
 
 __all__ = ["MOST_KINDS", "Problem", "problems_of"]
 
@@ -37,35 +39,40 @@ _Test = Callable[[RunInfo], str]
 def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
     """All kinds of problems that occur, losses first, then by number of runs."""
     found = [
-        _all(data.runs, "loss", "without results", "not in any result", lambda r: "" if r.is_done else _why(r)),
-        _of_done(data, "loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
-        _of_done(data, "loss", "samples lost in damaged files", "", lambda r: _count(r, "lost_in_files", "lost")),
-        _of_done(data, "loss", "samples dropped", "not used", lambda r: _count(r, "dropped_samples", "dropped")),
-        _of_done(data, "loss", "time jumps", "the log's clock is uneven", lambda r: _count(r, "time_jumps", "")),
-        _of_done(data, "loss", "clock faults", "stamps twice, back, reset, wrapped, paused, drifting", _clock),
-        _of_done(
-            data, "limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded "
-            "from figures over speed", lambda r: "" if r.water_from else "no lane",
-        ),
-        _of_done(data, "limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
-        _of_done(data, "limit", "vehicle file without the drivetrain", "rear-wheel drive is assumed",
-                 lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
-        _of_done(data, "limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope "
-                 "learnt in the drive; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
+        _problem(data.runs, "loss", "without results", "not in any result",
+                 lambda r: "" if r.is_done else r.reason or r.state),
+        *(_problem(data.done, weight, title, means, test) for weight, title, means, test in _KINDS),
         *_unavailable(data),
-        *_few(data, keys),
+        _few(data, keys),
         *_notes(data),
     ]  # fmt: skip
     order = ("loss", "limit", "note")
     return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -len(p.runs))))
 
 
+def _problem(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:
+    hits = tuple((r.index, cut(text, 300)) for r in runs if (text := test(r)))
+    return Problem(weight, title, means, hits)
+
+
+def _q(r: RunInfo, name: str) -> int:
+    return int(r.about["quality"].get(name, 0))
+
+
+def _times(name: str, word: str) -> _Test:
+    return lambda r: f"{_q(r, name)} {word}".rstrip() if _q(r, name) else ""
+
+
+def _clock(r: RunInfo) -> str:
+    return ", ".join(f"{_q(r, n)} {n.replace('_', ' ')}" for n in TimeFaults.KINDS if _q(r, n))
+
+
 def _no_dry_slope(info: RunInfo) -> str:
     """Report a vehicle file without the dry slope of a driven axle; default values do not count."""
-    axles = sorted({w[0] for w in info.vehicle.driven})
     if "slip_slope_drop" in info.about["unavailable"]:
         return ""
-    return "" if any(f"tyre.slip_slope_{a}" in info.vehicle.given for a in axles) else info.run.vehicle.name
+    is_given = any(f"tyre.slip_slope_{w[0]}" in info.vehicle.given for w in info.vehicle.driven)
+    return "" if is_given else info.run.vehicle.name
 
 
 def _lane_beyond(info: RunInfo) -> str:
@@ -76,31 +83,21 @@ def _lane_beyond(info: RunInfo) -> str:
     return f"lane from {lane[0]:g} to {lane[1]:g} s, the log ends at {end:.1f} s"
 
 
-def _all(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:
-    hits = tuple((r.index, cut(text, 300)) for r in runs if (text := test(r)))
-    return Problem(weight, title, means, hits)
-
-
-def _of_done(data: CampaignData, weight: str, title: str, means: str, test: _Test) -> Problem:
-    return _all(data.done, weight, title, means, test)
-
-
-def _why(r: RunInfo) -> str:
-    return r.reason or r.state
-
-
-def _q(r: RunInfo, name: str) -> int:
-    return int(r.about["quality"].get(name, 0))
-
-
-def _count(r: RunInfo, name: str, word: str) -> str:
-    n = _q(r, name)
-    return f"{n} {word}".rstrip() if n else ""
-
-
-def _clock(r: RunInfo) -> str:
-    names = ("duplicates", "back_steps", "resets", "wraps", "pauses", "drifts", "strays")
-    return ", ".join(f"{_q(r, n)} {n.replace('_', ' ')}" for n in names if _q(r, n))
+_KINDS: tuple[tuple[str, str, str, _Test], ...] = (
+    ("loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
+    ("loss", "samples lost in damaged files", "", _times("lost_in_files", "lost")),
+    ("loss", "samples dropped", "not used", _times("dropped_samples", "dropped")),
+    ("loss", "time jumps", "the log's clock is uneven", _times("time_jumps", "")),
+    ("loss", "clock faults", "stamps twice, back, reset, wrapped, paused, drifting", _clock),
+    ("limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded from figures over speed",
+     lambda r: "" if r.water_from else "no lane"),
+    ("limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
+    ("limit", "vehicle file without the drivetrain", "rear-wheel drive is assumed",
+     lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
+    ("limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope learnt in the "
+     "drive; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
+)  # fmt: skip
+"""Problems of runs with results: weight, title, consequence, and what is wrong with a run (empty: nothing)."""
 
 
 def _unavailable(data: CampaignData) -> list[Problem]:
@@ -118,19 +115,19 @@ def _unavailable(data: CampaignData) -> list[Problem]:
     return out
 
 
-def _few(data: CampaignData, keys: Sequence[str]) -> list[Problem]:
+def _few(data: CampaignData, keys: Sequence[str]) -> Problem:
     """Configurations on water whose runs are too few for an interval."""
     groups: dict[Group, list[RunInfo]] = {}
     for r in data.done:
         groups.setdefault(group_of(r, keys), []).append(r)
     hits = [
-        (r.index, f"{group_text(g)}: {len(runs)} run{'s' if len(runs) > 1 else ''}")
+        (r.index, f"{group_text(g)}: {counted(len(runs), 'run')}")
         for g, runs in groups.items()
         if len(runs) < TOO_FEW and ("water_depth_mm", 0.0) not in g
         for r in runs
     ]
     title = f"configuration with fewer than {TOO_FEW} runs"
-    return [Problem("limit", title, "its values, if any, have no interval", tuple(sorted(hits)))]
+    return Problem("limit", title, "its values, if any, have no interval", tuple(sorted(hits)))
 
 
 def _notes(data: CampaignData) -> list[Problem]:

@@ -1,10 +1,11 @@
-"""The small page of one run of a campaign, from the samples in the campaign's store."""
+"""One run of a campaign: its numbers, and its small page from the samples in the campaign's store."""
 
 from __future__ import annotations
 
 import math
 import shlex
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +13,24 @@ import numpy as np
 
 from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import FloatArray
+from aqualog.core.records import Event, FloatArray
 from aqualog.detect.registry import DETECTORS
-from aqualog.report import offline
 from aqualog.report.campaign.labels import key_title, value_text
-from aqualog.report.campaign.runs import RunFacts
+from aqualog.report.drive.report import EVENT_HEADS, event_cells
+from aqualog.report.page import report_page
+from aqualog.report.reduce import spans_of
+from aqualog.report.sections import Cell, Code, Headline, Lines, Para, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS, detector_colour
-from aqualog.report.wording import cut, detector_name, evidence_parts, number, place
+from aqualog.report.values import KMH, cut, number, place
+from aqualog.report.wording import detector_name
 
-__all__ = ["command_of", "run_page"]
+__all__ = ["BEHIND_S", "EventCount", "RunFacts", "command_of", "facts_of", "run_page"]
 
+BEHIND_S = 1.0  # [s] after the water in which an event still counts as on water, as in `evaluate`
+LEAST_S = 0.5  # [s] on the lane that count as a pass, as for the speed of full aquaplaning
+_OFF, _ON, _UNKNOWN = "off", "on", "unknown"
 MOST_SAMPLES = 300  # per line; beyond, means and extremes of several samples
 MOST_EVENTS = 80  # in the table and in the figure
-_KMH = 3.6
 
 
 def run_page(
@@ -39,29 +45,36 @@ def run_page(
     back : str
         Address of the campaign's page.
     """
-    return offline.render(
-        "run.html.j2",
-        css=("campaign.css",),
-        scripts=("loader.js", "run.js"),
-        islands={"run-data": _plots(info, samples) if samples is not None else {}},
-        plotly="../plotly.min.js",
-        title=cut(info.name, 160),
-        kind=f"run {info.index + 1} – {cut(data.name)}",
-        number=info.index + 1,
-        total=len(data.runs),
-        campaign=cut(data.name),
-        back=back,
-        state=info.state,
-        reason=cut(info.reason, 600),
-        headline=_headline(info),
-        configuration=[(key_title(k), value_text(k, v, is_alone=False)) for k, v in info.run.values.items()],
-        facts=_facts(info, facts),
-        problems=_problems(info),
-        events=[_event(e) for e in info.events[:MOST_EVENTS]],
-        more_events=max(0, len(info.events) - MOST_EVENTS),
-        command=command_of(data, info),
-        has_load=any(info.run.values.get(f"load_{a}_kg", 0.0) for a in ("front", "rear")),
+    configuration = [(key_title(k), value_text(k, v, is_alone=False)) for k, v in info.run.values.items()]
+    has_load = any(info.run.values.get(f"load_{a}_kg", 0.0) for a in ("front", "rear"))
+    more = f"and {len(info.events) - MOST_EVENTS} more events" if len(info.events) > MOST_EVENTS else ""
+    rows = [_event(e) for e in info.events[:MOST_EVENTS]]
+    look = "open" if not info.is_done else "partial" if info.events else "none"
+    over_time = (
+        "blue: on the lane; drag to zoom, double click to reset; rim speeds and slips: extremes of every 0.1 s, "
+        "relative to the vehicle's speed"
     )
+    sections = [
+        Section("", [Headline(_headline(info), [(f"{info.state}:", cut(info.reason, 600))] if info.reason else [])],
+                "verdict", look=f"verdict {look}"),
+        Section("Notes", [Lines(_problems(info), most=1000)], "quality", look="problems"),
+        *([Section("Over time", [Stack()], "plot-section", over_time)] if info.is_done else []),
+        Section("Events", [Table(EVENT_HEADS, rows, "events", (0, 1, 5, 8), wide=(8,)), Para(more)], "events-section"),
+        Section("The full page of this run", [
+            Code(command_of(data, info)),
+            Para("The vehicle file does not have this run's load; the campaign adds it to mass and centre of mass."
+                 if has_load else ""),
+        ], "full-page", "every signal at its own rate; run this command in the folder of the campaign file"),
+    ]  # fmt: skip
+    report = Report(
+        f"run {info.index + 1} – {cut(data.name)}", f"run {info.index + 1} of {len(data.runs)}", sections,
+        [*configuration, *_facts(info, facts)], footer="From the campaign's samples, ten a second.",
+        islands={"run-data": _plots(info, samples) if samples is not None else {}}, scripts=("loader.js", "run.js"),
+    )  # fmt: skip
+    return report_page(
+        report, title=cut(info.name, 160), template="run.html.j2", plotly="../plotly.min.js", back=back,
+        campaign=cut(data.name),
+    )  # fmt: skip
 
 
 def command_of(data: CampaignData, info: RunInfo) -> str:
@@ -116,19 +129,13 @@ def _problems(info: RunInfo) -> list[str]:
     return [cut(x, 300) for x in [*found, *info.about["notes"]]][:20]
 
 
-def _event(e: Mapping[str, Any]) -> list[str]:
-    v = e["evidence"].get("v_x")
-    words = "; ".join(evidence_parts(e["evidence"])) or "–"
-    return [
-        number(e["start_s"], 2), number(e["end_s"], 2), detector_name(e["detector"]),
-        place(e["wheel"], e["side"]) or "vehicle", e["severity"],
-        f"{number(_finite(e['peak']))} / {number(_finite(e['threshold']))}",
-        number(_KMH * v, 0) if isinstance(v, float | int) else "–", cut(words, 300),
-    ]  # fmt: skip
-
-
-def _finite(x: float | None) -> float:
-    return math.nan if x is None else float(x)
+def _event(e: Mapping[str, Any]) -> list[Cell]:
+    peak, threshold = (math.nan if e[k] is None else float(e[k]) for k in ("peak", "threshold"))
+    event = Event(
+        e["detector"], e["wheel"], e["side"], e["start_s"], e["end_s"], e["severity"], peak, threshold, e["evidence"]
+    )  # fmt: skip
+    cells = event_cells(event)
+    return [*cells[:-1], Cell(cut(cells[-1].text, 300))]
 
 
 def _plots(info: RunInfo, samples: RunSamples) -> dict[str, Any]:
@@ -136,13 +143,14 @@ def _plots(info: RunInfo, samples: RunSamples) -> dict[str, Any]:
     n = samples.t.size
     step = max(1, math.ceil(n / MOST_SAMPLES))
     v = samples.array("v_x")
-    lines: dict[str, list[list[Any]]] = {"speed": [["v_x", "", _mean(_KMH * v, step, 2)]]}
+    lines: dict[str, list[list[Any]]] = {"speed": [["v_x", "", _mean(KMH * v, step, 2)]]}
     low, high = ({w: samples.array(f"slip_{end}_{w}") for w in WHEELS} for end in ("min", "max"))
     # (3.13) is against the wheel's own speed and has no value where the wheel stops; the extremes are against the car
-    rims = {w: _KMH * v * (1.0 + 0.5 * (low[w] + high[w])) for w in WHEELS}
+    rims = {w: KMH * v * (1.0 + 0.5 * (low[w] + high[w])) for w in WHEELS}
     lines["speed"] += [[w.upper(), w, _mean(x, step, 2)] for w, x in rims.items()]
-    lines["low"] = [[w.upper(), w, _low(100.0 * x, step)] for w, x in low.items()]
-    lines["high"] = [[w.upper(), w, _high(100.0 * x, step)] for w, x in high.items()]
+    for name, slips, extreme in (("low", low, np.fmin), ("high", high, np.fmax)):
+        parts = {w: extreme.reduce(_parts(100.0 * x, step), axis=1) for w, x in slips.items()}
+        lines[name] = [[w.upper(), w, _short(x, 2)] for w, x in parts.items()]
     lines["traction"] = [[w.upper(), w, _mean(samples.array(f"mu_{w}"), step, 4)] for w in WHEELS]
     lines["resistance"] = [["resistance", "", _mean(samples.array("delta_a_x"), step, 3)]]
     lines = {k: [x for x in own if any(y is not None for y in x[2])] for k, own in lines.items()}
@@ -165,10 +173,8 @@ def _lane(info: RunInfo, samples: RunSamples) -> list[list[float]]:
     """Spans on the water, with the ends where wheels settle."""
     if info.run.lane is not None:
         return [[round(x, 3) for x in info.run.lane]]
-    wet = np.concatenate([[False], samples.on_water == 1.0, [False]])
-    edges = np.flatnonzero(wet[1:] != wet[:-1])
     half = 0.5 * samples.step_s if samples.t.size > 1 else 0.0
-    spans = edges.reshape(-1, 2)[:40]
+    spans = spans_of(samples.on_water == 1.0)[:40]
     return [[round(float(samples.t[a]) - half, 3), round(float(samples.t[b - 1]) + half, 3)] for a, b in spans]
 
 
@@ -178,14 +184,6 @@ def _mean(x: FloatArray, step: int, decimals: int) -> list[float | None]:
     mean = np.full(len(parts), np.nan)
     mean[known] = np.nanmean(parts[known], axis=1)
     return _short(mean, decimals)
-
-
-def _low(x: FloatArray, step: int) -> list[float | None]:
-    return _short(np.fmin.reduce(_parts(x, step), axis=1), 2)
-
-
-def _high(x: FloatArray, step: int) -> list[float | None]:
-    return _short(np.fmax.reduce(_parts(x, step), axis=1), 2)
 
 
 def _parts(x: FloatArray, step: int) -> FloatArray:
@@ -198,3 +196,61 @@ def _parts(x: FloatArray, step: int) -> FloatArray:
 
 def _short(x: FloatArray, decimals: int) -> list[float | None]:
     return [round(v, decimals) if math.isfinite(v) else None for v in x.tolist()]
+
+
+# --- facts of a run ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class EventCount:
+    """Events of a detector at a place (wheel, side; empty: the car): on water, off water, and unknown."""
+
+    detector: str
+    place: str
+    on: int
+    off: int
+    unknown: int
+
+
+@dataclass(frozen=True, slots=True)
+class RunFacts:
+    """`lane_kmh` mean speed on the lane, NaN without a pass; `lane_s` time on it; `dry_km` driven off it, NaN where the
+    lane is not known; `full` events that were full.
+    """
+
+    lane_kmh: float
+    lane_s: float
+    dry_km: float
+    events: tuple[EventCount, ...]
+    full: int
+
+
+def facts_of(info: RunInfo, samples: RunSamples) -> RunFacts:
+    """The numbers of one run."""
+    v = samples.array("v_x")
+    step = samples.step_s
+    wet = (samples.on_water == 1.0) & np.isfinite(v)
+    dry = (samples.on_water == 0.0) & np.isfinite(v)
+    seconds = float(np.count_nonzero(wet)) * step if wet.any() else 0.0
+    is_known = bool(np.isfinite(samples.on_water).any())
+    counts: dict[tuple[str, str], dict[str, int]] = {}
+    for event in info.events:
+        at = (str(event["detector"]), str(event["wheel"] or event["side"] or ""))
+        of = counts.setdefault(at, {_ON: 0, _OFF: 0, _UNKNOWN: 0})
+        of[_where(event, samples.t, samples.on_water, is_known=is_known)] += 1
+    return RunFacts(
+        lane_kmh=KMH * float(v[wet].mean()) if seconds >= LEAST_S else math.nan,
+        lane_s=seconds,
+        dry_km=float(v[dry].sum()) * step / 1e3 if is_known and dry.any() else 0.0 if is_known else math.nan,
+        events=tuple(EventCount(d, p, n[_ON], n[_OFF], n[_UNKNOWN]) for (d, p), n in sorted(counts.items())),
+        full=sum(e["severity"] == "full" for e in info.events),
+    )
+
+
+def _where(event: Mapping[str, Any], t: FloatArray, on_water: FloatArray, *, is_known: bool) -> str:
+    """Whether an event begins on water or within a second after it; the ends where wheels settle count as water."""
+    if not is_known:
+        return _UNKNOWN
+    start = float(event["start_s"])
+    near = on_water[(t >= start - BEHIND_S) & (t <= start + 0.5 * float(t[1] - t[0] if t.size > 1 else 1.0))]
+    return _OFF if near.size == 0 or bool(np.all(near == 0.0)) else _ON

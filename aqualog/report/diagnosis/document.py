@@ -9,23 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.diagnose.records import (
-    Agreement,
-    Cause,
-    ChannelGain,
-    Confusion,
-    Consequence,
-    Diagnosis,
-    Estimate,
-    Gain,
-    Limit,
-    Manoeuvre,
-    Remainder,
-)
+from aqualog.diagnose.records import Cause, Confusion, Consequence, Diagnosis, Estimate, Gain, Limit, Remainder
 from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Model
-from aqualog.report.numbers import quantity_text
-from aqualog.report.plain import fields_of, plain
+from aqualog.report.values import fields_of, plain, quantity_text
 
 __all__ = ["diagnosis_document"]
 
@@ -57,7 +43,9 @@ def diagnosis_document(
     vehicle : str
         Name of the vehicle file's car.
     """
-    d, test = diagnosis, diagnosis.significance
+    d, test, m = diagnosis, diagnosis.significance, diagnosis.manoeuvre
+    gained = {c.channel: c.unit for c in d.gain.channels} if d.gain is not None else {}
+    units = gained | {v.channel: v.unit for v in d.views}
     return {
         "schema_version": 1,
         "tool_version": tool_version,
@@ -69,7 +57,12 @@ def diagnosis_document(
         "alternative_sets": [
             {"causes": [_cause(c) for c in a.causes], "evidence_ratio": plain(a.evidence_ratio)} for a in d.alternatives
         ],
-        "agreement": [_agreement(a) for a in d.agreement],
+        "agreement": [
+            {**fields_of(a, "key", "parameter", "p_value", "holds"), "drives": [
+                {"drive": x.drive, **_estimate(x.alone), **fields_of(x, from_others="others", log_score_gain="gain")}
+                for x in a.drives
+            ]} for a in d.agreement
+        ],
         "unexplained": [_remainder(r) for r in d.remainders],
         "gain": _gain(d.gain) if d.gain is not None else None,
         "false_alarm_level": None if test is None else plain(test.level),
@@ -80,14 +73,22 @@ def diagnosis_document(
         "limits": [_limit(x) for x in d.limits],
         "isolability": [
             fields_of(c, "effect", "rivals", "separation", "p_correct", "relation", "sizes")
-            for c in d.confusions if _is_confused(c)
+            # those that a sentence reports; a log distinguishes thousands of other sets
+            for c in d.confusions if c.relation or not c.p_correct >= CRITERIA["told_apart"]
         ],
         "isolability_pairs": _pairs(d.confusions),
-        "next_manoeuvre": _manoeuvre(d.manoeuvre) if d.manoeuvre is not None else None,
+        "next_manoeuvre": None if m is None else {
+            **fields_of(m, "name", "separates", "sentence", "separation_now", "separation_then"),
+            "p_correct_now": _p_correct(m.separation_now), "p_correct_then": _p_correct(m.separation_then),
+            "minutes": plain(m.minutes),
+        },
         "extended_model": extended_model,
-        "model": _model(d.model),
+        "model": [
+            {"effect": t.effect.name, "where": t.where, "parameters": plain(t.values),
+             **({"knots": plain(t.knots)} if t.knots else {})} for t in d.model.terms
+        ],
         "channels": list(d.channels),
-        "channel_units": _units(d),
+        "channel_units": units,
         "untested": dict(d.untested),
         "criteria": dict(CRITERIA),
         "notes": [*notes, *d.notes],
@@ -106,16 +107,6 @@ def _cause(c: Cause) -> dict[str, Any]:
     }
 
 
-def _agreement(a: Agreement) -> dict[str, Any]:
-    return {
-        **fields_of(a, "key", "parameter", "p_value", "holds"),
-        "drives": [
-            {"drive": d.drive, **_estimate(d.alone), **fields_of(d, from_others="others", log_score_gain="gain")}
-            for d in a.drives
-        ],
-    }
-
-
 def _remainder(r: Remainder) -> dict[str, Any]:
     x = np.asarray(r.x, dtype=np.float64).reshape(len(r.f), -1)
     return {
@@ -129,7 +120,15 @@ def _remainder(r: Remainder) -> dict[str, Any]:
 def _gain(g: Gain) -> dict[str, Any]:
     score, interval, nothing = plain(g.log_score), plain([g.low, g.high]), [None, None]
     return {
-        "channel": {c.channel: _channel(c) for c in g.channels},
+        "channel": {
+            c.channel: {
+                **fields_of(c, "unit", "rmse_before", "rmse_after"),
+                "rmse_change": _change(c.rmse_before, c.rmse_after),
+                **fields_of(c, "free_before", "free_after"),
+                "free_change": _change(c.free_before, c.free_after),
+            }
+            for c in g.channels
+        },
         "heldout_log_score_gain": None if g.in_sample else score,
         "ci95": nothing if g.in_sample else interval,
         "in_sample_log_score_gain": score if g.in_sample else None,
@@ -138,15 +137,6 @@ def _gain(g: Gain) -> dict[str, Any]:
         **fields_of(g, "heldout", "in_sample"),
         "consequences": [_consequence(c) for c in g.consequences],
         "notes": list(g.notes),
-    }
-
-
-def _channel(c: ChannelGain) -> dict[str, Any]:
-    return {
-        **fields_of(c, "unit", "rmse_before", "rmse_after"),
-        "rmse_change": _change(c.rmse_before, c.rmse_after),
-        **fields_of(c, "free_before", "free_after"),
-        "free_change": _change(c.free_before, c.free_after),
     }
 
 
@@ -180,44 +170,12 @@ def _limit(x: Limit) -> dict[str, Any]:
     }
 
 
-def _units(d: Diagnosis) -> dict[str, str]:
-    """Units of the channels, as far as they are known."""
-    gained = {c.channel: c.unit for c in d.gain.channels} if d.gain is not None else {}
-    return gained | {v.channel: v.unit for v in d.views}
-
-
-def _is_confused(c: Confusion) -> bool:
-    """Whether a sentence reports it; a log distinguishes thousands of other sets."""
-    return bool(c.relation) or not c.p_correct >= CRITERIA["told_apart"]
-
-
 def _pairs(confusions: Sequence[Confusion]) -> dict[str, Any]:
     """P(right name) of every effect (rows) against every single rival (columns); null on the diagonal."""
     pairs = {(c.effect, c.rivals[0]): c.p_correct for c in confusions if len(c.rivals) == 1}
     keys = sorted({k for pair in pairs for k in pair})
     known = {pair: float(f"{p:.4g}") for pair, p in pairs.items() if math.isfinite(p)}
     return {"effects": keys, "p_correct": [[known.get((a, b), known.get((b, a))) for b in keys] for a in keys]}
-
-
-def _manoeuvre(m: Manoeuvre) -> dict[str, Any]:
-    return {
-        **fields_of(m, "name", "separates", "sentence", "separation_now", "separation_then"),
-        "p_correct_now": _p_correct(m.separation_now),
-        "p_correct_then": _p_correct(m.separation_then),
-        "minutes": plain(m.minutes),
-    }
-
-
-def _model(model: Model) -> list[dict[str, Any]]:
-    return [
-        {
-            "effect": t.effect.name,
-            "where": t.where,
-            "parameters": plain(t.values),
-            **({"knots": plain(t.knots)} if t.knots else {}),
-        }
-        for t in model.terms
-    ]
 
 
 def _p_correct(separation: float) -> float | None:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from aqualog.report.axes import axis, layout, see_through
 from aqualog.report.diagnosis.views import AFTER, BEFORE, coordinate_axis
 from aqualog.report.diagnosis.words import by_change, channel_title, effect_title
-from aqualog.report.numbers import measured, percent
-from aqualog.report.theme import INK, MUTED
-from aqualog.report.wording import plot_text, pretty_unit
+from aqualog.report.figures import GOOD_TO_BAD, axis, band, bars, dots, figure, heat, line, see_through
+from aqualog.report.theme import MUTED
+from aqualog.report.values import measured, percent, plot_text, pretty_unit
 
 __all__ = ["AFTER", "BEFORE", "gain_bars", "isolability", "plots", "remainder"]
 
-_APART = [[0.0, "#B2182B"], [0.5, "#F4D9A8"], [0.9, "#9CCBA9"], [1.0, "#2B7A4B"]]
+_APART = (*GOOD_TO_BAD[:2], (0.9, "#9CCBA9"), GOOD_TO_BAD[2])
+_NAMES: Mapping[str, Any] = {"autorange": "reversed", "type": "category", "automargin": True}
 _MOST_EFFECTS, _MOST_WITH_TEXT = 36, 24
 
 
@@ -38,21 +38,17 @@ def gain_bars(document: Mapping[str, Any]) -> dict[str, Any] | None:
         return None
     names = [r[0] for r in rows]
     data = [
-        {
-            "type": "bar", "orientation": "h", "name": name, "y": names, "x": [float(f"{x:.4g}") for x in values],
-            "marker": {"color": colour}, "text": texts, "textposition": "auto", "insidetextanchor": "start",
-            "hovertemplate": "%{y}: %{text} (%{x:.0f} %)<extra>%{fullData.name}</extra>",
-        }
+        bars(name, names, values, colour, text=texts, textposition="auto", insidetextanchor="start",
+             hovertemplate="%{y}: %{text} (%{x:.0f} %)<extra>%{fullData.name}</extra>")
         for name, values, texts, colour in (
             ("before", [100.0] * len(rows), [r[2] for r in rows], see_through(BEFORE, 0.55)),
             ("after", [r[1] for r in rows], [r[3] for r in rows], see_through(AFTER, 0.75)),
         )
     ]  # fmt: skip
     x = axis("root mean square error [% of that before]", [0.0, 1.08 * max(100.0, *(r[1] for r in rows))])
-    figure = layout("", x, axis(""), height=110 + 50 * len(rows))
-    figure["yaxis"] |= {"autorange": "reversed", "type": "category", "automargin": True}
-    figure["legend"] |= {"y": 1.0, "yanchor": "bottom"}
-    return {"data": data, "layout": figure}
+    return figure(
+        data, "", x, axis(**_NAMES), height=110 + 50 * len(rows), legend={"y": 1.0, "yanchor": "bottom"},
+    )  # fmt: skip
 
 
 def isolability(document: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -67,22 +63,17 @@ def isolability(document: Mapping[str, Any]) -> dict[str, Any] | None:
     keys = [names[i] for i in order]
     titles = [plot_text(effect_title(k), 34) for k in keys]
     values = [[rows[i][j] if i != j else None for j in order] for i in order]
-    heat: dict[str, Any] = {
-        "type": "heatmap", "x": titles, "y": titles, "z": values, "zmin": 0.5, "zmax": 1.0, "colorscale": _APART,
-        "xgap": 1, "ygap": 1, "hoverongaps": False, "text": [[percent(v) if v is not None else "" for v in row]
-                                                            for row in values],
-        "hovertemplate": "%{y} from %{x}: the right name in %{text}<extra></extra>",
-        "colorbar": {"title": {"text": "probability of the right name", "side": "right"}, "thickness": 12,
-                     "tickformat": ".0%",
-                     "outlinewidth": 0, "tickcolor": MUTED},
-    }  # fmt: skip
-    if len(keys) <= _MOST_WITH_TEXT:
-        heat |= {"texttemplate": "%{text}", "textfont": {"size": 10}}
-    figure = layout("", axis(""), axis(""), height=150 + 22 * max(len(keys), 6))
-    figure["xaxis"] |= {"tickangle": -45, "type": "category", "automargin": True, "showgrid": False}
-    figure["yaxis"] |= {"autorange": "reversed", "type": "category", "automargin": True, "showgrid": False}
-    figure["margin"] |= {"t": 30, "b": 20}
-    return {"data": [heat], "layout": figure}
+    texts = [[percent(v) if v is not None else "" for v in row] for row in values]
+    shown = {"texttemplate": "%{text}", "textfont": {"size": 10}} if len(keys) <= _MOST_WITH_TEXT else {}
+    cells = heat(
+        titles, titles, values, texts, (0.5, 1.0), _APART, **shown,
+        hovertemplate="%{y} from %{x}: the right name in %{text}<extra></extra>",
+        colorbar={"title": {"text": "probability of the right name", "side": "right"}, "thickness": 12,
+                  "tickformat": ".0%", "outlinewidth": 0, "tickcolor": MUTED},
+    )  # fmt: skip
+    x = axis(tickangle=-45, type="category", automargin=True, showgrid=False)
+    height = 150 + 22 * max(len(keys), 6)
+    return figure([cells], "", x, axis(**_NAMES, showgrid=False), height=height, margin={"t": 30, "b": 20})
 
 
 def remainder(r: Mapping[str, Any], document: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -100,28 +91,20 @@ def remainder(r: Mapping[str, Any], document: Mapping[str, Any]) -> dict[str, An
     labels = [axis(coordinate_axis(c)[0]) for c in r["depends_on"]]
     if len(columns) > 1:
         known = [i for i, f in enumerate(r["f"]) if f is not None]
-        dots = {
-            "type": "scatter", "mode": "markers", "x": [columns[0][i] for i in known],
-            "y": [columns[1][i] for i in known], "showlegend": False,
-            "marker": {"color": [r["f"][i] for i in known], "colorscale": "RdBu", "cmid": 0.0, "size": 11,
-                       "symbol": "square",
-                       "colorbar": {"thickness": 12, "outlinewidth": 0, "title": {"text": unit}}},
-            "customdata": [[r["f"][i], r["low"][i], r["high"][i]] for i in known],
-            "hovertemplate": "%{customdata[0]:.4g} (%{customdata[1]:.4g} … %{customdata[2]:.4g})<extra></extra>",
-        }  # fmt: skip
-        return {"data": [dots], "layout": layout(title, labels[0], labels[1], height=330)}
+        square = dots(
+            "", [columns[0][i] for i in known], [columns[1][i] for i in known], [r["f"][i] for i in known], size=11,
+            style={"colorscale": "RdBu", "cmid": 0.0, "symbol": "square",
+                   "colorbar": {"thickness": 12, "outlinewidth": 0, "title": {"text": unit}}},
+            showlegend=False, customdata=[[r["f"][i], r["low"][i], r["high"][i]] for i in known],
+            hovertemplate="%{customdata[0]:.4g} (%{customdata[1]:.4g} … %{customdata[2]:.4g})<extra></extra>",
+        )  # fmt: skip
+        return figure([square], title, labels[0], labels[1], height=330)
     x, order = columns[0], sorted(range(len(columns[0])), key=lambda i: (columns[0][i] is None, columns[0][i]))
     known = [i for i in order if None not in (x[i], r["low"][i], r["high"][i])]
-    band = {
-        "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": see_through(AFTER, 0.18),
-        "line": {"width": 0},
-        "x": [x[i] for i in known] + [x[i] for i in reversed(known)], "hoverinfo": "skip", "name": "95 % band",
-        "y": [r["high"][i] for i in known] + [r["low"][i] for i in reversed(known)],
-    }  # fmt: skip
-    line = {
-        "type": "scatter", "mode": "lines", "x": [x[i] for i in order], "y": [r["f"][i] for i in order],
-        "line": {"color": AFTER, "width": 2}, "name": "not explained", "hovertemplate": "%{y:.4g}<extra></extra>",
-    }  # fmt: skip
-    figure = layout(title, labels[0], axis(unit), height=330)
-    figure["font"] |= {"color": INK}
-    return {"data": [band, line], "layout": figure}
+    at, low, high = ([column[i] for i in known] for column in (x, r["low"], r["high"]))
+    data = [
+        band("95 % band", at, low, high, AFTER, 0.18),
+        line("not explained", [x[i] for i in order], [r["f"][i] for i in order], AFTER,
+             hovertemplate="%{y:.4g}<extra></extra>"),
+    ]  # fmt: skip
+    return figure(data, title, labels[0], axis(unit), height=330)

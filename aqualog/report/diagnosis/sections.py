@@ -10,9 +10,8 @@ from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis.figures import plots
 from aqualog.report.diagnosis.views import view_data
 from aqualog.report.diagnosis.words import by_sharpness, channel_title, effect_title, sentences, verdict_title
-from aqualog.report.numbers import interval_text, measured, percent
 from aqualog.report.sections import Bar, Bars, Beside, Figures, Headline, Lines, Para, Report, Residuals, Section, Table
-from aqualog.report.wording import number, pretty_unit
+from aqualog.report.values import interval_text, measured, number, percent, pretty_unit
 
 __all__ = ["diagnosis_report"]
 
@@ -61,7 +60,7 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
     footer = " ".join([*said["test"][1:], f"Intervals {level}."])
     return Report(
         "diagnosis", "what the simulation gets wrong", sections, _facts(d), figures, footer,
-        {"view-data": view_data(views, causes)}, ("diagnosis.js",),
+        {"view-data": view_data(views, causes)}, ("diagnosis.js", "figures.js"),
     )  # fmt: skip
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.records import ResidualView
-from aqualog.report.axes import axis, layout, rounded
 from aqualog.report.diagnosis.words import COORDINATES, channel_title
+from aqualog.report.figures import axis, dots, figure, line, rounded
 from aqualog.report.theme import wheel_colour
-from aqualog.report.wording import plot_text, pretty_unit
+from aqualog.report.values import plot_text, pretty_unit
 
 __all__ = ["AFTER", "BEFORE", "binned", "coordinate_axis", "view_data", "view_figures"]
 
@@ -90,23 +90,14 @@ def view_figures(
         if x is None:
             continue
         lines = [] if bins is None else [
-            _medians(bins[0], part[0], name, colour)
+            line(name, bins[0], part[0], colour)
             for part, name, colour in zip(bins[1:], ("before", "after"), (BEFORE, AFTER), strict=False)
         ]  # fmt: skip
-        dots = {
-            "type": "scatter", "mode": "markers", "name": "samples before", "x": x, "y": v["before"],
-            "marker": {"color": BEFORE, "size": 3, "opacity": 0.25}, "hoverinfo": "skip",
-        }  # fmt: skip
+        samples = dots("samples before", x, v["before"], BEFORE, size=3, style={"opacity": 0.25})
         drive = f", {data['drives'][v['drive']]}" if len(data["drives"]) > 1 else ""
-        y = axis("", v["limits"])
-        figures.append(
-            {"data": [dots, *lines], "layout": layout(v["title"] + drive, axis(coordinate_axis(start)[0]), y)}
-        )
+        title = v["title"] + drive
+        figures.append(figure([samples, *lines], title, axis(coordinate_axis(start)[0]), axis("", v["limits"])))
     return figures
-
-
-def _medians(x: list[Any], y: list[Any], name: str, colour: str) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "line": {"color": colour, "width": 2}}
 
 
 def _view(v: ResidualView, drive: int, coordinates: int, step: int) -> dict[str, Any]:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from aqualog.report.numbers import interval_text, measured, percent, short
-from aqualog.report.wording import detector_name, pretty_unit
+from aqualog.report.values import interval_text, measured, percent, pretty_unit, short, upper_first
+from aqualog.report.wording import detector_name
 
 __all__ = [
     "COORDINATES", "by_change", "by_sharpness", "channel_title", "coordinate_title", "effect_title", "limit_sentences",
@@ -91,6 +91,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
     causes = {c["key"] for c in document["causes"]}
     confused = _confused(document)
     gain = document["gain"] or {"notes": [], "consequences": []}
+    channels, worse = _channels(document)
     return {
         "headline": [document["sentence"] or f"{verdict_title(document['verdict'])}."],
         "test": _test(document["significance"]),
@@ -100,8 +101,8 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "causes_relations": _relations(c for c in document["isolability"] if _parties(c) & causes),
         "confused": [_confusion(c) for c in confused][:_MOST_CONFUSED],
         "causes_confused": [_confusion(c) for c in confused if _parties(c) & causes][:_MOST_CONFUSED],
-        "score": _score(document["gain"]) + _worse(document),
-        "channels": [s for name, c in by_change(document) for s in _channel(name, c)],
+        "score": _score(document["gain"]) + worse,
+        "channels": channels,
         "gain_notes": list(gain["notes"]),
         "consequences": [_consequence(c) for c in gain["consequences"]],
         "manoeuvre": _manoeuvre(document["next_manoeuvre"]),
@@ -235,28 +236,25 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
     return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}."]
 
 
-def _worse(document: Mapping[str, Any]) -> list[str]:
-    """Channels whose error grows; the full list shows only the largest changes first."""
-    grown = [
-        f"{channel_title(name)} +{percent(c[f'{kind}_change'])} {words}"
-        for name, c in by_change(document)
-        for kind, words in (("rmse", "for the next sample"), ("free", "in free simulation"))
-        if (c[f"{kind}_change"] or 0.0) > WORSE
-    ]
-    return [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
-
-
-def _channel(name: str, c: Mapping[str, Any]) -> list[str]:
-    parts = []
-    for kind, words in (("rmse", "error one sample ahead"), ("free", "error in free simulation")):
-        before, after, change = c[f"{kind}_before"], c[f"{kind}_after"], c[f"{kind}_change"]
-        if before is None or after is None:
-            continue
-        told = (
-            f" ({'+' if change > 0 else '−' if change < 0 else ''}{percent(abs(change))})" if change is not None else ""
-        )
-        parts.append(f"{words} {short(before)} → {short(after)} {pretty_unit(c['unit'])}".rstrip(" –") + told)
-    return [f"{_capital(channel_title(name))}: {', '.join(parts)}."] if parts else []
+def _channels(document: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+    """The error of each channel before and after, and a sentence on those that grow, which the list may hide."""
+    told, grown = [], []
+    for name, c in by_change(document):
+        parts = []
+        for kind, error, short_error in (
+            ("rmse", "error one sample ahead", "for the next sample"),
+            ("free", "error in free simulation", "in free simulation"),
+        ):
+            before, after, change = c[f"{kind}_before"], c[f"{kind}_after"], c[f"{kind}_change"]
+            if (change or 0.0) > WORSE:
+                grown.append(f"{channel_title(name)} +{percent(change)} {short_error}")
+            if before is None or after is None:
+                continue
+            sign = "" if not change else "+" if change > 0 else "−"
+            by = "" if change is None else f" ({sign}{percent(abs(change))})"
+            parts.append(f"{error} {short(before)} → {short(after)} {pretty_unit(c['unit'])}".rstrip(" –") + by)
+        told += [f"{upper_first(channel_title(name))}: {', '.join(parts)}."] if parts else []
+    return told, [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
 
 
 def _consequence(c: Mapping[str, Any]) -> str:
@@ -273,7 +271,7 @@ def _consequence(c: Mapping[str, Any]) -> str:
 def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
     if m is None:
         return []
-    said = [m["sentence"]] if m["sentence"] else [f"{_capital(m['name'].replace('_', ' '))}."]
+    said = [m["sentence"]] if m["sentence"] else [f"{upper_first(m['name'].replace('_', ' '))}."]
     if m["p_correct_now"] is None or m["p_correct_then"] is None or m["name"] in ("none", "sensor"):
         return said
     lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""
@@ -283,15 +281,11 @@ def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
 
 def _unexplained(r: Mapping[str, Any]) -> str:
     coordinates = " and ".join(coordinate_title(x) for x in r["depends_on"])
-    said = r["sentence"] or f"{_capital(channel_title(r['channel']))} depends on {coordinates}."
+    said = r["sentence"] or f"{upper_first(channel_title(r['channel']))} depends on {coordinates}."
     parts = [f"{percent(r['share'])} of the variance"] if r["share"] is not None else []
     parts += [f"p = {short(r['p_value'])}"] if r["p_value"] is not None else []
     parts += [f"{', '.join(coordinate_title(x) for x in r['proxies'])} explains it as well"] if r["proxies"] else []
     if r["nearest"]:
         alike = f" (similarity {short(r['cosine'])})" if r["cosine"] is not None else ""
         parts.append(f"nearest known effect {effect_title(r['nearest'])}{alike}")
-    return f"{said} {_capital('; '.join(parts))}." if parts else said
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return f"{said} {upper_first('; '.join(parts))}." if parts else said

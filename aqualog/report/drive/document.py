@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
@@ -11,12 +9,20 @@ import numpy as np
 
 from aqualog import __version__
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import DriveResult, Event, Signals, SlopeSummary, Track, Unavailable
+from aqualog.core.records import DriveResult, Signals, Track
 from aqualog.io.write_log import LogGroup
+from aqualog.report.values import fields_of, plain
 
 __all__ = ["SCHEMA_VERSION", "document", "result_groups", "signal_groups", "track_name"]
 
 SCHEMA_VERSION = 1
+_EVENT = ("detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence")
+_SLOPE = (
+    "place", "wheel", "slope", "slope_sd", "reference", "reference_from", "beta", "offset", "judged_s", "dropped_s",
+    "seconds", "inactive",
+)  # fmt: skip
+_BAD = ("not_finite", "out_of_range", "invalid_code", "frozen")
+_UNITS = {"(m/s^2)^2": "m^2/s^4"}
 
 
 def document(result: DriveResult, *, log: str) -> dict[str, Any]:
@@ -28,99 +34,41 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
         "tool_version": __version__,
         "log": log,
         "files": list(signals.files),
-        "start_time": _start(signals),
-        "duration_s": _number(signals.duration_s),
-        "sample_rate_hz": _number(1e9 / signals.step_ns),
+        "start_time": _start(signals.start_ns),
+        "duration_s": plain(signals.duration_s),
+        "sample_rate_hz": plain(1e9 / signals.step_ns),
         "vehicle": result.vehicle_name,
         "signals": {name: _signal(signals, name) for name in signals.symbols},
-        "events": [_event(e) for e in result.events],
-        "unavailable": [_lacking(u) for u in result.unavailable],
-        "limited": [_lacking(u) for u in result.limited],
-        "slip_slope": [_slope(s) for s in result.slopes],
+        "events": [fields_of(e, *_EVENT) for e in result.events],
+        "unavailable": [fields_of(u, "detector", "missing") for u in result.unavailable],
+        "limited": [fields_of(u, "detector", "missing") for u in result.limited],
+        "slip_slope": [
+            {**fields_of(s, *_SLOPE[:8]), "changes": s.alarms, **fields_of(s, *_SLOPE[8:])} for s in result.slopes
+        ],
         "quality": {
-            "dropped_samples": quality.dropped_samples,
-            "time_jumps": quality.time_jumps,
-            "truncated": quality.truncated,
-            "unfinalised": quality.unfinalised,
-            "frozen_samples": quality.frozen_samples,
-            **{n: getattr(quality.faults, n) for n in type(quality.faults).KINDS},
-            "first_s": {n: _number(s) for n, s in quality.faults.first_s.items()},
+            **fields_of(quality, "dropped_samples", "time_jumps", "truncated", "unfinalised", "frozen_samples"),
+            **fields_of(quality.faults, *quality.faults.KINDS, "first_s"),
             "notes": [*quality.notes, *result.notes],
         },
     }
 
 
-def _start(signals: Signals) -> str | None:
-    if signals.start_ns is None:
+def _start(start_ns: int | None) -> str | None:
+    if start_ns is None:
         return None
-    second, rest = divmod(signals.start_ns, 10**9)
+    second, rest = divmod(start_ns, 10**9)
     return f"{datetime.fromtimestamp(second, UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
 
 
-def _number(x: float) -> float | None:
-    return float(f"{x:.9g}") if math.isfinite(x) else None
-
-
-def _value(x: Any) -> Any:
-    return _number(x) if isinstance(x, float) else x
-
-
 def _signal(signals: Signals, name: str) -> dict[str, Any]:
-    origin = signals.origins.get(name)
+    origin, unit = signals.origins.get(name), SYMBOLS[name].unit
     if origin is None:
-        return {"channel": name, "unit": SYMBOLS[name].unit, "rate_hz": _number(1e9 / signals.step_ns)}
+        return {"channel": name, "unit": unit, "rate_hz": plain(1e9 / signals.step_ns)}
     return {
-        "channel": origin.channel,
-        "file": origin.file,
-        "unit": SYMBOLS[name].unit,
+        **fields_of(origin, "channel", "file"),
+        "unit": unit,
         "source_unit": origin.unit,
-        "rate_hz": _number(origin.rate_hz),
-        "missing_fraction": _number(origin.missing_fraction),
-        "samples": origin.samples,
-        "not_finite": origin.not_finite,
-        "out_of_range": origin.out_of_range,
-        "invalid_code": origin.invalid_code,
-        "frozen": origin.frozen,
-    }
-
-
-def _event(event: Event) -> dict[str, Any]:
-    return {
-        "detector": event.detector,
-        "wheel": event.wheel,
-        "side": event.side,
-        "start_s": _number(event.start_s),
-        "end_s": _number(event.end_s),
-        "severity": event.severity,
-        "peak": _number(event.peak),
-        "threshold": _number(event.threshold),
-        "evidence": _evidence(event.evidence),
-    }
-
-
-def _evidence(evidence: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _value(value) for name, value in evidence.items()}
-
-
-def _lacking(item: Unavailable) -> dict[str, Any]:
-    return {"detector": item.detector, "missing": list(item.missing)}
-
-
-def _slope(summary: SlopeSummary) -> dict[str, Any]:
-    return {
-        "place": summary.place,
-        "wheel": summary.wheel,
-        "slope": _number(summary.slope),
-        "slope_sd": _number(summary.slope_sd),
-        "reference": _number(summary.reference),
-        "reference_from": summary.reference_from,
-        "beta": None if summary.beta is None else _number(summary.beta),
-        "offset": _number(summary.offset),
-        "changes": summary.alarms,
-        "judged_s": _number(summary.judged_s),
-        "dropped_s": _number(summary.dropped_s),
-        "seconds": {name: _number(s) for name, s in summary.seconds.items()},
-        "inactive": {name: _number(s) for name, s in summary.inactive.items()},
+        **fields_of(origin, "rate_hz", "missing_fraction", "samples", *_BAD),
     }
 
 
@@ -133,7 +81,11 @@ def signal_groups(signals: Signals) -> list[LogGroup]:
 def result_groups(result: DriveResult) -> list[LogGroup]:
     """Canonical signals, statistics and detection bits as channels of three groups."""
     statistics = {
-        track_name(t): (_unit(t), f"statistic of {t.detector}, threshold {t.threshold:g} {t.unit}", t.statistic)
+        track_name(t): (
+            _UNITS.get(t.unit, t.unit),
+            f"statistic of {t.detector}, threshold {t.threshold:g} {t.unit}",
+            t.statistic,
+        )
         for t in result.tracks
     }
     bits = {
@@ -149,7 +101,3 @@ def track_name(track: Track) -> str:
     place = track.wheel or track.side
     name = f"{track.detector}_{place}" if place else track.detector
     return f"{track.detector}_cusum_{place}" if name in SYMBOLS else name
-
-
-def _unit(track: Track) -> str:
-    return {"(m/s^2)^2": "m^2/s^4"}.get(track.unit, track.unit)

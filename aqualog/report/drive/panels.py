@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aqualog.core.notation import SIDES, SYMBOLS, WHEELS
-from aqualog.core.records import DriveResult, Signals, Track
+from aqualog.core.records import DriveResult, FloatArray, Signals, Track
+from aqualog.report.drive.stack import VEHICLE, Lane, Line, Row, rows_figure
+from aqualog.report.figures import PALETTE
 from aqualog.report.reduce import Spans, spans_of
-from aqualog.report.row import VEHICLE, Lane, Line, Row, feature, wheel_lines
-from aqualog.report.standalone import rows_figure
 from aqualog.report.theme import INK, MUTED, WATER, WHEEL_COLOURS, detector_colour, wheel_colour
-from aqualog.report.wording import caption, detector_name, place, pretty_unit
+from aqualog.report.values import place, pretty_unit
+from aqualog.report.wording import caption, detector_name
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
+    import polars as pl
 
 __all__ = ["drive_rows", "signals_figure"]
 
 _MOST_BARS = 20_000  # per lane, and shades of the water; beyond, those that nearly touch are joined
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#7F6BB3", "#8C6D31")
 _STEERING = "#7F6BB3"
 _DEPTHS = {
     "water_depth": ("lane", WATER),
@@ -35,16 +36,27 @@ def drive_rows(result: DriveResult) -> list[Row]:
     return [row for row in _rows(result) if row.lines or row.lanes]
 
 
+def _feature(frame: pl.DataFrame, name: str) -> FloatArray | None:
+    """A column as floats; None where it is absent or has no value at all."""
+    import polars as pl
+
+    if name not in frame.columns:
+        return None
+    column = frame[name].cast(pl.Float64)
+    values: FloatArray = (column.fill_null(np.nan) if column.null_count() else column).to_numpy()
+    return values if np.isfinite(values).any() else None
+
+
 def _rows(r: DriveResult) -> Iterator[Row]:
     yield _speeds(r)
     yield _lanes(r)
     yield Row(
         "Speed difference", "wheel minus vehicle; below zero the wheel spins down", "km/h",
-        wheel_lines(r, "v_w_delta", ("m/s", "km/h")), include=(-1.0, 1.0), height=150,  # Eq. (2.4)
+        _wheel_lines(r, "v_w_delta", ("m/s", "km/h")), include=(-1.0, 1.0), height=150,  # Eq. (2.4)
     )  # fmt: skip
     yield Row(
         "Acceleration difference", "wheel minus vehicle; a healthy wheel stays near zero", "m/s²",
-        wheel_lines(r, "a_w_delta"), include=(-2.0, 2.0), height=150,  # Eq. (2.3)
+        _wheel_lines(r, "a_w_delta"), include=(-2.0, 2.0), height=150,  # Eq. (2.3)
     )  # fmt: skip
     yield from (
         _statistic(d, [t for t in r.tracks if t.detector == d]) for d in dict.fromkeys(t.detector for t in r.tracks)
@@ -52,18 +64,26 @@ def _rows(r: DriveResult) -> Iterator[Row]:
     yield _slip_slope(r)
     yield _resistance(r)
     yield _tie_rods(r)
-    yield _depths(r)
+    columns = [(label, colour, _feature(r.signals.frame, s)) for s, (label, colour) in _DEPTHS.items()]
+    depths = tuple(Line(label, VEHICLE, colour, v, units=("m", "mm")) for label, colour, v in columns if v is not None)
+    yield Row("Water depth", "as logged", "mm", depths, include=(0.0,), height=100)
+
+
+def _wheel_lines(r: DriveResult, stem: str, units: tuple[str, str] = ("-", "-")) -> tuple[Line, ...]:
+    """The lines of the wheels that have this feature; `units` are the feature's and the axis's."""
+    columns = [(w, _feature(r.features, f"{stem}_{w}")) for w in WHEELS]
+    return tuple(Line(w.upper(), w, wheel_colour(w), v, units=units) for w, v in columns if v is not None)
 
 
 def _speeds(r: DriveResult) -> Row:
     """Speed of the vehicle and of the four wheels on its centre line."""
     units = ("m/s", "km/h")
-    reference, estimate = feature(r.signals.frame, "v_x"), feature(r.features, "v_x_hat")
+    reference, estimate = _feature(r.signals.frame, "v_x"), _feature(r.features, "v_x_hat")
     below = () if reference is None else (Line("v_x reference", VEHICLE, MUTED, reference, 1.0, units),)
     above = () if estimate is None else (Line("v_x", VEHICLE, INK, estimate, 1.8, units),)
     return Row(
         "Speed", "wheels on the vehicle's centre line; a wheel that leaves the black line slips", "km/h",
-        (*below, *wheel_lines(r, "v_w", units), *above), least_span=4.0, shades=_watered(r), height=210,
+        (*below, *_wheel_lines(r, "v_w", units), *above), least_span=4.0, shades=_watered(r), height=210,
     )  # fmt: skip
 
 
@@ -110,7 +130,7 @@ def _slip_slope(r: DriveResult) -> Row:
     lines = []
     wheels = {t.side: t.wheel for t in r.tracks if t.detector == "slip_slope_drop"}
     for side, pair in SIDES.items():
-        slope, dry = (feature(r.features, f"slip_slope_{of}{side}") for of in ("", "ref_"))
+        slope, dry = (_feature(r.features, f"slip_slope_{of}{side}") for of in ("", "ref_"))
         if slope is None:
             continue
         wheel = wheels.get(side)
@@ -124,7 +144,7 @@ def _slip_slope(r: DriveResult) -> Row:
 
 def _resistance(r: DriveResult) -> Row:
     """Nominal minus measured acceleration, Eq. (2.9) of the thesis."""
-    values, offset = feature(r.features, "delta_a_x"), feature(r.features, "delta_a_x_offset")
+    values, offset = _feature(r.features, "delta_a_x"), _feature(r.features, "delta_a_x_offset")
     about = "nominal minus measured acceleration; water lifts it"
     lines = [] if values is None else [Line("delta_a_x", VEHICLE, detector_colour("resistance", None), values)]
     if lines and offset is not None:
@@ -137,24 +157,17 @@ def _tie_rods(r: DriveResult) -> Row:
     """Tie-rod forces, or the steering torque, beside the expectation for a dry road (thesis section 2.4)."""
     about, lines = "measured; dry model in grey", list[Line]()
     for wheel in ("fl", "fr"):
-        measured, model = (feature(r.features, f"tie_rod_{of}_{wheel}") for of in ("meas", "hat"))
+        measured, model = (_feature(r.features, f"tie_rod_{of}_{wheel}") for of in ("meas", "hat"))
         if measured is not None and model is not None:
             lines.append(Line(wheel.upper(), wheel, wheel_colour(wheel), measured))
             lines.append(Line(f"{wheel.upper()}, model", wheel, MUTED, model, width=0.9))
     if lines:
         return Row("Tie-rod forces", about, "N", tuple(lines), include=(-200.0, 200.0), decimals=0)
-    measured, model = (feature(r.features, f"steering_{of}") for of in ("meas", "hat"))
+    measured, model = (_feature(r.features, f"steering_{of}") for of in ("meas", "hat"))
     if measured is not None and model is not None:
         lines.append(Line("measured", VEHICLE, _STEERING, measured))
         lines.append(Line("model", VEHICLE, MUTED, model, width=0.9))
     return Row("Steering torque", about, "N·m", tuple(lines), include=(-1.0, 1.0))
-
-
-def _depths(r: DriveResult) -> Row:
-    """Water on the road, where it was measured."""
-    columns = [(label, colour, feature(r.signals.frame, s)) for s, (label, colour) in _DEPTHS.items()]
-    lines = tuple(Line(label, VEHICLE, colour, v, units=("m", "mm")) for label, colour, v in columns if v is not None)
-    return Row("Water depth", "as logged", "mm", lines, include=(0.0,), height=100)
 
 
 def signals_figure(signals: Signals, title: str) -> go.Figure:
@@ -179,5 +192,5 @@ def signals_figure(signals: Signals, title: str) -> go.Figure:
 
 def _signal(signals: Signals, name: str, i: int) -> Line:
     wheel = name[-2:] if name[-2:] in WHEELS else None
-    colour = wheel_colour(wheel) if wheel else _COLOURS[i % len(_COLOURS)]
+    colour = wheel_colour(wheel) if wheel else PALETTE[i % len(PALETTE)]
     return Line(name, wheel or VEHICLE, colour, signals.array(name))

@@ -271,7 +271,7 @@
   function mark(index) {
     selected = index;
     if (!eventBody) return;
-    for (const row of eventBody.rows) row.setAttribute("aria-selected", String(Number(row.dataset.event) === index));
+    for (const row of eventBody.rows) row.setAttribute("aria-selected", String(Number(row.dataset.row) === index));
   }
 
   function zoomTo(index, scroll) {
@@ -287,7 +287,7 @@
   }
 
   function step(by) {
-    const order = long ? long.order : Array.from(eventBody.rows, function (r) { return Number(r.dataset.event); });
+    const order = long ? long.order : Array.from(eventBody.rows, function (r) { return Number(r.dataset.row); });
     if (!order.length) return;
     const at = order.indexOf(selected);
     const next = at < 0 ? (by > 0 ? 0 : order.length - 1) : (at + by + order.length) % order.length;
@@ -298,11 +298,11 @@
   if (eventBody) {
     eventBody.addEventListener("click", function (e) {
       const row = e.target.closest("tr");
-      if (row) zoomTo(Number(row.dataset.event), true);
+      if (row) zoomTo(Number(row.dataset.row), true);
     });
     eventBody.addEventListener("keydown", function (e) {
       const row = e.target.closest("tr");
-      if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(Number(row.dataset.event), true); }
+      if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(Number(row.dataset.row), true); }
       const other = e.key === "ArrowDown" ? row.nextElementSibling : e.key === "ArrowUp" ? row.previousElementSibling : null;
       if (other) { e.preventDefault(); other.focus(); }
     });
@@ -333,7 +333,7 @@
 
   function eventRow(i) {
     const line = make("tr", { tabIndex: 0 });
-    line.dataset.event = i;
+    line.dataset.row = i;
     line.setAttribute("aria-selected", String(i === selected));
     columns.forEach(function (column, c) {
       const text = column(i)[0], colour = c === 1 ? data.table.places[data.table.place[i]][1] : "";
@@ -352,15 +352,15 @@
     long.first = first;
     eventBody.replaceChildren(...part.map(eventRow));
     eventTable.parentNode.scrollTop = 0;
-    document.getElementById("event-count").textContent = count
+    document.getElementById("events-count").textContent = count
       ? `${first + 1}–${first + part.length} of ${count}` + (count < data.events.length ? ` found among ${data.events.length}` : "")
       : "no event";
-    document.getElementById("event-back").disabled = first === 0;
-    document.getElementById("event-on").disabled = first + part.length >= count;
+    document.getElementById("events-back").disabled = first === 0;
+    document.getElementById("events-on").disabled = first + part.length >= count;
   }
 
   function orderEvents() {
-    const words = document.getElementById("event-search").value.trim().toLowerCase().split(/\s+/);
+    const words = document.getElementById("events-search").value.trim().toLowerCase().split(/\s+/);
     long.words = long.words || data.events.map(function (_, i) {
       return columns.map(function (column) { return column(i)[0]; }).join(" ").toLowerCase();
     });
@@ -381,10 +381,10 @@
   }
 
   if (long) {
-    document.getElementById("event-search").addEventListener("input", orderEvents);
-    document.getElementById("event-back").addEventListener("click", function () { fillEvents(long.first - PAGE); });
-    document.getElementById("event-on").addEventListener("click", function () { fillEvents(long.first + PAGE); });
-    document.getElementById("event-controls").hidden = false;
+    document.getElementById("events-search").addEventListener("input", orderEvents);
+    document.getElementById("events-back").addEventListener("click", function () { fillEvents(long.first - PAGE); });
+    document.getElementById("events-on").addEventListener("click", function () { fillEvents(long.first + PAGE); });
+    document.getElementById("events-controls").hidden = false;
     fillEvents(0);
     let first = 0;
     window.addEventListener("beforeprint", function () { first = long.first; fillEvents(0, Infinity); });

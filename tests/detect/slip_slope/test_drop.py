@@ -1,7 +1,6 @@
 """Criterion 4: the slope against its history (C56, C68), on scripted estimates and on simulated drives."""
 
 import json
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -23,7 +22,8 @@ from aqualog.detect.stream import DriveStream, detect_drive
 from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.report.drive.panels import drive_rows
-from aqualog.report.drive.words import event_table
+from aqualog.report.drive.report import drive_report
+from aqualog.report.text import report_text
 
 DT = 0.01
 RWD = Vehicle(name="rwd", given=frozenset({"mass", "tyre.slip_slope_r"}))
@@ -310,15 +310,16 @@ def test_history_goes_from_drive_to_drive():
 
 
 def test_text_and_page_of_a_drive():
-    """Shares of the time in the text, the slope beside its dry value as a row of the page."""
+    """Seconds of each state in the text, the slope beside its dry value as a row of the page."""
     samples = Path(__file__).parents[3] / "sample_logs"
     car = load_vehicle(samples / "vehicle.toml")
     result = detect_drive(load_signals([samples / "lane_drive.parquet"], vehicle=car), car)
-    told = [line for line in event_table(result).splitlines() if line.startswith(("  rl: ", "  rr: "))]
+    told = [x.split("  ") for x in report_text(drive_report(result)).splitlines() if x.startswith(("RL  ", "RR  "))]
     assert len(told) == 2
-    for line in told:
-        assert "dry 31.0 (vehicle file)" in line
-        assert 90 <= sum(int(x) for x in re.findall(r"(\d+)%", line)) <= 101
+    for cells in told:
+        name, _, dry, source, *seconds = [c.strip() for c in cells if c.strip()]
+        assert (dry, source) == ("31.0", "vehicle file"), name
+        assert sum(map(float, seconds)) == pytest.approx(24.0, abs=1.0)
     row = next(r for r in drive_rows(result) if r.title == "Slip slope")
     assert [x.label for x in row.lines] == ["RL", "RL, dry", "RR", "RR, dry"]
     assert np.nanmin(row.lines[0].values) < 15.0 < 30.0 < np.nanmax(row.lines[1].values)

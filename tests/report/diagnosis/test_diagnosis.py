@@ -4,11 +4,10 @@ runs."""
 import pytest
 
 from aqualog.report.diagnosis.sections import diagnosis_report
-from aqualog.report.offline import write_page
-from aqualog.report.page import report_page
+from aqualog.report.page import report_page, write_page
 from tests.headless import click, requests, severe, wait_for
+from tests.report.diagnosis.test_document import document_of
 from tests.report.diagnosis_case import HOSTILE, cases, views_of
-from tests.report.test_diagnosis_document import document_of
 
 pytestmark = pytest.mark.browser
 DRAWN = "return document.querySelectorAll('#views .js-plotly-plot').length"

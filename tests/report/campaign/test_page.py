@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,40 +14,21 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from aqualog.campaign.bins import plan
 from aqualog.campaign.samples import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.report.campaign.answers import answers_of
-from aqualog.report.campaign.findings import Curve, Point, crossing, find
+from aqualog.report.campaign.findings import Curve, Point, crossing
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
 from aqualog.report.campaign.labels import file_name, group_text, value_text
 from aqualog.report.campaign.quality import MOST_KINDS, problems_of
-from aqualog.report.campaign.run_page import command_of, run_page
-from aqualog.report.campaign.runs import facts_of
-from aqualog.report.wording import cut
-from tests.report.campaign_case import FORMULA, IMAGE, LONG, SCRIPT, load_case, make_case
+from aqualog.report.campaign.run_page import command_of, facts_of, run_page
+from aqualog.report.values import cut
+from tests.report.campaign_case import FORMULA, IMAGE, LONG, SCRIPT
 
 SECTIONS = ("verdict", "quality", "filters", "answers-section", "matrix-section", "slopes-section",
             "resistance-section", "full-section", "detections-section", "runs-section", "made-section")  # fmt: skip
 EVIL = 14  # index of the run with names that mean harm
-
-
-@pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    return load_case(make_case(tmp_path_factory.mktemp("case")))
-
-
-@pytest.fixture(scope="module")
-def findings(case):
-    return find(case, plan(case, ()))
-
-
-@pytest.fixture(scope="module")
-def folder(case, findings, tmp_path_factory):
-    out = tmp_path_factory.mktemp("report") / "out"
-    write_report(case, findings, out)
-    return out
 
 
 @pytest.fixture(scope="module")
@@ -268,8 +250,9 @@ def test_command_on_the_page_makes_the_full_one(case):
     assert "'a<b>/script><img src=x onerror=alert(3)>'\"'\"' .parquet'" in command_of(case, case.runs[EVIL])
 
 
-def test_command_line(tmp_path):
-    campaign = make_case(tmp_path, hostile=False)
+def test_command_line(case, tmp_path):
+    tmp_path = shutil.copytree(case.configured.campaign.path.parent, tmp_path / "case")
+    campaign = tmp_path / "campaign.toml"
     run = lambda *a: CliRunner().invoke(app, ["report", *map(str, a), "--jobs", "1"])  # noqa: E731
     done = run(campaign, "--by", "depth,manoeuvre")
     assert done.exit_code == 3, done.stderr  # a log is none

@@ -12,8 +12,8 @@ from aqualog.diagnose.records import Estimate
 from aqualog.report.diagnosis.document import diagnosis_document
 from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.words import effect_title, limit_sentences, sentences
-from aqualog.report.numbers import interval_text, measured, ordinary, percent, short
 from aqualog.report.text import report_text
+from aqualog.report.values import interval_text, measured, ordinary, percent, short
 from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, cases, numbers_in
 
 VERDICTS = list(cases())
@@ -268,6 +268,6 @@ def test_sets_that_are_told_apart_are_in_the_matrix_alone():
 
 
 def test_powers_of_ten_stay_numbers_in_plain_text():
-    from aqualog.report.numbers import ordinary
+    from aqualog.report.values import ordinary
 
     assert ordinary("p = 1.00·10⁻¹² at 3 m/s²") == "p = 1.00e-12 at 3 m/s²"

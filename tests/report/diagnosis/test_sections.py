@@ -12,10 +12,9 @@ from aqualog.report.diagnosis.figures import gain_bars, isolability, remainder
 from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.views import binned, view_data
 from aqualog.report.diagnosis.words import by_sharpness, sentences
-from aqualog.report.offline import write_page
 from aqualog.report.page import report_page
-from tests.report.diagnosis_case import HOSTILE, cases, view, views_of
-from tests.report.test_diagnosis_document import VERDICTS, document_of, round_trip
+from tests.report.diagnosis.test_document import VERDICTS, document_of, round_trip
+from tests.report.diagnosis_case import cases, view, views_of
 
 
 def render_page(document, views, title):
@@ -63,22 +62,6 @@ def test_what_the_page_tells_changes_with_the_document():
         assert said not in body(render_page(d, (), "t"))
         place[key] = value
         assert said in body(render_page(d, (), "t"))
-
-
-def test_names_of_drives_are_no_markup(pages, tmp_path):
-    evil = '"><img src=x onerror=alert(9)>\udcff'
-    write_page(tmp_path / "p.html", render_page(document_of(), views_of("named"), evil))
-    page = (tmp_path / "p.html").read_text(encoding="utf-8")
-    assert "<img" not in page.replace("<image", "").split("</style>")[1].split('<script type="application/json"')[0]
-    assert "<script>alert(1)" not in page
-    assert page.count("<script>") == pages["named"].count("<script>")
-    assert html.escape(HOSTILE) in page
-
-
-def test_nothing_is_asked_of_a_network(pages):
-    page = pages["named"]
-    assert "default-src 'none'" in html.unescape(page)
-    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=", page.split("<body>")[1].split("<script>")[0])
 
 
 def test_bins_hold_median_and_spread():
@@ -132,7 +115,7 @@ def test_gain_bars_are_relative_to_before():
     bars = gain_bars(document_of())
     before, after = bars["data"]
     assert set(before["x"]) == {100.0}
-    assert after["x"][0] == pytest.approx(38.16)
+    assert after["x"][0] == pytest.approx(38.16, abs=0.01)
     assert after["text"][0] == "0.045 m/s²"
     assert before["y"][:2] == ["force balance, next sample", "force balance, free simulation"]
     assert gain_bars(document_of("no_effect")) is None

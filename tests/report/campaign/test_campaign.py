@@ -2,23 +2,11 @@
 
 import pytest
 
-from aqualog.campaign.bins import plan
-from aqualog.report.campaign.findings import find
-from aqualog.report.campaign.folder import write_report
 from tests.headless import click, requests, severe, wait_for
-from tests.report.campaign_case import load_case, make_case
 
 pytestmark = pytest.mark.browser
 
 PILL = "//button[contains(@class, 'pill') and text()='{}']"
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    data = load_case(make_case(tmp_path_factory.mktemp("case")))
-    out = tmp_path_factory.mktemp("report") / "out"
-    write_report(data, find(data, plan(data, ())), out)
-    return out
 
 
 def opened(browser, path, fragment=""):
