@@ -16,7 +16,7 @@ ORDER = (
     "core", "physics", "guard", "io", "align", "features", "calibrate",
     "detect", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "thesis", "config", "face", "book", "cli",
 )  # fmt: skip
-# align/quantity and align/load read a map, which is a record of align; config turns TOML into these records
+# align/propose and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
 
 

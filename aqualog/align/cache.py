@@ -132,7 +132,9 @@ class SignalCache:
         """Keep the signals of a drive, unless its files have changed since the key was made."""
         from aqualog.align.signals_file import to_parquet
 
-        if change_since(key.paths, key.seen) or _names_folder(signals.quality.notes, key.paths):
+        folders = {f"{p}{os.sep}" for path in key.paths for p in (path, path.parent)} - {f".{os.sep}"}
+        # a note that names the place of a file would be wrong for a copy of it
+        if change_since(key.paths, key.seen) or any(f in note for f in folders for note in signals.quality.notes):
             return
         buffer = to_parquet(signals)
         data = buffer.getbuffer()
@@ -247,25 +249,16 @@ def cache_limit() -> int:
 @cache
 def _stamp() -> str:
     """Return a stamp of the code that makes signals of logs, and of the libraries that it reads them with."""
-    return hash_of([sources_stamp(_BEHIND), *map(_version, _LIBRARIES)])[:8]
-
-
-def _version(library: str) -> str:
-    try:
-        return f"{library} {version(library)}"
-    except PackageNotFoundError:
-        return library
+    libraries = list(_LIBRARIES)
+    for i, library in enumerate(_LIBRARIES):
+        with suppress(PackageNotFoundError):
+            libraries[i] = f"{library} {version(library)}"
+    return hash_of([sources_stamp(_BEHIND), *libraries])[:8]
 
 
 def _check(data: bytes | memoryview) -> str:
     """Return a check sum: Parquet has none over numbers, so a flipped bit would pass for a measured value."""
     return f"{zlib.crc32(data):08x}"
-
-
-def _names_folder(notes: Sequence[str], paths: Sequence[Path]) -> bool:
-    """Return whether a note names the place of a file, which would be wrong for a copy of it."""
-    folders = {f"{p}{os.sep}" for path in paths for p in (path, path.parent)} - {f".{os.sep}"}
-    return any(f in note for f in folders for note in notes)
 
 
 def _put(path: Path, buffer: io.BytesIO) -> None:

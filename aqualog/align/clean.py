@@ -5,7 +5,6 @@ A signal arrives in any pieces, a whole drive in one. The result does not depend
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from aqualog.align.freezes import Freeze, freeze_note, in_freezes, stand_watch_of, watch_of
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.resample import MEDIAN_OF
+from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS, Symbol
 from aqualog.core.records import BoolArray, ChannelInfo, FloatArray, Origin, TimeArray, TimeFaults
@@ -127,23 +126,10 @@ class Taken(NamedTuple):
 
 
 class Cleaner:
-    """Clean one signal.
+    """Clean one signal, under the name that the map has.
 
-    Parameters
-    ----------
-    name : str
-        As the map has it.
-    entry : Entry
-    info : ChannelInfo
-    signal_map : SignalMap
-    vehicle : Vehicle
-    freezes : tuple of Freeze, optional
-        Where the signal is frozen, from `frozen` of an earlier pass; without them no sample is left out as frozen.
-
-    Raises
-    ------
-    SignalError, ConfigError
-        If the unit does not fit the signal; ConfigError where the map gives the unit.
+    `freezes`, from `frozen` of an earlier pass: where it is frozen; without them no sample is left out as frozen. If
+    the unit does not fit the signal: SignalError, or ConfigError where the map gives the unit.
     """
 
     def __init__(
@@ -223,8 +209,10 @@ class Cleaner:
         glitch = self._judged_glitches(rule, t, x)
         # a jump is judged once what may lead back, and the stamps behind that, are known
         certain = t.size if is_last else int(np.searchsorted(t, t[-1] - KNOWN_NS, side="left"))
-        if not is_last and glitch[-1] and _dead_since(glitch, x) < certain:
-            self._dead, certain = float(x[-1]), t.size
+        if not is_last and glitch[-1]:
+            since = int(np.flatnonzero(~glitch).max(initial=-1)) + 1  # where the glitch at the end begins
+            if since < certain and bool((x[since:] == x[-1]).all()):  # the sensor is dead
+                self._dead, certain = float(x[-1]), t.size
         while 0 < certain < t.size and glitch[max(certain - 2, 0) : certain + 1].any():
             certain -= 1  # neither in a glitch nor at its end, nor behind that
         new = slice(self._done, max(certain, self._done))
@@ -291,13 +279,6 @@ def _where(keep: BoolArray, t: TimeArray, x: FloatArray) -> Samples:
     return (t, x) if keep.all() else (t[keep], x[keep])
 
 
-def _dead_since(glitch: BoolArray, x: FloatArray) -> int:
-    """Return where the constant value of the glitch at the end begins; beyond the end if the sensor is not dead."""
-    last = np.flatnonzero(~glitch)
-    start = int(last[-1]) + 1 if last.size else 0
-    return start if bool((x[start:] == x[-1]).all()) else glitch.size
-
-
 class _Judged(NamedTuple):
     """Samples (n,) in SI, and flags for those that are not finite, that are error codes, or that are out of range."""
 
@@ -315,18 +296,12 @@ class _Judged(NamedTuple):
 def _judged(symbol: Symbol, entry: Entry, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> _Judged:
     """Convert samples (n,), each by itself; raise SignalError if the unit is not one of the symbol."""
     values = _to_si(symbol, raw, unit, vehicle, where) * entry.scale + entry.offset
-    is_code = _is_any_of(raw, entry.invalid)
+    is_code = np.zeros(raw.size, dtype=np.bool_)
+    for code in entry.invalid:  # up to rounding: of 32 bits, or of 1023 * 0.1 against 102.3
+        is_code |= np.isclose(raw, code, rtol=_ROUNDING, atol=0.0)
     is_bad = ~np.isfinite(values)
     is_out = ~is_bad & ~is_code & ((values < symbol.low) | (values > symbol.high))
     return _Judged(values, is_bad, is_code, is_out)
-
-
-def _is_any_of(raw: FloatArray, codes: Sequence[float]) -> BoolArray:
-    """Return which samples (n,) are error codes, up to rounding: of 32 bits, or of 1023 * 0.1 against 102.3."""
-    found = np.zeros(raw.size, dtype=np.bool_)
-    for code in codes:
-        found |= np.isclose(raw, code, rtol=_ROUNDING, atol=0.0)
-    return found
 
 
 def _to_si(symbol: Symbol, raw: FloatArray, unit: str, vehicle: Vehicle, where: str) -> FloatArray:

@@ -25,12 +25,10 @@ import numpy as np
 
 from aqualog.align.clock_search import BLOCK_S, LEAST_BLOCKS, Match, Options, Peak, Smoothed, match
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import NOWHERE, Interval, half_width
 from aqualog.core.records import FloatArray, TimeArray
 
 __all__ = ["ClockFit", "estimate_clock"]
-
-Interval = tuple[float, float]
 
 _RATE_BLOCKS = 40  # at most so many blocks for the offset; longer drives get longer blocks
 _SLOW_BLOCKS = 8  # for drift and levels: driving style, slip, grade and warm tyres stay alike for minutes
@@ -41,42 +39,30 @@ _HUBER = 1.345
 class ClockFit:
     """How the clock and the values of one source stand against a reference.
 
+    All intervals hold 95 % and cover noise, not the run time or filter of a sensor.
+
     Attributes
     ----------
-    offset_s : float
+    offset_s, offset_ci95
         Positive: the source is LATE, an event bears a stamp that is `offset_s` larger than the reference's.
-        Holds at `mid_ns`.
-    offset_ci95 : (low, high)
-        95 % interval of `offset_s`. Covers noise, not the run time or filter of a sensor.
-    slip_offset_s : float
+        Holds at `mid_ns`, a stamp of the source in the middle of the overlap.
+    slip_offset_s, slip_offset_ci95
         Offset if x - x_ref may also hold tyre slip k v dv/dt; NaN unless the quantity is a speed. Where its interval
         and that of `offset_s` do not overlap, part of `offset_s` is slip and not time.
-    slip_offset_ci95 : (low, high)
-    drift_ppm : float
-        Growth of the offset in microseconds per second of the source's clock; an estimate even if not significant.
-    drift_ppm_ci95 : (low, high)
-    drift_significant : bool
-        The 99 % interval of the drift excludes 0. Only then `to_reference` uses it.
-    scale, bias : float
+    drift_ppm, drift_ppm_ci95
+        Growth of the offset in microseconds per second of the source's clock. `drift_significant`: its 99 % interval
+        excludes 0; only then `to_reference` uses it.
+    scale, bias, scale_ci95, bias_ci95
         x = scale * x_ref + bias, at the same instant; bias in the unit of x.
-    scale_ci95, bias_ci95 : (low, high)
-    ratio : float
+    ratio, ratio_ci95
         Scale if there is no bias, as between two speeds: x = ratio * x_ref.
-    ratio_ci95 : (low, high)
-    peak : float
-        Correlation of the rates of change at the best lag, -1 to 1.
-    peak_limit : float
-        Limit that `peak` had to reach to be more than chance.
-    runner_up : float
-        Best correlation outside the main peak; -1 if the main peak fills the search range.
-    overlap_s : float
-        Time in which both sources were usable after alignment.
-    n : int
-        Samples of the source in that time.
+    peak, peak_limit, runner_up
+        Correlation of the rates of change at the best lag, -1 to 1; the limit that it had to reach to be more than
+        chance; the best correlation outside the main peak, -1 if that fills the search range.
+    overlap_s, n
+        Time in which both sources were usable after alignment, and samples of the source in it.
     rms : float
         Residual of the smoothed levels, unit of x.
-    mid_ns : int
-        Stamp of the source, in the middle of the overlap, for which `offset_s` holds.
     """
 
     offset_s: float
@@ -132,7 +118,7 @@ def estimate_clock(
     t_ref_ns, t_ns : int64 arrays (n,), (m,)
         Stamps of the reference and of the other source, not decreasing; of equal stamps the later sample counts.
     x_ref, x : arrays (n,), (m,)
-        Samples; NaN and infinite ones are left out. Rates, gaps and units may differ. Inputs are not changed.
+        Samples; NaN and infinite ones are left out. Rates, gaps and units may differ.
     max_offset_s : float
         Search range on either side of `start_offset_s`, > 0. [s]
     start_offset_s : float
@@ -144,10 +130,6 @@ def estimate_clock(
         Usable common time that is needed, at least 20. [s]
     min_peak : float
         Least correlation of the rates of change. The limit is higher where chance alone reaches it.
-
-    Returns
-    -------
-    ClockFit
 
     Valid range: drifts up to about 1000 ppm; rates of 1 Hz and more. A value that is logged faster than it is measured
     looks late by half its true sample time.
@@ -163,7 +145,9 @@ def estimate_clock(
     """
     o = Options(max_offset_s, start_offset_s, min_overlap_s, min_peak, quantity, f"clock fit on {quantity}")
     found = match(t_ref_ns, x_ref, t_ns, x, o)
-    mid = _middle(found.a, found.b, found.start, found.step, found.peak.lag)
+    k = np.flatnonzero(found.b.good)
+    k = k[_at(found.a.good.astype(np.float64), np.asarray(k - found.peak.lag / found.step, dtype=np.float64)) > 0.999]
+    mid = found.start + found.step * 0.5 * float(k[0] + k[-1])
     pair = _Pair(found.a, found.b, found.start, found.step, mid, max(BLOCK_S, 10 * found.smoothing))
     return _fit(pair, found, o)
 
@@ -173,7 +157,7 @@ class _Pair(NamedTuple):
     b: Smoothed
     start: float
     step: float
-    mid: float
+    mid: float  # of the common time, on the other source's clock
     block_s: float
 
 
@@ -190,15 +174,8 @@ class _Estimate(NamedTuple):
     dof: FloatArray
 
     def interval(self, i: int, *, level: float = 0.95) -> Interval:
-        half = student_quantile(0.5 + level / 2.0, float(self.dof[i])) * float(self.sigma[i])
+        half = half_width(float(self.sigma[i]), float(self.dof[i]), level)
         return float(self.value[i]) - half, float(self.value[i]) + half
-
-
-def _middle(a: Smoothed, b: Smoothed, start: float, step: float, lag: float) -> float:
-    """Return the middle of the common time, on the other source's clock."""
-    k = np.flatnonzero(b.good)
-    k = k[_at(a.good.astype(np.float64), np.asarray(k - lag / step, dtype=np.float64)) > 0.999]
-    return start + step * 0.5 * float(k[0] + k[-1])
 
 
 def _at(y: FloatArray, k: FloatArray) -> FloatArray:
@@ -235,7 +212,8 @@ def _fit_lag(pair: _Pair, start: FloatArray, terms: tuple[str, ...] = ()) -> tup
     value = np.append(start[:2], np.zeros(len(terms)))
     rows = _lag_rows(pair, value, terms)
     for _ in range(40):
-        change = _solve(rows)
+        weighted = rows.design * rows.weight[:, None]
+        change = np.linalg.lstsq(rows.design.T @ weighted, weighted.T @ rows.residual, rcond=None)[0]
         # beyond the smoothing time the linear step means nothing
         change *= min(1.0, 0.2 / max(abs(float(change[0])), 1e-300))
         value = value + change
@@ -271,18 +249,15 @@ def _huber(residual: FloatArray) -> FloatArray:
     return np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(residual), 1e-300))
 
 
-def _solve(rows: _Rows) -> FloatArray:
-    weighted = rows.design * rows.weight[:, None]
-    return np.asarray(np.linalg.lstsq(rows.design.T @ weighted, weighted.T @ rows.residual, rcond=None)[0])
-
-
-def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
+def _jackknife(pair: _Pair, value: FloatArray, rows: _Rows, most_blocks: int) -> _Estimate:
     """Return standard errors from leaving out one block after the other, each by one Gauss-Newton step.
 
     The degrees of freedom count blocks by their information: one braking among quiet minutes is one observation.
     """
+    unknown = _Estimate(value, np.full(value.size, math.inf), np.ones(value.size))
     if rows.t.size < 10:
-        return _unknown(value)
+        return unknown
+    block_s = max(pair.block_s, float(np.ptp(rows.t)) / most_blocks)
     label = np.floor((rows.t - rows.t[0]) / block_s).astype(np.int64)
     first = np.flatnonzero(np.diff(label, prepend=-1))
     weighted = rows.design * rows.weight[:, None]
@@ -292,7 +267,7 @@ def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
     g = np.add.reduceat(weighted * rows.residual[:, None], first, axis=0)
     blocks = g.shape[0]
     if blocks < LEAST_BLOCKS:
-        return _unknown(value)
+        return unknown
     # columns differ by orders of magnitude (drift against gain), which a relative pseudo-inverse would not forgive
     unit = np.sqrt(np.maximum(np.einsum("bii->i", h), 1e-300))
     h, g = h / (unit[:, None] * unit), g / unit
@@ -304,26 +279,23 @@ def _jackknife(value: FloatArray, rows: _Rows, block_s: float) -> _Estimate:
     return _Estimate(value, np.sqrt(variance), dof)
 
 
-def _unknown(value: FloatArray) -> _Estimate:
-    return _Estimate(value, np.full(value.size, math.inf), np.ones(value.size))
-
-
 def _fit(pair: _Pair, found: Match, o: Options) -> ClockFit:
     peak = found.peak
     plain, rows = _fit_lag(pair, np.array([peak.lag, 1.0]))
     _check_fit(float(plain[0]), peak, rows, pair.step, o)
     bent, bent_rows = _fit_lag(pair, plain, ("drift",))
-    drifting = _jackknife(bent, bent_rows, _block(pair, bent_rows, _SLOW_BLOCKS))
+    drifting = _jackknife(pair, bent, bent_rows, _SLOW_BLOCKS)
     low, high = drifting.interval(2, level=0.99)
+    drift_low, drift_high = drifting.interval(2)
     significant = low > 0.0 or high < 0.0
     value, rows = (bent, bent_rows) if significant else (plain, rows)
-    lag = _jackknife(value, rows, _block(pair, rows, _RATE_BLOCKS))
+    lag = _jackknife(pair, value, rows, _RATE_BLOCKS)
     offset, drift = float(value[0]), float(bent[2]) if significant else 0.0
     slip, slip_ci = _slip_offset(pair, value, o, with_drift=significant)
     beta, level_rows = _fit_level(pair, offset, drift, with_bias=True)
-    level = _jackknife(beta, level_rows, _block(pair, level_rows, _SLOW_BLOCKS))
+    level = _jackknife(pair, beta, level_rows, _SLOW_BLOCKS)
     ratio, ratio_rows = _fit_level(pair, offset, drift, with_bias=False)
-    pure = _jackknife(ratio, ratio_rows, _block(pair, ratio_rows, _SLOW_BLOCKS))
+    pure = _jackknife(pair, ratio, ratio_rows, _SLOW_BLOCKS)
     inside = (found.times >= level_rows.t[0]) & (found.times <= level_rows.t[-1])
     return ClockFit(
         offset_s=o.start_offset_s + offset,
@@ -331,7 +303,7 @@ def _fit(pair: _Pair, found: Match, o: Options) -> ClockFit:
         slip_offset_s=slip,
         slip_offset_ci95=slip_ci,
         drift_ppm=float(bent[2]) * 1e6,
-        drift_ppm_ci95=_scaled(drifting.interval(2), 1e6),
+        drift_ppm_ci95=(1e6 * drift_low, 1e6 * drift_high),
         drift_significant=significant,
         scale=float(beta[0]),
         scale_ci95=level.interval(0),
@@ -351,22 +323,14 @@ def _fit(pair: _Pair, found: Match, o: Options) -> ClockFit:
 
 def _slip_offset(pair: _Pair, value: FloatArray, o: Options, *, with_drift: bool) -> tuple[float, Interval]:
     if not o.has_slip:
-        return math.nan, (math.nan, math.nan)
+        return math.nan, NOWHERE
     slip, rows = _fit_lag(pair, value, ("slip", "drift") if with_drift else ("slip",))
-    estimate = _jackknife(slip, rows, _block(pair, rows, _RATE_BLOCKS))
+    estimate = _jackknife(pair, slip, rows, _RATE_BLOCKS)
     return o.start_offset_s + float(slip[0]), _shifted(estimate.interval(0), o.start_offset_s)
 
 
 def _shifted(interval: Interval, by: float) -> Interval:
     return interval[0] + by, interval[1] + by
-
-
-def _scaled(interval: Interval, by: float) -> Interval:
-    return interval[0] * by, interval[1] * by
-
-
-def _block(pair: _Pair, rows: _Rows, most: int) -> float:
-    return max(pair.block_s, float(np.ptp(rows.t)) / most) if rows.t.size else pair.block_s
 
 
 def _check_fit(offset: float, peak: Peak, rows: _Rows, step: float, o: Options) -> None:

@@ -91,7 +91,12 @@ class Match(NamedTuple):
 
 def match(t_ref_ns: TimeArray, x_ref: FloatArray, t_ns: TimeArray, x: FloatArray, o: Options) -> Match:
     """Search the best lag; parameters and errors as of `estimate_clock`."""
-    _check_options(o)
+    if not (math.isfinite(o.max_offset_s) and o.max_offset_s > 0.0):
+        raise FitError(f"search range {o.max_offset_s} s", where=o.where, expected="a positive number of seconds")
+    if not math.isfinite(o.start_offset_s):
+        raise FitError(f"start offset {o.start_offset_s} s", where=o.where, expected="a number of seconds")
+    if not o.min_overlap_s >= (least := LEAST_BLOCKS * BLOCK_S):
+        raise FitError(f"least overlap {o.min_overlap_s} s", where=o.where, expected=f"{least:g} s or more")
     ref = _series(t_ref_ns, x_ref, where=f"{o.where}, reference")
     other = _series(t_ns, x, where=f"{o.where}, other source")
     # integers are subtracted before they become seconds: epoch nanoseconds do not fit a double
@@ -105,16 +110,6 @@ def match(t_ref_ns: TimeArray, x_ref: FloatArray, t_ns: TimeArray, x: FloatArray
     _check_variation(a, o.quantity, where=f"{o.where}, reference")
     _check_variation(b, o.quantity, where=f"{o.where}, other source")
     return Match(a, b, start, step, smoothing, _search(a, b, step, o), other.t, lead, other.origin_ns)
-
-
-def _check_options(o: Options) -> None:
-    least = LEAST_BLOCKS * BLOCK_S
-    if not (math.isfinite(o.max_offset_s) and o.max_offset_s > 0.0):
-        raise FitError(f"search range {o.max_offset_s} s", where=o.where, expected="a positive number of seconds")
-    if not math.isfinite(o.start_offset_s):
-        raise FitError(f"start offset {o.start_offset_s} s", where=o.where, expected="a number of seconds")
-    if not o.min_overlap_s >= least:
-        raise FitError(f"least overlap {o.min_overlap_s} s", where=o.where, expected=f"{least:g} s or more")
 
 
 def _series(t_ns: TimeArray, x: FloatArray, *, where: str) -> _Series:

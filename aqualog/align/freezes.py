@@ -79,16 +79,9 @@ def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
 class FreezeWatch:
     """Check the samples of one signal, which may arrive in pieces.
 
-    Parameters
-    ----------
-    least_s : float
-        Shortest stretch. [s]
-    standing : float
-        Magnitude up to which the signal may keep its value.
-    coarsest : float
-        Largest step between neighbouring levels of a signal that is judged.
-    r_e : float, optional
-        Effective radius of a wheel [m]: its sensor may wake up late.
+    `least_s` is the shortest stretch [s], `standing` the magnitude up to which the signal may keep its value,
+    `coarsest` the largest step between levels of a signal that is judged. With `r_e` [m], that of a wheel, its sensor
+    may wake up late.
     """
 
     def __init__(self, least_s: float, standing: float, coarsest: float, *, r_e: float | None = None) -> None:
@@ -184,7 +177,12 @@ def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch
     moving_s = (moved_ns[end] - moved_ns[begin]) * 1e-9
     lengths_s = np.where((moving_s >= _CREEP_S) | (len(standing) == 0), (t_ns[end] - t_ns[begin]) * 1e-9, 0.0)
     at = values[begin]
-    candidates = [k for k in np.flatnonzero(moving_s >= _STOP_S).tolist() if not _is_rest(at[k], at, lengths_s)]
+
+    def is_rest(value: float) -> bool:
+        more, least_s = _AT_REST
+        return int(((at == value) & (lengths_s >= least_s)).sum()) > more
+
+    candidates = [k for k in np.flatnonzero(moving_s >= _STOP_S).tolist() if not is_rest(at[k])]
     if not candidates:
         return None
     k = max(candidates, key=lambda i: lengths_s[i])
@@ -200,12 +198,6 @@ def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch
         return None
     first, last = int(t_ns[begin[k]]), int(t_ns[end[k]])
     return Stop((last - first) * 1e-9, (first - int(t_ns[0])) * 1e-9, float(at[k]), float(moving_s[k]), changes / steps)
-
-
-def _is_rest(value: float, at: FloatArray, lengths_s: FloatArray) -> bool:
-    """Return whether a signal that stands still for `lengths_s` (m,) [s] at the values `at` (m,) rests at this one."""
-    more, least_s = _AT_REST
-    return int(((at == value) & (lengths_s >= least_s)).sum()) > more
 
 
 def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch]) -> tuple[Freeze, ...]:
@@ -266,17 +258,13 @@ class StandWatch:
         before = np.append(self._since is not None, stands[:-1])
         for k in np.flatnonzero((stands != before) | (dt > _PAUSE_NS)).tolist():
             if before[k]:
-                end = int(t_ns[k - 1]) if k else t_last
-                self._close(end, is_left_soundly=bool(stands[k] or is_sound[k]))
+                assert self._since is not None
+                if self._is_sound and (stands[k] or is_sound[k]):  # reached and left as a car stops and starts
+                    self._found.append((self._since, int(t_ns[k - 1]) if k else t_last))
+                self._since = None
             if stands[k]:
                 self._since, self._is_sound = int(t_ns[k]), bool(is_sound[k])
         self._last = int(t_ns[-1]), float(v[-1])
-
-    def _close(self, end_ns: int, *, is_left_soundly: bool) -> None:
-        assert self._since is not None
-        if self._is_sound and is_left_soundly:
-            self._found.append((self._since, end_ns))
-        self._since = None
 
     def finish(self) -> tuple[Stretch, ...]:
         """List the stretches in which the car stands, in order."""

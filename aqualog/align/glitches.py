@@ -11,8 +11,8 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
-    "KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "Leap", "glitches_of", "is_leap", "lost_speed", "sensor_glitches",
-    "spikes",
+    "KNOWN_NS", "RETURN_NS", "RIM_LIMIT", "Glitches", "Leap", "glitches_of", "is_leap", "lost_speed",
+    "sensor_glitches", "spikes",
 ]  # fmt: skip
 
 RIM_LIMIT = 400.0  # [m/s^2] at the rim; a locking wheel reaches 100, a spin-down in full aquaplaning 50
@@ -79,14 +79,7 @@ def glitches_of(name: str, r_e: float | None) -> Glitches | None:
 def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolArray:
     """Flag samples of a wheel speed that the wheel did not make.
 
-    Parameters
-    ----------
-    t_ns : int64 array (n,)
-        Strictly increasing stamps.
-    omega : array (n,)
-        Finite samples. [rad/s]
-    r_e : float
-        Effective radius. [m]
+    Of finite samples (n,) [rad/s] at strictly increasing stamps (n,), and the effective radius [m].
 
     Returns
     -------
@@ -127,19 +120,8 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
 def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> BoolArray:
     """Flag samples of an acceleration, a yaw rate or a steering angle that the car did not make.
 
-    Parameters
-    ----------
-    t_ns : int64 array (n,)
-        Strictly increasing stamps.
-    x : array (n,)
-        Finite samples.
-    leap : Leap
-        Limits of a car, in the unit of `x`; default that of an acceleration. [m/s²]
-
-    Returns
-    -------
-    bool array (n,)
-        From a step that no car makes to the step back to where it was, within 150 ms.
+    Of finite samples (n,) at strictly increasing stamps (n,), by the limits of a car in their unit; default those of an
+    acceleration [m/s²]. Returns bool (n,), true from a step that no car makes to the step back, within 150 ms.
     """
     spike = np.zeros(x.size, dtype=np.bool_)
     if x.size < 3:
@@ -168,18 +150,9 @@ def _soon_after(jumps: Sequence[int], position: int, t_ns: TimeArray, span_ns: i
 def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
     """Flag samples of a reference speed that are zero because the reference was lost.
 
-    Parameters
-    ----------
-    t_ns : int64 array (n,)
-        Strictly increasing stamps.
-    v : array (n,)
-        Finite samples. [m/s]
-
-    Returns
-    -------
-    bool array (n,)
-        Stretches of exactly zero, into which it falls faster than a car stops. A zero is kept if the value
-        before it was a repeated one: a slow signal is held there on a finer grid, and the rate of its fall is unknown.
+    Of finite samples (n,) [m/s] at strictly increasing stamps (n,). Returns bool (n,), true in stretches of exactly
+    zero into which it falls faster than a car stops. A zero is kept if the value before it was a repeated one: a slow
+    signal is held there on a finer grid, and the rate of its fall is unknown.
     """
     lost = np.zeros(v.size, dtype=np.bool_)
     if v.size < 2:

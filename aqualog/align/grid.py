@@ -1,4 +1,4 @@
-"""Build the common grid of a drive, and put one signal on it."""
+"""The common grid of a drive, and one signal on it: linear or hold, never across a gap, never beyond the ends."""
 
 from __future__ import annotations
 
@@ -10,13 +10,146 @@ import polars as pl
 
 from aqualog.align.clean import Clean, Span
 from aqualog.align.mapping import SignalMap
-from aqualog.align.resample import Placed, bin_mean, gap_limit_ns, hold, linear
+from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import WHEELS, Symbol
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["MAX_ROWS", "Grid", "columns_of", "common_clock", "frame_of", "grid_of", "missing_samples", "onto_grid"]
+__all__ = [
+    "MAX_ROWS", "Grid", "Placed", "bin_mean", "columns_of", "common_clock", "gap_limit_ns", "grid_of", "hold",
+    "linear", "median_period_ns", "missing_samples", "onto_grid", "placed",
+]  # fmt: skip
+
+
+def median_period_ns(t_ns: TimeArray) -> int:
+    """Return the median sample time of the first 2^18 steps. [ns] 0 for fewer than two samples."""
+    return int(np.median(np.diff(t_ns[: MEDIAN_OF + 1]))) if t_ns.size > 1 else 0
+
+
+def gap_limit_ns(period_ns: int, *, is_state: bool) -> int:
+    """Return the longest interval across which a value may be carried, by the median sample time. [ns]
+
+    Five sample times for a continuous signal (at least 50 ms), ten for a state (at least 2 s): a lost frame or two is
+    bridged, an outage is not.
+    """
+    return max(10 * period_ns, 2_000_000_000) if is_state else max(5 * period_ns, 50_000_000)
+
+
+class Placed(NamedTuple):
+    """Positions of the points (m,) of a grid among stamps (n,).
+
+    `right` (m,): the first stamp that is not before the point, n behind the last; `exact` (m,): it is at the point;
+    `between`: indices (k,) of the points with a stamp on either side, `span` (k,) the interval there [ns], and `share`
+    (k,) how much of it lies before the point.
+    """
+
+    right: TimeArray
+    exact: BoolArray
+    between: TimeArray
+    span: TimeArray
+    share: FloatArray
+
+
+def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Placed:
+    """Find the points of a grid among strictly increasing stamps, at least one; signals with the same stamps share it.
+
+    With the step [ns] of even points, stamps are counted by the step that they fall into; else each point is searched
+    for.
+    """
+    n, m = t_ns.size, grid_ns.size
+    if dt_ns is not None and m:
+        step = np.clip((t_ns - grid_ns[0]) // dt_ns + 1, 0, m)
+        right = np.cumsum(np.bincount(step, minlength=m + 1)[:m])
+    else:
+        right = np.searchsorted(t_ns, grid_ns, side="left")
+    exact = (right < n) & (t_ns[np.minimum(right, n - 1)] == grid_ns)
+    between = np.flatnonzero(~exact & (right > 0) & (right < n))
+    i = right[between]
+    before = t_ns[i - 1]
+    span = t_ns[i] - before
+    # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
+    share = (grid_ns[between] - before).astype(np.float64) / span.astype(np.float64)
+    return Placed(right, exact, between, span, share)
+
+
+def linear(
+    t_ns: TimeArray,
+    x: FloatArray,
+    grid_ns: TimeArray,
+    *,
+    gap_ns: int,
+    period_ns: int | None = None,
+    at: Placed | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    """Interpolate finite samples (n,) at strictly increasing stamps (n,) linearly to points (m,). [ns]
+
+    Intervals up to `gap_ns` are bridged. `period_ns`: median sample time, default that of the stamps; `at`: positions
+    of these points among these stamps, if known.
+
+    Returns
+    -------
+    y : array (m,)
+        NaN outside the first and last stamp and inside longer intervals.
+    bridged : bool array (m,)
+        Grid points inside an interval of more than 1.5 median sample times: a sample was missing there.
+    """
+    y = np.full(grid_ns.size, np.nan)
+    bridged = np.zeros(grid_ns.size, dtype=bool)
+    if t_ns.size == 0:
+        return y, bridged
+    right, exact, between, span, share = at or placed(t_ns, grid_ns)
+    y[exact] = x[right[exact]]
+    i = right[between]
+    values = x[i - 1] + share * (x[i] - x[i - 1])
+    y[between] = np.where(span <= gap_ns, values, np.nan)
+    bridged[between] = span > 1.5 * (median_period_ns(t_ns) if period_ns is None else period_ns)
+    return y, bridged
+
+
+def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at: Placed | None = None) -> FloatArray:
+    """Hold the last value for at most `gap_ns`, also beyond the last stamp. Shapes as `linear`."""
+    y = np.full(grid_ns.size, np.nan)
+    if t_ns.size == 0:
+        return y
+    right, exact, *_ = at or placed(t_ns, grid_ns)
+    last = right - ~exact
+    known = last >= 0
+    age = grid_ns[known] - t_ns[last[known]]
+    y[known] = np.where(age <= gap_ns, x[last[known]], np.nan)
+    return y
+
+
+def bin_mean(
+    t_ns: TimeArray,
+    x: FloatArray,
+    grid_ns: TimeArray,
+    *,
+    dt_ns: int,
+    gap_ns: int,
+    period_ns: int | None = None,
+    at: Placed | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    """Average the samples within half a grid step on either side, for signals much faster than the grid.
+
+    Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
+    Returns as `linear`.
+    """
+    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns, at=at)
+    if t_ns.size == 0:
+        return y, bridged
+    low = np.searchsorted(t_ns, grid_ns - dt_ns // 2, side="left")
+    high = np.searchsorted(t_ns, grid_ns + dt_ns - dt_ns // 2, side="left")
+    count = high - low
+    full = count >= 2
+    # sums of each bin by itself: differences of one long running sum would lose digits over hours
+    edges = np.column_stack([low[full], np.minimum(high[full], x.size - 1)]).ravel()
+    sums = np.add.reduceat(x, edges)[::2] if edges.size else np.zeros(0)
+    tail = high[full] == x.size  # reduceat needs an end index; the last sample is added where the bin holds it
+    sums = sums + np.where(tail, x[-1], 0.0)
+    y[full & ~np.isnan(y)] = (sums / count[full])[~np.isnan(y[full])]
+    return y, bridged
+
 
 MAX_ROWS = 60_000_000
 _SPARSE_ROWS = 1_000_000  # beyond, a grid with one sample in 50 points is a jump of the time stamps, not a drive
@@ -121,21 +254,10 @@ def onto_grid(
     dt_ns: int,
     at: Placed | None,
 ) -> tuple[FloatArray, bool]:
-    """Put a signal on points of the grid; flag points where a sample was missing.
+    """Put samples (n,) of a signal, at least those around the points (m,) [ns], on the grid; tell if one was missing.
 
-    Parameters
-    ----------
-    symbol : Symbol
-    span : Span
-        Of the whole signal: its sample time decides what is bridged.
-    t_ns, x : arrays (n,)
-        Its samples, or a stretch of them that encloses the points.
-    points : int64 array (m,)
-        [ns]
-    dt_ns : int
-        Step of the grid. [ns]
-    at : Placed, optional
-        Where the points lie among these stamps; None without samples.
+    `span` is that of the whole signal: its sample time decides what is bridged. `at`: where the points lie among these
+    stamps; None without samples.
     """
     is_state = symbol.kind == "state"
     gap_ns = gap_limit_ns(span.period_ns, is_state=is_state)
@@ -155,11 +277,6 @@ def missing_samples(span: Span, grid: Grid) -> float:
         return 0.0
     expected = grid.rows * grid.dt_ns / span.mean_period_ns
     return min(max(0.0, 1.0 - span.samples / expected), 1.0)
-
-
-def frame_of(t: FloatArray, columns: dict[str, pl.Series], ordered: Sequence[str]) -> pl.DataFrame:
-    """Build the table: time and signals in their usual order."""
-    return pl.DataFrame([pl.Series("t", t), *(columns[n].rename(n) for n in ordered)])
 
 
 def columns_of(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[str, pl.Series]]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from aqualog.align.mapping import Entry, SignalMap, resolve
-from aqualog.align.table import build_signals
+from aqualog.align.mapping import SignalMap, resolve
+from aqualog.align.table import Found, build_signals
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
-from aqualog.core.errors import SignalError
-from aqualog.core.records import ChannelInfo, FileFaults, Signals
+from aqualog.core.errors import SignalError, listed
+from aqualog.core.records import FileFaults, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import Part, ReadOptions
@@ -39,6 +39,59 @@ def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions
     return ReadOptions(tuple(dbc), signal_map.time_channel, signal_map.time_unit, signal_map.csv)
 
 
+class _Request(NamedTuple):
+    """What to read, and how; `report` is called with the name of each step."""
+
+    paths: Sequence[Path]
+    vehicle: Vehicle
+    signal_map: SignalMap
+    dbc: Sequence[Path]
+    rate_hz: float | None
+    report: Callable[[str], None]
+
+    def opened(self, stack: ExitStack) -> DriveLog:
+        return stack.enter_context(DriveLog(self.paths, read_options(self.signal_map, self.dbc)))
+
+    def found(self, log: DriveLog, wanted: Callable[[str], bool] = lambda _: True) -> Found:
+        self.report(f"listing channels of {len(self.paths)} file{'s' if len(self.paths) > 1 else ''}")
+        return find_channels(log, self.signal_map, wanted)
+
+    def read(self, log: DriveLog, found: Found) -> Signals:
+        return read_signals(
+            log, found, signal_map=self.signal_map, vehicle=self.vehicle, rate_hz=self.rate_hz, report=self.report
+        )
+
+    def in_windows(self, log: DriveLog, found: Found, stack: ExitStack) -> LoadedLong:
+        wanted = [info for _, info in found.values()]
+        total = max(sum(info.count for info in wanted), 1)
+        first = iter([log])
+        again = stack.enter_context(ExitStack())
+
+        def parts() -> list[Part]:
+            # what a reader has lost is counted once, in the first pass
+            return (next(first, None) or self.opened(again)).parts(wanted)
+
+        drive = long_drive(
+            found, parts, signal_map=self.signal_map, vehicle=self.vehicle, rate_hz=self.rate_hz,
+            tell=lambda done: self.report(f"going through the signals, {100 * done // total} %"),
+        )  # fmt: skip
+        return LoadedLong(drive, (*log.faults, *idle_files(log, found)), stack)
+
+    def kept(self, cache: SignalCache | None, read: Callable[[], _Read]) -> _Read | Signals:
+        """The signals from the cache; else read them and keep the table if it is whole."""
+        if cache is None:
+            return read()
+        self.report("looking into the cache")
+        key = cache.key(self.paths, self.vehicle, self.signal_map, self.dbc, self.rate_hz)
+        signals = cache.get(key) if key is not None else None
+        if signals is not None:
+            return signals
+        found = read()
+        if key is not None and isinstance(found, Signals):
+            cache.put(key, found)
+        return found
+
+
 def load_signals(
     paths: Sequence[Path],
     *,
@@ -56,13 +109,10 @@ def load_signals(
 
     Parameters
     ----------
-    paths : sequence of Path
-        Files of one drive.
+    paths, dbc
+        Files of one drive; databases for raw CAN frames.
     vehicle : Vehicle
         For wheel speeds in km/h and steering wheel angles.
-    signal_map : SignalMap, optional
-    dbc : sequence of Path
-        Databases for raw CAN frames.
     rate_hz : float, optional
         Grid rate; default that of the wheel speeds.
     wanted : callable, optional
@@ -76,15 +126,14 @@ def load_signals(
     ------
     LogError, SignalError, ConfigError
     """
-    signal_map = signal_map or SignalMap()
+    request = _Request(paths, vehicle, signal_map or SignalMap(), dbc, rate_hz, report)
 
     def read() -> Signals:
-        with DriveLog(paths, read_options(signal_map, dbc)) as log:
-            report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-            found = find_channels(log, signal_map, wanted or (lambda _: True))
-            return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+        with ExitStack() as stack:
+            log = request.opened(stack)
+            return request.read(log, request.found(log, wanted or (lambda _: True)))
 
-    return read() if wanted is not None else _kept(cache, paths, vehicle, signal_map, dbc, rate_hz, report, read)
+    return read() if wanted is not None else request.kept(cache, read)
 
 
 def load_drive(
@@ -100,100 +149,41 @@ def load_drive(
     least: int = LONG,
     cache: SignalCache | None = None,
 ) -> Signals | LoadedLong:
-    """Open a drive: as a whole, or window by window if it is long.
+    """Open a drive: as a whole, or window by window if it is long. Parameters and errors as of `load_signals`, and
 
     Parameters
     ----------
-    paths, vehicle, signal_map, dbc, rate_hz, report, cache
-        As of `load_signals`.
     note : callable
         Called with the reason why a long drive is read as a whole.
     whole_for : str
         Name of the feature that needs the whole drive; empty without one.
     least : int
         Samples of all signals together from which a drive is long.
-
-    Raises
-    ------
-    LogError, SignalError, ConfigError
     """
-    signal_map = signal_map or SignalMap()
-    options = read_options(signal_map, dbc)
+    request = _Request(paths, vehicle, signal_map or SignalMap(), dbc, rate_hz, report)
 
     def read() -> Signals | LoadedLong:
         with ExitStack() as stack:
-            log = stack.enter_context(DriveLog(paths, options))
-            report(f"listing channels of {len(paths)} file{'s' if len(paths) > 1 else ''}")
-            found = find_channels(log, signal_map)
+            log = request.opened(stack)
+            found = request.found(log)
             reason = f"{whole_for} works on whole drives only" if whole_for else ""
             if sum(info.count for _, info in found.values()) >= least:
                 if not reason:
                     try:
-                        loaded = _in_windows(log, found, options, stack, signal_map, vehicle, rate_hz, report)
+                        loaded = request.in_windows(log, found, stack)
                         return loaded._replace(opened=stack.pop_all())
                     except NotInPiecesError as error:
                         reason = str(error)
                 note(f"the drive is read as a whole, which needs much memory: {reason}")
-                log = stack.enter_context(DriveLog(paths, options))
-            return read_signals(log, found, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, report=report)
+                log = request.opened(stack)
+            return request.read(log, found)
 
-    return _kept(cache, paths, vehicle, signal_map, dbc, rate_hz, report, read)
-
-
-def _in_windows(
-    log: DriveLog,
-    found: Mapping[str, tuple[Entry, ChannelInfo]],
-    options: ReadOptions,
-    opened: ExitStack,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    rate_hz: float | None,
-    report: Callable[[str], None],
-) -> LoadedLong:
-    wanted = [info for _, info in found.values()]
-    total = max(sum(info.count for info in wanted), 1)
-    first = iter([log])
-    again = ExitStack()
-    opened.push(again)
-
-    def parts() -> list[Part]:
-        # what a reader has lost is counted once, in the first pass
-        return (next(first, None) or again.enter_context(DriveLog(log.paths, options))).parts(wanted)
-
-    def tell(done: int) -> None:
-        report(f"going through the signals, {100 * done // total} %")
-
-    drive = long_drive(found, parts, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, tell=tell)
-    return LoadedLong(drive, (*log.faults, *idle_files(log, found)), opened)
-
-
-def _kept(
-    cache: SignalCache | None,
-    paths: Sequence[Path],
-    vehicle: Vehicle,
-    signal_map: SignalMap,
-    dbc: Sequence[Path],
-    rate_hz: float | None,
-    report: Callable[[str], None],
-    read: Callable[[], _Read],
-) -> _Read | Signals:
-    """Return the signals of a drive from the cache; else read them and keep the table if it is whole."""
-    if cache is None:
-        return read()
-    report("looking into the cache")
-    key = cache.key(paths, vehicle, signal_map, dbc, rate_hz)
-    signals = cache.get(key) if key is not None else None
-    if signals is not None:
-        return signals
-    found = read()
-    if key is not None and isinstance(found, Signals):
-        cache.put(key, found)
-    return found
+    return request.kept(cache, read)
 
 
 def read_signals(
     log: DriveLog,
-    found: Mapping[str, tuple[Entry, ChannelInfo]],
+    found: Found,
     *,
     signal_map: SignalMap,
     vehicle: Vehicle,
@@ -210,20 +200,18 @@ def read_signals(
     return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)
 
 
-def idle_files(log: DriveLog, found: Mapping[str, tuple[Entry, ChannelInfo]]) -> list[FileFaults]:
+def idle_files(log: DriveLog, found: Found) -> list[FileFaults]:
     """Return a note on files of a drive that hold none of its signals: one for all of them, or no note."""
     used = {info.file for _, info in found.values()}
     idle = [path.name for path in log.paths if path.name not in used]
     if not idle:
         return []
-    names = ", ".join(idle[:_NAMED]) + (f" and {len(idle) - _NAMED} more" if len(idle) > _NAMED else "")
     give = "gives" if len(idle) == 1 else "give"
-    return [FileFaults(notes=(f"{names} {give} none of the signals (`aqualog inspect` lists what is in a log)",))]
+    note = f"{listed(idle, _NAMED)} {give} none of the signals (`aqualog inspect` lists what is in a log)"
+    return [FileFaults(notes=(note,))]
 
 
-def find_channels(
-    log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], bool] = lambda _: True
-) -> dict[str, tuple[Entry, ChannelInfo]]:
+def find_channels(log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], bool] = lambda _: True) -> Found:
     """Find the channels of a drive that are signals, by symbol.
 
     Raises

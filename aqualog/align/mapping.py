@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
-from aqualog.core.errors import SignalError
+from aqualog.core.errors import SignalError, listed
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import ChannelInfo
 from aqualog.core.vehicle import Vehicle
@@ -158,8 +158,7 @@ def _quoted(names: Sequence[str]) -> str:
 
 
 def _listed(matches: Sequence[ChannelInfo]) -> str:
-    text = ", ".join(channel_id(m) + (f" [{m.unit}]" if m.unit else "") for m in matches[:4])
-    return text + (f" and {len(matches) - 4} more" if len(matches) > 4 else "")
+    return listed([channel_id(m) + (f" [{m.unit}]" if m.unit else "") for m in matches], 4)
 
 
 def _nearest(wanted: Sequence[str], channels: Sequence[ChannelInfo]) -> str:

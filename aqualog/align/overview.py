@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.align.resample import median_period_ns
+from aqualog.align.grid import median_period_ns
 from aqualog.align.timebase import ClockRepair
 from aqualog.core.records import Channel, FloatArray, TimeFaults
 from aqualog.core.units import is_unit, parse_unit
@@ -72,12 +72,13 @@ def _remark(channel: Channel, finite: FloatArray) -> str:
     if finite.size > 10 and finite.min() == finite.max():
         return "constant"
     top = finite.max()
-    is_code = top >= 511 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
-    if is_code and finite.size > 10 and (finite == top).mean() < 0.2:
-        return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
+    is_last = top >= 511 and float(top + 1).is_integer() and (int(top) + 1) & int(top) == 0
+    is_code = is_last and finite.size > 10 and (finite == top).mean() < 0.2
     # the last but one of a width is a code, too, where nothing comes near it: a measured value climbs there
     is_next = top >= 510 and float(top).is_integer() and (int(top) + 2) & (int(top) + 1) == 0
-    if is_next and 3 <= (finite == top).sum() < 0.2 * finite.size and finite[finite < top].max() < 0.8 * top:
+    if is_next and 3 <= (finite == top).sum() < 0.2 * finite.size:
+        is_code = is_code or finite[finite < top].max() < 0.8 * top
+    if is_code:
         return f"{top:.0f} looks like an error code: invalid = [{top:.0f}] in the map"
     if finite.size > 100:
         inner_low, inner_high = np.percentile(finite, (1.0, 99.0))

@@ -1,4 +1,4 @@
-"""Propose a signal map for a log with names of its own.
+"""Propose a signal map for a log with names of its own, or the channel that carries one quantity.
 
 A name suggests which signal a channel may be, and its unit rules out wrong ones. The data decide among the rest: an
 accelerometer must follow the derivative of the speed, a yaw rate the difference of the wheel speeds.
@@ -15,15 +15,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.mapping import Entry, channel_id
+from aqualog.align.grid import linear
+from aqualog.align.mapping import Entry, SignalMap, channel_id, matching
 from aqualog.align.overview import ChannelOverview, overview, rotated_channels
-from aqualog.align.resample import linear
 from aqualog.align.timebase import ClockRepair
+from aqualog.core.errors import SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
-from aqualog.core.units import is_unit, parse_unit
+from aqualog.core.units import convert, is_unit, parse_unit
+from aqualog.core.vehicle import Vehicle
 
-__all__ = ["Look", "Proposal", "look_at", "propose_map", "words_of"]
+__all__ = [
+    "CANONICAL", "QUANTITIES", "Look", "Proposal", "Quantity", "find_quantity", "look_at", "propose_map", "words_of",
+]  # fmt: skip
+
+
+CANONICAL = "its canonical name"
+"""Reason of a proposal that needs no map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,24 +133,16 @@ def look_at(channels: Sequence[Channel]) -> Look:
 
 
 def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
-    """Return the most likely channel of each signal.
+    """Return the most likely channel of each signal, by symbol, of the channels with samples of one drive.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-        With samples, all files of one drive.
-
-    Returns
-    -------
-    mapping symbol -> Proposal
-        Signals that name and unit support; the reason holds the evidence of the data. Check a proposal before use.
+    Name and unit support each of them; the reason holds the evidence of the data. Check a proposal before use.
     """
     usable = _Named(c for c in channels if c.values.size > 1 and np.isfinite(c.values).any())
     found: dict[str, Proposal] = {}
     for symbol in (*SYMBOLS, *ACCEPTED):
         exact = [c for c in usable if c.info.name == symbol]
         if len(exact) == 1:
-            found[symbol] = Proposal(Entry(symbol, (_address(exact[0], usable),)), "its canonical name", 10.0)
+            found[symbol] = Proposal(Entry(symbol, (_address(exact[0], usable),)), CANONICAL, 10.0)
     for several in _OF_WHEELS:
         for wheel, positions in several.positions.items():
             candidates = [
@@ -158,7 +158,8 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
             candidates = [p for p in candidates if set(words_of(p.entry.channel[0])) & set(want)]
         if rule.symbol == "v_x" and all(f"omega_{w}" in found for w in WHEELS):
             # beside four wheel speeds, a "vehicle speed" is made from them: only a sensor of its own is a reference
-            candidates = [p for p in candidates if set(words_of(_file_and_path(p, usable))) & set(rule.bonus)]
+            named = [(p, channel_id(usable.by_address[p.entry.channel[0]].info)) for p in candidates]
+            candidates = [p for p, name in named if set(words_of(name)) & set(rule.bonus)]
         if rule.symbol == "a_x" and speed is not None:
             candidates = [_check_acceleration(p, usable, speed) for p in candidates]
         if rule.symbol == "yaw_rate":
@@ -279,13 +280,10 @@ def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
 # --- the data's word ---------------------------------------------------------------------------------------------
 
 
-def _file_and_path(p: Proposal, channels: _Named) -> str:
-    return channel_id(channels.by_address[p.entry.channel[0]].info)
-
-
-def _clean(channel: Channel) -> tuple[TimeArray, FloatArray]:
+def _clean(channel: Channel, values: FloatArray | None = None) -> tuple[TimeArray, FloatArray]:
+    """Stamps in order, and the finite values there: the channel's own, or these in place of them."""
     t, order, _ = ClockRepair().repair(channel.t_ns)
-    x = channel.values[order]
+    x = (channel.values if values is None else values)[order]
     good = np.isfinite(x)
     return t[good], x[good]
 
@@ -299,14 +297,20 @@ _GRID_NS = 100_000_000
 _LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
 
 
+def _even_times(channel: Channel, least: int) -> TimeArray | None:
+    """Stamps every 0.1 s over a channel; None if it has no more samples than `least`, or its stamps jump."""
+    t, _ = _clean(channel)
+    is_drive = t.size > least and int(t[-1]) - int(t[0]) < _LONGEST_NS
+    return np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64) if is_drive else None
+
+
 def _speed(found: dict[str, Proposal], channels: _Named) -> tuple[TimeArray, FloatArray] | None:
     """Return the speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
     for symbol in ("omega_rl", "omega_fl", "v_x"):
         if symbol in found:
             channel = channels.by_address[found[symbol].entry.channel[0]]
-            t, _ = _clean(channel)
-            if t.size > 20 and int(t[-1]) - int(t[0]) < _LONGEST_NS:
-                grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
+            grid = _even_times(channel, 20)
+            if grid is not None:
                 return grid, _on_grid(channel, grid)
     return None
 
@@ -318,9 +322,8 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
     return float(np.corrcoef(a[good], b[good])[0, 1])
 
 
-def _smooth(x: FloatArray, width: int = 11) -> FloatArray:
-    kernel = np.ones(width) / width
-    return np.convolve(x, kernel, mode="same")
+def _smooth(x: FloatArray) -> FloatArray:
+    return np.convolve(x, np.ones(11) / 11, mode="same")
 
 
 def _check_acceleration(p: Proposal, channels: _Named, speed: tuple[TimeArray, FloatArray]) -> Proposal:
@@ -341,12 +344,10 @@ def _check_acceleration(p: Proposal, channels: _Named, speed: tuple[TimeArray, F
 def _check_yaw(p: Proposal, channels: _Named, found: dict[str, Proposal]) -> Proposal:
     if "omega_rl" not in found or "omega_rr" not in found:
         return p
-    left = channels.by_address[found["omega_rl"].entry.channel[0]]
-    right = channels.by_address[found["omega_rr"].entry.channel[0]]
-    t, _ = _clean(left)
-    if t.size < 2 or int(t[-1]) - int(t[0]) > _LONGEST_NS:
+    left, right = (channels.by_address[found[f"omega_{w}"].entry.channel[0]] for w in ("rl", "rr"))
+    grid = _even_times(left, 1)
+    if grid is None:
         return p
-    grid = np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64)
     turn = _on_grid(right, grid) - _on_grid(left, grid)
     r = _correlation(_smooth(turn), _smooth(_on_grid(channels.by_address[p.entry.channel[0]], grid)))
     if np.isnan(r) or abs(r) < 0.5:
@@ -355,3 +356,93 @@ def _check_yaw(p: Proposal, channels: _Named, found: dict[str, Proposal]) -> Pro
     if r < 0:
         return replace(p, reason=f"{reason}: sign turned", entry=replace(p.entry, scale=-1.0))
     return replace(p, reason=reason, score=p.score + r)
+
+
+QUANTITIES = {"speed": "m/s", "yaw_rate": "rad/s"}
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Samples of a quantity in one file. `t_ns` strictly increasing, `x` in m/s or rad/s."""
+
+    file: str
+    label: str
+    t_ns: TimeArray
+    x: FloatArray
+    absolute: bool
+    note: str = ""
+
+
+def find_quantity(
+    channels: Sequence[Channel], *, quantity: str, signal_map: SignalMap, vehicle: Vehicle, named: str | None = None
+) -> Quantity:
+    """Find the quantity in the channels of ONE file.
+
+    Order of preference: the channel that is named; the signal map; names and units. A reference speed is preferred to
+    the mean of the wheel speeds.
+
+    Raises
+    ------
+    SignalError
+        If the file carries no such quantity.
+    """
+    infos = [c.info for c in channels]
+    if named is not None:
+        hits = [c for c in channels if c.info in matching(infos, named)]
+        if len(hits) != 1:
+            raise SignalError(
+                f'{"no" if not hits else "more than one"} channel "{named}"',
+                where=channels[0].info.file if channels else "",
+                hint="`aqualog inspect` lists the channels",
+            )
+        return _single(hits[0], Entry("v_x", (named,)), quantity)
+    known = {s: e for s, e in signal_map.entries.items() if any(len(matching(infos, c)) == 1 for c in e.channel)}
+    proposed = {s: p.entry for s, p in propose_map(channels).items()}
+    for entries in (known, proposed):
+        found = _from_entries(channels, entries, quantity, vehicle)
+        if found is not None:
+            return found
+    if quantity == "speed":
+        bare = [c for c in channels if not c.info.unit and {"speed", "velocity"} & set(words_of(c.info.name))]
+        if bare:
+            return _single(bare[0], Entry("v_x", (bare[0].info.path,)), quantity)
+    raise SignalError(
+        f"no {quantity.replace('_', ' ')} found",
+        where=channels[0].info.file if channels else "",
+        expected="a channel that both sources carry",
+        hint="name it with --channel FILE=CHANNEL",
+    )
+
+
+def _channel(channels: Sequence[Channel], entry: Entry) -> Channel:
+    infos = [c.info for c in channels]
+    hit = next(m for c in entry.channel if (m := matching(infos, c)))[0]
+    return next(c for c in channels if c.info is hit)
+
+
+def _from_entries(
+    channels: Sequence[Channel], entries: dict[str, Entry], quantity: str, vehicle: Vehicle
+) -> Quantity | None:
+    symbol = "yaw_rate" if quantity == "yaw_rate" else "v_x"
+    if symbol in entries:
+        return _single(_channel(channels, entries[symbol]), entries[symbol], quantity)
+    wheels = [(w, entries[f"omega_{w}"]) for w in WHEELS if f"omega_{w}" in entries]
+    if quantity == "yaw_rate" or len(wheels) < 2:
+        return None
+    parts = [_single(_channel(channels, e), e, quantity, r_e=vehicle.r_e(w)) for w, e in wheels]
+    t = parts[0].t_ns
+    mean = np.mean([p.x if p.t_ns is t else linear(p.t_ns, p.x, t, gap_ns=10**9)[0] for p in parts], axis=0)
+    return replace(parts[0], label=f"mean of {len(wheels)} wheels", x=mean)
+
+
+def _single(channel: Channel, entry: Entry, quantity: str, *, r_e: float | None = None) -> Quantity:
+    """One channel in SI; a turning wheel becomes a speed by its effective radius [m]."""
+    unit, target = entry.unit or channel.info.unit, QUANTITIES[quantity]
+    note = ""
+    if r_e is not None and unit and parse_unit(unit).dimension == "angular_speed":
+        values, note = convert(channel.values, unit, "rad/s") * entry.scale * r_e, f"r_e = {r_e:g} m"
+    elif not unit or not is_unit(unit):
+        values, note = channel.values, f"no unit: taken as {target}"
+    else:
+        values = convert(channel.values, unit, target, where=channel_id(channel.info)) * entry.scale + entry.offset
+    return Quantity(channel.info.file, channel.info.path, *_clean(channel, values), channel.absolute, note)

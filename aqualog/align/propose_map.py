@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aqualog.align.mapping import Entry, SignalMap, matching
-from aqualog.align.propose import Proposal, look_at, words_of
-from aqualog.core.errors import AqualogError
+from aqualog.align.propose import CANONICAL, Proposal, look_at, words_of
+from aqualog.core.errors import AqualogError, listed
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import ChannelInfo
 from aqualog.core.units import is_unit
@@ -112,13 +112,10 @@ def propose_signals(
                 best = found
         proposed.append(best)
     if len(kinds) > 1:
-        notes.append(f"the drives have {len(kinds)} different sets of channels; {_sizes(by_size)}")
+        sizes = ", ".join(f"{len(k)} as {k[0][0].name}" for k in by_size[:5])
+        more = f" and {len(kinds) - 5} sets more" if len(kinds) > 5 else ""
+        notes.append(f"the drives have {len(kinds)} different sets of channels; {sizes}{more}")
     return _joined(proposed, drives, kinds, most_missing, notes)
-
-
-def _sizes(kinds: Sequence[Sequence[_Files]]) -> str:
-    parts = [f"{len(k)} as {k[0][0].name}" for k in kinds[:5]]
-    return ", ".join(parts) + (f" and {len(kinds) - 5} sets more" if len(kinds) > 5 else "")
 
 
 def _proposals(files: _Files, options: ReadOptions | None) -> tuple[dict[str, Proposal], list[str]]:
@@ -150,7 +147,9 @@ def _joined(
     absent: dict[str, list[str]] = {}
     for symbol in dict.fromkeys(s for p in proposed for s in p):
         own = [p[symbol] for p in proposed if symbol in p]
-        entry = _one_entry(symbol, [_by_name(symbol, p) for p in own], notes)
+        # a channel with the canonical name by that name alone, whatever group it stands in
+        by_name = [replace(p.entry, channel=(symbol,)) if p.reason == CANONICAL else p.entry for p in own]
+        entry = _one_entry(symbol, by_name, notes)
         lacking, doubled = _without(entry, drives, kinds)
         is_rare = len(lacking) > most_missing * len(drives) and not symbol.startswith("omega_")
         if is_rare and not _is_canonical(symbol, entry):
@@ -174,7 +173,11 @@ def _joined(
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
         )
     unmapped = _unmapped(kinds, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
-    speeds = [n for n in unmapped if "[" not in n and {"speed", "velocity"} & set(words_of(n)) and _is_road_speed(n)]
+
+    def is_road_speed(words: set[str]) -> bool:
+        return bool({"speed", "velocity"} & words) and not _NO_ROAD_SPEED & words
+
+    speeds = [n for n in unmapped if "[" not in n and is_road_speed(set(words_of(n)))]
     if "v_x" not in found and "v_x" not in left_out:
         hint = (
             f"; {', '.join(speeds[:3])} may be it, but the file gives no unit: map it with its unit" if speeds else ""
@@ -184,10 +187,6 @@ def _joined(
 
 
 _NO_ROAD_SPEED = {"wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad"}
-
-
-def _is_road_speed(name: str) -> bool:
-    return not _NO_ROAD_SPEED & set(words_of(name))
 
 
 def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
@@ -207,23 +206,16 @@ def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ..
     return tuple(told)
 
 
-def _by_name(symbol: str, proposal: Proposal) -> Proposal:
-    """A channel with the canonical name by that name alone, whatever group it stands in."""
-    if proposal.reason != "its canonical name":
-        return proposal
-    return replace(proposal, entry=replace(proposal.entry, channel=(symbol,)))
-
-
 def _is_canonical(symbol: str, entry: Entry) -> bool:
     return entry.channel == (symbol,) and entry.scale == 1.0
 
 
-def _one_entry(symbol: str, proposals: Sequence[Proposal], notes: list[str]) -> Entry:
+def _one_entry(symbol: str, proposals: Sequence[Entry], notes: list[str]) -> Entry:
     """One line for the drives of all kinds; the most frequent kind decides where one map cannot express two."""
-    first = proposals[0].entry
+    first = proposals[0]
     channels = list(first.channel)
     unit = first.unit
-    for entry in (p.entry for p in proposals[1:]):
+    for entry in proposals[1:]:
         new = [c for c in entry.channel if c not in channels]
         if not new and (entry.unit, entry.scale) == (first.unit, first.scale):
             continue
@@ -254,6 +246,5 @@ def _without(entry: Entry, drives: Sequence[_Files], kinds: _Kinds) -> tuple[lis
 
 
 def _some(drives: Sequence[_Files]) -> str:
-    names = [files[0].name for files in drives[:3]]
-    more = f" and {len(drives) - 3} more" if len(drives) > 3 else ""
-    return f"{len(drives)} drive{'' if len(drives) == 1 else 's'} ({', '.join(names)}{more})"
+    names = listed([files[0].name for files in drives], 3)
+    return f"{len(drives)} drive{'' if len(drives) == 1 else 's'} ({names})"

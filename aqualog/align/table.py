@@ -1,8 +1,8 @@
-"""Build one table of the signals of a drive."""
+"""Build one table of the signals of a drive, and count what was lost between the files and it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,21 +15,92 @@ from aqualog.align.grid import (
     Grid,
     columns_of,
     common_clock,
-    frame_of,
+    gap_limit_ns,
     grid_of,
     missing_samples,
     onto_grid,
+    placed,
 )
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.quality import missing_notes, quality_of
-from aqualog.align.resample import placed
 from aqualog.align.timebase import ClockRepair, OfLast
-from aqualog.core.errors import SignalError
+from aqualog.core.errors import SignalError, listed
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Signals
+from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Quality, Signals, TimeFaults
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["Found", "Freezes", "Plan", "build_signals", "cleaners_of", "plan_drive"]
+__all__ = ["Found", "Freezes", "Plan", "build_signals", "cleaners_of", "missing_notes", "plan_drive", "quality_of"]
+
+MUCH = 0.2  # share of a drive; dropouts and sources that begin a little later stay below
+NAMED = 6  # signals in one line
+_TIME_WORDS = {
+    "duplicates": "doubled", "back_steps": "out of order", "resets": "resets", "wraps": "wraps", "pauses": "pauses",
+    "strays": "from elsewhere, left out",
+}  # fmt: skip
+
+
+def missing_notes(origins: Iterable[Origin]) -> list[str]:
+    """Return notes on signals without values for much of the drive; signals of one file that are alike share a line.
+
+    A rate that falls to less than a fifth shows up only here: each step is then a gap, and no detector judges there.
+    """
+    alike: dict[tuple[str, int, int], list[str]] = {}
+    for o in origins:
+        if SYMBOLS[o.symbol].kind == "continuous" and o.missing_fraction >= MUCH:
+            limit_ns = gap_limit_ns(round(1e9 / o.rate_hz) if o.rate_hz else 0, is_state=False)
+            alike.setdefault((o.file, round(100.0 * o.missing_fraction), limit_ns), []).append(o.symbol)
+    return [
+        f"{file}: {listed(names, NAMED)}: no value for {share} % of the drive: not recorded there, left out, or "
+        f"samples further apart than {1e-6 * limit_ns:.0f} ms, which are not joined (a rate that changes?)"
+        for (file, share, limit_ns), names in alike.items()
+    ]
+
+
+def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], notes: Sequence[str]) -> Quality:
+    """Collect counts and notes of a drive, from its signals' origins and the losses that the readers report."""
+    by_file: dict[str, TimeFaults] = {}
+    for clean in cleaned:  # the channels of one file mostly share their stamps: the worst one speaks for the file
+        seen, new = by_file.get(clean.origin.file, TimeFaults()), clean.origin.faults
+        by_file[clean.origin.file] = seen.worse(new)
+    faults = sum(by_file.values(), TimeFaults(drifts=sum(len(f.drifts) for f in file_faults)))
+    own = sum(
+        c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
+        + c.origin.faults.duplicates + c.origin.faults.strays
+        for c in cleaned
+    )  # fmt: skip
+    left_out = [(c.origin.faults.duplicates + c.origin.faults.strays, c.origin.samples) for c in cleaned]
+    # a doubled or stray stamp here and there is a logger's habit; many are samples lost to a wrong clock
+    is_lossy = any(n > 0.01 * samples for n, samples in left_out)
+    lost = sum(f.lost_samples for f in file_faults) + (max(n for n, _ in left_out) if is_lossy else 0)
+    on_time = [
+        f"{file}: time stamps: "
+        + ", ".join(f"{getattr(own, n)} {word}{own.place(n)}" for n, word in _TIME_WORDS.items() if getattr(own, n))
+        for file, own in by_file.items()
+        if own != TimeFaults()
+    ]
+    told = [*(n for f in file_faults for n in f.notes), *on_time, *_reset_notes(by_file), *notes]
+    return Quality(
+        dropped_samples=own + lost,
+        lost_in_files=lost,
+        frozen_samples=sum(c.origin.frozen for c in cleaned),
+        time_jumps=faults.back_steps + faults.resets + faults.wraps + faults.pauses,
+        truncated=any(f.truncated for f in file_faults),
+        unfinalised=any(f.unfinalised for f in file_faults),
+        faults=faults,
+        notes=tuple(dict.fromkeys(told)),
+    )
+
+
+def _reset_notes(by_file: Mapping[str, TimeFaults]) -> list[str]:
+    """Return files whose clock restarts beside others whose clock goes on: only they are moved."""
+    went_on = [file for file, faults in by_file.items() if not faults.resets]
+    return [
+        f"{file}: its clock restarts{faults.place('resets')}, that of {listed(went_on, NAMED)} does not. The part "
+        "after the restart is placed 1 s behind the part before, which assumes a pause of 1 s; it may be out of step "
+        "with the other files (`aqualog align` compares them; else cut the file there)"
+        for file, faults in by_file.items()
+        if faults.resets and went_on
+    ]
+
 
 Found = Mapping[str, tuple[Entry, ChannelInfo]]
 Freezes = Mapping[str, tuple[Freeze, ...]]
@@ -80,7 +151,8 @@ class Plan:
             y, bridged[name] = onto_grid(clean.symbol, clean.span, t, x, points, self.grid.dt_ns, at)
             for column, series in columns_of(clean.symbol, y, self.vehicle):
                 columns.setdefault(column, series)  # a signal under its canonical name wins over a derived one
-        return self._signals(frame_of(self.grid.seconds(first, last), columns, self.symbols)), bridged
+        time = pl.Series("t", self.grid.seconds(first, last))
+        return self._signals(pl.DataFrame([time, *(columns[n].rename(n) for n in self.symbols)])), bridged
 
     def _signals(self, frame: pl.DataFrame) -> Signals:
         start = self.grid.start_ns if self.absolute else None
@@ -89,14 +161,8 @@ class Plan:
     def facts(self, missing: Mapping[str, int], bridged: frozenset[str], faults: Sequence[FileFaults]) -> Signals:
         """Return origins and quality of the whole drive, with an empty table.
 
-        Parameters
-        ----------
-        missing : mapping symbol -> int
-            Rows without a value, of the whole table.
-        bridged : frozenset of str
-            Signals of the map of which a sample was missing.
-        faults : sequence of FileFaults
-            What the readers lost.
+        `missing`: rows of the whole table without a value, by symbol; `bridged`: signals of the map of which a sample
+        was missing; `faults`: what the readers lost.
         """
         origins: dict[str, Origin] = {}
         for clean in self.cleaned:
@@ -128,10 +194,8 @@ def build_signals(
     ----------
     mapped : mapping symbol -> (entry, channel)
         As found by `resolve`, with samples.
-    signal_map : SignalMap
-        For the clock corrections.
-    vehicle : Vehicle
-        Effective radii (wheel speeds in km/h or m/s) and steering ratio.
+    signal_map, vehicle
+        Clock corrections; effective radii (wheel speeds in km/h or m/s) and steering ratio.
     file_faults : sequence
         What the readers lost.
     rate_hz : float, optional

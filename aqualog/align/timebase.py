@@ -20,10 +20,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.align.resample import MEDIAN_OF
 from aqualog.core.records import BoolArray, TimeArray, TimeFaults
 
-__all__ = ["DAY_NS", "ClockRepair", "OfLast"]
+__all__ = ["DAY_NS", "MEDIAN_OF", "ClockRepair", "OfLast"]
+
+MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has the same median
 
 _Value = TypeVar("_Value")
 
@@ -71,20 +72,9 @@ class ClockRepair:
         self._of_last = OfLast(self._repaired)
 
     def repair(self, t_ns: TimeArray) -> tuple[TimeArray, TimeArray, TimeFaults]:
-        """Repair one vector.
+        """Repair one vector of stamps (n,) in file order, which is not changed. [ns]
 
-        Parameters
-        ----------
-        t_ns : int64 array (n,)
-            Stamps in file order; not changed.
-
-        Returns
-        -------
-        t_ns : int64 array (m,)
-            Strictly increasing stamps, m <= n.
-        order : int64 array (m,)
-            Which sample of the input belongs to each stamp.
-        faults : TimeFaults
+        Returns strictly increasing stamps (m,), m <= n, which sample of the input belongs to each (m,), and the faults.
         """
         return self._of_last(t_ns)
 
@@ -94,7 +84,8 @@ class ClockRepair:
         if n < 2:
             return t_ns.copy(), order, TimeFaults()
         steps = np.diff(t_ns)
-        period = _median_period(steps)
+        forward = steps[:MEDIAN_OF][steps[:MEDIAN_OF] > 0]
+        period = int(np.median(forward)) if forward.size else 0
         fixed, strays = t_ns, 0
         wraps: list[int] = []
         resets: list[int] = []
@@ -147,7 +138,10 @@ class ClockRepair:
             if _is_doubled(t_ns, begin, int(i)):  # nothing to shift: what comes after goes on where it stopped
                 continue
             begin = int(i) + 1
-            wrap = _wrap_of(int(-steps[i]) + period, period)
+            # a counter wraps from its very end to its very start: a short span may also be a restart
+            off = max(3 * period, 2_000_000)
+            span = int(-steps[i]) + period
+            wrap = next((w for w in _WRAPS_NS if abs(span - w) <= off and w > 20 * _SECOND), None)
             if wrap is not None:
                 shift[i + 1 :] += wrap
                 wraps.append(int(i))
@@ -225,18 +219,3 @@ def _is_doubled(t_ns: TimeArray, begin: int, last: int) -> bool:
     steps = np.diff(block[:-1])
     uneven = int((np.abs(steps - np.median(steps)) > _EVEN * np.median(steps)).sum()) if steps.size else 0
     return uneven >= _LEAST_UNEVEN and bool(np.array_equal(block[:-1], t_ns[last + 1 : last + block.size]))
-
-
-def _median_period(steps: TimeArray) -> int:
-    positive = steps[:MEDIAN_OF][steps[:MEDIAN_OF] > 0]
-    return int(np.median(positive)) if positive.size else 0
-
-
-def _wrap_of(span: int, period: int) -> int | None:
-    """Return the counter length that explains a jump back to within a few sample times; None without one."""
-    tolerance = max(3 * period, 2_000_000)
-    for wrap in _WRAPS_NS:
-        # a counter wraps from its very end to its very start, so a short span cannot be distinguished from a restart
-        if abs(span - wrap) <= tolerance and wrap > 20 * _SECOND:
-            return wrap
-    return None

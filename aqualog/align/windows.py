@@ -80,18 +80,10 @@ def long_drive(
     rate_hz: float | None = None,
     tell: Callable[[int], None] = lambda _: None,
 ) -> LongDrive:
-    """Read the files once and plan the windows.
+    """Read the files once and plan the windows, of channels as `resolve` finds them; the rest as of `build_signals`.
 
-    Parameters
-    ----------
-    found : mapping symbol -> (entry, channel)
-        As found by `resolve`.
-    parts : callable
-        Returns the pieces of the channels, from the start at each call.
-    signal_map, vehicle, rate_hz
-        As of `build_signals`.
-    tell : callable
-        Called with the number of samples read so far.
+    `parts` returns the pieces of the channels, from the start at each call; `tell` is called with the number of samples
+    read so far.
 
     Raises
     ------

@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from polars.exceptions import PanicException
 
 from aqualog.align.load import load_drive
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
-from aqualog.campaign.measure import Measurement, measure, measure_long
+from aqualog.campaign.measure import measure, measure_long
 from aqualog.campaign.place import Address
-from aqualog.campaign.samples import load_results
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import Store
 from aqualog.campaign.tables import write_tables
 from aqualog.core.errors import AqualogError, ConfigError, FitError, LogError, SignalError
@@ -108,21 +108,18 @@ def run_batch(
 
     Parameters
     ----------
-    configured : Configured
-    store : Store
-        Made if it is not there.
+    configured, store
+        The store is made if it is not there.
     jobs : int
         Processes on this machine.
+    force : bool
+        Measure logs again that already have results.
     limits : Limits
         Limits of one log.
     elsewhere : callable, optional
         Works on the logs in place of these processes: `aqualog.campaign.cluster.on_cluster`.
-    force : bool
-        Measure logs again that already have results.
-    report : callable
-        Progress.
-    told : callable
-        Called at once with name and reason of every log without result.
+    report, told : callable
+        Progress; name and reason of every log without result, at once.
 
     A log that fails does not affect the others. If its content is at fault, the failure is stored too, and the log is
     tried again only after a change of it, of its configuration or of aqualog. An interrupt keeps all finished results.
@@ -143,6 +140,10 @@ def run_batch(
     contents = Contents(store.contents())
     todo = plan_jobs(configured, contents)
     plan = compared(todo, store, force=force)
+
+    def write_all() -> None:
+        write_tables(load_results(configured, store, todo, damaged_fail=True))
+
     with store.held(must=bool(plan.new)) as is_held:
         if plan.new:
             plan = compared(todo, store, force=force)  # another batch may have been at work until now
@@ -156,7 +157,7 @@ def run_batch(
         except BaseException:
             if not store.part:
                 with suppress(AqualogError):  # the user should see the reason that ended the batch
-                    write_tables(load_results(configured, store, todo, damaged_fail=True))
+                    write_all()
             raise
         if lost := tally.made - len(store.keys()[0] & plan.new.keys()):
             raise AqualogError(
@@ -164,54 +165,52 @@ def run_batch(
                 hint="its mounts; the same command goes on with the rest",
             )  # fmt: skip
         if is_held and not store.part:
-            write_tables(load_results(configured, store, todo, damaged_fail=True))
+            write_all()
     return BatchOutcome(tally.made, plan.kept, tally.failed)
 
 
+@dataclass(eq=False, slots=True)
 class _Tally:
     """State of the logs so far."""
 
-    def __init__(
-        self, configured: Configured, store: Store, total: int, plan: Compared, limits: Limits, report: Report,
-        told: Callable[[str, str], None],
-    ) -> None:  # fmt: skip
-        self.made = 0
-        self.failed: dict[str, str] = {}
-        self._configured, self._store, self._total, self._plan, self._limits = configured, store, total, plan, limits
-        self._report, self._told = report, told
-        for job, reason in plan.failed:
+    configured: Configured
+    store: Store
+    total: int
+    plan: Compared
+    limits: Limits
+    report: Report
+    told: Callable[[str, str], None]
+    made: int = 0
+    failed: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for job, reason in self.plan.failed:
             self._fail(job, reason)
         self._tell()
 
     def record(self, key: str, outcome: Fault | Crashed | None) -> None:
-        """Take the outcome of a job.
-
-        Raises
-        ------
-        AqualogError
-            If the store is at fault.
-        """
-        job = self._plan.new[key]
+        """Take the outcome of a job; AqualogError if the store is at fault."""
+        job = self.plan.new[key]
         if isinstance(outcome, Crashed):
             # next time there may be more memory, or a quieter machine
-            self._fail(job, _how_it_ended(outcome, job, self._limits))
+            self._fail(job, _how_it_ended(outcome, job, self.limits))
         elif outcome is None:
             self.made += 1
         elif outcome.ends_batch:
             raise AqualogError(outcome.reason)
         else:
             if outcome.is_proven:
-                self._store.put_failure(key, outcome.reason)
+                self.store.put_failure(key, outcome.reason)
             self._fail(job, outcome.reason)
         self._tell()
 
     def _fail(self, job: Job, reason: str) -> None:
-        name = name_of(self._configured.campaign, job.logs)
+        name = name_of(self.configured.campaign, job.logs)
         self.failed[name] = reason
-        self._told(name, reason)
+        self.told(name, reason)
 
     def _tell(self) -> None:
-        self._report(self._plan.kept + self.made + len(self.failed), self._total, len(self.failed))
+        self.report(self.plan.kept + self.made + len(self.failed), self.total, len(self.failed))
 
 
 def _how_it_ended(crashed: Crashed, job: Job, limits: Limits) -> str:
@@ -234,37 +233,26 @@ def _work(
 ) -> None:
     shared = (configured.signal_map, configured.dbc, configured.settings)
     tasks = {k: (store.address, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
-    if elsewhere is not None:
-        _work_elsewhere(store, tasks, elsewhere, record)
-        return
-    if store.is_shared and ((len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS):
+    if elsewhere is None and store.is_shared and ((len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS):
         work_on(tasks, measure_one, jobs=jobs, record=record, limits=limits)
-        return
-    for key, task in tasks.items():
-        record(key, measure_one(*task))
+    elif elsewhere is None:
+        for key, task in tasks.items():
+            record(key, measure_one(*task))
+    else:
+        made: set[str] = set()
 
+        def taken(key: str, outcome: Fault | Crashed | None) -> None:
+            if outcome is None:
+                made.add(key)
+            record(key, outcome)
 
-def _work_elsewhere(
-    store: Store,
-    tasks: Mapping[str, tuple[Any, ...]],
-    elsewhere: WorkOn,
-    record: Callable[[str, Fault | Crashed | None], None],
-) -> None:
-    """Work on other machines, and check that their results are here."""
-    made: set[str] = set()
-
-    def taken(key: str, outcome: Fault | Crashed | None) -> None:
-        if outcome is None:
-            made.add(key)
-        record(key, outcome)
-
-    elsewhere(tasks, measure_one, taken)
-    lost = made - store.keys()[0]
-    if lost:
-        raise AqualogError(
-            f"{len(lost)} results that workers have written are missing here", where=store.name,
-            expected="the same store on every machine", hint="a shared disk, or a URL that means the same everywhere",
-        )  # fmt: skip
+        elsewhere(tasks, measure_one, taken)
+        if lost := made - store.keys()[0]:
+            raise AqualogError(
+                f"{len(lost)} results that workers have written are missing here", where=store.name,
+                expected="the same store on every machine",
+                hint="a shared disk, or a URL that means the same everywhere",
+            )  # fmt: skip
 
 
 def measure_one(
@@ -283,7 +271,12 @@ def measure_one(
     except AqualogError as error:
         return Fault(error.line(), ends_batch=True)
     try:
-        measurement = _measured(logs, vehicle, signal_map, dbc, settings)
+        loaded = load_drive(logs, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
+        if isinstance(loaded, Signals):
+            measurement = measure(loaded, vehicle, settings=settings)
+        else:
+            with loaded.opened:
+                measurement = measure_long(loaded.drive, vehicle, settings=settings, faults=loaded.faults)
         found = None
     except (Exception, PanicException) as error:
         found = _fault(error, logs)
@@ -321,13 +314,3 @@ def _told(error: BaseException, logs: Sequence[Path]) -> str:
     if isinstance(error, MemoryError):
         return "not enough memory"
     return f"aqualog failed ({type(error).__name__}: {str(error)[:200]}). Try: `aqualog detect` on it with --debug"
-
-
-def _measured(
-    logs: Sequence[Path], vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], settings: Settings
-) -> Measurement:
-    loaded_drive = load_drive(logs, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
-    if isinstance(loaded_drive, Signals):
-        return measure(loaded_drive, vehicle, settings=settings)
-    with loaded_drive.opened:
-        return measure_long(loaded_drive.drive, vehicle, settings=settings, faults=loaded_drive.faults)

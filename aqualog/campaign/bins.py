@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.campaign.definition import Campaign, Run, group_keys
 from aqualog.campaign.measure import REASONS
-from aqualog.campaign.records import Campaign, Run, group_keys
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
@@ -163,15 +163,12 @@ def cells(
 
     Parameters
     ----------
-    data, plan
     wheels : callable
         Wheels of a run's car that count; `("",)` for the car as a whole.
     columns : callable
         Columns to use of a run and a wheel, or the reason for a missing column. Samples with a NaN are left out.
-    road : str
-        `wet` or `dry`.
-    by_speed : bool
-        In bins of speed, or all speeds together.
+    road, by_speed
+        `wet` or `dry`; in bins of speed, or all speeds together.
     keys : tuple of str, optional
         Other keys than the plan's.
     only_usable : bool
@@ -206,16 +203,18 @@ def cells(
             index = np.flatnonzero(whole)
             if index.size:
                 step = index + number * _APART
-                place = _place(wheel, by_side=plan.by_side)
+                place = next(s for s, ws in SIDES.items() if wheel in ws) if plan.by_side and wheel else wheel
                 part = (info, info.index, step, {k: x[index] for k, x in found.columns.items()})
                 parts.setdefault((group_of(info, keys), place), []).append(part)
     out = []
     for (group, place), pieces in sorted(parts.items(), key=lambda item: _order(item[0])):
         pool = pooled([(i, step, c) for _, i, step, c in pieces])
         infos = {info.index: info for info, *_ in pieces}
-        for low, high, here in _by_speed(pool, plan.width_kmh) if by_speed else [(math.nan, math.nan, pool)]:
-            runs = tuple(infos[i] for i in np.unique(here.run))
-            out.append(Cell(group, place, road, low, high, here, runs))
+        bin_of = np.floor(pool.columns["v_x"] / KMH / plan.width_kmh) if by_speed else np.full(pool.run.size, math.nan)
+        for k in np.unique(bin_of).tolist():
+            here = pool.part(bin_of == k) if by_speed else pool
+            low, high = k * plan.width_kmh, (k + 1.0) * plan.width_kmh
+            out.append(Cell(group, place, road, low, high, here, tuple(infos[i] for i in np.unique(here.run))))
     return out, Counter({k: n for k, n in left_out.items() if n})
 
 
@@ -226,16 +225,6 @@ def pooled(pieces: Sequence[tuple[int, NDArray[np.int64], dict[str, FloatArray]]
     order = np.lexsort((step, run))
     names = pieces[0][2].keys()
     return Pool(run[order], step[order], {k: np.concatenate([c[k] for *_, c in pieces])[order] for k in names})
-
-
-def _by_speed(pool: Pool, width_kmh: float) -> Iterator[tuple[float, float, Pool]]:
-    number = np.floor(pool.columns["v_x"] / KMH / width_kmh).astype(np.int64)
-    for k in np.unique(number):
-        yield float(k * width_kmh), float((k + 1) * width_kmh), pool.part(number == k)
-
-
-def _place(wheel: str, *, by_side: bool) -> str:
-    return next(s for s, ws in SIDES.items() if wheel in ws) if by_side and wheel else wheel
 
 
 def _order(item: tuple[Group, str]) -> tuple[tuple[tuple[int, float, str], ...], str]:

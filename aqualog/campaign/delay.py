@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import pooled, road_of
-from aqualog.campaign.regress import NOWHERE, Design, Interval, estimate
-from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.campaign.bins import Cell, Picked, Plan, cells
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
+from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.moments import Design
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import FloatArray
+from aqualog.core.regression import estimate
 
 __all__ = ["Delay", "delays", "source_of"]
 
@@ -29,8 +30,7 @@ Source = tuple[str, str]
 class Delay:
     """Delay of v_x against the wheels of one car, late positive. [s]
 
-    `value` and `ci` are NaN without an estimate. `reason` then gives the cause, and a slope must be estimated together
-    with the delay.
+    `value` and `ci` are NaN without an estimate; `reason` then gives the cause, and slopes are fitted with a delay.
     """
 
     vehicle: str
@@ -64,39 +64,37 @@ def delays(data: CampaignData) -> dict[Source, Delay]:
     mean slip also depends on the mean traction; both are estimated together where the data allow. The estimate is
     corrected for the noise of a / v (free wheels) or of the traction.
     """
-    members: dict[Source, list[RunInfo]] = {}
-    for info in data.done:
-        if source_of(info)[1] == "v_x":
-            members.setdefault(source_of(info), []).append(info)
-    return {source: _delay(data, source[0], infos) for source, infos in members.items()}
+
+    def columns(info: RunInfo, samples: RunSamples, _: str) -> Picked | str:
+        if source_of(info)[1] != "v_x":
+            return "no measured velocity"
+        is_awd = info.vehicle.drivetrain == "awd"
+        wheels = [w for w in WHEELS if is_awd or w not in info.vehicle.driven]
+        slip, mu = (np.mean([samples.array(f"{n}_{w}") for w in wheels], axis=0) for n in ("slip", "mu"))
+        u, v = samples.array("a_over_v"), samples.array("v_x") / _V_UNIT
+        return Picked({"u": u, "slip": slip, "mu": mu if is_awd else np.zeros_like(u), "v": v})
+
+    found, _ = cells(
+        data, Plan(("vehicle",)), wheels=lambda _: ("",), columns=columns, road="dry", by_speed=False
+    )  # fmt: skip
+    dry = {cell.infos[0].run.vehicle.stem: cell for cell in found}
+    first = {source_of(info): info for info in reversed(data.done) if source_of(info)[1] == "v_x"}
+    return {s: _delay(s[0], first[s], dry.get(s[0])) for s in dict.fromkeys(map(source_of, data.done)) if s in first}
 
 
-def _delay(data: CampaignData, name: str, infos: list[RunInfo]) -> Delay:
-    pieces = []
-    awd = infos[0].vehicle.drivetrain == "awd"
-    wheels = [w for w in WHEELS if awd or w not in infos[0].vehicle.driven]
-    for info in infos:
-        samples = data.samples(info)
-        u = samples.array("a_over_v")
-        slip = _mean([samples.array(f"slip_{w}") for w in wheels])
-        mu = _mean([samples.array(f"mu_{w}") for w in wheels]) if awd else np.zeros_like(u)
-        v = samples.array("v_x") / _V_UNIT
-        good = road_of(samples, "dry") & samples.is_usable & np.isfinite(u + slip + mu + v)
-        index = np.flatnonzero(good)
-        if index.size:
-            pieces.append((info.index, index, {"u": u[index], "slip": slip[index], "mu": mu[index], "v": v[index]}))
-    runs = len(pieces)
-    if runs < LEAST_RUNS:
+def _delay(name: str, first: RunInfo, dry: Cell | None) -> Delay:
+    runs, samples = (len(dry.infos), dry.pool.run.size) if dry is not None else (0, 0)
+    if dry is None or runs < LEAST_RUNS:
         reason = f"{runs} runs with dry, straight driving against v_x, at least {LEAST_RUNS} needed"
-        return Delay(name, math.nan, NOWHERE, runs, sum(p[1].size for p in pieces), reason)
-    pool = pooled(pieces)
-    c = pool.columns
+        return Delay(name, math.nan, NOWHERE, runs, samples, reason)
+    is_awd = first.vehicle.drivetrain == "awd"
+    c = dry.pool.columns
     columns, scatters = [c["u"], np.ones_like(c["u"]), c["v"] ** 2], [False, True, False]
-    if awd:
+    if is_awd:
         # the brush's curve, s = k mu (1 + mu / 3 mu_max ...), looks like a delay: both grow with the acceleration
         columns, scatters = [*columns, c["mu"], c["mu"] ** 2], [*scatters, True, False]
-    noisy = tuple(i == (3 if awd else 0) for i in range(len(columns)))
-    design = Design(np.stack(columns), c["slip"], pool.run, pool.step, tuple(scatters), noisy)
+    noisy = tuple(i == (3 if is_awd else 0) for i in range(len(columns)))
+    design = Design(np.stack(columns), c["slip"], dry.pool.run, dry.pool.step, tuple(scatters), noisy)
     found = estimate(design, robust=True)
     tau, ci = float(found.value[0]), found.interval(0)
     half = 0.5 * (ci[1] - ci[0])
@@ -104,13 +102,8 @@ def _delay(data: CampaignData, name: str, infos: list[RunInfo]) -> Delay:
     if not float(np.ptp(c["u"])) > U_MIN:
         reason = "no accelerations in the dry driving"
     elif not half <= HALF_MAX:
-        with_slope = " apart from the slope" if awd else ""
+        with_slope = " apart from the slope" if is_awd else ""
         reason = f"known only to ±{half:.3f} s{with_slope}: the accelerations of the dry driving differ too little"
     elif not abs(tau) <= LATEST:
         reason = f"{tau:+.2f} s is too long for the delay of a velocity: check the clocks (`aqualog align`)"
-    return Delay(name, tau if not reason else math.nan, ci if not reason else NOWHERE, runs, c["u"].size, reason)
-
-
-def _mean(columns: list[FloatArray]) -> FloatArray:
-    mean: FloatArray = np.mean(columns, axis=0)
-    return mean
+    return Delay(name, tau if not reason else math.nan, ci if not reason else NOWHERE, runs, samples, reason)

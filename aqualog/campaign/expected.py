@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
-from aqualog.campaign.records import loads_of
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.definition import loads_of
+from aqualog.campaign.results import RunInfo
 from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
@@ -22,16 +22,7 @@ from aqualog.physics.rolling import load_factor, pressure_factor
 from aqualog.physics.tyre_brush import brush_parts
 from aqualog.physics.water import residual_film
 
-__all__ = [
-    "LINEAR",
-    "Expected",
-    "contact_of",
-    "expected",
-    "expected_of_runs",
-    "friction_of",
-    "full_speed_of",
-    "tangent_of",
-]
+__all__ = ["LINEAR", "Expected", "contact_of", "expected", "expected_of_runs", "friction_of", "tangent_of"]
 
 LINEAR = (math.inf, math.inf)  # friction (dry, wet) of a brush that never slides: its slope is the tangent (2.2)
 _THETA = np.linspace(0.0, 2.5, 1001)  # C |s| / (3 mu F_z); at a slope of 28 and mu 0.8 a slip of 0.2
@@ -59,25 +50,16 @@ class Expected:
 def expected(
     info: RunInfo, wheel: str, v: float, *, wet: bool = True, mu_range: tuple[float, float] | None = None
 ) -> Expected:
-    """Expectation for a wheel of a run at constant speed on even water.
+    """Expectation for a wheel of a run at constant speed `v` [m/s] on even water, or off it.
 
     Parameters
     ----------
     info : RunInfo
         Must give the tyre (one of the model's), and on water also the depth and the pressures.
-    wheel : str
-    v : float
-        [m/s]
-    wet : bool
-        On the lane or off it.
     mu_range : (float, float), optional
         Traction over which the measured slope was estimated. The slopes are then those of a regression line over that
         range, because the brush's curve bends (E22). A fit over 0.03 to 0.26 gives a tenth less than the slope at zero
         slip.
-
-    Returns
-    -------
-    Expected
 
     L = 1 - (v / v_full)^n; on the rear axle in the water that the front wheel of its side leaves. Slope: the vehicle
     file's value times the factors of tyre, pressure and load, and L² (2.2). The contact does not fluctuate here; the
@@ -124,11 +106,10 @@ def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> Floa
     low, high = mu_range
     if not math.isfinite(mu_max):
         return slip_stiffness_ratio(L)
-    carried = _carried() if L is _L else _carried_by(L)
     found = np.full(L.size, np.nan)
     if not low < high:
         return found
-    for i, row in enumerate(carried):
+    for i, row in enumerate(_carried() if L is _L else _carried_by(L)):
         if max(-low, high) <= mu_max * row[-1]:
             at_low, at_high = (math.copysign(float(np.interp(abs(x) / mu_max, row, _THETA)), x) for x in mu_range)
             found[i] = (high - low) / (3.0 * mu_max * (at_high - at_low))
@@ -141,9 +122,7 @@ def _carried_by(L: FloatArray) -> FloatArray:
     return np.asarray(stuck + slid, dtype=np.float64)
 
 
-@lru_cache(maxsize=1)
-def _carried() -> FloatArray:
-    return _carried_by(_L)
+_carried = cache(lambda: _carried_by(_L))
 
 
 def tangent_of(chord: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
@@ -152,7 +131,7 @@ def tangent_of(chord: FloatArray, mu_max: float, mu_range: tuple[float, float]) 
 
 
 def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
-    """Contact L whose regression slope over `mu_range` is `share` times the full contact's tangent at zero slip.
+    """Contact L [-] whose regression slope over `mu_range` is `share` times the full contact's tangent at zero slip.
 
     Parameters
     ----------
@@ -163,15 +142,10 @@ def contact_of(share: FloatArray, mu_max: float, mu_range: tuple[float, float]) 
     mu_range : (float, float)
         Traction over which the slope was regressed, low < high. [-]
 
-    Returns
-    -------
-    L : like share
-        At least the contact that carries the traction at all. Above 1, which is scatter, L grows with sqrt(share), so
-        that a mean over many is not cut. NaN where no contact carries the traction.
-
-    Inverts the regression slope by a table in steps of 0.005. A brush with a rigid carcass and even friction is
-    assumed. (2.2), L², is its limit at small traction, since the curve of a shortened contact bends sooner than that of
-    a full one (2.1).
+    L is at least the contact that carries the traction at all. Above 1, which is scatter, L grows with sqrt(share), so
+    that a mean over many is not cut. NaN where no contact carries the traction. Inverts the regression slope by a table
+    in steps of 0.005. A brush with a rigid carcass and even friction is assumed. (2.2), L², is its limit at small
+    traction, since the curve of a shortened contact bends sooner than that of a full one (2.1).
     """
     known = _shares(_L, mu_max, mu_range)
     good = np.isfinite(known)
@@ -200,9 +174,7 @@ def expected_of_runs(
     mu_range: tuple[float, float] | None = None,
 ) -> Expected:
     """Mean over runs and wheels of one cell, or the reason for none; runs of one configuration are computed once."""
-    different = {
-        (repr(i.vehicle), *(i.run.values.get(k) for k in _TOLD_BY)): i for i in infos
-    }.values()  # fmt: skip
+    different = {(repr(i.vehicle), *(i.run.values.get(k) for k in _TOLD_BY)): i for i in infos}.values()
     all_of_them = [
         expected(i, w, v, wet=wet, mu_range=mu_range) for i in different for w in wheels if w in i.vehicle.driven
     ]
@@ -211,27 +183,6 @@ def expected_of_runs(
     reason = next((e.reason for e in all_of_them if e.reason), "")
     contact, slope, dry = np.mean([(e.contact, e.slope, e.slope_dry) for e in all_of_them], axis=0)
     return Expected(float(contact), float(slope), float(dry), reason)
-
-
-def full_speed_of(info: RunInfo, wheel: str) -> float | str:
-    """Speed at which the model lifts a wheel off the road, or the reason for none. [m/s] Infinite without a wedge.
-
-    For a rear wheel by bisection, because what the front wheel leaves depends on the speed.
-    """
-    tyre = TYRES.get(str(info.run.values.get("tyre", "")))
-    if tyre is None:
-        return "the tyre is not known to the model"
-    at_top = _contact(info, wheel, 100.0, tyre)
-    if isinstance(at_top, str):
-        return at_top
-    if at_top > 0.0:
-        return float("inf")
-    low, high = 1.0, 100.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        found = _contact(info, wheel, middle, tyre)
-        low, high = (low, middle) if not isinstance(found, str) and found <= 0.0 else (middle, high)
-    return high
 
 
 def _contact(info: RunInfo, wheel: str, v: float, tyre: Tyre) -> float | str:

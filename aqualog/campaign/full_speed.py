@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.campaign.bins import DEPTH_KEYS, KMH, Group, Plan, group_of
-from aqualog.campaign.regress import NOWHERE, Interval
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.results import CampaignData
 from aqualog.campaign.slip_slope import SLOPE_MAX, SlopeRow, SlopeTable, contact
 from aqualog.campaign.spin_downs import Pass, passes
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import NOWHERE, Interval, student_quantile
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
@@ -158,21 +157,11 @@ def _lack(v: FloatArray, L: FloatArray, sigma: FloatArray, v_full: float, n: flo
 
 
 def fit_contact(v: FloatArray, contact: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit L = 1 - (v / v_full)^n, 0 beyond v_full.
+    """Fit L = 1 - (v / v_full)^n, 0 beyond v_full, in each row.
 
-    Parameters
-    ----------
-    v : array (m,)
-        [m/s]
-    contact : array (b, m)
-        L, one fit per row. [-] Bins that are NaN or not positive in a row do not count there.
-    sigma : array (m,)
-        Standard deviations. [-]
-
-    Returns
-    -------
-    v_full, n : array (b,)
-        v_full in steps of 0.5 km/h up to 250 km/h, n in 2 ... 8. NaN where fewer than two bins count.
+    Of speeds `v` (m,) [m/s], `contact` L (b, m) [-], of which NaN and what is not positive do not count, and standard
+    deviations `sigma` (m,) [-]. Returns v_full (b,) in steps of 0.5 km/h up to 250 km/h [m/s] and n (b,) in 2 ... 8;
+    NaN where fewer than two bins count.
     """
     share = v[None, None] / _SPEEDS[:, None, None]
     flat = np.maximum(1.0 - share ** _EXPONENTS[None, :, None], 0.0).reshape(-1, v.size)
@@ -217,17 +206,10 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
 
 
 def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:
-    """Speed (b,) at which half of the passes have an event: logistic curve of greatest likelihood.
+    """Speed (b,) [m/s] at which half of the passes have an event: logistic curve of greatest likelihood.
 
-    Parameters
-    ----------
-    v : array (m,)
-        Mean speed of each pass. [m/s]
-    hit : bool array (m,)
-    times : array (b, m)
-        How often each pass counts, one fit per row.
-
-    The width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly have a speed too: the
+    Of mean speeds `v` (m,) [m/s], whether a pass has one (m,), and how often each counts (b, m), a fit per row. The
+    width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly have a speed too: the
     middle of the gap. NaN where a row has passes of one kind only.
     """
     z = (v[None, None] - _SPEEDS[:, None, None]) / _WIDTHS[None, :, None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap, map_text
-from aqualog.campaign.records import Campaign, Run, with_load
+from aqualog.campaign.definition import Campaign, with_load
 from aqualog.core.errors import AqualogError
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import Settings
@@ -16,18 +16,7 @@ from aqualog.io.fingerprint import Contents, Seen, hash_of, sources_stamp
 
 __all__ = ["Configured", "Job", "code_stamp", "name_of", "plan_jobs", "result_key"]
 
-_BEHIND = (
-    "core",
-    "physics",
-    "guard",
-    "io",
-    "align",
-    "features",
-    "calibrate",
-    "detect",
-    "campaign/measure.py",
-    "campaign/thin.py",
-)
+_BEHIND = ("core", "physics", "guard", "io", "align", "features", "calibrate", "detect", "campaign/measure.py")
 """Sources behind a result."""
 
 
@@ -68,18 +57,15 @@ def plan_jobs(configured: Configured, contents: Contents) -> list[Job]:
     found: dict[tuple[tuple[Path, ...], str], list[int]] = {}
     cars: dict[tuple[tuple[Path, ...], str], Vehicle | str] = {}
     for index, run in enumerate(runs):
-        car = _car(configured, run)
+        car: Vehicle | str
+        try:
+            car = with_load(configured.vehicles[run.vehicle], run)
+        except AqualogError as error:
+            car = error.line()
         at = (run.logs, car if isinstance(car, str) else repr(car))
         found.setdefault(at, []).append(index)
         cars[at] = car
     return [_job(configured, contents, logs, cars[logs, said], indices) for (logs, said), indices in found.items()]
-
-
-def _car(configured: Configured, run: Run) -> Vehicle | str:
-    try:
-        return with_load(configured.vehicles[run.vehicle], run)
-    except AqualogError as error:
-        return error.line()
 
 
 def _job(
@@ -107,24 +93,17 @@ def result_key(
 ) -> str:  # fmt: skip
     """Key under which the result of a drive is kept.
 
-    Parameters
-    ----------
-    logs : sequence of Path
-        Files of the drive; their names count, since a map may ask for them.
-    vehicle : Vehicle
-        With the run's load; `given` decides which detectors run.
+    Names of the `logs` count, since a map may ask for them; of the `vehicle`, with the run's load, also what is
+    `given`, since that decides which detectors run.
     """
     files = [f"{p.name}:{contents.of(p)}" for p in (*logs, *dbc)]
-    return hash_of([code_stamp(), *files, _told(vehicle), map_text(signal_map), repr(settings)])
+    # sets and mappings have no order of their own
+    values = {n: getattr(vehicle, n) for n in Vehicle.__slots__}
+    plain = {n: sorted(v.items()) if isinstance(v, dict) else v for n, v in values.items() if n != "given"}
+    car = repr(sorted(plain.items(), key=lambda item: item[0])) + repr(sorted(vehicle.given))
+    return hash_of([code_stamp(), *files, car, map_text(signal_map), repr(settings)])
 
 
 def code_stamp() -> str:
     """Hash of the source code behind a result: after a change of an equation all logs are measured again."""
     return sources_stamp(_BEHIND)
-
-
-def _told(vehicle: Vehicle) -> str:
-    # sets and mappings have no order of their own
-    values = {n: getattr(vehicle, n) for n in Vehicle.__slots__}
-    plain = {n: sorted(v.items()) if isinstance(v, dict) else v for n, v in values.items() if n != "given"}
-    return repr(sorted(plain.items(), key=lambda item: item[0])) + repr(sorted(vehicle.given))

@@ -13,7 +13,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from aqualog.campaign.records import Campaign, Run
+from aqualog.campaign.definition import Campaign, Run
+from aqualog.core.errors import listed
 
 __all__ = ["FEW", "TOO_FEW", "Configuration", "Factor", "Gap", "Matrix", "campaign_matrix", "speeds_of"]
 
@@ -73,24 +74,15 @@ class Matrix:
 
 def speeds_of(run: Run) -> tuple[float, ...]:
     """Speeds [km/h] of a run from the campaign file: its `x_speed_kmh`."""
-    text = str(run.values.get(_SPEED, "")).replace(",", ".")
-    try:
-        value = float(text)
-    except ValueError:
-        return ()
-    return (value,) if math.isfinite(value) else ()
+    value = _number(str(run.values.get(_SPEED, "")).replace(",", "."))
+    return (value,) if value is not None and math.isfinite(value) else ()
 
 
 def campaign_matrix(campaign: Campaign, speeds: Callable[[int, Run], Sequence[float]] | None = None) -> Matrix:
-    """The matrix of a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    speeds : function (index of the run, run) -> speeds in km/h, optional
-        Further speeds of a run, such as measured ones; default `speeds_of`.
-    """
-    columns = _columns(campaign.runs)
+    """The matrix of a campaign. `speeds` of (index of the run, run) are its speeds [km/h]; default `speeds_of`."""
+    groups = [r.groups for r in campaign.runs]
+    columns = {k: [g.get(k, "") for g in groups] for k in _CONFIGURATION}
+    columns = {k: c for k, c in columns.items() if any(c)}
     constants = {k: c[0] for k, c in columns.items() if len(set(c)) == 1 and c[0]}
     varied = {k: c for k, c in columns.items() if len(set(c)) > 1}
     together = _together(varied)
@@ -102,20 +94,19 @@ def campaign_matrix(campaign: Campaign, speeds: Callable[[int, Run], Sequence[fl
     ranks = [{v: i for i, v in enumerate(f.values)} for f in factors]
     order = sorted(cells, key=lambda values: [r[v] for r, v in zip(ranks, values, strict=True)])
     told = speeds or (lambda _, run: speeds_of(run))
-    configurations = tuple(_configuration(c, cells[c], campaign.runs, told) for c in order)
-    shown = set(_CONFIGURATION) | {"manoeuvre", _SPEED}
-    others = {k: len({r.groups.get(k, "") for r in campaign.runs}) for k in campaign.keys if k not in shown}
-    others = {k: n for k, n in others.items() if k not in ("lane_start_s", "lane_end_s")}
+    configurations = []
+    for values in order:
+        own = [(i, campaign.runs[i]) for i in cells[values]]
+        manoeuvres = Counter(str(run.values.get("manoeuvre", "")) for _, run in own)
+        driven = sorted({round(v, 1) for i, run in own for v in told(i, run)})
+        configurations.append(
+            Configuration(values, tuple(cells[values]), dict(sorted(manoeuvres.items())), tuple(driven))
+        )
+    shown = {*_CONFIGURATION, "manoeuvre", _SPEED, "lane_start_s", "lane_end_s"}
+    others = {k: len({g.get(k, "") for g in groups}) for k in campaign.keys if k not in shown}
     return Matrix(
-        constants, factors, together, others, configurations, _gaps(factors, set(cells)), _notes(campaign)
+        constants, factors, together, others, tuple(configurations), _gaps(factors, set(cells)), _notes(campaign)
     )  # fmt: skip
-
-
-def _columns(runs: Sequence[Run]) -> dict[str, list[str]]:
-    """The configuration keys as texts, run by run; keys without any value are left out."""
-    groups = [r.groups for r in runs]
-    columns = {k: [g.get(k, "") for g in groups] for k in _CONFIGURATION}
-    return {k: c for k, c in columns.items() if any(c)}
 
 
 def _together(varied: Mapping[str, Sequence[str]]) -> dict[str, str]:
@@ -137,14 +128,11 @@ def _together(varied: Mapping[str, Sequence[str]]) -> dict[str, str]:
             if is_function and not is_first and (both_ways or key in _OF_OTHERS):
                 found[key] = other
                 break
-    # a key may follow a key that follows another one: the last of the chain is the factor
-    return {k: _end(o, found) for k, o in found.items()}
-
-
-def _end(key: str, found: Mapping[str, str]) -> str:
-    while key in found:
-        key = found[key]
-    return key
+    for key, other in found.items():  # a key may follow one that follows another: the last of the chain is the factor
+        while other in found:
+            other = found[other]
+        found[key] = other
+    return found
 
 
 def _factor(key: str, column: Sequence[str]) -> Factor:
@@ -160,17 +148,6 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-
-
-def _configuration(
-    values: tuple[str, ...],
-    indices: Sequence[int],
-    runs: Sequence[Run],
-    speeds: Callable[[int, Run], Sequence[float]],
-) -> Configuration:
-    manoeuvres = Counter(str(runs[i].values.get("manoeuvre", "")) for i in indices)
-    found = sorted({round(v, 1) for i in indices for v in speeds(i, runs[i])})
-    return Configuration(values, tuple(indices), dict(sorted(manoeuvres.items())), tuple(found))
 
 
 def _gaps(factors: Sequence[Factor], driven: set[tuple[str, ...]]) -> tuple[Gap, ...]:
@@ -219,7 +196,7 @@ def _notes(campaign: Campaign) -> tuple[str, ...]:
     lacking = [" on ".join(x for x in m if x) for m in wet if m not in dry]
     if lacking:
         notes.append(
-            f"no dry run of {_listed(lacking)}: the dry slip slope comes from the driving before and after the lane"
+            f"no dry run of {listed(lacking, 6)}: the dry slip slope comes from the driving before and after the lane"
         )
     return tuple(notes)
 
@@ -232,8 +209,3 @@ def _runs(count: int, total: int) -> str:
     if count == total:
         return "all runs"
     return f"{count} of {total} runs"
-
-
-def _listed(names: Sequence[str], most: int = 6) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

@@ -1,27 +1,220 @@
-"""Cost of a campaign, estimated from a sample of its logs: time, memory, disk space and shards."""
+"""Cost of a campaign, from a sample of its logs measured as the batch measures: time, memory, disk space, shards."""
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.campaign.batch import compared
-from aqualog.campaign.batch_cost import BatchCost, LogCost
+from aqualog.campaign.batch import CRASHED, Fault, compared, measure_one, run_batch
+from aqualog.campaign.definition import number_of
 from aqualog.campaign.jobs import Configured, Job, plan_jobs
-from aqualog.campaign.records import number_of
 from aqualog.campaign.store import Store
+from aqualog.core.compiled import kept_code
 from aqualog.core.errors import LogError
 from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
+from aqualog.guard.worker import Crashed, work_on
 from aqualog.io.fingerprint import Remembered
 from aqualog.io.open_log import sniff
 
-__all__ = ["Estimate", "Plan", "Work", "Worker", "choose", "foretell", "makespan", "shards_within", "work_of"]
+__all__ = [
+    "BatchCost", "Estimate", "LogCost", "Plan", "Work", "Worker", "choose", "foretell", "makespan", "measure_cost",
+    "peak_memory", "shards_within", "work_of",
+]  # fmt: skip
+
+Report = Callable[[int, int, int], None]
+
+_met: set[str] = set()  # formats that this process has met: their libraries are loaded
+
+
+class Times(NamedTuple):
+    """Wall-clock and computing time. [s]"""
+
+    wall: float
+    cpu: float
+
+    def since(self, began: Times) -> Times:
+        """Time that has passed."""
+        return Times(self.wall - began.wall, self.cpu - began.cpu)
+
+
+class Timing(NamedTuple):
+    """One log in its process: `took` once everything is loaded.
+
+    Where the process met its format first it was measured twice, and `loading` is what the first time took longer; else
+    None. `ended` are the process's own clocks afterwards, `peak_bytes` the most memory that it has held so far, 0 where
+    the system gives no value.
+    """
+
+    outcome: Fault | None
+    process: int
+    took: Times
+    loading: Times | None
+    ended: Times
+    peak_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class LogCost:
+    """One log of the sample; `reason` if it gave no result."""
+
+    logs: tuple[Path, ...]
+    format: str
+    size: int
+    wall_s: float
+    cpu_s: float
+    store_bytes: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class BatchCost:
+    """Timing of a batch of the sample.
+
+    `hashing_s` before and `tables_s` behind the logs, in the process that leads; `start_s` and `start_cpu_s` of a
+    process that meets all formats: all but the logs themselves; `ending_s` until all processes have ended; `peak_bytes`
+    of the process that held most.
+    """
+
+    tried: tuple[LogCost, ...]
+    processes: int
+    hashing_s: float
+    tables_s: float
+    start_s: float
+    start_cpu_s: float
+    ending_s: float
+    peak_bytes: int
+
+
+def measure_cost(
+    configured: Configured,
+    sample: Sequence[tuple[Job, str, int]],
+    *,
+    processes: int,
+    reporter: Callable[[], Report] = lambda: lambda done, total, failed: None,
+    told: Callable[[], None] = lambda: None,
+) -> BatchCost:
+    """Measure a few logs, (job, format, bytes) each, into a store that is thrown away.
+
+    After an installation the detectors are compiled with the first logs, which no other run pays: the sample is then
+    measured once more, and `told` is called before. So many `processes` work at a time, so that they are in each
+    other's way as in the batch. `reporter` makes the callable that receives the numbers of finished, all, failed logs.
+    """
+    before = kept_code()
+    found = _measured_once(configured, sample, processes, reporter())
+    if kept_code() <= before:
+        return found
+    told()
+    return _measured_once(configured, sample, processes, reporter())
+
+
+def _measured_once(
+    configured: Configured, sample: Sequence[tuple[Job, str, int]], processes: int, report: Report
+) -> BatchCost:
+    runs = tuple(configured.campaign.runs[j.runs[0]] for j, _, _ in sample)
+    of = {j.logs: (form, size) for j, form, size in sample}
+    costs: dict[str, Timing | Crashed] = {}
+    spent: dict[str, tuple[Path, ...]] = {}
+    marks: list[float] = []
+    asked: list[float] = []  # of a clock that all processes of a machine share and nobody sets
+
+    def work_timed(
+        tasks: Mapping[Any, tuple[Any, ...]], work: Callable[..., Any], record: Callable[[Any, Any], None]
+    ) -> None:
+        marks.append(time.perf_counter())
+        asked.append(time.monotonic())
+        timed = {key: (of[task[3]][0], task) for key, task in tasks.items()}
+        spent.update({key: task[3] for key, task in tasks.items()})
+
+        def taken(key: str, cost: Timing | Crashed) -> None:
+            costs[key] = cost
+            record(key, cost if isinstance(cost, Crashed) else cost.outcome)
+
+        work_on(timed, _timed, jobs=processes, record=taken)
+        marks.append(time.perf_counter())
+        asked.append(time.monotonic())
+
+    def log_cost(key: str, cost: Timing | Crashed) -> LogCost:
+        logs = spent[key]
+        if isinstance(cost, Crashed):
+            return LogCost(logs, *of[logs], cost.seconds, 0.0, 0, CRASHED)
+        return LogCost(logs, *of[logs], *cost.took, store.size_of(key), cost.outcome.reason if cost.outcome else "")
+
+    with tempfile.TemporaryDirectory(prefix="aqualog-plan-") as folder:
+        store = Store(Path(folder) / "store")
+        began = time.perf_counter()
+        some = replace(configured, campaign=replace(configured.campaign, runs=runs))
+        run_batch(some, store, elsewhere=work_timed, report=report)
+        ended = time.perf_counter()
+        found = tuple(log_cost(k, c) for k, c in costs.items())
+    real = [(of[spent[k]][0], c) for k, c in costs.items() if isinstance(c, Timing)]
+    first, last = marks[:2] or (ended, ended)
+    start = [_besides_logs(real, asked[0] if n == 0 else 0.0, n) for n in (0, 1)]
+    return BatchCost(
+        found, processes, first - began, ended - last, start[0], start[1],
+        max(asked[1] - max((c.ended.wall for _, c in real), default=asked[1]), 0.0),
+        max((c.peak_bytes for _, c in real), default=0),
+    )  # fmt: skip
+
+
+def _besides_logs(costs: Sequence[tuple[str, Timing]], began: float, clock: int) -> float:
+    """Time of a process besides its logs: its start, libraries of all formats, waiting. Median; `clock` of `Times`."""
+    loading: dict[str, list[float]] = {}
+    of: dict[int, list[tuple[str, Timing]]] = {}
+    for form, cost in costs:
+        of.setdefault(cost.process, []).append((form, cost))
+    totals = []
+    for own in of.values():
+        own.sort(key=lambda x: x[1].ended.wall)
+        for form, c in own[1:]:  # with its first log a process loads much that is of no format
+            if c.loading is not None:
+                loading.setdefault(form, []).append(c.loading[clock])
+        logs = sum(c.took[clock] * (1 if c.loading is None else 2) for _, c in own)
+        totals.append((max(own[-1][1].ended[clock] - began - logs, 0.0), {f for f, _ in own}))
+    each = {form: median(x) for form, x in loading.items()}
+    return median(t + sum(s for f, s in each.items() if f not in met) for t, met in totals) if totals else 0.0
+
+
+def _timed(form: str, task: tuple[Any, ...]) -> Timing:
+    """Measure a log, and once more if this process had to load something for it."""
+    outcome, took = _measured(task)
+    loading = None
+    if form not in _met and outcome is None:
+        _met.add(form)
+        first = took
+        outcome, took = _measured(task)
+        loading = first.since(took)
+    return Timing(
+        outcome, os.getpid(), took, loading, Times(time.monotonic(), time.process_time()), peak_memory()
+    )  # fmt: skip
+
+
+def _measured(task: tuple[Any, ...]) -> tuple[Fault | None, Times]:
+    began = Times(time.perf_counter(), time.process_time())
+    outcome = measure_one(*task)
+    return outcome, Times(time.perf_counter(), time.process_time()).since(began)
+
+
+def peak_memory() -> int:
+    """Most memory that this process has held; 0 where the system gives no value. [byte]"""
+    try:
+        import resource
+    except ImportError:  # no such count on this system
+        return 0
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most
+
 
 LEVEL = 0.9  # of the intervals
 _MOST_SHARDS = 2000
@@ -125,12 +318,12 @@ def choose(new: Sequence[tuple[Job, str, int]], count: int) -> list[tuple[Job, s
         if not open_:
             break
         given[max(open_, key=lambda f: (shares[f] / given[f], f))] += 1
-    return [by_form[f][i] for f, k in given.items() for i in _spread(len(by_form[f]), k)]
 
+    def spread(n: int, k: int) -> list[int]:
+        """k of n places, ends included; a single one is the last, which shows most about memory."""
+        return [n - 1] if k == 1 else sorted({round(x) for x in np.linspace(0, n - 1, k)})
 
-def _spread(n: int, k: int) -> list[int]:
-    """k of n places, ends included; a single one is the last, which shows most about memory."""
-    return [n - 1] if k == 1 else sorted({round(x) for x in np.linspace(0, n - 1, k)})
+    return [by_form[f][i] for f, k in given.items() for i in spread(len(by_form[f]), k)]
 
 
 def foretell(work: Work, trial: BatchCost, *, processes: int, cores: int, lead_s: float, lead_cpu_s: float) -> Plan:
@@ -141,16 +334,8 @@ def foretell(work: Work, trial: BatchCost, *, processes: int, cores: int, lead_s
     The interval is that of the sum over all logs, from the scatter of the sample; it does not cover a machine that is
     busier later.
 
-    Parameters
-    ----------
-    work : Work
-        At least one log of a known format.
-    trial : BatchCost
-        At least one log with a result.
-    processes : int
-        Requested number; no more work in parallel than there are cores.
-    lead_s : float
-        Time that the leading process takes to get ready; `lead_cpu_s` computing.
+    `work` holds at least one log of a known format, `trial` one with a result. No more of the requested `processes`
+    work in parallel than there are `cores`. `lead_s`, `lead_cpu_s`: time until the leading process is ready. [s]
     """
     good = [t for t in trial.tried if not t.reason]
     forms = [f for _, f, _ in work.new]

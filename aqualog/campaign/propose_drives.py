@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.propose_map import LogFile
-from aqualog.campaign.records import GROUP_NAMES
+from aqualog.campaign.definition import GROUP_NAMES
 from aqualog.campaign.store import MARK
 from aqualog.core.errors import AqualogError
 from aqualog.io.open_log import open_log, sniff
@@ -90,14 +90,10 @@ def scan(
         if channels:
             logs.append(LogFile(path, name, channels))
         else:
-            bad.append((name, _without_channel(path.name, notes)))
+            # raw frames, for example, that no database decodes
+            frames = next((n.removeprefix(f"{path.name}: ") for n in notes if "raw CAN frames" in n), "")
+            bad.append((name, f"no channel in it; {frames}" if frames else "no channel in it"))
     return Found(tuple(logs), tuple(bad), tuple(labels))
-
-
-def _without_channel(name: str, notes: Sequence[str]) -> str:
-    """Reason why a log has no channel, for example raw frames that no database decodes."""
-    frames = next((n.removeprefix(f"{name}: ") for n in notes if "raw CAN frames" in n), "")
-    return f"no channel in it; {frames}" if frames else "no channel in it"
 
 
 def _walk(folder: Path) -> list[Path]:
@@ -112,15 +108,19 @@ def _walk(folder: Path) -> list[Path]:
     return sorted(found)
 
 
-def _table_kind(path: Path) -> str:
-    """`labels` or `runs` for tables that are not logs, else empty."""
+def _first_line(path: Path) -> bytes:
     if not path.is_file():  # a pipe would never end
-        return ""
+        return b""
     try:
         with path.open("rb") as file:
-            head = file.readline(4096).decode("utf-8-sig", errors="replace")
+            return file.readline(4096)
     except OSError:
-        return ""
+        return b""
+
+
+def _table_kind(path: Path) -> str:
+    """`labels` or `runs` for tables that are not logs, else empty."""
+    head = _first_line(path).decode("utf-8-sig", errors="replace")
     names = {cell.strip(' "\r\n') for cell in re.split(r"[,;\t]", head)}
     if {"start_s", "end_s", "effect"} <= names:
         return "labels"
@@ -277,16 +277,12 @@ def without_twins(logs: Sequence[LogFile]) -> tuple[tuple[LogFile, ...], tuple[s
             continue
         first: dict[bytes, str] = {}
         for log in sorted(same, key=lambda f: (len(f.name), f.name)):
-            original = first.setdefault(_digest(log.path), log.name)
+            with log.path.open("rb") as file:
+                original = first.setdefault(hashlib.file_digest(file, "sha256").digest(), log.name)
             if original != log.name:
                 twin_of[log.name] = original
     notes = tuple(f"{f.name} is left out: byte for byte {twin_of[f.name]}" for f in logs if f.name in twin_of)
     return tuple(f for f in logs if f.name not in twin_of), notes
-
-
-def _digest(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").digest()
 
 
 def broken_logs(folder: Path, bad: Sequence[tuple[str, str]]) -> tuple[LogFile, ...]:
@@ -294,20 +290,14 @@ def broken_logs(folder: Path, bad: Sequence[tuple[str, str]]) -> tuple[LogFile, 
 
     Not so are pipes, names that a table cannot hold, and texts called .csv whose first line has one cell only.
     """
+
+    def is_text(path: Path) -> bool:
+        head = _first_line(path) if path.suffix.lower() in (".csv", ".tsv") else b""
+        return bool(head.strip()) and not any(sign in head for sign in b",;\t")
+
     found = []
     for name, _ in bad:
         path = folder / name
-        if ";" not in name and name == name.strip() and (path.is_dir() or (path.is_file() and not _is_text(path))):
+        if ";" not in name and name == name.strip() and (path.is_dir() or (path.is_file() and not is_text(path))):
             found.append(LogFile(path, name, ()))
     return tuple(found)
-
-
-def _is_text(path: Path) -> bool:
-    if path.suffix.lower() not in (".csv", ".tsv"):
-        return False
-    try:
-        with path.open("rb") as file:
-            head = file.readline(4096)
-    except OSError:
-        return False
-    return bool(head.strip()) and not any(sign in head for sign in b",;\t")

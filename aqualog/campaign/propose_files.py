@@ -31,14 +31,8 @@ _IF_KNOWN = ("labels", "wear", "tread_depth_mm", "load_front_kg", "load_rear_kg"
 def runs_text(drives: Sequence[Drive], table: NameTable, labels: Mapping[int, str], *, base: Path, folder: Path) -> str:
     """The table of runs, a line per drive; columns that names could not fill are there, but blank.
 
-    Parameters
-    ----------
-    drives : sequence of Drive
-    table : NameTable
-        A value per drive in each column.
-    labels : mapping index of the drive -> labels file below the folder
-    base, folder : Path
-        Folder of the table; folder of the logs.
+    `table` has a value per drive in each column, `labels` a labels file below the `folder` of the logs by index of the
+    drive; `base` is the folder of the table.
     """
     columns = [c for c in _COLUMNS if c in table.columns or c not in _IF_KNOWN or (c == "labels" and labels)]
     columns += [c for c in table.columns if c not in columns]

@@ -182,14 +182,9 @@ def _stem(name: str) -> str:
 def _camel(word: str) -> list[str]:
     """`DryConst80` -> Dry, Const, 80; other numbers stay with their word, as in `TripA05`."""
     parts = re.split(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])", word)
-    return [
-        q for p in parts for q in (re.split(r"(?<=\D)(?=\d)", p) if _is_known(re.sub(r"\d+$", "", p).lower()) else [p])
-    ]
-
-
-def _is_known(word: str) -> bool:
-    word = word.lower()
-    return word in _MANOEUVRE or word in _DRY or word in _WET or word in _WEAR or word in _TYRES
+    known = {*_MANOEUVRE, *_DRY, *_WET, *_WEAR, *_TYRES}
+    split = (re.split(r"(?<=\D)(?=\d)", p) if re.sub(r"\d+$", "", p).lower() in known else [p] for p in parts)
+    return [word for words in split for word in words]
 
 
 def _note_rule(rules: dict[str, list[str]], column: str, told: str) -> None:

@@ -63,13 +63,9 @@ def read_table(path: Path, *, key: str) -> RunTable:
         return RunTable((), 1, (), separator)
     line, heading = rows[0]
     width = max(i for i, name in enumerate(heading, 1) if name)
-    body = tuple((n, _cut(cells, width)) for n, cells in rows[1:])
+    # without empty cells behind the heading's last name
+    body = tuple((n, cells if any(cells[width:]) else cells[:width]) for n, cells in rows[1:])
     return RunTable(heading[:width], line, body, separator)
-
-
-def _cut(cells: tuple[str, ...], width: int) -> tuple[str, ...]:
-    """Without empty cells behind the heading's last name."""
-    return cells[:width] if not any(cells[width:]) else cells
 
 
 def _text(data: bytes) -> str | None:

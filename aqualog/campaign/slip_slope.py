@@ -12,10 +12,12 @@ import numpy as np
 from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, Pool, cells, driven_of
 from aqualog.campaign.delay import Delay, Source, delays, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
-from aqualog.campaign.regress import ATTENUATION_MAX, NOWHERE, Design, Estimate, Interval, estimate
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
+from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.moments import Design
 from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray
+from aqualog.core.regression import NOISE_MAX, Estimate, estimate
 
 __all__ = ["LIMITS", "Limits", "SlopeRow", "SlopeTable", "contact", "fit_slope", "slip_slopes", "too_few_runs"]
 
@@ -173,25 +175,17 @@ def _row(cell: Cell, late: Mapping[Source, Delay], limits: Limits, *, robust: bo
     model = expected_of_runs(cell.infos, wheels, v, wet=cell.road == "wet", mu_range=(low, high))
     bare = SlopeRow(
         cell.group, cell.place, cell.road, cell.low_kmh, cell.high_kmh, pool.runs, mu.size, (low, high), v,
-        expected=model,
+        friction=friction_of(cell.infos), expected=model,
     )  # fmt: skip
-    bare = replace(bare, friction=friction_of(cell.infos))
     return fit_slope(bare, pool, [late.get(source_of(i)) for i in cell.infos], limits, robust=robust)
 
 
 def fit_slope(
     bare: SlopeRow, pool: Pool, late: Sequence[Delay | None], limits: Limits = LIMITS, *, robust: bool = False
 ) -> SlopeRow:
-    """Fill in the slope of a row.
+    """Fill in the slope of a row, which has counts, from a pool with columns `mu`, `slip`, `u` (a / v) and `v_x`.
 
-    Parameters
-    ----------
-    bare : SlopeRow
-        With counts.
-    pool : Pool
-        Columns `mu`, `slip`, `u` (a / v) and `v_x`.
-    late : sequence of Delay or None
-        Of each run, in order; None: the slip is not against v_x.
+    `late`: delay of v_x in each run, in order; None: the slip is not against v_x.
     """
     mu, slip, u = (pool.columns[n] for n in ("mu", "slip", "u"))
     if mu.size < limits.samples:
@@ -212,7 +206,10 @@ def fit_slope(
     found = estimate(
         Design(np.stack(columns), slip, pool.run, pool.step, tuple(scatters), tuple(noisy)), robust=robust
     )  # fmt: skip
-    return _told(bare, found, columns, slip, half_tau * _shared(mu, u), limits, is_open=is_open)
+    x = mu - mu.mean()
+    # error of 1 / slope per error of the delay: slope of a / v over the traction, within and between the runs
+    shared = abs(float(np.mean(x * u)) / float(np.mean(x * x)))
+    return _told(bare, found, columns, slip, half_tau * shared, limits, is_open=is_open)
 
 
 def _told(
@@ -225,7 +222,7 @@ def _told(
     open_word = ", because the delay of v_x is not known" if is_open else ""
     few = found.runs < limits.runs
     reason = ""
-    if found.attenuation > ATTENUATION_MAX:
+    if found.attenuation > NOISE_MAX:
         reason = f"{100.0 * min(found.attenuation, 1.0):.0f} % of the variation of the traction is noise"
     elif not few and not low > 0.0 < high:
         reason = (
@@ -244,23 +241,12 @@ def _told(
     if few:
         return replace(row, reason=too_few_runs(found.runs, limits))
     row = replace(row, slope_ci=(1.0 / high, 1.0 / low), intercept_ci=found.interval(1))
-    doubt = _doubt(high / low, r2)
+    doubt = ""
+    if high / low > SPAN_MAX:
+        doubt = f"the interval spans a factor of {high / low:.1f}, at most {SPAN_MAX:g} is reliable"
+    elif r2 < 0.0:
+        doubt = f"r2 is {r2:.2f}: a constant slip explains the samples better than the line"
     return replace(row, reliable=not doubt, reason=doubt)
-
-
-def _doubt(span: float, r2: float) -> str:
-    """Reason why a slope with an interval is not reliable."""
-    if span > SPAN_MAX:
-        return f"the interval spans a factor of {span:.1f}, at most {SPAN_MAX:g} is reliable"
-    if r2 < 0.0:
-        return f"r2 is {r2:.2f}: a constant slip explains the samples better than the line"
-    return ""
-
-
-def _shared(mu: FloatArray, u: FloatArray) -> float:
-    """Error of 1 / slope per error of the delay: slope of a / v over the traction, within and between the runs."""
-    x = mu - mu.mean()
-    return abs(float(np.mean(x * u)) / float(np.mean(x * x)))
 
 
 def contact(row: SlopeRow, dry: SlopeRow, slope: FloatArray, slope_dry: FloatArray) -> FloatArray:

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of
-from aqualog.campaign.regress import Interval
-from aqualog.campaign.samples import CampaignData, RunInfo
-from aqualog.core.intervals import poisson, wilson
+from aqualog.campaign.results import CampaignData, RunInfo
+from aqualog.core.intervals import Interval, poisson, wilson
 
 __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 
@@ -67,13 +66,12 @@ def passes(data: CampaignData) -> list[Pass]:
         wet = (samples.on_water == 1.0) & np.isfinite(samples.array("v_x"))
         if np.count_nonzero(wet) * samples.step_s < LEAST_S:
             continue
-        v = samples.array("v_x")[wet]
-        t = samples.t
-        start, end = float(t[wet][0]), float(t[wet][-1])
+        v, t = samples.array("v_x")[wet], samples.t[wet]
+        start, end = float(t[0]), float(t[-1])
         wheels = free_of(info)
         seconds = float(np.count_nonzero(wet)) * samples.step_s
-        deepest = {w: float(np.nanmin(np.append(samples.array(f"slip_min_{w}")[wet], np.nan))) if
-                   np.isfinite(samples.array(f"slip_min_{w}")[wet]).any() else math.nan for w in wheels}  # fmt: skip
+        slips = {w: samples.array(f"slip_min_{w}")[wet] for w in wheels}
+        deepest = {w: float(np.nanmin(x)) if np.isfinite(x).any() else math.nan for w, x in slips.items()}
         minor, full = (
             {w: sum(e["detector"] == d and e["wheel"] == w and start <= e["start_s"] <= end for e in info.events)
              for w in wheels} for d in ("minor_spin_down", "spin_down")
@@ -91,7 +89,12 @@ def minor_spin_downs(data: CampaignData, plan: Plan) -> tuple[SpinDownRow, ...]:
         number = int(p.v_mean / KMH // plan.width_kmh)
         for wheel in p.minor:
             members.setdefault((group_of(p.info, plan.keys), wheel, number), []).append(p)
-    return tuple(_row(key, found, plan.width_kmh) for key, found in sorted(members.items(), key=lambda x: _order(x[0])))
+
+    def order(key: tuple[Group, str, int]) -> tuple[tuple[str, ...], str, int]:
+        group, wheel, number = key
+        return tuple(f"{v:012.4f}" if isinstance(v, float) else str(v) for _, v in group), wheel, number
+
+    return tuple(_row(key, members[key], plan.width_kmh) for key in sorted(members, key=order))
 
 
 def _row(key: tuple[Group, str, int], found: Sequence[Pass], width: float) -> SpinDownRow:
@@ -106,8 +109,3 @@ def _row(key: tuple[Group, str, int], found: Sequence[Pass], width: float) -> Sp
         (low / seconds, high / seconds), 100.0 * events / metres, hit / len(found), wilson(hit, len(found)),
         sum(p.full[wheel] > 0 for p in found), float(np.median(depths)) if depths else math.nan,
     )  # fmt: skip
-
-
-def _order(key: tuple[Group, str, int]) -> tuple[tuple[str, ...], str, int]:
-    group, wheel, number = key
-    return tuple(f"{v:012.4f}" if isinstance(v, float) else str(v) for _, v in group), wheel, number

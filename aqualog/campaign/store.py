@@ -23,11 +23,11 @@ from typing import Any
 import polars as pl
 
 from aqualog.campaign.measure import Measurement
-from aqualog.campaign.place import Address, Folder, Place, address_of, is_orphan
+from aqualog.campaign.place import Address, Place, is_orphan, place_of
 from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.core.notation import WHEELS
 
-__all__ = ["MARK", "Store", "place_of"]
+__all__ = ["MARK", "Store"]
 
 MARK = "aqualog_store.json"
 _METADATA_KEY = "aqualog"
@@ -50,72 +50,21 @@ _PARTS: Mapping[str, type] = {
 }  # fmt: skip
 
 
-def place_of(address: Address) -> Place:
-    """The place behind an address.
-
-    Raises
-    ------
-    ConfigError
-        If a package for it is missing, or fsspec does not know it.
-    AqualogError
-        If it cannot be reached.
-    """
-    address = address_of(address)
-    if isinstance(address, Path):
-        return Folder(address)
-    from aqualog.campaign.place_remote import Remote
-
-    return Remote(address)
-
-
 class Store:
-    """A store.
+    """A store; `address`, `name`, `is_shared`, `at` and `holds` are those of its `Place`.
 
-    Parameters
-    ----------
-    address : Path or str
-        Its folder, made by `held` if it is not there; or a URL of fsspec.
-    part : str
-        Name of the shard that works here beside others; it makes no tables.
-
-    Raises
-    ------
-    AqualogError
-        If a URL is invalid, lacks its package, or cannot be reached.
+    The address is its folder, made by `held` if it is not there, or a URL of fsspec; AqualogError if that is invalid,
+    lacks its package, or cannot be reached. `part`: the shard that works here beside others; it makes no tables.
     """
 
     def __init__(self, address: Address, part: str = "") -> None:
         self._place: Place = place_of(address)
         self.part = part
-
-    @property
-    def address(self) -> Address:
-        """Address from which another process opens the same store."""
-        return self._place.address
-
-    @property
-    def name(self) -> str:
-        """The address for messages."""
-        return self._place.name
-
-    @property
-    def is_shared(self) -> bool:
-        """Whether other processes can see it."""
-        return self._place.is_shared
-
-    def at(self, name: str) -> str:
-        """Address of a file of the store for messages."""
-        return self._place.at(name)
+        self.address, self.name, self.is_shared = self._place.address, self._place.name, self._place.is_shared
+        self.at, self.holds = self._place.at, self._place.holds
 
     def check(self) -> None:
-        """Refuse a folder that is not a store; a missing folder is accepted.
-
-        Raises
-        ------
-        ConfigError
-        AqualogError
-            If a URL cannot be reached.
-        """
+        """Refuse (ConfigError) a folder that is not a store; a missing folder is accepted."""
         with self._reached():
             if not self._place.check(_FOLDERS, _FILES):
                 return
@@ -137,24 +86,19 @@ class Store:
     def held(self, *, must: bool) -> Iterator[bool]:
         """Prepare the folder and keep other batches out; yields whether that was possible.
 
-        Behind a URL there are no locks: two batches would do the same work twice, to the same result.
-
-        Parameters
-        ----------
-        must : bool
-            Whether there is something to write; if not, a store that is only read may be in use or read-only.
-
-        Raises
-        ------
-        AqualogError
-            If it must be held and another batch holds it, or it cannot be written.
+        Behind a URL there are no locks: two batches would do the same work twice, to the same result. `must`: whether
+        there is something to write; then AqualogError if another batch holds it or it cannot be written.
         """
         with ExitStack() as stack:
             is_held = False
             try:
                 self._place.make(())
                 stack.enter_context(self._place.held(_LOCK, together=bool(self.part)))
-                self._make()
+                if not self._place.has(MARK):
+                    self._place.write(MARK, (json.dumps({"schema_version": _SCHEMA}) + "\n").encode())
+                self._place.make(_FOLDERS)
+                if not self.part:  # another shard's file may be in the making
+                    self._place.sweep(("", "samples", "failed"))
                 if self.part:
                     stack.enter_context(self._place.held(f"parts/{self.part}.lock"))
                 is_held = True
@@ -169,13 +113,6 @@ class Store:
                     raise self._unwritable(error) from error
             yield is_held
 
-    def _make(self) -> None:
-        if not self._place.has(MARK):
-            self._place.write(MARK, (json.dumps({"schema_version": _SCHEMA}) + "\n").encode())
-        self._place.make(_FOLDERS)
-        if not self.part:  # another shard's file may be in the making
-            self._place.sweep(("", "samples", "failed"))
-
     @property
     def exists(self) -> bool:
         """Whether this folder is a store."""
@@ -186,24 +123,12 @@ class Store:
         name = _samples(key)
         return self._place.copy(name).stat().st_size if self._place.has(name) else 0
 
-    def state_of(self, key: str) -> str:
-        """`done`, `failed`, or empty if unknown."""
-        if self._place.has(_samples(key)):
-            return "done"
-        return "failed" if self._place.has(_failure(key)) else ""
-
     def keys(self) -> tuple[set[str], set[str]]:
         """Keys of all logs that are done, and of those that failed; one look at each folder."""
         return _stems(self._place.names("samples"), ".parquet"), _stems(self._place.names("failed"), ".json")
 
     def put(self, key: str, measurement: Measurement) -> None:
-        """Keep the result of a log, whole.
-
-        Raises
-        ------
-        AqualogError
-            If the store cannot be written; this and the methods below that write.
-        """
+        """Keep the result of a log, whole. This and all methods that write: AqualogError if that is not possible."""
         metadata = {_METADATA_KEY: json.dumps(measurement.about, ensure_ascii=True, separators=(",", ":"))}
         with self._told():
             self._write_frame(_samples(key), measurement.samples, metadata=metadata, statistics=False)
@@ -227,13 +152,7 @@ class Store:
             self._place.remove(_samples(key))
 
     def look_at(self, keys: Collection[str]) -> None:
-        """Announce that the findings of these logs are needed next: behind a URL many are read together.
-
-        Raises
-        ------
-        AqualogError
-            If the store cannot be reached.
-        """
+        """Announce that the findings of these logs are needed next: behind a URL many are read together."""
         with self._reached():
             self._place.look_at([_samples(k) for k in sorted(keys)])
 
@@ -250,15 +169,7 @@ class Store:
         return True
 
     def about(self, key: str) -> Mapping[str, Any]:
-        """Findings of a log.
-
-        Raises
-        ------
-        LogError
-            If its file is damaged.
-        AqualogError
-            If the store cannot be reached.
-        """
+        """Findings of a log; LogError if its file is damaged, AqualogError if the store cannot be reached."""
         name = _samples(key)
         with self._reached():
             try:
@@ -275,13 +186,7 @@ class Store:
         return found
 
     def samples(self, key: str) -> pl.DataFrame:
-        """Samples of a log. A file whose data are damaged is removed, so that the next batch makes it again.
-
-        Raises
-        ------
-        LogError
-            If its file is damaged or cannot be read.
-        """
+        """Samples of a log; LogError if they cannot be read. A damaged file is removed, to be made again."""
         name = _samples(key)
         try:
             frame = pl.read_parquet(self._place.copy(name), hive_partitioning=False)
@@ -306,13 +211,7 @@ class Store:
         self.write_json(f"parts/{self.part}.json" if self.part else _CONTENTS, known)
 
     def read_json(self, name: str) -> Any:
-        """A JSON file of the store; None where it is not there or damaged.
-
-        Raises
-        ------
-        AqualogError
-            If a store behind a URL cannot be reached.
-        """
+        """A JSON file of the store; None where it is not there or damaged, AqualogError if a URL cannot be reached."""
         with self._reached():
             try:
                 return json.loads(self._place.read(name))
@@ -332,10 +231,6 @@ class Store:
         """A table of the store, whole."""
         with self._told():
             self._write_frame(name, frame)
-
-    def holds(self, path: Path) -> bool:
-        """Whether a path is inside this store."""
-        return self._place.holds(path)
 
     def _write_frame(self, name: str, frame: pl.DataFrame, **options: Any) -> None:
         # into memory first: then a disk that is full is an OSError with its number

@@ -10,15 +10,13 @@ from typing import Any
 import polars as pl
 
 from aqualog import __version__
+from aqualog.campaign.definition import Campaign
 from aqualog.campaign.jobs import code_stamp, name_of
-from aqualog.campaign.records import Campaign
-from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
 
-__all__ = [
-    "NUMBERS", "TEXTS", "StoredRun", "events_table", "lane_faults", "runs_table", "stored_runs", "write_tables",
-]  # fmt: skip
+__all__ = ["NUMBERS", "TEXTS", "StoredRun", "events_table", "lane_faults", "runs_table", "stored_runs", "write_tables"]
 
 TEXTS = ("tyre", "wear", "manoeuvre")
 NUMBERS = (
@@ -58,16 +56,7 @@ def write_tables(data: CampaignData) -> None:
 def runs_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
     """A row for each run: state, configuration, range, events of each detector, quality. [s, m, km/h, Hz]"""
     extra = sorted({k for i in infos for k in i.run.values if k.startswith("x_")})
-    return pl.DataFrame([_run_row(i) for i in infos], schema=_run_schema(extra), strict=False)
-
-
-def events_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
-    """A row for each event of each run. [s, m/s]"""
-    return pl.DataFrame([_event_row(i, e) for i in infos for e in i.events], schema=_EVENT, strict=False)
-
-
-def _run_schema(extra: Sequence[str]) -> dict[str, Any]:
-    return {
+    schema: dict[str, Any] = {
         "run": pl.Int64, "name": pl.String, "key": pl.String, "state": pl.String, "reason": pl.String,
         "vehicle": pl.String, **dict.fromkeys(TEXTS, pl.String), **dict.fromkeys(NUMBERS, pl.Float64),
         **dict.fromkeys(extra, pl.String), "start_ns": pl.Int64, "duration_s": pl.Float64, "distance_m": pl.Float64,
@@ -75,6 +64,12 @@ def _run_schema(extra: Sequence[str]) -> dict[str, Any]:
         "traction": pl.String, **{f"events_{d}": pl.Int64 for d in DETECTORS}, "unavailable": pl.String,
         "truncated": pl.Boolean, **dict.fromkeys(_QUALITY, pl.Int64), "notes": pl.String,
     }  # fmt: skip
+    return pl.DataFrame([_run_row(i) for i in infos], schema=schema, strict=False)
+
+
+def events_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
+    """A row for each event of each run. [s, m/s]"""
+    return pl.DataFrame([_event_row(i, e) for i in infos for e in i.events], schema=_EVENT, strict=False)
 
 
 def _run_row(info: RunInfo) -> dict[str, Any]:

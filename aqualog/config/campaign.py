@@ -1,7 +1,7 @@
 """Read campaign files: which logs were driven in which configuration.
 
 All faults of the file, of its table of runs and of the files that they name are reported at once, before any log is
-opened. A missing log is no fault of the file: the other logs can be analysed, and `aqualog.campaign.logs` reports it.
+opened. A missing log is no fault of the file: the other logs can be analysed, and `campaign.definition` reports it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from aqualog.campaign.logs import near_name
-from aqualog.campaign.records import Campaign, Run
+from aqualog.campaign.definition import Campaign, Run, near_name
 from aqualog.campaign.run_table import RunTable, as_point, decimal_sign, read_table
 from aqualog.config.labels import load_labels
 from aqualog.config.reader import Faults, Key, Row, Table, read

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
+from aqualog.campaign.definition import Campaign, Run
 from aqualog.campaign.jobs import Configured
-from aqualog.campaign.records import Campaign, Run
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.reader import tried

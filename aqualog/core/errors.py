@@ -11,9 +11,10 @@ Every message is one line: what, where (file, channel, time or line), what was e
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 
-__all__ = ["AqualogError", "ConfigError", "ExitCode", "FitError", "LogError", "SignalError"]
+__all__ = ["AqualogError", "ConfigError", "ExitCode", "FitError", "LogError", "SignalError", "listed"]
 
 
 class ExitCode(IntEnum):
@@ -102,3 +103,8 @@ class FitError(AqualogError):
     """The data do not carry the estimate that was asked for."""
 
     exit_code = ExitCode.NOTHING_USABLE
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """At most so many names, and how many there are beyond, for a message."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

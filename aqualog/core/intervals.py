@@ -10,7 +10,20 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["chi2_log_p", "jackknife_sd", "poisson", "student_quantile", "variance_ratio_chance", "wilson"]
+__all__ = [
+    "NOWHERE",
+    "Interval",
+    "chi2_log_p",
+    "half_width",
+    "jackknife_sd",
+    "poisson",
+    "student_quantile",
+    "variance_ratio_chance",
+    "wilson",
+]
+
+Interval = tuple[float, float]
+NOWHERE: Interval = (math.nan, math.nan)
 
 
 def student_quantile(probability: float, dof: float) -> float:
@@ -19,6 +32,11 @@ def student_quantile(probability: float, dof: float) -> float:
     density = np.cos(u) ** (dof - 1.0)
     area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
     return math.sqrt(dof) * math.tan(float(np.interp(2.0 * probability - 1.0, area / area[-1], u)))
+
+
+def half_width(sigma: float, dof: float, level: float = 0.95) -> float:
+    """Half the interval of a value with standard deviation `sigma`, by Student's t."""
+    return student_quantile(0.5 + level / 2.0, dof) * sigma
 
 
 def chi2_log_p(x: float, dof: int) -> float:

@@ -1,4 +1,4 @@
-"""Moments of samples in blocks, for straight lines over one drive or many: normal equations block by block."""
+"""Samples in groups, the blocks of one drive or the runs of a campaign: normal equations group by group, and noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,32 @@ from numpy.typing import NDArray
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["Noise", "block_moments", "block_starts", "second_difference"]
+__all__ = [
+    "APART", "Design", "Index", "Moments", "Noise", "block_moments", "block_starts", "moments_of", "run_numbers",
+    "second_difference",
+]  # fmt: skip
+
+APART = 3  # samples between values whose noise is independent: 0.3 s of smoothing at 10 Hz
+LEAST_TRIPLES = 10  # of a run, to estimate the noise of its own traction; else that of all runs is used
+
+Index = NDArray[np.int64]
+_NONE: Index = np.zeros(0, dtype=np.int64)
+
+
+class Design(NamedTuple):
+    """Data of a fit: `columns` (p, n), `y` (n,), and for each sample its `run` of a campaign, or its block of a drive.
+
+    `run` ascends. Only `estimate` uses the rest. `step` ascends within a run and counts samples of the even grid, so
+    that gaps show. `scatters` (p,): whether a column's coefficient differs from run to run. `noisy` (p,):
+    whether the column is measured with noise that is independent after `APART` samples; at most one.
+    """
+
+    columns: FloatArray
+    y: FloatArray
+    run: Index
+    step: Index = _NONE
+    scatters: tuple[bool, ...] = ()
+    noisy: tuple[bool, ...] = ()
 
 
 class Noise(NamedTuple):
@@ -63,3 +88,47 @@ def block_moments(
 def second_difference(x: FloatArray, apart: int) -> FloatArray:
     """Return x[k + 2 a] - 2 x[k + a] + x[k]: fast changes and noise, without level and drift. (n - 2 a,)"""
     return x[2 * apart :] - 2.0 * x[apart:-apart] + x[: -2 * apart]
+
+
+class Moments(NamedTuple):
+    """Per run: X'X (g, p, p), X'y (g, p), the same of the noise, and weights."""
+
+    h: FloatArray
+    c: FloatArray
+    h_noise: FloatArray
+    c_noise: FloatArray
+    weight: FloatArray  # (g,)
+
+
+def moments_of(d: Design, first: Index, weight: FloatArray) -> Moments:
+    """Moments of each run; those of the noise per unit of weight, times the run's weight."""
+    p = len(d.columns)
+    h, c = block_moments(d.columns, d.y, first, weight=weight)
+    total = np.add.reduceat(weight, first)
+    h_noise, c_noise = np.zeros_like(h), np.zeros_like(c)
+    for i in (i for i in range(p) if d.noisy[i]):
+        both, same, triples = _second_differences(d, i, first)
+        enough = triples >= LEAST_TRIPLES
+        if triples.sum() >= LEAST_TRIPLES:
+            count = np.where(enough, triples, 1)
+            h_noise[:, i, i] = total * np.where(enough, same / count, same.sum() / triples.sum()) / 6.0
+            c_noise[:, i] = total * np.where(enough, both / count, both.sum() / triples.sum()) / 6.0
+    return Moments(h, c, h_noise, c_noise, total)
+
+
+def run_numbers(d: Design, first: Index) -> Index:
+    """Return which of the runs each sample is of, from 0. (n,)"""
+    return np.repeat(np.arange(first.size), np.diff(np.append(first, d.y.size)))
+
+
+def _second_differences(d: Design, i: int, first: Index) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Per run: sum of D x D y and of (D x)^2 over triples of samples, and their number."""
+    a = 2 * APART
+    if d.y.size <= a:
+        return np.zeros(first.size), np.zeros(first.size), np.zeros(first.size)
+    run = run_numbers(d, first)
+    whole = (run[a:] == run[:-a]) & (d.step[a:] - d.step[:-a] == a) & (d.step[APART:-APART] - d.step[:-a] == APART)
+    d_x, d_y = (second_difference(v, APART) for v in (d.columns[i], d.y))
+    r = run[a:][whole]
+    both, same = (np.bincount(r, product[whole], first.size).astype(np.float64) for product in (d_x * d_y, d_x * d_x))
+    return both, same, np.bincount(r, minlength=first.size).astype(np.float64)

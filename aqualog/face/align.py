@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.align.clock import ClockFit
-    from aqualog.align.quantity import Quantity
+    from aqualog.align.propose import Quantity
     from aqualog.report.sections import Report
 
 __all__ = ["Alignment", "align", "check_quantity"]
@@ -225,7 +225,7 @@ def check_quantity(quantity: str) -> None:
     ------
     ConfigError
     """
-    from aqualog.align.quantity import QUANTITIES
+    from aqualog.align.propose import QUANTITIES
 
     if text_of(quantity, "quantity") not in QUANTITIES:
         raise ConfigError(f'quantity "{quantity[:60]}"', expected=" or ".join(QUANTITIES))
@@ -243,7 +243,7 @@ def _compared(
     drive: Drive, vehicle: Vehicle, quantity: str, channels: Mapping[str, str], hear: Listener
 ) -> list[Quantity]:  # fmt: skip
     from aqualog.align.load import read_options
-    from aqualog.align.quantity import find_quantity
+    from aqualog.align.propose import find_quantity
     from aqualog.io.open_log import DriveLog
 
     with DriveLog(list(drive.paths), read_options(drive.signal_map, list(drive.dbc))) as log:

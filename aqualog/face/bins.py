@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.campaign.full_speed import FullSpeed
-    from aqualog.campaign.resistance import MeanRow, ResistanceTable
+    from aqualog.campaign.means import MeanRow, ResistanceTable
     from aqualog.campaign.slip_slope import SlopeTable
     from aqualog.campaign.spin_downs import SpinDownRow
     from aqualog.face.campaign_runs import CampaignRuns
@@ -180,9 +180,9 @@ def binned_slopes(
     hear("regressing")
     from aqualog.campaign.bins import plan
     from aqualog.campaign.full_speed import full_speeds
+    from aqualog.campaign.means import spin_ups
     from aqualog.campaign.slip_slope import slip_slopes
     from aqualog.campaign.spin_downs import minor_spin_downs
-    from aqualog.campaign.spin_ups import spin_ups
 
     cells = plan(data, by, width_kmh=bin_width, road=road)
     slopes = slip_slopes(data, cells, robust=robust)
@@ -207,7 +207,7 @@ def binned_resistance(
     runs.campaign.check_bins(by, bin_width=bin_width, road=road)
     hear("averaging")
     from aqualog.campaign.bins import plan
-    from aqualog.campaign.resistance import resistances
+    from aqualog.campaign.means import resistances
 
     cells = plan(runs.data, by, width_kmh=bin_width, road=road)
     return BinnedResistance(runs, resistances(runs.data, cells, relative=relative, robust=robust))

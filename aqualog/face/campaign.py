@@ -306,7 +306,7 @@ class Campaign:
         AqualogError
             If the store cannot be written, or another batch writes there.
         """
-        from aqualog.campaign.records import part_of, shard_of
+        from aqualog.campaign.definition import part_of, shard_of
         from aqualog.guard.worker import Limits
 
         began = time.monotonic()
@@ -326,7 +326,7 @@ class Campaign:
             configured = replace(configured, campaign=part_of(configured.campaign, part))
         if not configured.campaign.runs:  # a matrix of shards may have more parts than there are logs
             from aqualog.campaign.batch import BatchOutcome
-            from aqualog.campaign.samples import CampaignData
+            from aqualog.campaign.results import CampaignData
             from aqualog.campaign.store import Store
 
             return CampaignRuns(self, CampaignData(configured, Store(self.store), ()), BatchOutcome(0, 0, {}), part)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.campaign.batch import BatchOutcome
-    from aqualog.campaign.records import Shard
-    from aqualog.campaign.samples import CampaignData
+    from aqualog.campaign.definition import Shard
+    from aqualog.campaign.results import CampaignData
     from aqualog.face.bins import BinnedResistance, BinnedSlopes
     from aqualog.face.campaign import Campaign
 

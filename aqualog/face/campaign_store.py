@@ -15,10 +15,10 @@ from aqualog.face.progress import Progress as Counted
 
 if TYPE_CHECKING:
     from aqualog.campaign.batch import BatchOutcome
+    from aqualog.campaign.definition import Shard
     from aqualog.campaign.jobs import Configured
     from aqualog.campaign.place import Address
-    from aqualog.campaign.records import Shard
-    from aqualog.campaign.samples import CampaignData
+    from aqualog.campaign.results import CampaignData
     from aqualog.guard.worker import Limits, WorkOn
 
 __all__ = ["bring_up_to_date", "is_campaign", "refuse_in_store", "split"]
@@ -63,7 +63,7 @@ def bring_up_to_date(
         hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")
     hear("looking at the logs")
     from aqualog.campaign.batch import run_batch
-    from aqualog.campaign.samples import load_results
+    from aqualog.campaign.results import load_results
     from aqualog.campaign.store import Store
 
     if cluster is None and not has_kept_code():

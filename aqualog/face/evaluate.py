@@ -198,7 +198,7 @@ def evaluate(
     --------
     >>> aq.evaluate("drive.mf4", "car.toml", labels="labels.csv").tables
     """
-    from aqualog.campaign.records import group_keys
+    from aqualog.campaign.definition import group_keys
 
     hear = listener(progress)
     given = inputs_of(inputs, vehicle, map=map, dbc=dbc, labels=labels)

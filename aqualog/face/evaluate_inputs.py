@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aqualog.align.mapping import SignalMap
+from aqualog.campaign.definition import Run, with_load
 from aqualog.campaign.jobs import Configured
-from aqualog.campaign.records import Run, with_load
 from aqualog.config.configured import files_of
 from aqualog.config.labels import load_labels
 from aqualog.config.signal_map import load_signal_map

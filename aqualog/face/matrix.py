@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.campaign.records import Campaign
+    from aqualog.campaign.definition import Campaign
     from aqualog.report.sections import Report
 
 __all__ = ["Matrix", "matrix"]
@@ -97,7 +97,7 @@ def matrix(path: PathLike) -> Matrix:
     ConfigError
         With all faults of all files in one message.
     """
-    from aqualog.campaign.logs import log_states
+    from aqualog.campaign.definition import log_states
     from aqualog.campaign.matrix import campaign_matrix, speeds_of
     from aqualog.campaign.tables import lane_faults, stored_runs
     from aqualog.config.campaign import read_campaign

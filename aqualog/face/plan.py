@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.campaign.batch_cost import BatchCost
     from aqualog.campaign.place import Address
-    from aqualog.campaign.plan import Estimate, Plan, Work
+    from aqualog.campaign.plan import BatchCost, Estimate, Plan, Work
     from aqualog.campaign.store import Store
     from aqualog.face.campaign import Campaign
 
@@ -123,8 +122,7 @@ def plan(
     began, began_cpu = time.monotonic(), time.process_time()
     seconds = _seconds(within) if within is not None else None
     hear = listener(progress)
-    from aqualog.campaign.batch_cost import measure_cost
-    from aqualog.campaign.plan import choose, foretell, shards_within, work_of
+    from aqualog.campaign.plan import choose, foretell, measure_cost, shards_within, work_of
     from aqualog.campaign.store import Store
     from aqualog.guard.worker import most_processes
 
@@ -178,7 +176,7 @@ def _document(
     work: Work, trial: BatchCost, found: Plan, processes: int, store: Store, within_s: float | None,
     parts: tuple[int, float] | None,
 ) -> dict[str, Any]:  # fmt: skip
-    from aqualog.campaign.batch_cost import peak_memory
+    from aqualog.campaign.plan import peak_memory
 
     worker = found.worker
     # one process beside the workers leads; without workers it is the one that works

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from aqualog.align.grid import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.mapping import Entry, SignalMap, resolve
-from aqualog.align.resample import bin_mean, gap_limit_ns, hold, linear, median_period_ns
 from aqualog.align.table import build_signals
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.records import Channel, ChannelInfo, FloatArray, Signals, TimeArray

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from aqualog import __version__
+from aqualog.core.intervals import Interval
 from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
-from aqualog.detect.slip_slope.regression import Interval, Line
+from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.stability import percent
 from aqualog.report.sections import Cell, Figures, Lines, Para, Report, Section, Table
 from aqualog.report.slope_figures import slope_plots

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.results import CampaignData
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.guard.worker import Crashed, work_on
 from aqualog.thesis.catalogue import NUMBERS, OF_CAMPAIGN, needs_campaign, rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 
 from aqualog.align.clock import estimate_clock
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import student_quantile
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real_logs"
 real = [
@@ -82,11 +80,11 @@ def test_late_source_has_positive_offset():
     assert estimate_clock(t + 250_000_000, v, t, v).offset_s == pytest.approx(-0.25, abs=1e-4)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_below_one_sample(seed):
-    fit = estimate_clock(*pair(seed, 1200.0, offset=0.137, sd=0.02, scale=1.009))
-    assert fit.offset_s == pytest.approx(0.137, abs=0.003)
-    assert fit.scale == pytest.approx(1.009, abs=0.002)
+def test_below_one_sample():
+    for seed in range(3):
+        fit = estimate_clock(*pair(seed, 1200.0, offset=0.137, sd=0.02, scale=1.009))
+        assert fit.offset_s == pytest.approx(0.137, abs=0.003)
+        assert fit.scale == pytest.approx(1.009, abs=0.002)
 
 
 def test_without_noise_the_grid_leaves_no_trace():
@@ -98,20 +96,17 @@ def test_without_noise_the_grid_leaves_no_trace():
         assert estimate_clock(*a, *b).offset_s == pytest.approx(offset, abs=2e-4)
 
 
-def test_scale_and_bias_do_not_move_the_offset():
-    t_ref, v_ref, t, v = pair(1, offset=0.4)
-    plain, bent = estimate_clock(t_ref, v_ref, t, v), estimate_clock(t_ref, v_ref, t, 3.6 * v + 7.0)
+def test_scale_bias_and_order_of_the_sources():
+    t_ref, v_ref, t, v = pair(2, offset=-0.31, scale=1.02)
+    plain, bent, turned = (
+        estimate_clock(*x) for x in ((t_ref, v_ref, t, v), (t_ref, v_ref, t, 3.6 * v + 7.0), (t, v, t_ref, v_ref))
+    )
     assert bent.offset_s == pytest.approx(plain.offset_s, abs=1e-6)
     assert bent.scale == pytest.approx(3.6 * plain.scale, rel=1e-6)
     assert bent.bias == pytest.approx(3.6 * plain.bias + 7.0, abs=1e-4)
     assert bent.peak == pytest.approx(plain.peak, abs=1e-9)
-
-
-def test_swapping_the_sources_turns_the_sign_and_inverts_the_scale():
-    t_ref, v_ref, t, v = pair(2, offset=-0.31, scale=1.02)
-    one, two = estimate_clock(t_ref, v_ref, t, v), estimate_clock(t, v, t_ref, v_ref)
-    assert two.offset_s == pytest.approx(-one.offset_s, abs=2e-3)
-    assert two.scale * one.scale == pytest.approx(1.0, abs=2e-3)
+    assert turned.offset_s == pytest.approx(-plain.offset_s, abs=2e-3)
+    assert turned.scale * plain.scale == pytest.approx(1.0, abs=2e-3)
 
 
 def test_drift_of_100_ppm_over_20_minutes():
@@ -186,18 +181,9 @@ def test_different_gaps_do_not_pull_the_offset():
 
 def test_same_input_same_numbers_and_inputs_untouched():
     arrays = pair(7, offset=0.2)
-    copies = [a.copy() for a in arrays]
     for a in arrays:
         a.flags.writeable = False
     assert estimate_clock(*arrays) == estimate_clock(*arrays)
-    for a, b in zip(arrays, copies, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-def test_record_is_frozen():
-    fit = estimate_clock(*pair(7))
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        fit.offset_s = 0.0
 
 
 def test_clocks_hours_apart():
@@ -241,11 +227,6 @@ def test_constant_speed(noise):
     refused(t, still, t_ref, v_ref, match="reference: no variation|weak peak")
 
 
-def test_opposite_signs_are_named():
-    t_ref, v_ref, t, v = pair(1)
-    refused(t_ref, v_ref, t, -v, match="opposite signs")
-
-
 def test_periodic_signals_are_ambiguous():
     t = np.arange(0, 300_000_000_000, 20_000_000)
     slalom = 0.3 * np.sin(2.0 * np.pi * t * 1e-9 / 4.0)
@@ -262,30 +243,30 @@ def test_offset_outside_the_search_range():
     assert estimate_clock(t_ref, v_ref, t, v, max_offset_s=7.0).offset_s == pytest.approx(6.0, abs=0.02)
 
 
-def test_bad_arguments():
-    t_ref, v_ref, t, v = pair(1)
-    refused(t_ref, v_ref, t[::-1], v, match="backwards")
-    refused(t_ref, v_ref, t, v[:-1], match="stamps for")
-    refused(t_ref, v_ref, t, np.full(t.size, np.nan), match="finite samples")
-    refused(t_ref, v_ref, t[:0], v[:0], match="finite samples")
-    refused(t_ref, v_ref, t, v, match="search range", max_offset_s=0.0)
-    refused(t_ref, v_ref, t, v, match="start offset", start_offset_s=math.nan)
-    refused(t_ref, v_ref, t, v, match="least overlap", min_overlap_s=5.0)
+def test_bad_arguments_and_opposite_signs():
+    *ref, t, v = pair(1)
+    refused(*ref, t, -v, match="opposite signs")
+    refused(*ref, t[::-1], v, match="backwards")
+    refused(*ref, t, v[:-1], match="stamps for")
+    refused(*ref, t, np.full(t.size, np.nan), match="finite samples")
+    refused(*ref, t[:0], v[:0], match="finite samples")
+    refused(*ref, t, v, match="search range", max_offset_s=0.0)
+    refused(*ref, t, v, match="start offset", start_offset_s=math.nan)
+    refused(*ref, t, v, match="least overlap", min_overlap_s=5.0)
 
 
 # ---------------------------------------------------------------------------------------------------- statistics
 
 
-def test_quantiles_of_student():
-    for dof, quantile in ((1, 12.7062), (2, 4.3027), (5, 2.5706), (11, 2.2010), (100, 1.9840)):
-        assert student_quantile(0.975, dof) == pytest.approx(quantile, rel=1e-4)
-
-
 @pytest.mark.parametrize(
-    ("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), pytest.param(150.0, 0.3, 5.0, marks=pytest.mark.nightly)]
+    ("cases", "seconds", "sd", "memory_s"),
+    [
+        (60, 60.0, 0.1, 2.0),
+        *(pytest.param(220, *x, marks=pytest.mark.nightly) for x in ((60.0, 0.1, 2.0), (150.0, 0.3, 5.0))),
+    ],
 )
-def test_intervals_cover_the_truth(seconds, sd, memory_s):
-    cases, refusals, hits = 220, 0, np.zeros(5)
+def test_intervals_cover_the_truth(cases, seconds, sd, memory_s):
+    refusals, hits = 0, np.zeros(5)
     for seed in range(cases):
         offset = np.random.default_rng(10_000 + seed).uniform(-3.0, 3.0)
         data = pair(seed, seconds, offset=offset, sd=sd, memory_s=memory_s, scale=1.01, bias=0.3)
@@ -310,7 +291,10 @@ def test_intervals_cover_the_truth(seconds, sd, memory_s):
 
 @pytest.mark.parametrize(
     ("seconds", "max_offset_s", "cases"),
-    [(60.0, 10.0, 300), pytest.param(150.0, 60.0, 200, marks=pytest.mark.nightly)],
+    [
+        (60.0, 10.0, 100),
+        *(pytest.param(*x, marks=pytest.mark.nightly) for x in ((60.0, 10.0, 300), (150.0, 60.0, 200))),
+    ],
 )
 def test_unrelated_drives_are_refused(seconds, max_offset_s, cases):
     accepted = 0

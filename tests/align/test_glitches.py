@@ -1,3 +1,4 @@
+import itertools
 import time
 from functools import partial
 
@@ -18,19 +19,14 @@ def test_a_sound_wheel_has_none():
     assert not sensor_glitches(T, wheel(), r_e=R_E).any()
 
 
-@pytest.mark.parametrize("length", [1, 20, 80])
-@pytest.mark.parametrize("level", [0.0, 300.0])
-def test_dropouts_and_spikes(length, level):
+@pytest.mark.parametrize(
+    ("length", "level"),
+    [(1, 0.0), (20, 300.0), (80, 0.0), (80, 300.0), (1000, 0.0), (300, 587.0), (300, 287.1), (300, 140.0 / R_E)],
+)
+def test_dropouts_spikes_dead_sensors_and_codes_that_stand_for_seconds(length, level):
     x = wheel()
     x[1000 : 1000 + length] = level
-    found = sensor_glitches(T, x, r_e=R_E)
-    assert np.flatnonzero(found).tolist() == list(range(1000, 1000 + length))
-
-
-def test_dead_sensor_until_it_turns_again():
-    x = wheel()
-    x[1000:2000] = 0.0
-    assert np.flatnonzero(sensor_glitches(T, x, r_e=R_E)).tolist() == list(range(1000, 2000))
+    assert np.flatnonzero(sensor_glitches(T, x, r_e=R_E)).tolist() == list(range(1000, 1000 + length))
 
 
 def test_real_spin_downs_and_lock_ups_stay():
@@ -40,25 +36,13 @@ def test_real_spin_downs_and_lock_ups_stay():
     assert not sensor_glitches(T, wheel() * locked, r_e=R_E).any()
 
 
-def test_slow_logs_are_left_alone():
-    t = (np.arange(300) * 100_000_000).astype(np.int64)
+def test_a_step_to_a_value_that_lives_and_slow_logs_stay():
+    x = wheel()
+    x[1000:] += 60.0 / R_E  # nobody knows which of the two sides is the wheel's
+    assert not sensor_glitches(T, x, r_e=R_E).any()
     x = np.full(300, 80.0)
     x[100:102] = 10.0
-    assert not sensor_glitches(t, x, r_e=R_E).any()
-
-
-@pytest.mark.parametrize("level", [587.0, 287.1, 140.0 / R_E])
-def test_a_code_that_stands_for_seconds(level):
-    x = wheel()
-    x[1000:1300] = level
-    assert np.flatnonzero(sensor_glitches(T, x, r_e=R_E)).tolist() == list(range(1000, 1300))
-
-
-def test_a_step_to_a_value_that_lives_stays():
-    """Nobody knows which of the two sides is the wheel's."""
-    x = wheel()
-    x[1000:] += 60.0 / R_E
-    assert not sensor_glitches(T, x, r_e=R_E).any()
+    assert not sensor_glitches(10 * T[:300], x, r_e=R_E).any()
 
 
 def deceleration():
@@ -67,13 +51,11 @@ def deceleration():
     return ramp + np.random.default_rng(1).normal(0, 1.0, T.size)
 
 
-@pytest.mark.parametrize("length", [1, 5, 9])
-@pytest.mark.parametrize("height", [18.0, -18.0, 35.0])
-@pytest.mark.parametrize("at", [1000, 560])
-def test_spikes_of_an_acceleration(at, height, length):
-    a = deceleration()
-    a[at : at + length] += height
-    assert np.flatnonzero(spikes(T, a)).tolist() == list(range(at, at + length))
+def test_spikes_of_an_acceleration():
+    for at, height, length in itertools.product((1000, 560), (18.0, -18.0, 35.0), (1, 5, 9)):
+        a = deceleration()
+        a[at : at + length] += height
+        assert np.flatnonzero(spikes(T, a)).tolist() == list(range(at, at + length))
 
 
 def test_what_a_car_does_is_no_spike():
@@ -167,7 +149,7 @@ def test_spikes_of_yaw_rate_and_steering(name, amplitude, hertz, height):
 @pytest.mark.parametrize("find", [spikes, partial(sensor_glitches, r_e=0.3)])
 def test_a_sensor_that_shakes_for_long_takes_no_longer_per_sample(find):
     """Each leap was held against all that follow: an hour took minutes."""
-    t_ns = np.arange(80_000) * 10**7
+    t_ns = np.arange(20_000) * 10**7
     x = np.abs(np.random.default_rng(1).normal(0.0, 40.0, t_ns.size).cumsum()) + 5.0
 
     def cost(n):
@@ -175,4 +157,4 @@ def test_a_sensor_that_shakes_for_long_takes_no_longer_per_sample(find):
         find(t_ns[:n], x[:n])
         return time.process_time() - begin
 
-    assert min(cost(80_000) for _ in range(2)) < 10.0 * max(min(cost(20_000) for _ in range(2)), 0.02)
+    assert min(cost(20_000) for _ in range(2)) < 10.0 * max(min(cost(5_000) for _ in range(2)), 0.005)

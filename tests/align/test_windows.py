@@ -219,10 +219,11 @@ def test_a_signal_that_is_frozen_for_a_while(size):
     assert len([n for n in whole.quality.notes if "frozen" in n]) == 2
 
 
-def test_codes_scales_and_clocks_of_the_map():
+def test_codes_and_scales_of_the_map_and_an_own_rate():
     entries = {"omega_fr": Entry("omega_fr", "omega_fr", invalid=(60.5,), scale=2.0, offset=0.1)}
     left, right = wheels(3000)
     same([left, replace(right, values=np.round(right.values, 1))], entries=entries)
+    same(wheels(), rate_hz=33.0)
 
 
 def test_a_pause_of_the_whole_log_and_one_signal_that_ends_early():
@@ -237,26 +238,20 @@ def test_the_shortest_drives(rows):
     same([channel("omega_fl", np.arange(4) * 0.01, [1.0, 2.0, 0.0, 0.0], "rad/s")], rows=rows, size=1)
 
 
-def test_an_own_rate():
-    same(wheels(), rate_hz=33.0)
-
-
-@pytest.mark.parametrize("at", [1, 2500])
-def test_stamps_that_step_back_need_the_whole_log(at):
+@pytest.mark.parametrize(
+    ("at", "by", "match"),
+    [
+        (1, -15_000_000, "out of order"),
+        (2500, -15_000_000, "out of order"),
+        (1, 10**5 * S, "leap"),
+        (4990, 10**5 * S, "leap"),
+    ],
+)
+def test_stamps_that_step_back_or_leap_by_a_day_need_the_whole_log(at, by, match):
     left, right = wheels()
-    t = left.t_ns.copy()
-    t[at:] -= 15_000_000
-    with pytest.raises(NotInPiecesError, match="out of order"):
-        both([replace(left, t_ns=t), right])
-
-
-@pytest.mark.parametrize("at", [1, 4990])
-def test_stamps_that_leap_by_a_day_need_the_whole_log(at):
-    left, right = wheels()
-    t = left.t_ns.copy()
-    t[at:] += 100_000 * S
-    with pytest.raises(NotInPiecesError, match="leap"):
-        both([replace(left, t_ns=t), replace(right, t_ns=t)])
+    left.t_ns[at:] += by
+    with pytest.raises(NotInPiecesError, match=match):
+        both([left, replace(right, t_ns=left.t_ns) if by > 0 else right])
 
 
 def test_a_unit_that_is_none_of_the_signal_leaves_it_out():
@@ -267,16 +262,10 @@ def test_a_unit_that_is_none_of_the_signal_leaves_it_out():
 
 
 def test_no_usable_signal_is_an_error():
-    left, _ = wheels(10)
+    c = replace(wheels(10)[0], values=np.full(10, np.nan))
+    found = {"omega_fl": (Entry("omega_fl", "omega_fl"), c.info)}
     with pytest.raises(SignalError, match="no usable signal"):
-        both_none(replace(left, values=np.full(10, np.nan)))
-
-
-def both_none(c):
-    return long_drive(
-        {"omega_fl": (Entry("omega_fl", "omega_fl"), c.info)}, lambda: pieces([c], 3, np.random.default_rng(0)), signal_map=SignalMap(),
-        vehicle=CAR,
-    )  # fmt: skip
+        long_drive(found, lambda: pieces([c], 3, np.random.default_rng(0)), signal_map=SignalMap(), vehicle=CAR)
 
 
 def test_a_rate_with_which_the_rows_grow_too_many_is_the_users():

@@ -38,8 +38,7 @@ def made(runs: int, samples: int) -> Samples:
 
 def lines_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope and offset of each run in each bin (cells, 2), by the moments that all fits rest on."""
-    from aqualog.campaign.moments import Design, moments_of
-    from aqualog.core.moments import block_starts
+    from aqualog.core.moments import Design, block_starts, moments_of
 
     cell = s.run * BINS + s.bin
     columns = np.stack([s.mu, np.ones_like(s.mu)])
@@ -60,7 +59,8 @@ def lines_with_scipy(s: Samples) -> np.ndarray:
 
 def slopes_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope of each bin with the half width of its interval (bins, 2), runs as the unit, as `bin-slipslope` has it."""
-    from aqualog.campaign.regress import Design, estimate
+    from aqualog.core.moments import Design
+    from aqualog.core.regression import estimate
 
     found = []
     for b in range(BINS):

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from aqualog.campaign.definition import Campaign, Run, with_load
 from aqualog.campaign.jobs import Configured
-from aqualog.campaign.records import Campaign, Run, with_load
-from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.vehicle import Vehicle
 
 CAR = Vehicle(name="blind rwd", mass=1610.0, l_f=1.35, l_r=1.45, h_cg=0.53, rolling_resistance=0.0102)

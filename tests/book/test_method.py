@@ -6,7 +6,7 @@ import pytest
 
 from aqualog.align import freezes, glitches
 from aqualog.calibrate import design, online
-from aqualog.campaign import full_speed, samples
+from aqualog.campaign import full_speed, results
 from aqualog.detect import braking, joint_criteria, minor_spin_down, other_surface, resistance, spin, tie_rod
 from aqualog.detect.detector import JointCusumParams
 from aqualog.detect.registry import DETECTORS, RIVALS
@@ -146,7 +146,7 @@ def rows():
         "calibration",
         f"above {design.V_MIN:g} m/s, below {design.A_Y_MAX:g} m/s² lateral and {design.YAW_MAX:g} rad/s",
     )
-    yield "campaign_regression", f"| settling | {samples.SETTLING_S:g} s |"
+    yield "campaign_regression", f"| settling | {results.SETTLING_S:g} s |"
     yield "full_aquaplaning", f"| draws | {full_speed.DRAWS} |"
     yield "full_aquaplaning", f"| extrapolation | noted beyond {full_speed.EXTRAPOLATED:g} times"
     yield "reading", f"faster than {glitches.RIM_LIMIT:g} m/s² at the rim"

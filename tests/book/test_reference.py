@@ -13,7 +13,7 @@ from aqualog.book.reference import PAGES
 from aqualog.book.reference.model import EFFECTS_EXAMPLE, vehicle_example
 from aqualog.book.reference.settings import MAP_EXAMPLE, THRESHOLDS_EXAMPLE
 from aqualog.book.topics import DOCS
-from aqualog.campaign.records import GROUP_NAMES
+from aqualog.campaign.definition import GROUP_NAMES
 from aqualog.cli.commands import loaded
 from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aqualog.campaign.regress import ATTENUATION_MAX, Design, estimate
+from aqualog.core.moments import Design
+from aqualog.core.regression import NOISE_MAX, estimate
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def study(world, repeats, seed, *, robust=False):
         e = estimate(made(world, rng), robust=robust)
         low, high = e.interval(0)
         held.append(low <= truth <= high)
-        told.append(low > 0.0 and e.attenuation <= ATTENUATION_MAX)
+        told.append(low > 0.0 and e.attenuation <= NOISE_MAX)
         value.append(float(e.value[0]) / truth - 1.0)
         half.append(float(e.half[0]) / truth)
         lost.append(e.attenuation)

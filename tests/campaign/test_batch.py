@@ -14,9 +14,9 @@ import pytest
 from aqualog.align.load import load_signals
 from aqualog.campaign import batch
 from aqualog.campaign.batch import CRASHED, run_batch
+from aqualog.campaign.definition import Run, with_load
 from aqualog.campaign.measure import measure
-from aqualog.campaign.records import Run, with_load
-from aqualog.campaign.samples import load_results
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError, LogError

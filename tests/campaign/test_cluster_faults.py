@@ -20,9 +20,7 @@ from typer.testing import CliRunner
 
 import aqualog
 from aqualog.campaign import cluster as asking
-from aqualog.campaign import cluster_worker
-from aqualog.campaign.cluster import bounds_here, on_cluster
-from aqualog.campaign.cluster_worker import Asked, asked_of, own_stamp, unlike
+from aqualog.campaign.cluster import Asked, asked_of, bounds_here, on_cluster, own_stamp, unlike
 from aqualog.cli.main import app
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.guard.reading import ReadLimits
@@ -37,7 +35,7 @@ def here(workers=1):
     """A scheduler and workers in this process; a fresh worker has not been asked yet."""
     from distributed import LocalCluster
 
-    cluster_worker._fit.clear()
+    asking._fit.clear()
     with LocalCluster(
         n_workers=workers, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp://",
         host="127.0.0.1",
@@ -153,12 +151,12 @@ def test_workers_that_have_what_is_asked(tmp_path):
 def test_logs_that_a_worker_does_not_see(campaign, tmp_path, monkeypatch, late):
     """A worker behind another mount, there from the start or joined later: the file that it looks for is not there."""
     log = campaign.parent / "logs" / "v080_0.parquet"
-    real = cluster_worker._missing
+    real = asking._missing
     monkeypatch.setattr(
-        cluster_worker, "_missing", lambda files: real([(p.with_name("x") if p == log else p, s) for p, s in files])
+        asking, "_missing", lambda files: real([(p.with_name("x") if p == log else p, s) for p, s in files])
     )
     if late:
-        monkeypatch.setattr(asking, "_everywhere", lambda client, address, ask, *args: {})
+        monkeypatch.setattr(asking._Scheduler, "everywhere", lambda self, ask, *args: {})
     with here() as made:
         result = batch(campaign, tmp_path / "s", made.scheduler_address)
     assert result.exit_code == 2

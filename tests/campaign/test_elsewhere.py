@@ -9,7 +9,7 @@ import time
 import polars as pl
 import pytest
 
-from aqualog.campaign.records import Shard, part_of, shard_of
+from aqualog.campaign.definition import Shard, part_of, shard_of
 from aqualog.config.configured import configure
 from aqualog.core.errors import ConfigError
 from aqualog.guard.worker import Crashed

@@ -7,9 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from aqualog.campaign.logs import log_states, missing_lines
+from aqualog.campaign.definition import Campaign, Run, log_states, missing_lines
 from aqualog.campaign.matrix import campaign_matrix
-from aqualog.campaign.records import Campaign, Run
 from tests.commands import run
 
 

@@ -13,10 +13,19 @@ import numpy as np
 import pytest
 
 from aqualog.campaign.batch import run_batch
-from aqualog.campaign.batch_cost import BatchCost, LogCost, measure_cost
+from aqualog.campaign.definition import Campaign, Run, Shard, part_of
 from aqualog.campaign.jobs import Job
-from aqualog.campaign.plan import Work, choose, foretell, makespan, shards_within, work_of
-from aqualog.campaign.records import Campaign, Run, Shard, part_of
+from aqualog.campaign.plan import (
+    BatchCost,
+    LogCost,
+    Work,
+    choose,
+    foretell,
+    makespan,
+    measure_cost,
+    shards_within,
+    work_of,
+)
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
@@ -207,10 +216,8 @@ def test_errors(tmp_path, campaign):
 def test_a_sample_in_which_was_compiled_is_measured_again(kept, times, monkeypatch):
     """Only the first plan after an installation compiles; the batch behind it does not."""
     states, measured, heard = iter(kept), [], []
-    monkeypatch.setattr("aqualog.campaign.batch_cost.kept_code", lambda: frozenset(next(states)))
-    monkeypatch.setattr(
-        "aqualog.campaign.batch_cost._measured_once", lambda *given: measured.append(given) or len(measured)
-    )
+    monkeypatch.setattr("aqualog.campaign.plan.kept_code", lambda: frozenset(next(states)))
+    monkeypatch.setattr("aqualog.campaign.plan._measured_once", lambda *given: measured.append(given) or len(measured))
     assert measure_cost(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
     assert heard == [1] * (times - 1)
 

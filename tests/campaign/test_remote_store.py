@@ -18,10 +18,9 @@ import pytest
 from fsspec.implementations.local import LocalFileSystem
 from fsspec.implementations.memory import MemoryFileSystem
 
-from aqualog.campaign.cluster_worker import asked_of, unlike
-from aqualog.campaign.place import Folder, address_of
-from aqualog.campaign.place_remote import Remote
-from aqualog.campaign.store import Store, place_of
+from aqualog.campaign.cluster import asked_of, unlike
+from aqualog.campaign.place import Place, Remote, address_of, place_of
+from aqualog.campaign.store import Store
 from aqualog.core.errors import ConfigError, LogError
 from tests.campaign.dask_here import cluster
 from tests.campaign.made import make_campaign
@@ -161,7 +160,7 @@ def test_footers_of_any_length(plain, url, monkeypatch):
     key = sorted(Store(store).keys()[0])[0]
     about = Store(store).about(key)
     for tail in (12, 100, 5_000, 10**7):
-        monkeypatch.setattr("aqualog.campaign.place_remote._TAIL", tail)
+        monkeypatch.setattr("aqualog.campaign.place._TAIL", tail)
         asked = Store(url)
         asked.look_at([key, "no-such-key"])
         assert set(asked._place._footers) == {f"samples/{key}.parquet"}
@@ -214,7 +213,7 @@ def test_without_fsspec(plain, monkeypatch):
 
 def test_a_folder_imports_no_fsspec(plain):
     code = (
-        "import sys; from pathlib import Path; from aqualog.campaign.store import place_of\n"
+        "import sys; from pathlib import Path; from aqualog.campaign.place import place_of\n"
         "place_of(Path(sys.argv[1])).names(); print(any(m.startswith('fsspec') for m in sys.modules))"
     )
     assert subprocess.check_output([sys.executable, "-c", code, str(plain[1])], text=True) == "False\n"
@@ -309,7 +308,7 @@ def test_addresses(tmp_path):
             address_of(text)
     assert address_of("a/b:c") == Path("a/b:c")
     assert address_of("S3://b/x") == "S3://b/x"
-    assert isinstance(Store(f"file://{tmp_path}")._place, Folder)
+    assert isinstance(Store(f"file://{tmp_path}")._place, Place)
     assert Remote("other://user:word@host/x").name == "other://***@host/x"
     with pytest.raises(ConfigError, match="chain"):
         address_of("zip://a::file://b")

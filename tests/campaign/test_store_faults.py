@@ -16,7 +16,7 @@ import pytest
 from aqualog.campaign import batch, place
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.jobs import _BEHIND, code_stamp
-from aqualog.campaign.samples import load_results
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import MARK, Store
 from aqualog.config.configured import configure, configure_logs
 from aqualog.core.errors import AqualogError, LogError

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aqualog.campaign.records import group_keys
+from aqualog.campaign.definition import group_keys
 from aqualog.config.campaign import load_campaign, read_campaign
 from aqualog.config.labels import load_labels
 from aqualog.core.errors import ConfigError

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aqualog.campaign.definition import Run, with_load
 from aqualog.campaign.measure import measure
-from aqualog.campaign.records import Run, with_load
 from aqualog.core.intervals import chi2_log_p
 from aqualog.diagnose.campaign import diagnose_campaign
 from aqualog.diagnose.campaign.expect import Driven, respond

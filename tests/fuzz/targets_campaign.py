@@ -3,9 +3,8 @@
 from functools import cache
 from pathlib import Path
 
-from aqualog.campaign.logs import log_states, missing_lines
+from aqualog.campaign.definition import log_states, missing_lines, with_load
 from aqualog.campaign.matrix import campaign_matrix
-from aqualog.campaign.records import with_load
 from aqualog.config.campaign import read_campaign
 from aqualog.config.configured import configure, files_of
 from aqualog.core.errors import ConfigError

@@ -4,7 +4,7 @@ import csv
 from functools import partial
 
 from aqualog.campaign.batch import run_batch
-from aqualog.campaign.samples import load_results
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.vehicle import vehicle_toml

@@ -7,7 +7,7 @@ import numpy as np
 
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
 from aqualog.campaign.bins import plan
-from aqualog.campaign.samples import CampaignData, load_results
+from aqualog.campaign.results import CampaignData, load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.records import Unavailable

@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from aqualog.campaign.batch import run_batch
-from aqualog.campaign.samples import load_results
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.model import campaign as simulated

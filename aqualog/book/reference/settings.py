@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aqualog.book.markdown import code, fence, number, page, table
-from aqualog.campaign.records import GROUP_NAMES
+from aqualog.campaign.definition import GROUP_NAMES
 from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS
 from aqualog.config.reader import Key

@@ -9,16 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.core.intervals import student_quantile
-from aqualog.core.moments import Noise, block_moments, block_starts, second_difference
+from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.moments import Design, Noise, second_difference
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.regression import NOISE_MAX, jackknife
 
-__all__ = ["Interval", "Late", "Line", "Trend", "fit_line", "fit_trend", "lag_of_slip", "noise_of_traction"]
+__all__ = ["Late", "Line", "Trend", "fit_line", "fit_trend", "lag_of_slip", "noise_of_traction"]
 
-LEVEL = 0.95
 LEAST_BLOCKS = 5
 CORRECTED_FROM = 0.01  # share of k that noise of the traction takes away, from which it is given back
-NOISE_MAX = 0.30  # beyond, the correction rests on the noise more than on the data
 SHARED_MAX = 0.95  # of the traction with a / v; beyond, its errors of some percent count five times and more
 TRACTION_MIN = 1e-3  # [-] standard deviation; a slip of 3e-5 goes with it, less than any wheel speed resolves
 SLIP_MIN = 1e-7  # [-] standard deviation; measured speeds have more
@@ -29,14 +28,12 @@ TIMES_MAX = 10.0  # change of the slope beyond which a straight line in time say
 LAG_MAX = 0.5  # [s]
 LAG_SAMPLES = 20_000
 
+_STILL = "check the wheel mapping: two wheels on one channel, or a signal that stands still"
 _FEW = "a longer drive with straight stretches, or a larger --mu-max"
 _EVEN = "a drive that accelerates and coasts on a straight road"
 _APART = "a drive at different speeds or on grades, or --delay where it is known (`aqualog align`)"
 _TURNED = "check drivetrain, wheel mapping, and the sign and unit of the torque"
 _UNITS = "check the torque's unit and whether it is of one wheel, and the mass in the vehicle file"
-
-Interval = tuple[float, float]
-_NOWHERE: Interval = (math.nan, math.nan)
 
 
 class Late(NamedTuple):
@@ -83,7 +80,7 @@ class Line:
     reason: str = ""
     hint: str = ""
     delay: float = math.nan
-    delay_ci: Interval = _NOWHERE
+    delay_ci: Interval = NOWHERE
     shared: float = math.nan
 
     @property
@@ -99,7 +96,7 @@ class Line:
     @property
     def slope_ci(self) -> Interval:
         """Return the 95 % interval of the slope: the inverse of that of k, exact if 0 is outside [fieller1954]. [-]"""
-        return (1.0 / self.k_ci[1], 1.0 / self.k_ci[0]) if self.told else _NOWHERE
+        return (1.0 / self.k_ci[1], 1.0 / self.k_ci[0]) if self.told else NOWHERE
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +147,16 @@ def fit_line(
     """
     blocks = int(np.unique(label).size)
     spread = float(np.var(mu)) if mu.size else 0.0
-    reason, hint = _nothing_to_fit(blocks, spread, slip)
+    reason = hint = ""
+    if blocks < LEAST_BLOCKS:
+        reason, hint = f"too few stretches of usable driving: {blocks} of at least {LEAST_BLOCKS}", _FEW
+    elif not spread > TRACTION_MIN**2:
+        reason, hint = "the traction is constant", _EVEN
+    elif not float(np.std(slip)) > SLIP_MIN:
+        reason, hint = "the slip is constant", _STILL
     if reason:
         return Line(
-            math.nan, _NOWHERE, math.nan, _NOWHERE, math.nan, math.nan, is_corrected=False, samples=mu.size,
+            math.nan, NOWHERE, math.nan, NOWHERE, math.nan, math.nan, is_corrected=False, samples=mu.size,
             blocks=blocks, reason=reason, hint=hint,
         )  # fmt: skip
     fitted = late if late is not None and late.is_open else None
@@ -175,10 +178,19 @@ def fit_line(
         reason, hint = f"slip falls with traction (1 / slope is {k:.3f})", _TURNED
     elif attenuation > NOISE_MAX or shared > SHARED_MAX or not k_ci[0] > 0.0:
         reason, hint = _open_slope(mu, slip, label, k, k_ci, shared)
-    else:
-        reason, hint = _implausible(k, offset)
+    elif abs(offset) > OFFSET_MAX:
+        faster = 100.0 * (1.0 / (1.0 - offset) - 1.0) if offset < 1.0 else math.inf
+        word = "faster" if offset > 0.0 else "slower"
+        reason = (
+            f"the radii in the vehicle file do not fit: without traction the driven wheels run {abs(faster):.0f} % "
+            f"{word} than the free ones (or v_x)"
+        )
+        hint = "check r_e and the units of the wheel speeds"
+    elif not SLOPE_RANGE[0] <= 1.0 / k <= SLOPE_RANGE[1]:
+        low, high = SLOPE_RANGE
+        reason, hint = f"a slope of {1.0 / k:.3g} is outside what a tyre has ({low:g} to {high:g})", _UNITS
     residual = slip - k * mu - offset
-    delay, delay_ci = math.nan, _NOWHERE
+    delay, delay_ci = math.nan, NOWHERE
     if fitted is not None:
         delay = float(value[2])
         delay_ci = (delay - float(half[2]), delay + float(half[2]))
@@ -187,20 +199,6 @@ def fit_line(
         k, k_ci, offset, (offset - float(half[1]), offset + float(half[1])), float(np.sqrt(np.mean(residual**2))),
         attenuation, is_corrected, mu.size, blocks, reason, hint, delay, delay_ci, shared,
     )  # fmt: skip
-
-
-def _nothing_to_fit(blocks: int, spread: float, slip: FloatArray) -> tuple[str, str]:
-    """Return reason and hint if no line can be fitted; else empty texts."""
-    if blocks < LEAST_BLOCKS:
-        return f"too few stretches of usable driving: {blocks} of at least {LEAST_BLOCKS}", _FEW
-    if not spread > TRACTION_MIN**2:
-        return "the traction is constant", _EVEN
-    if not float(np.std(slip)) > SLIP_MIN:
-        return (
-            "the slip is constant",
-            "check the wheel mapping: two wheels on one channel, or a signal that stands still",
-        )
-    return "", ""
 
 
 def _alone(mu: FloatArray, late: Late, noise: float) -> tuple[float, float]:
@@ -230,37 +228,14 @@ def _open_slope(
     )  # fmt: skip
 
 
-def _implausible(k: float, offset: float) -> tuple[str, str]:
-    """Return reason and hint if this is no tyre; empty if it may be one."""
-    if abs(offset) > OFFSET_MAX:
-        faster = 100.0 * (1.0 / (1.0 - offset) - 1.0) if offset < 1.0 else math.inf
-        word = "faster" if offset > 0.0 else "slower"
-        return (
-            f"the radii in the vehicle file do not fit: without traction the driven wheels run {abs(faster):.0f} % "
-            f"{word} than the free ones (or v_x)", "check r_e and the units of the wheel speeds",
-        )  # fmt: skip
-    if not SLOPE_RANGE[0] <= 1.0 / k <= SLOPE_RANGE[1]:
-        low, high = SLOPE_RANGE
-        return f"a slope of {1.0 / k:.3g} is outside what a tyre has ({low:g} to {high:g})", _UNITS
-    return "", ""
-
-
 def _fit(
-    mu: FloatArray,
-    slip: FloatArray,
-    label: NDArray[np.int64],
-    noise: float,
-    late: Late | None,
-    *,
-    with_noise: bool,
+    mu: FloatArray, slip: FloatArray, label: NDArray[np.int64], noise: float, late: Late | None, *, with_noise: bool
 ) -> tuple[FloatArray, FloatArray]:
-    one = np.ones_like(mu)
+    columns: list[FloatArray] = [mu, np.ones_like(mu)]
     if late is None:
-        return _jackknife([mu, one], slip, label, [Noise(noise, (1.0, 0.0))])
-    noises = [Noise(noise, (1.0, 0.0, 0.0))]
-    if with_noise:
-        noises.append(Noise(1.0, (0.0, 0.0, late.noise)))
-    return _jackknife([mu, one, late.column], slip, label, noises)
+        return jackknife(Design(np.stack(columns), slip, label), [Noise(noise, (1.0, 0.0))])
+    noises = [Noise(noise, (1.0, 0.0, 0.0)), *([Noise(1.0, (0.0, 0.0, late.noise))] if with_noise else [])]
+    return jackknife(Design(np.stack([*columns, late.column]), slip, label), noises)
 
 
 def fit_trend(
@@ -274,19 +249,8 @@ def fit_trend(
 ) -> Trend:
     """Estimate the change of the slope with time, s = (k + k' tau) mu + delta + delta' tau, tau from -1/2 to 1/2.
 
-    Parameters
-    ----------
-    t : array (n,)
-        [s]
-    mu, slip, label, noise
-        As in `fit_line`.
-    late : Late, optional
-        A delay of the reference is estimated too, the same for the whole time.
-
-    Returns
-    -------
-    Trend
-        The offset may drift too: tyres warm up and grow.
+    Parameters as in `fit_line`, at times `t` (n,) [s]. With `late` a delay of the reference is estimated too, the same
+    for the whole time. The offset may drift: tyres warm up and grow.
     """
     tau = (t - t[0]) / (t[-1] - t[0]) - 0.5
     columns: list[FloatArray] = [mu, np.ones_like(mu), tau * mu, tau]
@@ -297,7 +261,7 @@ def fit_trend(
     noises = [Noise(noise if is_corrected else 0.0, noisy)]
     if late is not None and is_corrected:
         noises.append(Noise(1.0, (0.0, 0.0, 0.0, 0.0, late.noise)))
-    value, half = _jackknife(columns, slip, label, noises)
+    value, half = jackknife(Design(np.stack(columns), slip, label), noises)
     k = abs(float(value[0]))
     low, middle, high = (_change_of_slope((float(value[2]) + r * float(half[2])) / k) for r in (1.0, 0.0, -1.0))
     return Trend(middle, (low, high))
@@ -312,23 +276,10 @@ def _change_of_slope(c: float) -> float:
 
 
 def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, apart: int, k: float) -> float:
-    """Return the variance of that part of the fast changes of the traction which the slip does not follow.
+    """Return the variance of that part of the fast changes of the traction which the slip does not follow. [-]
 
-    Parameters
-    ----------
-    mu, slip : array (n,)
-        Samples in order of time. [-]
-    is_used : bool array (n,)
-        Which ones are fitted.
-    apart : int
-        Samples between values whose noise is independent: the length of the smoothing.
-    k : float
-        Slip per traction, 1 / C. [-]
-
-    Returns
-    -------
-    variance : float
-        Of the samples as they are. 0 where it cannot be estimated. [-]
+    Of samples (n,) in order of time [-], of which `is_used` are fitted. `apart`: samples between values whose noise is
+    independent, the length of the smoothing; `k`: slip per traction, 1 / C [-]. 0 where it cannot be estimated.
 
     From second differences D: real changes show in both, so var(D mu) - cov(D mu, D s) / k is noise alone, six times.
     Noise that changes more slowly than the smoothing stays undetected.
@@ -344,21 +295,10 @@ def noise_of_traction(mu: FloatArray, slip: FloatArray, is_used: BoolArray, *, a
 
 
 def lag_of_slip(mu: FloatArray, slip: FloatArray, is_used: BoolArray, dt: float) -> float:
-    """Return the delay of the slip against the traction: the shift with the best correlation.
+    """Return the delay of the slip against the traction [s]: the shift with the best correlation, good to 0.05 s.
 
-    Parameters
-    ----------
-    mu, slip : array (n,)
-        Samples in order of time. [-]
-    is_used : bool array (n,)
-        Which ones are compared; of more than 20,000, that many, evenly.
-    dt : float
-        [s]
-
-    Returns
-    -------
-    lag : float
-        NaN where nothing moves together within half a second. Good to 0.05 s. [s]
+    Of samples (n,) [-] every `dt` [s], of which `is_used` are compared, 20,000 at most. NaN where nothing moves
+    together within half a second.
     """
     step = max(1, round(0.02 / dt))
     shifts = np.arange(-int(LAG_MAX / dt / step), int(LAG_MAX / dt / step) + 1) * step
@@ -386,45 +326,3 @@ def _correlation(x: FloatArray, y: FloatArray) -> float:
     x = x - x.mean()
     size = math.sqrt(float(x @ x) * float(y @ y))
     return float(x @ y) / size if size > 1e-30 else 0.0
-
-
-def _jackknife(
-    columns: list[FloatArray], y: FloatArray, label: NDArray[np.int64], noises: list[Noise]
-) -> tuple[FloatArray, FloatArray]:
-    """Fit by least squares with the noise of the design subtracted from its moments; errors by leaving out blocks.
-
-    Parameters
-    ----------
-    columns : list of p arrays (n,)
-        Of the design.
-    y : array (n,)
-    label : int array (n,)
-        Ascending.
-    noises : list of Noise
-        Independent of each other.
-
-    Returns
-    -------
-    value, half : array (p,)
-        Estimate and half width of the 95 % interval.
-    """
-    first = block_starts(label)
-    unit = np.array([math.sqrt(float(np.mean(c * c))) or 1.0 for c in columns])  # they differ by orders of magnitude
-    p = unit.size
-    h, g = block_moments(columns, y, first, noises=noises)
-    h, g = h / np.multiply.outer(unit, unit), g / unit
-    inverse = np.linalg.pinv(h.sum(axis=0), rcond=1e-9, hermitian=True)
-    value = inverse @ g.sum(axis=0)
-    without = np.einsum("bij,bj->bi", np.linalg.pinv(h.sum(axis=0) - h, rcond=1e-9, hermitian=True), g.sum(axis=0) - g)
-    blocks = first.size
-    sigma = np.sqrt((blocks - 1) / blocks * np.sum((without - value) ** 2, axis=0))
-    half = np.zeros(p)
-    for i in (j for j in range(p) if sigma[j] > 0.0):
-        # information of a block about a parameter: what its samples weigh in the estimate
-        weight = np.zeros_like(y)
-        for c, w in zip(columns, inverse[i] / unit, strict=True):
-            weight += w * c
-        inform = np.add.reduceat(weight * weight, first)
-        dof = max(float(inform.sum() ** 2 / np.sum(inform**2)) - 1.0, 1.0)
-        half[i] = student_quantile(0.5 + LEVEL / 2.0, dof) * sigma[i]
-    return value / unit, half / unit

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.intervals import Interval
 from aqualog.core.records import FloatArray
-from aqualog.detect.slip_slope.regression import TIMES_MAX, Interval, Late, Line, fit_line, fit_trend
+from aqualog.detect.slip_slope.regression import TIMES_MAX, Late, Line, fit_line, fit_trend
 
 __all__ = ["Segment", "Stability", "Verdict", "block_labels", "judge_stability", "make_segments", "percent"]
 

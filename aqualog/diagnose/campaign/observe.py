@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.campaign.records import loads_of
-from aqualog.campaign.resistance import dry_level
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.definition import loads_of
+from aqualog.campaign.means import dry_level
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import WIND_UP
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray

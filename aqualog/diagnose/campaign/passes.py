@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.campaign.expect import Driven, respond

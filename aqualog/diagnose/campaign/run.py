@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from aqualog.campaign.records import Campaign
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.definition import Campaign
+from aqualog.campaign.results import CampaignData
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.campaign.advice import advice
@@ -62,7 +62,7 @@ def diagnose_campaign(
     campaign : Campaign
         For its name.
     data : CampaignData
-        Its results (`aqualog.campaign.samples.load_results`).
+        Its results (`aqualog.campaign.results.load_results`).
     vehicle : Vehicle, optional
         In place of the runs' vehicle files, without load.
     seed : int

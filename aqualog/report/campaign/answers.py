@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from aqualog.campaign.bins import Group
 from aqualog.campaign.full_speed import FullSpeed
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.results import CampaignData
 from aqualog.report.campaign.findings import Curve, Findings, crossing
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.campaign.run_page import RunFacts

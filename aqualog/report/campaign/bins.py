@@ -9,10 +9,10 @@ from typing import Any
 from aqualog import __version__
 from aqualog.campaign.bins import Group, Plan
 from aqualog.campaign.full_speed import FullSpeed
-from aqualog.campaign.regress import Interval
-from aqualog.campaign.resistance import MeanRow, ResistanceTable
+from aqualog.campaign.means import MeanRow, ResistanceTable
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable
 from aqualog.campaign.spin_downs import SpinDownRow
+from aqualog.core.intervals import Interval
 from aqualog.core.notation import SIDES
 from aqualog.report.sections import Lines, Para, Report, Section, Table
 from aqualog.report.values import KMH, ends, fields_of, plain

@@ -9,10 +9,10 @@ from typing import TypeVar
 
 from aqualog.campaign.bins import Group, Plan, group_of
 from aqualog.campaign.full_speed import FullSpeed, full_speeds
-from aqualog.campaign.regress import NOWHERE, Interval
-from aqualog.campaign.resistance import MeanRow, ResistanceTable, resistances
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.means import MeanRow, ResistanceTable, resistances
+from aqualog.campaign.results import CampaignData
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
+from aqualog.core.intervals import NOWHERE, Interval
 from aqualog.report.values import KMH
 
 __all__ = [

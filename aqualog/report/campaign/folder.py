@@ -13,7 +13,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from aqualog.campaign.bins import Group
-from aqualog.campaign.samples import CampaignData
+from aqualog.campaign.results import CampaignData
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
 from aqualog.io.atomic_write import write_text

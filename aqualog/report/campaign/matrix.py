@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from aqualog import __version__
-from aqualog.campaign.logs import LogState, missing_lines
+from aqualog.campaign.definition import Campaign, LogState, missing_lines
 from aqualog.campaign.matrix import FEW, TOO_FEW, Configuration, Matrix
 from aqualog.campaign.propose_files import NEEDED
-from aqualog.campaign.records import Campaign
 from aqualog.campaign.tables import StoredRun
 from aqualog.core.vehicle import Vehicle
 from aqualog.report.sections import Lines, Para, Report, Section, Table

@@ -8,7 +8,7 @@ from typing import Any
 from aqualog import __version__
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import campaign_matrix
-from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import DETECTORS
 from aqualog.report.campaign.answers import RESISTANCE_LEVEL, Answer, answers_of, headline, off_water, summaries

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import TOO_FEW
-from aqualog.campaign.samples import CampaignData, RunInfo
+from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.records import TimeFaults
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.values import counted, cut

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Event, FloatArray
 from aqualog.detect.registry import DETECTORS

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from aqualog.align.load import load_signals
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, DriveResult, FloatArray
 from aqualog.detect.stream import detect_drive

@@ -10,13 +10,14 @@ import numpy as np
 
 from aqualog.campaign.bins import Pool, pooled
 from aqualog.campaign.full_speed import fit_half
-from aqualog.campaign.regress import Design, estimate
-from aqualog.campaign.resistance import dry_level
-from aqualog.campaign.samples import RunInfo, RunSamples
+from aqualog.campaign.means import dry_level
+from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.campaign.slip_slope import SlopeRow
 from aqualog.campaign.spin_downs import Pass, passes
 from aqualog.core.intervals import student_quantile
+from aqualog.core.moments import Design
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.regression import estimate
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 
 __all__ = [
@@ -109,7 +110,7 @@ def pool_of(evidence: Evidence, runs: Sequence[RunInfo], columns: Columns) -> Po
 def resistance_of() -> Columns:
     """Resistance measure on water minus the run's own level on the dry road before it. [m/s²]
 
-    A run with less than a second of dry road before the water has no value, as in `campaign.resistance`.
+    A run with less than a second of dry road before the water has no value, as in `campaign.means`.
     """
 
     def columns(_: RunInfo, samples: RunSamples) -> tuple[BoolArray, FloatArray]:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.core.errors import FitError
 from aqualog.thesis.catalogue import Wish
 from aqualog.thesis.record import RunsUsed

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.detect.joint_criteria import CRITERIA
 from aqualog.detect.slip_slope.activation import CORNERING
 from aqualog.thesis.catalogue import rows

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from aqualog.campaign.bins import Pool
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.report.theme import INK, MUTED, THRESHOLD
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit

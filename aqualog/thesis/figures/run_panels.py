@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from aqualog.campaign.bins import Pool
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.report.theme import INK, WATER, WHEEL_COLOURS, wheel_colour

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.campaign.bins import KMH, Plan
-from aqualog.campaign.samples import RunInfo
+from aqualog.campaign.results import RunInfo
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.thesis.catalogue import figure_of, needs_of

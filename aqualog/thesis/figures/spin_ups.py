@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from aqualog.campaign.bins import Plan, Pool
-from aqualog.campaign.samples import RunInfo, RunSamples
-from aqualog.campaign.spin_ups import is_spinning, spin_ups
+from aqualog.campaign.means import is_spinning, spin_ups
+from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.report.theme import wheel_colour
 from aqualog.thesis.catalogue import figure_of, needs_of

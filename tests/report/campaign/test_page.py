@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from aqualog.campaign.samples import RunInfo, RunSamples
+from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.report.campaign.answers import answers_of

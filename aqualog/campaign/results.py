@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from aqualog.campaign.definition import Run
 from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
-from aqualog.campaign.records import Run
 from aqualog.campaign.store import Store
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import BoolArray, FloatArray
@@ -120,13 +120,7 @@ class CampaignData:
         return tuple(r for r in self.runs if r.is_done)
 
     def samples(self, info: RunInfo) -> RunSamples:
-        """Samples of a run.
-
-        Raises
-        ------
-        LogError
-            If its file in the store is damaged.
-        """
+        """Samples of a run; LogError if its file in the store is damaged."""
         frame = self._read(info.key)
         t: FloatArray = frame["t"].to_numpy()
         return RunSamples(frame, t, _on_water(info, frame, t, self.labels_of(info)))
@@ -141,10 +135,7 @@ def load_results(
 ) -> CampaignData:
     """The store's results of a campaign; runs without results are included, with the reason.
 
-    Raises
-    ------
-    AqualogError
-        If a result is damaged; with `damaged_fail` its run has failed.
+    AqualogError if a result is damaged; with `damaged_fail` its run has failed instead.
     """
     jobs = plan_jobs(configured, Contents(store.read_json("contents.json"))) if jobs is None else jobs
     done, failed = store.keys()

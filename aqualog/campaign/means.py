@@ -1,4 +1,4 @@
-"""Resistance measure over speed: one row per configuration, road and bin of speed."""
+"""Means over cells: resistance measure, and traction of driven wheels while they spin up."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, cells
-from aqualog.campaign.regress import NOWHERE, Design, Interval, estimate
-from aqualog.campaign.samples import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, cells, driven_of
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import LIMITS, Limits, too_few_runs
-from aqualog.core.records import FloatArray
+from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.moments import Design
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.regression import estimate
+from aqualog.physics.load import wheel_loads
+from aqualog.physics.traction import residual_traction
 
-__all__ = ["MeanRow", "ResistanceTable", "dry_level", "mean_of_cell", "resistances"]
+__all__ = [
+    "SPINNING", "MeanRow", "ResistanceTable", "dry_level", "is_spinning", "mean_of_cell", "resistances", "spin_ups",
+]  # fmt: skip
 
 DRY_S = 1.0  # [s] of dry driving before the lane that a run's own level needs
 
@@ -59,16 +66,9 @@ def resistances(
 ) -> ResistanceTable:
     """Mean resistance measure of all cells.
 
-    Parameters
-    ----------
-    data, plan
-    relative : bool
-        Subtract the run's own level on dry road before the lane (at least a second). This removes errors of mass,
-        rolling resistance, grade and accelerometer offset. A run without such a stretch is left out and counted.
-    robust : bool
-        Huber's weights [huber1981].
-    limits : Limits
-        Least runs and samples.
+    `relative`: subtract the run's own level on dry road before the lane (at least a second). This removes errors of
+    mass, rolling resistance, grade and accelerometer offset. A run without such a stretch is left out and counted.
+    `robust`: Huber's weights [huber1981].
 
     Thesis: Eq. (2.9), Figs 2.11 to 2.15.
     """
@@ -117,3 +117,46 @@ def mean_of_cell(cell: Cell, column: str, limits: Limits = LIMITS, *, robust: bo
     if found.runs < limits.runs:
         return MeanRow(*bare, v, value, reason=too_few_runs(found.runs, limits))
     return MeanRow(*bare, v, value, found.interval(0), scatter, dof, reliable=True)
+
+
+SPIN_LIMITS = Limits(samples=3)
+SPINNING = 0.10  # [-] slip from which a brush of slope 30 and friction 1 slides as a whole: 3 mu / C (D)
+
+
+def spin_ups(
+    data: CampaignData, plan: Plan, *, residual: bool = False, limits: Limits = SPIN_LIMITS
+) -> tuple[MeanRow, ...]:
+    """Mean traction coefficient [-] on the lane while a wheel spins up, per configuration, driven wheel and bin.
+
+    `residual`: subtract the missing acceleration of the vehicle (`physics.traction.residual_traction`); the rest pushes
+    the car and is a lower bound. Otherwise the traction is the torque minus the wheel's own acceleration; on water it
+    also turns the wheel against the increased rolling resistance.
+
+    Slip defines spinning (`is_spinning`), not the detector's events. The detector reports spin-ups only below a
+    traction of 0.07, to exclude other slippery surfaces; a mean over its events would have no values above that.
+
+    Thesis: Fig. 2.7.
+    """
+
+    def columns(info: RunInfo, samples: RunSamples, wheel: str) -> Picked | str:
+        mu = samples.array(f"mu_{wheel}")
+        if np.isnan(mu).all():
+            return "no traction: no torque of the driven wheels"
+        if residual:
+            car = info.vehicle
+            a_x = np.nan_to_num(samples.array("a_x"))
+            loads = wheel_loads(
+                a_x, np.zeros_like(a_x), mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg, track=car.track
+            )
+            mu = residual_traction(mu, samples.array("delta_a_x"), loads[WHEELS.index(wheel)], mass=car.mass)
+        return Picked({"v_x": samples.array("v_x"), "mu": mu}, {"no spin-up": ~is_spinning(samples, wheel)})
+
+    found, _ = cells(data, plan, wheels=driven_of, columns=columns, road="wet", only_usable=False)
+    return tuple(mean_of_cell(c, "mu", limits) for c in found)
+
+
+def is_spinning(samples: RunSamples, wheel: str) -> BoolArray:
+    """Steps in which the rim is all the time faster than the car by `SPINNING`."""
+    with np.errstate(invalid="ignore"):
+        spins: BoolArray = samples.array(f"slip_min_{wheel}") > SPINNING
+    return spins

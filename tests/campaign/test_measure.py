@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.align.load import LoadedLong, load_drive, load_signals
-from aqualog.campaign import thin
+from aqualog.campaign import measure as measuring
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.measure import measure, measure_long
 from aqualog.campaign.store import Store
@@ -87,7 +87,7 @@ def test_short_and_slow_drives(tmp_path, dt, seconds):
         whole, long = both(path, RWD, rows)
         assert long.samples.equals(whole.samples)
         assert long.about == whole.about
-    assert whole.samples.height == round(seconds / dt) // max(1, round(thin.STEP_S / dt))
+    assert whole.samples.height == round(seconds / dt) // max(1, round(measuring.STEP_S / dt))
 
 
 def test_bits_are_those_of_their_detectors(tmp_path):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.campaign import moments
-from aqualog.campaign.regress import Design, estimate
-from aqualog.core.moments import block_starts
+from aqualog.core import regression
+from aqualog.core.moments import Design, block_starts, moments_of
+from aqualog.core.regression import estimate
 from tests.campaign.slope_coverage import World, made, study
 
 
@@ -115,12 +115,6 @@ def test_units_of_the_columns_do_not_matter():
     assert other.half[0] * 1e4 == pytest.approx(one.half[0], rel=1e-6)
 
 
-def test_drawing_each_run_once_is_the_fit_itself():
-    d = made(World(runs=6), np.random.default_rng(12))
-    found = estimate(d)
-    assert found.parts.again(np.ones((1, 6)))[0] == pytest.approx(found.value[0], rel=1e-6)
-
-
 @pytest.mark.parametrize("p", [1, 2, 3])
 def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
     """-2 log of the restricted likelihood with V = sigma^2 I + X T X' written out, run by run."""
@@ -133,7 +127,7 @@ def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
     )
     grid = np.concatenate([np.zeros((1, p)), 10.0 ** rng.uniform(-2, 2, (6, p))])
     d = Design(columns, y, run, np.arange(run.size), (True,) * p, (False,) * p)
-    found = moments._unlikelihood(moments.moments_of(d, block_starts(run), np.ones_like(y)), variance, grid)
+    found = regression._unlikelihood(moments_of(d, block_starts(run), np.ones_like(y)), variance, grid)
     dense = []
     for t in grid:
         V = np.where(run[:, None] == run, columns.T @ (t[:, None] * columns), 0.0) + variance * np.eye(run.size)

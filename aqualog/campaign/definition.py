@@ -1,11 +1,14 @@
-"""A measuring campaign: which logs were driven in which configuration, with which load; parts of it for machines."""
+"""A measuring campaign: which logs were driven in which configuration and load, which exist, and parts of it."""
 
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,8 +17,8 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import centre_shift
 
 __all__ = [
-    "GROUP_NAMES", "Campaign", "Run", "Shard", "group_keys", "loads_of", "number_of", "part_of", "shard_of",
-    "with_load",
+    "GROUP_NAMES", "Campaign", "LogState", "Run", "Shard", "group_keys", "loads_of", "log_states", "missing_lines",
+    "near_name", "number_of", "part_of", "shard_of", "with_load",
 ]  # fmt: skip
 
 _MOST_PARTS = 100_000
@@ -71,13 +74,7 @@ class Campaign:
 
 
 def group_keys(names: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
-    """Keys behind the value of --by.
-
-    Raises
-    ------
-    ConfigError
-        Names all unknown keys, with the most similar existing ones.
-    """
+    """Keys behind the value of --by; ConfigError names all unknown ones, with the most similar existing ones."""
     found: list[str] = []
     wrong: list[str] = []
     for name in names:
@@ -133,12 +130,7 @@ class Shard:
 
 
 def shard_of(text: str) -> Shard:
-    """The shard of a text such as `2/8`.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """The shard of a text such as `2/8`; ConfigError for any other text."""
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
     shard = Shard(int(match[1]), int(match[2])) if match else Shard(0, 0)
     if not 1 <= shard.index <= shard.count <= _MOST_PARTS:
@@ -161,3 +153,64 @@ def number_of(campaign: Campaign, logs: Sequence[Path]) -> int:
     base = campaign.path.parent
     names = [p.relative_to(base) if p.is_relative_to(base) else p for p in logs]
     return zlib.crc32("\n".join(p.as_posix() for p in names).encode())
+
+
+MOST_NEAR = 20  # missing logs for which a folder is searched for a similar name
+
+
+@dataclass(frozen=True, slots=True)
+class LogState:
+    """One file: its size [byte], None if it is not there; `place` of the first run that names it, and `runs` naming it.
+
+    `near` is a file beside it with a similar name, where it is missing.
+    """
+
+    path: Path
+    size: int | None
+    place: str
+    runs: int
+    near: str = ""
+
+
+def log_states(campaign: Campaign, places: Sequence[str] = ()) -> tuple[LogState, ...]:
+    """State of every file that the runs name, each once; a ROS 2 bag is one, with the size of its files.
+
+    `places`: where each run stands (`config.campaign.read_campaign`); empty: the campaign file.
+    """
+    first: dict[Path, str] = {}
+    count = Counter(path for run in campaign.runs for path in run.logs)
+    for index, run in enumerate(campaign.runs):
+        for path in run.logs:
+            first.setdefault(path, places[index] if places else campaign.path.name)
+    states = []
+    searched = 0
+    for path, place in first.items():
+        near = ""
+        size: int | None = None
+        with suppress(OSError):
+            files = [p for p in path.iterdir() if p.is_file()] if path.is_dir() else [path]
+            size = sum(p.stat().st_size for p in files)
+        if size is None and searched < MOST_NEAR:
+            searched += 1
+            near = near_name(path)
+        states.append(LogState(path, size, place, count[path], near))
+    return tuple(states)
+
+
+def near_name(path: Path) -> str:
+    """A file beside a missing one with a similar name, or an empty string."""
+    try:
+        names = [n.name for n in os.scandir(path.parent)]
+    except OSError:
+        return ""
+    near = difflib.get_close_matches(path.name, names[:2000], n=1, cutoff=0.75)
+    return near[0] if near else ""
+
+
+def missing_lines(states: Sequence[LogState], most: int = 10) -> list[str]:
+    """One sentence per log that is missing, at most `most` of them and how many there are beyond."""
+    missing = [s for s in states if s.size is None]
+    lines = [
+        f"{s.place}: no such log {s.path}" + (f' (did you mean "{s.near}"?)' if s.near else "") for s in missing[:most]
+    ]
+    return [*lines, f"and {len(missing) - most} more logs are missing"] if len(missing) > most else lines

@@ -1,0 +1,349 @@
+"""Straight lines and means over samples in groups: the blocks of one drive, or the runs of a campaign.
+
+One way for both: a design, its moments in each group, the fit, the interval. `jackknife` knows the noise of the columns
+and leaves out one block after the other. `estimate` finds the noise, and lets coefficients scatter from run to run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aqualog.core.compiled import compiled
+from aqualog.core.intervals import Interval, half_width
+from aqualog.core.moments import (
+    APART,
+    Design,
+    Index,
+    Moments,
+    Noise,
+    block_moments,
+    block_starts,
+    moments_of,
+    run_numbers,
+)
+from aqualog.core.records import FloatArray
+
+__all__ = ["NOISE_MAX", "Estimate", "estimate", "jackknife"]
+
+NOISE_MAX = 0.30  # share of a coefficient; beyond, its correction rests on the noise more than on the data
+ROUNDS = 12
+MAD = 1.4826  # standard deviation over median absolute deviation, normal noise
+HUBER = 1.345  # residuals beyond so many standard deviations count less; 95 % efficient on normal noise
+LAGS = 30  # samples over which the errors of a run may be correlated
+_EXPONENTS = np.linspace(-2.0, 9.0, 12)  # decades of the variance between runs over that of a run's own coefficient
+
+
+def jackknife(d: Design, noises: Sequence[Noise]) -> tuple[FloatArray, FloatArray]:
+    """Fit by least squares with known noise of the columns subtracted from their moments; errors by leaving out blocks.
+
+    The noises are independent of each other. Returns estimate and half width of the 95 % interval, (p,) each; degrees
+    of freedom count the blocks by their information.
+    """
+    first = block_starts(d.run)
+    unit = np.array([math.sqrt(float(np.mean(c * c))) or 1.0 for c in d.columns])  # they differ by orders of magnitude
+    h, g = block_moments(d.columns, d.y, first, noises=noises)
+    h, g = h / np.multiply.outer(unit, unit), g / unit
+    inverse = np.linalg.pinv(h.sum(axis=0), rcond=1e-9, hermitian=True)
+    value = inverse @ g.sum(axis=0)
+    without = np.einsum("bij,bj->bi", np.linalg.pinv(h.sum(axis=0) - h, rcond=1e-9, hermitian=True), g.sum(axis=0) - g)
+    blocks = first.size
+    sigma = np.sqrt((blocks - 1) / blocks * np.sum((without - value) ** 2, axis=0))
+    half = np.zeros(unit.size)
+    for i in np.flatnonzero(sigma > 0.0).tolist():
+        # information of a block about a parameter: what its samples weigh in the estimate
+        weight = np.zeros_like(d.y)
+        for c, w in zip(d.columns, inverse[i] / unit, strict=True):
+            weight += w * c
+        inform = np.add.reduceat(weight * weight, first)
+        half[i] = half_width(float(sigma[i]), max(float(inform.sum() ** 2 / np.sum(inform**2)) - 1.0, 1.0))
+    return value / unit, half / unit
+
+
+class _Working(NamedTuple):
+    """The model that the weights come from; the intervals do not require it to be true."""
+
+    variance: float  # of a residual within a run, times the samples that count as one, since errors are correlated
+    between: FloatArray  # (p,) variance of the coefficients from run to run
+
+
+def _about_own_mean(d: Design, m: Moments, w: _Working) -> Moments:
+    """The noise's moments without the part that a run's own offset absorbs with the mean of the noise.
+
+    The mean of n samples whose noise is independent after `APART` of them keeps `APART` / n of its variance, and the
+    offset absorbs the share n T / (sigma^2 + n T) of it, with intercepts that scatter by T. Without this, k would be 3
+    % too large in runs of 30 samples where noise is a third of the variation.
+    """
+    is_one = np.ptp(d.columns, axis=1) == 0.0
+    if not is_one.any():
+        return m
+    own = m.weight * float(w.between[is_one].max())
+    keeps = np.maximum(1.0 - APART / np.maximum(m.weight, APART) * own / (w.variance + own), 0.0)
+    return m._replace(h_noise=m.h_noise * keeps[:, None, None], c_noise=m.c_noise * keeps[:, None])
+
+
+def _working_model(d: Design, first: Index, m: Moments, weight: FloatArray) -> _Working:
+    """Variances within and between the runs."""
+    own = np.einsum("gij,gj->gi", np.linalg.pinv(m.h, rcond=1e-8, hermitian=True), m.c)
+    run = run_numbers(d, first)
+    e = d.y - np.einsum("ig,gi->g", d.columns, own[run]) if d.y.size else d.y
+    e = e * np.sqrt(weight)
+    memory = _memory(e, run, d.step)
+    free = np.maximum(m.weight - len(d.columns) * memory, 0.2 * m.weight)
+    variance = max(float(e @ e) / float(free.sum()), 1e-30) * memory
+    between = _between(m, variance, np.array(d.scatters)) if first.size > 1 else np.zeros(len(d.columns))
+    return _Working(variance, between)
+
+
+def _memory(e: FloatArray, run: Index, step: Index) -> float:
+    """Number of neighbouring samples that count as one: 1 + 2 (sum of the autocorrelation up to its first zero)."""
+    power = float(e @ e)
+    if not power > 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(LAGS, e.size - 1) + 1):
+        pair = (run[lag:] == run[:-lag]) & (step[lag:] - step[:-lag] == lag)
+        count = int(np.count_nonzero(pair))
+        r = float((e[lag:] * e[:-lag])[pair].sum()) / power * e.size / count if count else 0.0
+        if r <= 0.0:
+            break
+        total += 2.0 * min(r, 1.0)
+    return total
+
+
+def _between(m: Moments, variance: float, scatters: NDArray[np.bool_]) -> FloatArray:
+    """Variance of the coefficients from run to run that makes the data most likely (restricted), on a grid."""
+    p = m.c.shape[1]
+    diagonal = np.einsum("gii->gi", m.h)
+    scale = np.array([variance / max(float(np.median(diagonal[:, i])), 1e-30) for i in range(p)])
+    axis = np.concatenate([[0.0], 10.0**_EXPONENTS])
+    axes = [scale[i] * axis if scatters[i] else np.zeros(1) for i in range(p)]
+    best = np.zeros(p)
+    for finer in range(2):
+        grid = np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
+        best = grid[int(np.argmin(_unlikelihood(m, variance, grid)))]
+        if finer == 0:
+            step = 10.0 ** (np.linspace(-0.75, 0.75, 7) * (_EXPONENTS[1] - _EXPONENTS[0]))
+            axes = [best[i] * step if best[i] > 0.0 else np.zeros(1) for i in range(p)]
+    return best
+
+
+def _unlikelihood(m: Moments, variance: float, grid: FloatArray) -> FloatArray:
+    """-2 log of the restricted likelihood, without a constant, for each row of `grid` (q, p)."""
+    k, a, b, spread = _weighed(variance, m.h, m.c, grid)
+    value = np.einsum("qij,qj->qi", np.linalg.pinv(a, rcond=1e-10, hermitian=False), b)
+    # residual sum of squares without y'y, which is the same for all
+    rss = -2.0 * value @ m.c.sum(axis=0) + np.einsum("qi,ij,qj->q", value, m.h.sum(axis=0), value)
+    explained = _explained(k, m.h, m.c, grid, value)
+    result: FloatArray = spread + np.linalg.slogdet(a)[1] + (rss - explained) / variance
+    return result
+
+
+@compiled
+def _inverse(x, out):  # type: ignore[no-untyped-def]
+    """|det x| of a small matrix (p, p), which is used up; its inverse into `out`. Gauss and Jordan with pivots."""
+    p = x.shape[0]
+    for i in range(p):
+        for j in range(p):
+            out[i, j] = 1.0 if i == j else 0.0
+    determinant = 1.0
+    for i in range(p):
+        best = i
+        for r in range(i + 1, p):
+            if abs(x[r, i]) > abs(x[best, i]):
+                best = r
+        for j in range(p):
+            x[i, j], x[best, j] = x[best, j], x[i, j]
+            out[i, j], out[best, j] = out[best, j], out[i, j]
+        pivot = x[i, i]
+        determinant *= abs(pivot)
+        for j in range(p):
+            x[i, j] /= pivot
+            out[i, j] /= pivot
+        for r in range(p):
+            if r != i:
+                factor = x[r, i]
+                for j in range(p):
+                    x[r, j] -= factor * x[i, j]
+                    out[r, j] -= factor * out[i, j]
+    return determinant
+
+
+@compiled
+def _weighed(variance, h, c, grid):  # type: ignore[no-untyped-def]
+    """For each row T of `grid`: K = (sigma^2 I + H T)^-1 of the runs (q, g, p, p), sums of K H and of K c over them,
+    and the sum of log |I + H T / sigma^2|.
+    """
+    q, (g, p) = grid.shape[0], c.shape
+    k, a, b, spread = np.empty((q, g, p, p)), np.zeros((q, p, p)), np.zeros((q, p)), np.zeros(q)
+    inner = np.empty((p, p))
+    for n in range(q):
+        for r in range(g):
+            for i in range(p):
+                for j in range(p):
+                    inner[i, j] = (variance if i == j else 0.0) + h[r, i, j] * grid[n, j]
+            own = k[n, r]
+            spread[n] += math.log(_inverse(inner, own) / variance**p)
+            for i in range(p):
+                for j in range(p):
+                    b[n, i] += own[i, j] * c[r, j]
+                    for other in range(p):
+                        a[n, i, other] += own[i, j] * h[r, j, other]
+    return k, a, b, spread
+
+
+@compiled
+def _explained(k, h, c, grid, value):  # type: ignore[no-untyped-def]
+    """Sum over the runs of s' T K s with s = c - H value, for each row of `grid`. (q,)"""
+    q, (g, p) = grid.shape[0], c.shape
+    out, s = np.zeros(q), np.empty(p)
+    for n in range(q):
+        for r in range(g):
+            for i in range(p):
+                s[i] = c[r, i]
+                for j in range(p):
+                    s[i] -= h[r, i, j] * value[n, j]
+            for i in range(p):
+                for j in range(p):
+                    out[n] += s[i] * grid[n, i] * k[n, r, i, j] * s[j]
+    return out
+
+
+def _huber_weights(d: Design, first: Index, m: Moments, w: _Working, value: FloatArray) -> FloatArray:
+    """Weights of the samples, by their residual about the line of their own run."""
+    s = m.c - m.h @ value
+    k = np.linalg.inv(w.variance * np.eye(value.size) + m.h * w.between)
+    own = value + w.between * np.einsum("gij,gj->gi", k, s)
+    run = run_numbers(d, first)
+    e = d.y - np.einsum("in,ni->n", d.columns, own[run])
+    scale = max(MAD * float(np.median(np.abs(e))), 1e-12)
+    weight: FloatArray = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(e), 1e-30))
+    return weight
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Coefficients of a fit.
+
+    `value`, `half` (p,): estimates and half widths of the 95 % intervals, infinite with one run; `dof` (p,) degrees of
+    freedom; `scatter` (p,) standard deviation of the coefficients from run to run; `attenuation` share of the noisy
+    column's coefficient that plain least squares would have lost [-]; `noise` variance of that column's noise; numbers
+    of `runs` and `samples`.
+    """
+
+    value: FloatArray
+    half: FloatArray
+    dof: FloatArray
+    scatter: FloatArray
+    attenuation: float
+    noise: float
+    runs: int
+    samples: int
+
+    def interval(self, i: int) -> Interval:
+        """95 % interval of a coefficient."""
+        return float(self.value[i] - self.half[i]), float(self.value[i] + self.half[i])
+
+
+def estimate(design: Design, *, robust: bool = False) -> Estimate:
+    """Fit y = columns' coefficient, with coefficients that scatter from run to run.
+
+    At least one run, and no NaN. `robust`: Huber's weights [huber1981], on the residuals about each run's own line.
+
+    Generalised least squares with V = sigma^2 I + X T X' per run: the intercepts, and on request the slopes, scatter
+    about a mean (T by restricted likelihood), the errors within a run are correlated (sigma^2 counts `memory` samples
+    as one). With p columns all of it needs X'X and X'y of each run only. Variation within runs and differences between
+    runs both count, with weights from the data.
+
+    Noise of the traction biases k towards 0. Its moments, from second differences over `APART` samples, are subtracted
+    from X'X and X'y alike, so that the estimate stays consistent; run by run, so that the error of the noise is in the
+    intervals too.
+
+    Intervals: cluster-robust variance of the runs' scores with the correction of Bell and McCaffrey (CR2 [bell2002])
+    and Satterthwaite's degrees of freedom [satterthwaite1946], as Pustejovsky and Tipton [pustejovsky2018] give them
+    for weighted fits: they hold with a handful of runs, and whether or not the model behind the weights is right.
+    """
+    unit = np.sqrt(np.mean(design.columns**2, axis=1))
+    unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
+    d = design._replace(columns=design.columns / unit[:, None])
+    first = block_starts(d.run)
+    weight = np.ones_like(d.y)
+    moments = moments_of(d, first, weight)
+    working = _working_model(d, first, moments, weight)
+    moments = _about_own_mean(d, moments, working)
+    value, k = _solve(moments, working)
+    for _ in range(ROUNDS if robust else 0):
+        weight = _huber_weights(d, first, moments, working, value)
+        moments = moments_of(d, first, weight)
+        working = _working_model(d, first, moments, weight)
+        moments = _about_own_mean(d, moments, working)
+        old, (value, k) = value, _solve(moments, working)
+        if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
+            break
+    half, dof = _half_widths(moments, k, value)
+    # a clipped residual does not depend on the coefficients, though its weight is not zero ([huber1981], chapter 7)
+    half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
+    i = d.noisy.index(True) if any(d.noisy) else -1
+    noise = 0.0
+    if i >= 0:  # fast changes that y does not follow
+        m = moments_of(d, first, weight)
+        real = float(m.c_noise[:, i].sum()) / float(value[i]) if value[i] != 0.0 else 0.0
+        noise = max(float(m.h_noise[:, i, i].sum()) - max(real, 0.0), 0.0) / float(m.weight.sum())
+    return Estimate(
+        value / unit, half / unit, dof, np.sqrt(working.between) / unit, _attenuation(moments, k, noise, i),
+        noise * (float(unit[i]) ** 2 if i >= 0 else 0.0), first.size, d.y.size,
+    )  # fmt: skip
+
+
+def _solve(m: Moments, w: _Working) -> tuple[FloatArray, FloatArray]:
+    """Coefficients, and the weights K = (sigma^2 I + H T)^-1 of the runs' moments (g, p, p)."""
+    k = np.linalg.inv(w.variance * np.eye(m.c.shape[1]) + m.h * w.between)
+    a = np.einsum("gij,gjk->ik", k, m.h - m.h_noise)
+    b = np.einsum("gij,gj->i", k, m.c - m.c_noise)
+    value: FloatArray = np.linalg.pinv(a, rcond=1e-10) @ b
+    return value, np.asarray(k, dtype=np.float64)
+
+
+def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Half widths of the 95 % intervals and degrees of freedom, by the scores of the runs."""
+    p, g = value.size, k.shape[0]
+    if g < 2:
+        return np.full(p, np.inf), np.zeros(p)
+    plain = np.einsum("gij,gjk->gik", k, m.h)
+    plain = 0.5 * (plain + np.swapaxes(plain, 1, 2))
+    size, axes = np.linalg.eigh(plain.sum(axis=0))
+    size = np.maximum(size, 1e-12 * size[-1])
+    root, unroot = (axes * size**-0.5) @ axes.T, (axes * size**0.5) @ axes.T  # M^(1/2), M^(-1/2)
+    share, turn = np.linalg.eigh(root @ plain @ root)  # share of a run in the whole: B
+    share = np.clip(share, 0.0, 1.0 - 1e-6)
+    grow = np.einsum("gij,gj,gkj->gik", turn, (1.0 - share) ** -0.5, turn)
+    score = np.einsum("gij,gj->gi", k, m.c - m.c_noise - (m.h - m.h_noise) @ value)
+    score = np.einsum("gij,gj->gi", grow, score @ root)
+    jacobian = np.linalg.pinv(np.einsum("gij,gjk->ik", k, m.h - m.h_noise), rcond=1e-10)
+    to_value = jacobian @ unroot
+    half, dof = np.zeros(p), np.zeros(p)
+    b = np.einsum("gij,gj,gkj->gik", turn, share, turn)
+    for i in range(p):
+        w = to_value[i]
+        sigma = math.sqrt(float(np.sum((score @ w) ** 2)))
+        q = grow @ w
+        r = np.einsum("gij,gj->gi", b, q)
+        omega = np.diag(np.einsum("gi,gi->g", q, r)) - r @ r.T
+        power = float(np.sum(omega * omega))
+        dof[i] = max(float(np.trace(omega)) ** 2 / power, 1.0) if power > 0.0 else 1.0
+        half[i] = half_width(sigma, float(dof[i]))
+    return half, dof
+
+
+def _attenuation(m: Moments, k: FloatArray, noise: float, i: int) -> float:
+    """Share of coefficient i that would be lost without the correction for noise."""
+    if i < 0:
+        return 0.0
+    a = np.einsum("gij,gjk->ik", k, m.h)
+    lost = noise * np.einsum("gj,g->j", k[:, :, i], m.weight)
+    return float(np.linalg.pinv(a, rcond=1e-10)[i] @ lost)
