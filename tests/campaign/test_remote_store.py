@@ -308,7 +308,7 @@ def test_addresses(tmp_path):
             address_of(text)
     assert address_of("a/b:c") == Path("a/b:c")
     assert address_of("S3://b/x") == "S3://b/x"
-    assert isinstance(Store(f"file://{tmp_path}")._place, Place)
+    assert type(Store(f"file://{tmp_path}")._place) is Place
     assert Remote("other://user:word@host/x").name == "other://***@host/x"
     with pytest.raises(ConfigError, match="chain"):
         address_of("zip://a::file://b")
