@@ -160,9 +160,10 @@ def test_part_of_a_pair_is_no_answer_unless_it_was_found_itself(passed):
     assert choice.names == (("v_x",) if passed else ("v_x", "a_x"))
 
 
-def test_nothing_where_there_is_nothing():
-    """Of 16 drives of noise at a level of 5 %: four or more would be less than one chance in a hundred."""
-    assert sum(bool(search(fake(100 + i, keep=0.9), level=0.05, seed=i)) for i in range(16)) < 4
+@pytest.mark.parametrize(("drives", "most"), [(4, 1), pytest.param(16, 3, marks=pytest.mark.nightly)])
+def test_nothing_where_there_is_nothing(drives, most):
+    """Of drives of noise at a level of 5 %: more would be about one chance in a hundred."""
+    assert sum(bool(search(fake(100 + i, keep=0.9), level=0.05, seed=i)) for i in range(drives)) <= most
 
 
 def test_a_function_where_the_drive_was_not_is_not_told():
