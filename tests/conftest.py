@@ -15,6 +15,15 @@ sys.path.insert(0, str(ROOT / "sample_logs"))
 sys.path.insert(0, str(ROOT / "tests"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _shared(tmp_path_factory):
+    """A folder that all workers of a run have in common; one process alone needs none."""
+    from tests import shared
+
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared.FOLDER = tmp_path_factory.getbasetemp().parent / "shared"
+
+
 @pytest.fixture(scope="session")
 def real_logs() -> Path:
     """The measured drives; skips the test where they are not."""

@@ -132,9 +132,9 @@ def test_track_clearing_is_named_with_its_size(cleared):
     assert any(c.startswith("slip_slope_r") for c in cause.explains)
     assert found.gain.low > 0.0
     assert found.model.terms[0].effect.name == "track_clearing"
-    again = diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=120)
-    assert again.sentence == found.sentence
-    assert again.significance == found.significance
+    one, again = (diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=9) for _ in range(2))
+    assert again.sentence == one.sentence
+    assert again.significance == one.significance
 
 
 def test_nothing_hidden_is_told_as_nothing():
