@@ -14,6 +14,27 @@ REAL_LOGS = ROOT.parent / "shared" / "real_logs"
 sys.path.insert(0, str(ROOT / "sample_logs"))
 sys.path.insert(0, str(ROOT / "tests"))
 
+# modules of a quarter of a minute and more: they begin first, so that at the end no worker waits for another
+LONG = (
+    "real/test_diagnose_real.py", "thesis/test_figures_browser.py", "thesis/test_figures_page.py",
+    "diagnose/test_consequence.py", "diagnose/test_level.py", "cli/test_processes.py", "campaign/test_plan.py",
+    "thesis/figures/test_half_car_figures.py", "campaign/test_batch.py", "campaign/test_store_faults.py",
+    "campaign/test_elsewhere.py", "campaign/test_remote_store.py", "face/test_every_command.py", "guard/test_command.py",
+    "diagnose/test_run.py", "diagnose/test_grade.py", "cli/test_hostile_outputs.py", "cli/test_leaving.py",
+)  # fmt: skip
+
+
+def pytest_configure(config):
+    """Keep the order of the collection when modules go to workers; by default those with many tests begin."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """Let long modules begin."""
+    places = {name: i for i, name in enumerate(LONG)}
+    items.sort(key=lambda item: places.get(item.nodeid.split("::")[0].removeprefix("tests/"), len(LONG)))
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _shared(tmp_path_factory):
