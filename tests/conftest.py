@@ -25,7 +25,9 @@ LONG = (
 
 
 def pytest_configure(config):
-    """Keep the order of the collection when modules go to workers; by default those with many tests begin."""
+    """Give workers whole modules, in the order of the collection: what a module makes once is made once."""
+    if getattr(config.option, "dist", "no") == "load":
+        config.option.dist = "loadscope"
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
