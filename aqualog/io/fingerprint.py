@@ -41,13 +41,15 @@ class Contents:
         """
         if path.is_dir():
             return hash_of(f"{p.relative_to(path)}:{self.of(p)}" for p in _files(path))
-        state = path.stat()
-        if not stat.S_ISREG(state.st_mode):
-            raise OSError(errno.EINVAL, "is a device or a pipe; expected a log", str(path))
-        name = os.path.realpath(path)
+        state, name = path.stat(), os.path.realpath(path)
         entry = self.known.get(name)
         if entry and entry[:2] == [state.st_size, state.st_mtime_ns]:
             return str(entry[2])
+        return self._unknown(path, name, state)
+
+    def _unknown(self, path: Path, name: str, state: os.stat_result) -> str:
+        if not stat.S_ISREG(state.st_mode):
+            raise OSError(errno.EINVAL, "is a device or a pipe; expected a log", str(path))
         digest = _digest(path, state.st_size)
         self.known[name] = [state.st_size, state.st_mtime_ns, digest]
         self.has_changed = True
@@ -63,20 +65,8 @@ class Contents:
 class Remembered(Contents):
     """Known hashes, without reading any file: an unknown one gets a value that no file's hash has."""
 
-    def of(self, path: Path) -> str:
-        """Return the hash if known.
-
-        Raises
-        ------
-        OSError
-            If there is no such file.
-        """
-        if path.is_dir():
-            return super().of(path)
-        state, name = path.stat(), os.path.realpath(path)
-        entry = self.known.get(name)
-        is_known = entry is not None and entry[:2] == [state.st_size, state.st_mtime_ns]
-        return str(entry[2]) if entry is not None and is_known else f"not known: {name}"
+    def _unknown(self, path: Path, name: str, state: os.stat_result) -> str:
+        return f"not known: {name}"
 
 
 def change_since(paths: Sequence[Path], seen: Seen) -> str:

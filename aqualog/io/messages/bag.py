@@ -31,12 +31,13 @@ _U32 = struct.Struct("<I")
 _LONGEST_HEAD = 1 << 16  # [byte]
 _CHUNK_MARK = b"\x04\0\0\0op=" + bytes([CHUNK])
 _BEFORE_MARK = 80  # bytes: how far before that field the head of a chunk may begin
-_BLOCK = 1 << 20
 _PAIR = struct.Struct("<II")
 
 
 class BagWalk(RecordWalk[Head]):
     """One pass over a bag from a place on."""
+
+    overlap = _BEFORE_MARK + len(_CHUNK_MARK)
 
     def _has_body(self, head: Head) -> bool:
         return kind_of(head) != INDEX
@@ -56,19 +57,13 @@ class BagWalk(RecordWalk[Head]):
         is_long = kind_of(head) != INDEX and end - start > LONGEST
         return None if is_long or end > (self._size if known is None else known) else (head, start, end)
 
-    def _sought(self, offset: int) -> int | None:
-        while offset < self._size:
-            self._file.seek(offset)
-            block = self._file.read(_BLOCK)
-            mark = block.find(_CHUNK_MARK)
-            while mark >= 0:
-                found = self._head_before(offset + mark, offset)
-                if found is not None:
-                    return found
-                mark = block.find(_CHUNK_MARK, mark + 1)
-            if len(block) < _BLOCK:
-                return None
-            offset += len(block) - _BEFORE_MARK - len(_CHUNK_MARK)
+    def _chunk_in(self, block: bytes, offset: int) -> int | None:
+        mark = block.find(_CHUNK_MARK)
+        while mark >= 0:
+            found = self._head_before(offset + mark, offset)
+            if found is not None:
+                return found
+            mark = block.find(_CHUNK_MARK, mark + 1)
         return None
 
     def _head_before(self, mark: int, least: int) -> int | None:

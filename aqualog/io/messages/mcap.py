@@ -55,7 +55,6 @@ _FOOTER_LENGTH, _DATA_END_LENGTH = 20, 4
 _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 _ATTACHMENT = 2 * 8 + 2 * 4 + 8 + 4  # bytes of an attachment beside its name, its type and its data
 
-_BLOCK = 1 << 20
 _NAMES = {0: "plain", 3: "lz4", 4: "zstd"}  # length of the compression's name: where the length of the data stands
 _FIXED = 40  # bytes of a chunk beside that name and the data
 _CHUNK_HEAD = np.dtype({
@@ -274,6 +273,7 @@ def _crc(file: BinaryIO, start: int, end: int) -> int:
 class McapWalk(RecordWalk[int]):
     """One pass over the data section; the head of a record is its opcode."""
 
+    overlap = _CHUNK_HEAD.itemsize - 1
     has_end_record = True
 
     def _record_at(self, offset: int) -> tuple[int, int, int] | None:
@@ -319,30 +319,20 @@ class McapWalk(RecordWalk[int]):
                 return False
         return left == 0
 
-    def _sought(self, offset: int) -> int | None:
-        while offset + _CHUNK_HEAD.itemsize <= self._size:
-            self._file.seek(offset)
-            block = self._file.read(_BLOCK)
-            if len(block) < _CHUNK_HEAD.itemsize:
-                return None
-            found = _chunks_in(block, self._size - offset)
-            if found.size:
-                return offset + int(found[0])
-            offset += len(block) - _CHUNK_HEAD.itemsize + 1
-        return None
-
-
-def _chunks_in(block: bytes, room: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Where in a block the lengths are those of a chunk that ends within `room`."""
-    at = np.flatnonzero(np.frombuffer(block, np.uint8)[: len(block) - _CHUNK_HEAD.itemsize + 1] == Opcode.CHUNK)
-    if not at.size:
-        return at
-    heads = rows_of(block, at, _CHUNK_HEAD.itemsize).view(_CHUNK_HEAD)
-    length = heads["length"].astype(np.float64)
-    agrees = np.zeros(at.size, dtype=np.bool_)
-    for size, name in _NAMES.items():
-        agrees |= (heads["name"] == size) & (length == heads[name].astype(np.float64) + (_FIXED + size))
-    return at[agrees & (length <= room - at - HEAD.size)]
+    def _chunk_in(self, block: bytes, offset: int) -> int | None:
+        """The first place where the lengths are those of a chunk that ends within the file."""
+        room = self._size - offset
+        octets = np.frombuffer(block, np.uint8)[: max(len(block) - self.overlap, 0)]
+        at = np.flatnonzero(octets == Opcode.CHUNK)
+        if not at.size:
+            return None
+        heads = rows_of(block, at, _CHUNK_HEAD.itemsize).view(_CHUNK_HEAD)
+        length = heads["length"].astype(np.float64)
+        agrees = np.zeros(at.size, dtype=np.bool_)
+        for size, name in _NAMES.items():
+            agrees |= (heads["name"] == size) & (length == heads[name].astype(np.float64) + (_FIXED + size))
+        found = at[agrees & (length <= room - at - HEAD.size)]
+        return offset + int(found[0]) if found.size else None
 
 
 class Scan(NamedTuple):

@@ -20,6 +20,7 @@ from aqualog.io.messages.streams import SAMPLES, Stream, make_stream
 __all__ = ["ChunkSource", "MessageSource", "RecordWalk"]
 
 Head = TypeVar("Head")
+_BLOCK = 1 << 20  # bytes
 
 
 class RecordWalk(ABC, Generic[Head]):
@@ -36,6 +37,8 @@ class RecordWalk(ABC, Generic[Head]):
         Where the index knows chunks; empty without a sound one.
     """
 
+    overlap = 0
+    """Bytes that two blocks share in which a chunk is sought."""
     has_end_record = False
     """Whether a record says where the records end; else the file does."""
 
@@ -77,9 +80,20 @@ class RecordWalk(ABC, Generic[Head]):
     def _record_at(self, offset: int) -> tuple[Head, int, int] | None:
         """Head of the record there, and where its body stands; None if it cannot be one."""
 
-    @abstractmethod
     def _sought(self, offset: int) -> int | None:
         """The first place from `offset` on that looks like a chunk."""
+        while offset < self._size:
+            self._file.seek(offset)
+            block = self._file.read(_BLOCK)
+            found = self._chunk_in(block, offset)
+            if found is not None or len(block) < _BLOCK:
+                return found
+            offset += len(block) - self.overlap
+        return None
+
+    @abstractmethod
+    def _chunk_in(self, block: bytes, offset: int) -> int | None:
+        """The first place in a block of the file, read from `offset` on, that looks like a chunk."""
 
     @abstractmethod
     def _has_body(self, head: Head) -> bool: ...

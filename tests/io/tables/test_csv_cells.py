@@ -34,14 +34,14 @@ def same(a, b):
         np.testing.assert_array_equal(x.view("u8") if x.dtype == float else x, y.view("u8") if y.dtype == float else y)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(st.one_of(NUMBER, EXACT), min_size=1, max_size=8))
 def test_numbers_are_those_of_their_text(cells):
     read, text = both_ways(cells)
     same(numbers(read, STYLES[0]), numbers(text, STYLES[0]))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(CELL, min_size=1, max_size=4))
 def test_other_cells_are_those_of_their_text(cells):
     read, text = both_ways(cells)
