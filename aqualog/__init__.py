@@ -29,10 +29,9 @@ if TYPE_CHECKING:
     from aqualog.face.campaign import Campaign
     from aqualog.face.detect import detect
     from aqualog.face.diagnose import diagnose
-    from aqualog.face.doctor import doctor
     from aqualog.face.drive import Drive, convert, read
     from aqualog.face.evaluate import evaluate
-    from aqualog.face.inspect import inspect
+    from aqualog.face.inspect import doctor, inspect
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
     from aqualog.model.term import Model
@@ -47,7 +46,7 @@ _FACE = {
     "Campaign": "aqualog.face.campaign",
     "align": "aqualog.face.align",
     "calibrate": "aqualog.face.calibrate",
-    "doctor": "aqualog.face.doctor",
+    "doctor": "aqualog.face.inspect",
     "evaluate": "aqualog.face.evaluate",
     "inspect": "aqualog.face.inspect",
     "diagnose": "aqualog.face.diagnose",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import typer
@@ -15,59 +17,72 @@ __all__ = ["COMMANDS", "Command", "Commands", "loaded"]
 
 
 class Command(NamedTuple):
-    """A command: the first paragraph of its help, and where it is.
+    """A command: where it is, and the first paragraph of its help.
 
-    `module` of `aqualog.cli` and `function` in it, or a `typer.Typer` with commands of its own; empty: both are named
-    as the command is. `runs_bare`: without arguments it does something else than to show its help.
+    `module` of `aqualog.cli` and `function` in it, or a `typer.Typer` with commands of its own; empty: it is named as
+    the command is. `runs_bare`: without arguments it does something else than to show its help.
     """
 
+    module: str
     line: str
-    module: str = ""
     function: str = ""
     runs_bare: bool = False
 
     def load(self, name: str) -> Any:
         """The function or the `typer.Typer` of the command of that name."""
-        own = name.replace("-", "_")
-        return getattr(import_module(f"aqualog.cli.{self.module or own}"), self.function or own)
+        return getattr(import_module(f"aqualog.cli.{self.module}"), self.function or name.replace("-", "_"))
 
 
 COMMANDS = {
-    "detect": Command("Detect aquaplaning in one drive."),
+    "detect": Command("drive", "Detect aquaplaning in one drive."),
     "inspect": Command(
-        "List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix."
+        "logs",
+        "List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix.",
     ),
-    "doctor": Command("Report what is wrong with a log, what was lost of it, and what to do."),
-    "convert": Command("Write the aligned signals of one drive as one log, in SI units and with canonical names."),
-    "align": Command("Find the clock offset (and drift) between sources from a quantity that both carry."),
+    "doctor": Command("logs", "Report what is wrong with a log, what was lost of it, and what to do."),
+    "convert": Command(
+        "logs", "Write the aligned signals of one drive as one log, in SI units and with canonical names."
+    ),
+    "align": Command("logs", "Find the clock offset (and drift) between sources from a quantity that both carry."),
     "slip-slope": Command(
-        "Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same."
+        "drive", "Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same."
     ),
-    "batch": Command("Run every log of a campaign through the detectors and keep the results."),
-    "plan": Command("Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."),
+    "batch": Command("campaign", "Run every log of a campaign through the detectors and keep the results."),
+    "plan": Command(
+        "campaign", "Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards."
+    ),
     "bin-slipslope": Command(
-        "Slip slope over speed for each configuration, and the speed of full aquaplaning.", module="bins"
+        "campaign", "Slip slope over speed for each configuration, and the speed of full aquaplaning."
     ),
-    "bin-resistance": Command("Mean resistance measure over speed for each configuration.", module="bins"),
+    "bin-resistance": Command("campaign", "Mean resistance measure over speed for each configuration."),
     "report": Command(
-        "Make the page of a campaign: quality, test matrix, slip slope and resistance over speed, detections, all runs."
+        "campaign",
+        "Make the page of a campaign: quality, test matrix, slip slope and resistance over speed, detections, all "
+        "runs.",
     ),
     "calibrate": Command(
-        "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined."
+        "drives",
+        "Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.",
     ),
     "diagnose": Command(
-        "Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain."
+        "drives",
+        "Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.",
     ),
     "evaluate": Command(
-        "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."
+        "drives", "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."
     ),
-    "simulate": Command("Simulate one drive of a scenario file, or the drives of a measuring campaign."),
-    "figures": Command("Make figures of the thesis again, from runs, with what they say about its claims."),
-    "reproduce": Command("Reproduce the thesis: simulate its campaign, run everything, and judge each of its claims."),
-    "cache": Command("Show or empty the folder in which aligned signals are kept.", runs_bare=True),
-    "campaign": Command("Campaign files: many drives in known configurations.", function="campaign_app"),
+    "simulate": Command("thesis", "Simulate one drive of a scenario file, or the drives of a measuring campaign."),
+    "figures": Command("thesis", "Make figures of the thesis again, from runs, with what they say about its claims."),
+    "reproduce": Command(
+        "thesis", "Reproduce the thesis: simulate its campaign, run everything, and judge each of its claims."
+    ),
+    "cache": Command("logs", "Show or empty the folder in which aligned signals are kept.", runs_bare=True),
+    "campaign": Command("campaign", "Campaign files: many drives in known configurations.", function="campaign_app"),
     "help": Command(
-        "Show the documents: topics, one page, or the pages that hold a word.", function="help_pages", runs_bare=True
+        "help",
+        "Show the documents: topics, one page, or the pages that hold a word.",
+        function="help_pages",
+        runs_bare=True,
     ),
 }
 
@@ -77,7 +92,50 @@ def loaded() -> dict[str, Any]:
     return {name: _made(name, command) for name, command in COMMANDS.items()}
 
 
-class Commands(TyperGroup):
+class _Light:
+    """A command that reads texts and paths without pydantic, which typer loads for them in a tenth of a second."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters."""
+        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for parameter in found:
+            if getattr(parameter, "_runtime_param", self) is None:  # typer's own attribute: without it, its way holds
+                parameter._runtime_param = _Read()
+        return found
+
+
+class _Read:
+    """How a parameter is read."""
+
+    def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Return the value of a parameter as typer does; a number goes its way."""
+        is_many = param.multiple or param.nargs == -1
+        if value is None:
+            return () if is_many else None
+        kind = _PLAIN.get(param.type_descriptor.annotation)
+        values = list(value) if is_many and isinstance(value, list | tuple) else [value]
+        if kind is not None and all(isinstance(v, str | Path) and (kind is str or _is_readable(v)) for v in values):
+            return [kind(v) for v in values] if is_many else kind(value)
+        if not is_many and isinstance(value, float | int) and value == param.default:
+            return value
+        from typer._coercion import build_runtime_param
+
+        return build_runtime_param(param.type_descriptor).coerce(value, param, ctx)
+
+
+_PLAIN: dict[Any, Callable[[Any], Any]] = {str: str, list[str]: str, Path: Path, list[Path]: Path}
+
+
+def _is_readable(name: str | Path) -> bool:
+    """Return whether a path is free or can be read; of one that cannot, typer says so."""
+    return "\0" not in str(name) and (os.access(name, os.R_OK) or not os.path.lexists(name))
+
+
+class _Command(_Light, TyperCommand):
+    """One command."""
+
+
+class Commands(_Light, TyperGroup):
     """The group of all commands: each is its line of help until it is asked for."""
 
     def __init__(self, **attributes: Any) -> None:
@@ -145,5 +203,5 @@ def _made(name: str, command: Command) -> Any:
     if isinstance(target, typer.Typer):
         app.add_typer(target, name=name)
         return typer.main.get_group(app).commands[name]
-    app.command(name, no_args_is_help=not command.runs_bare)(target)
+    app.command(name, cls=_Command, no_args_is_help=not command.runs_bare)(target)
     return typer.main.get_command(app)

@@ -6,7 +6,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
@@ -31,13 +31,8 @@ PROGRESS_MODES = ("auto", "bar", "plain", "off")
 def clean(text: str) -> str:
     """Text without control characters, so that a name in a log cannot drive the terminal; endless lines are cut."""
     shown = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
-    if len(shown) <= _LINE:
-        return shown
-    return "\n".join(_cut(line) for line in shown.split("\n"))
-
-
-def _cut(line: str) -> str:
-    return line if len(line) <= _LINE else f"{line[: _LINE - 40]}… ({len(line)} characters)"
+    lines = shown.split("\n")
+    return "\n".join(x if len(x) <= _LINE else f"{x[: _LINE - 40]}… ({len(x)} characters)" for x in lines)
 
 
 def clean_line(text: str) -> str:
@@ -71,23 +66,16 @@ class Console:
             sys.stderr.write(f"{clean_line(text)}\n")
 
     @contextmanager
-    def told_if_slow(self, what: str) -> Iterator[None]:
-        """Say that something is being compiled if its first run takes long."""
-        from threading import Timer
-
-        timer = Timer(SLOW_S, self.note, [f"compiling {what}; this takes a while, once after an installation"])
-        timer.daemon = True
-        timer.start()
-        try:
-            yield
-        finally:
-            timer.cancel()
-
-    @contextmanager
     def hearing(self) -> Iterator[Heard]:
         """Show what a call of the face is doing: its steps as progress, its notes as notes."""
-        with self.steps() as steps:
-            yield Heard(self, steps)
+        mode = self.progress
+        if mode == "auto":
+            mode = "bar" if sys.stderr.isatty() and os.environ.get("TERM") != "dumb" else "off"
+        heard = Heard(self, "off" if self.quiet else mode)
+        try:
+            yield heard
+        finally:
+            heard.clear()
 
     def error(self, text: str) -> None:
         """Something that failed, while the rest goes on."""
@@ -97,29 +85,16 @@ class Console:
         """Print a result on stdout: the document, or what a reader sees (`text` in place of the result's own)."""
         sys.stdout.write(result.to_json() + "\n" if as_json else clean(result.text() if text is None else text))
 
-    @contextmanager
-    def steps(self) -> Iterator[Steps]:
-        """Progress of a piece of work: one line that renews itself on a terminal, a line a step with `plain`."""
-        on_terminal = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
-        mode = self.progress
-        if mode == "auto":
-            mode = "bar" if on_terminal else "off"
-        steps = Steps("off" if self.quiet else mode)
-        try:
-            yield steps
-        finally:
-            steps.clear()
 
+class Heard(Listener):
+    """A call of the face on the terminal: one line that renews itself (`bar`), or a line a step (`plain`)."""
 
-class Steps(Listener):
-    """Shows which step is being worked on."""
-
-    def __init__(self, mode: str) -> None:
-        self.mode = mode
-        self._width = 0
+    def __init__(self, console: Console, mode: str) -> None:
+        self.console, self.mode = console, mode
+        self._width = self._failed = 0
 
     def __call__(self, step: str) -> None:
-        """Begin a step."""
+        """Show a step."""
         if self.mode == "bar":
             line = f"{' '.join(clean(step).split())} ..."
             sys.stderr.write(f"\r{line.ljust(self._width)}")
@@ -134,18 +109,6 @@ class Steps(Listener):
             sys.stderr.write(f"\r{' ' * self._width}\r")
             sys.stderr.flush()
 
-
-class Heard(Listener):
-    """A call of the face on the terminal."""
-
-    def __init__(self, console: Console, steps: Steps) -> None:
-        self.console, self.steps, self.mode = console, steps, steps.mode
-        self._failed = 0
-
-    def __call__(self, step: str) -> None:
-        """Show a step."""
-        self.steps(step)
-
     def note(self, text: str) -> None:
         """Show a note at once."""
         self.console.note(text)
@@ -158,19 +121,28 @@ class Heard(Listener):
         """Show an input that failed; of many the first ones."""
         self._failed += 1
         if self._failed <= _SHOWN_AT_ONCE:
-            self.steps.clear()
+            self.clear()
             text = reason if name in reason else f"{name}: {reason.removeprefix(f'{Path(name).name}: ')}"
             sys.stderr.write(f"error: {clean_line(text)}\n")
 
     def settled(self, where: str) -> None:
         """Show how many more failed."""
         if self._failed > _SHOWN_AT_ONCE:
-            self.steps.clear()
+            self.clear()
             sys.stderr.write(f"error: and {self._failed - _SHOWN_AT_ONCE} more; all are in {where}\n")
 
-    def slow(self, what: str) -> AbstractContextManager[object]:
+    @contextmanager
+    def slow(self, what: str) -> Iterator[None]:
         """Say that something is being compiled, if it takes long."""
-        return self.console.told_if_slow(what)
+        from threading import Timer
+
+        timer = Timer(SLOW_S, self.note, [f"compiling {what}; this takes a while, once after an installation"])
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
 
 
 @contextmanager
@@ -194,44 +166,39 @@ def guarded(*, debug: bool) -> Iterator[None]:
             yield
             # what stdout cannot take must come to light here, not when the interpreter ends
             data.flush()
-    except AqualogError as error:
-        if debug:
-            traceback.print_exc()
-        sys.stderr.write(f"error: {clean(error.line())}\n")
-        raise typer.Exit(int(error.exit_code)) from error
     except BrokenPipeError:
         # the reader of our output has gone; nothing to say, and nobody to say it to
         _silence()
         raise typer.Exit(int(ExitCode.DONE)) from None
-    except OSError as error:
-        if debug:
-            traceback.print_exc()
-        where = f"{error.filename}: " if error.filename else ""
-        hint = ""
-        if error.filename == _StandardOutput.NAME:
-            _silence()
-            hint = ". Try: another place for the output"
-        sys.stderr.write(f"error: {clean_line(f'{where}{error.strerror or error}')}{hint}\n")
-        raise typer.Exit(int(ExitCode.FAILED)) from error
     except KeyboardInterrupt as error:
         # without a word of the command: files are renamed into place, so those that are there are whole
         sys.stderr.write(f"interrupted{', ' if str(error) else ''}{error}\n")
         raise typer.Exit(int(ExitCode.INTERRUPTED)) from None
     except (typer.Exit, typer.Abort):
         raise
-    except MemoryError as error:
-        if debug:
-            traceback.print_exc()
-        sys.stderr.write(f"error: {_memory_told()}\n")
-        raise typer.Exit(int(ExitCode.FAILED)) from error
     except Exception as error:
         if debug:
             traceback.print_exc()
-        kind = type(error).__name__
-        sys.stderr.write(
-            f"error: aqualog failed ({kind}: {clean_line(str(error))[:300]}). Try: --debug, and report it\n"
-        )
-        raise typer.Exit(int(ExitCode.FAILED)) from error
+        sys.stderr.write(f"error: {_line_of(error)}\n")
+        code = error.exit_code if isinstance(error, AqualogError) else ExitCode.FAILED
+        raise typer.Exit(int(code)) from error
+
+
+def _line_of(error: Exception) -> str:
+    """Return the line that a user sees of an error."""
+    if isinstance(error, AqualogError):
+        return clean(error.line())
+    if isinstance(error, OSError):
+        where = f"{error.filename}: " if error.filename else ""
+        hint = ""
+        if error.filename == _StandardOutput.NAME:
+            _silence()
+            hint = ". Try: another place for the output"
+        return f"{clean_line(f'{where}{error.strerror or error}')}{hint}"
+    if isinstance(error, MemoryError):
+        return _memory_told()
+    kind = type(error).__name__
+    return f"aqualog failed ({kind}: {clean_line(str(error))[:300]}). Try: --debug, and report it"
 
 
 def _memory_told() -> str:

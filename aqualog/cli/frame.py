@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from aqualog.cli.options import SHARED
+from aqualog.cli.options import OPTIONS
 
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
@@ -92,8 +92,8 @@ class Run:
         from aqualog.align.mapping import SignalMap
         from aqualog.config.signal_map import load_signal_map
         from aqualog.core.vehicle import Vehicle
+        from aqualog.face.arguments import expand, list_files, refuse_existing
         from aqualog.face.drive import Drive
-        from aqualog.face.paths import expand, list_files, refuse_existing
         from aqualog.io.fingerprint import state_of
 
         paths = expand(self.logs)
@@ -181,13 +181,13 @@ def command(
 ) -> Callable[[Callable[..., Output]], Callable[..., None]]:
     """Make a command of its body.
 
-    The body takes the `Run` and what it declares; a parameter without `typer.Option` is a shared option. An error
-    within becomes one line and an exit code, and its output is printed.
+    The body takes the `Run` and the options that it has as parameters. An error within becomes one line and an exit
+    code, and its output is printed.
 
     Parameters
     ----------
     takes : str
-        Names of the options in the order of the help: of `SHARED`, or parameters of the body.
+        Names of the options in the order of the help.
     has_steps : bool
         Whether it takes -q, -v and --progress, too.
     reads_logs : bool
@@ -195,9 +195,9 @@ def command(
     """
 
     def made(body: Callable[..., Output]) -> Callable[..., None]:
-        own = inspect.signature(body, eval_str=True).parameters
+        own = inspect.signature(body).parameters
         names = [*takes.split(), *(("quiet", "verbose", "progress") if has_steps else ()), "debug"]
-        options = [_parameter(name, own) for name in names]
+        options = [_parameter(name) for name in names]
 
         def work(**given: Any) -> None:
             from aqualog.cli.console import guarded
@@ -219,17 +219,12 @@ def command(
     return made
 
 
-def _parameter(name: str, own: Mapping[str, inspect.Parameter]) -> inspect.Parameter:
-    """Return a parameter for typer: the body's where it has a help of its own, else the shared one."""
-    short = name.partition(":")[0]
-    if name in SHARED and not (short in own and hasattr(own[short].annotation, "__metadata__")):
-        kind, default = SHARED[name]
-    else:
-        kind, default = own[name].annotation, own[name].default
-    is_needed = default is ... or default is inspect.Parameter.empty
+def _parameter(name: str) -> inspect.Parameter:
+    """Return an option as a parameter for typer."""
+    kind, default = OPTIONS[name]
     return inspect.Parameter(
-        short, inspect.Parameter.KEYWORD_ONLY, annotation=kind,
-        default=inspect.Parameter.empty if is_needed else default,
+        name.partition(":")[0], inspect.Parameter.KEYWORD_ONLY, annotation=kind,
+        default=inspect.Parameter.empty if default is ... else default,
     )  # fmt: skip
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from aqualog.cli.frame import Output, Run, command
 
@@ -22,13 +20,7 @@ _NAME_WIDTH = 22
 
 
 @command("topic", has_steps=False, reads_logs=False)
-def help_pages(
-    run: Run,
-    topic: Annotated[
-        list[str] | None,
-        typer.Argument(help="A page, a command, or words to look for.", metavar="TOPIC", show_default=False),
-    ] = None,
-) -> Output:
+def help_pages(run: Run, topic: list[str] | None) -> Output:
     """Show the documents: topics, one page, or the pages that hold a word.
 
     Without TOPIC, the topics are listed with a line each. A TOPIC that is the name of a page shows that page, on a

@@ -13,7 +13,6 @@ import typer
 
 from aqualog import __version__
 from aqualog.cli.commands import Commands
-from aqualog.cli.start import interrupted
 from aqualog.guard.command import begin_command
 from aqualog.guard.streams import open_streams
 
@@ -45,7 +44,7 @@ def _main(
 
 
 def run() -> None:
-    """Entry point of the installed command.
+    """Run the command that the arguments name.
 
     A request to end is an interrupt as Ctrl-C is: it leaves by the usual way, so that no half-written file stays.
     """
@@ -65,10 +64,7 @@ def run() -> None:
         signal.signal(signal.SIGALRM, _raise)
         sys.unraisablehook = _lost
     begin_command()
-    try:
-        app()
-    except KeyboardInterrupt:  # before it was known which command it is
-        interrupted()
+    app()
 
 
 _AGAIN_S = 0.05

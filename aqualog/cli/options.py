@@ -1,4 +1,4 @@
-"""Options that several commands share, each declared once; a command names those that it takes."""
+"""Every option and argument of the commands, declared once; a command names those that it takes."""
 
 from __future__ import annotations
 
@@ -7,51 +7,57 @@ from typing import Annotated, Any
 
 import typer
 
-__all__ = ["SHARED"]
+__all__ = ["OPTIONS"]
 
 
 def _option(kind: Any, default: Any, *names: str, **about: Any) -> tuple[Any, Any]:
     return Annotated[kind, typer.Option(*names, **about)], default
 
 
-def _vehicle(text: str) -> tuple[Any, Any]:
-    return _option(Path | None, None, "--vehicle", help=text, metavar="FILE")
+def _argument(
+    kind: Any, text: str, metavar: str, *, shows_default: bool = False, default: Any = ...
+) -> tuple[Any, Any]:
+    return Annotated[kind, typer.Argument(help=text, metavar=metavar, show_default=shows_default)], default
 
 
-def _logs(text: str, metavar: str) -> tuple[Any, Any]:
-    return Annotated[list[str], typer.Argument(help=text, metavar=metavar, show_default=False)], ...
+def _file(text: str, *names: str, metavar: str = "FILE", default: Any = None) -> tuple[Any, Any]:
+    """Return an option that names a file or folder; with `...` as default it must be given."""
+    kind = Path | None if default is None else Path
+    return _option(kind, default, *(names or ("-o", "--out")), help=text, metavar=metavar)
 
 
-SHARED: dict[str, tuple[Any, Any]] = {
-    "logs": _logs("Log files of one drive: files, folders, globs, @list.txt.", "LOG..."),
-    "logs:drives": _logs(
-        "Logs of dry drives, each argument a drive of its own; a folder is one drive of several files.", "LOG..."
+def _flag(text: str, name: str) -> tuple[Any, Any]:
+    return _option(bool, False, name, help=text)
+
+
+OPTIONS: dict[str, tuple[Any, Any]] = {
+    "logs": _argument(list[str], "Log files of one drive: files, folders, globs, @list.txt.", "LOG..."),
+    "logs:drives": _argument(
+        list[str], "Logs of dry drives, each argument a drive of its own; a folder is one drive of several files.",
+        "LOG...",
     ),
-    "logs:diagnosed": _logs(
+    "logs:diagnosed": _argument(
+        list[str],
         "Logs, each argument a drive of its own; a folder is one drive of several files. Or a campaign file.",
         "LOG...|CAMPAIGN.toml",
     ),
-    "logs:campaign": _logs(
-        "A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
+    "logs:campaign": _argument(
+        list[str], "A campaign file (TOML), or logs: each a drive of its own; files, folders, globs, @list.txt.",
         "CAMPAIGN.toml|LOG...",
     ),
-    "logs:sources": (
-        Annotated[
-            list[str],
-            typer.Argument(help="Reference first, then the sources to compare with it.", metavar="REFERENCE SOURCE..."),
-        ],
-        ...,
+    "logs:sources": _argument(
+        list[str], "Reference first, then the sources to compare with it.", "REFERENCE SOURCE...", shows_default=True
     ),
-    "vehicle": _vehicle("Vehicle file (TOML). Without it a default car is taken."),
-    "vehicle:needed": _vehicle("Vehicle file (TOML): must be given."),
-    "vehicle:of_logs": _vehicle("Vehicle file (TOML): must be given for logs, a campaign file names its own."),
-    "vehicle:believed": _vehicle(
-        "Vehicle file (TOML): what the simulation believes. Drives need one; a campaign names its own."
+    "vehicle": _file("Vehicle file (TOML). Without it a default car is taken.", "--vehicle"),
+    "vehicle:needed": _file("Vehicle file (TOML): must be given.", "--vehicle"),
+    "vehicle:of_logs": _file(
+        "Vehicle file (TOML): must be given for logs, a campaign file names its own.", "--vehicle",
     ),
-    "vehicle:proposed": _vehicle("Vehicle file of all runs; without it one to fill is written."),
-    "signals": _option(
-        Path | None, None, "--signals", help="Signal map (TOML): which channel is which signal.", metavar="FILE"
+    "vehicle:believed": _file(
+        "Vehicle file (TOML): what the simulation believes. Drives need one; a campaign names its own.", "--vehicle",
     ),
+    "vehicle:proposed": _file("Vehicle file of all runs; without it one to fill is written.", "--vehicle"),
+    "signals": _file("Signal map (TOML): which channel is which signal.", "--signals"),
     "dbc": _option(
         list[Path] | None, None, "--dbc", help="CAN database for raw frames; may be given several times.",
         metavar="FILE",
@@ -72,9 +78,9 @@ SHARED: dict[str, tuple[Any, Any]] = {
         str | None, None, "-o", "--out", "--store", metavar="DIR",
         help="Folder or URL (s3://...) for the results; default beside the campaign file: NAME.store.",
     ),
-    "thresholds": _option(
-        Path | None, None, "--thresholds", metavar="FILE",
-        help="Thresholds of the detectors (TOML), as `aqualog evaluate --tune` writes them; default: built in.",
+    "thresholds": _file(
+        "Thresholds of the detectors (TOML), as `aqualog evaluate --tune` writes them; default: built in.",
+        "--thresholds",
     ),
     "jobs": _option(
         int | None, None, "--jobs", help="Logs at a time; default one per core.", min=1, max=1024, metavar="N"
@@ -82,17 +88,11 @@ SHARED: dict[str, tuple[Any, Any]] = {
     "jobs:drives": _option(
         int | None, None, "--jobs", help="Campaign: drives at a time.", min=1, max=1024, metavar="N"
     ),
-    "model": _option(
-        Path | None, None, "--model", metavar="FILE",
-        help="Model file (TOML), as `aqualog diagnose` writes it: effects that the car is known to have.",
+    "model": _file(
+        "Model file (TOML), as `aqualog diagnose` writes it: effects that the car is known to have.", "--model"
     ),
-    "model:known": _option(
-        Path | None, None, "--model", help="Model file (TOML): what is known already, on top of the base.",
-        metavar="FILE",
-    ),
-    "model:simulated": _option(
-        Path | None, None, "--model", help="Model file (TOML): effects on top of the base.", metavar="FILE"
-    ),
+    "model:known": _file("Model file (TOML): what is known already, on top of the base.", "--model"),
+    "model:simulated": _file("Model file (TOML): effects on top of the base.", "--model"),
     "by": _option(
         str, "", "--by", metavar="KEYS",
         help="Configuration keys: tyre,pressure,water-depth,load,wear,side,manoeuvre,... Default: those that differ.",
@@ -101,15 +101,139 @@ SHARED: dict[str, tuple[Any, Any]] = {
         float, 10.0, "--bin-width", help="Width of the speed bins.", min=1.0, max=100.0, metavar="KMH"
     ),
     "road": _option(str, "wet", "--road", help="wet, dry or both.", metavar="ROAD"),
-    "robust": _option(bool, False, "--robust", help="Weigh outliers down (Huber [huber1981])."),
-    "table": _option(
-        Path | None, None, "-o", "--out", help="Table of the rows: FILE.csv or FILE.parquet.", metavar="FILE"
-    ),
-    "json": _option(bool, False, "--json", help="Print one JSON document."),
-    "force": _option(bool, False, "--force", help="Overwrite existing results."),
+    "robust": _flag("Weigh outliers down (Huber [huber1981]).", "--robust"),
+    "as_measured": _flag("Do not take off each run's own level on dry road.", "--as-measured"),
+    "table": _file("Table of the rows: FILE.csv or FILE.parquet."),
+    "json": _flag("Print one JSON document.", "--json"),
+    "force": _flag("Overwrite existing results.", "--force"),
     "quiet": _option(bool, False, "-q", "--quiet", help="Errors only on stderr."),
     "verbose": _option(bool, False, "-v", "--verbose", help="More detail on stderr."),
     "progress": _option(str, "auto", "--progress", help="auto, bar, plain or off.", metavar="MODE"),
-    "debug": _option(bool, False, "--debug", help="Show a traceback on errors."),
+    "debug": _flag("Show a traceback on errors.", "--debug"),
+    # one log
+    "write_map:proposed": _file("Write the proposed signal map to this file.", "--write-map"),
+    "write_map:clocks": _file("Write the signal map with the clocks found.", "--write-map"),
+    "out:log": _file("File to write: .mf4, .mcap, .csv or .parquet.", default=...),
+    "decimal_comma": _flag("CSV with decimal comma and semicolons.", "--decimal-comma"),
+    "quantity": _option(str, "speed", "--quantity", help="speed or yaw_rate: what both carry.", metavar="NAME"),
+    "channel": _option(
+        list[str] | None, None, "--channel", help="Channel of a file, if names do not decide.", metavar="FILE=CHANNEL"
+    ),
+    "max_offset": _option(float, 10.0, "--max-offset", help="Search range in s.", min=0.1, max=3600.0),
+    "start_offset": _option(
+        float | None, None, "--start-offset", help="Rough offset in s of clocks that are far apart."
+    ),
+    "clean": _flag("Remove what is kept.", "--clean"),
+    # one drive
+    "out:results": _file("Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
+    "write": _file(
+        "Signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.", "--write"
+    ),
+    "history": _file(
+        "Dry slip slopes of this car from earlier drives (JSON); read, and written back with this drive's.",
+        "--history",
+    ),
+    "configuration": _option(
+        str, "", "--configuration", metavar="TEXT",
+        help="What the dry slope belongs to: tyre, pressure, load, in any words; default the vehicle's name.",
+    ),
+    "reference": _option(
+        str, "robust", "--reference", metavar="RULE",
+        help="Dry slope of the history: robust (upper quartile of the periods' means) or max (as the thesis).",
+    ),
+    "fail_on_event": _flag("Exit with 5 if anything was detected.", "--fail-on-event"),
+    "out:slopes": _file("Folder for slip_slope.json, .csv and .html.", metavar="DIR"),
+    "method": _option(
+        str, "auto", "--method", metavar="NAME",
+        help="auto, axle (driven against free wheels), velocity (against v_x) or differential (recursive only).",
+    ),
+    "traction": _option(
+        str, "auto", "--traction", help="auto, torque or accelerometer (one driven axle).", metavar="NAME"
+    ),
+    "mu_max": _option(float, 0.3, "--mu-max", help="Largest traction coefficient used.", min=0.02, max=1.0),
+    "delay": _option(
+        float | None, None, "--delay", metavar="SECONDS", min=-1.0, max=1.0,
+        help="By how much v_x is late against the wheels, where known; else it is estimated (velocity only).",
+    ),
+    # several drives
+    "out:vehicle": _file("Vehicle file with the calibrated values."),
+    "fix": _option(
+        list[str] | None, None, "--fix", metavar="KEY=VALUE",
+        help="What is known: mass=KG, torque_gain=X, drag_area=M2 or rolling_resistance=X; may be repeated.",
+    ),
+    "page:calibration": _file("Page with tables and residuals (HTML).", "--page"),
+    "holdout": _option(
+        list[str] | None, None, "--holdout", metavar="LOG",
+        help="Drive on which the gain is measured and nothing is fitted; may be repeated.",
+    ),
+    "out:model": _file("Extended model: a file that --model takes."),
+    "page:diagnosis": _file("Page with the pictures before and after (HTML).", "--page"),
+    "level": _option(
+        float, 0.01, "--level", help="Share of drives without effect that may be given one.", min=1e-4, max=0.5
+    ),
+    "seed:drawn": _option(int, 1, "--seed", help="Of all that is drawn at random.", min=0, max=2**63 - 1),
+    "surrogates": _option(
+        int | None, None, "--surrogates", help="How many drives without effect calibrate the test.", min=1,
+        max=100_000, metavar="N",
+    ),
+    "bootstrap": _option(
+        bool, True, "--bootstrap/--no-bootstrap", help="Without: quicker, the test by its formula alone."
+    ),
+    "labels": _file(
+        "Labels (CSV start_s,end_s,effect,wheel), or a folder with NAME.csv for each log NAME; without lines: no "
+        "water.", "--labels",
+    ),
+    "by:tables": _option(
+        str, "", "--by", help="Tables by configuration: tyre,depth,pressure,manoeuvre,... of the campaign."
+    ),
+    "rivals": _flag("Also the methods of the prior art.", "--rivals"),
+    "roc": _flag("Also at thresholds from a quarter to four times.", "--roc"),
+    "tune": _file(
+        "Propose thresholds on some drives, report them on the others, and write them here.", "--tune"
+    ),
+    "out:page": _file("Page (HTML)."),
+    # campaigns
+    "folder": _argument(Path, "Folder with logs, in it or below it.", "FOLDER", shows_default=True),
+    "out:campaign": _file("Campaign file to write.", default=Path("campaign.toml")),
+    "limit_s": _option(
+        float | None, None, "--limit-s", help="Longest time for one log, in seconds.", min=1.0, max=1e9, metavar="S"
+    ),
+    "limit_mb": _option(
+        int | None, None, "--limit-mb", help="Most memory for one process, in megabytes.", min=300, metavar="MB"
+    ),
+    "shard": _option(
+        str | None, None, "--shard", help="Only the I-th of N parts, for N machines on one folder.", metavar="I/N"
+    ),
+    "cluster": _option(
+        str | None, None, "--cluster", help="Work on the workers of this dask scheduler.", metavar="tcp://HOST:8786"
+    ),
+    "sample": _option(
+        int | None, None, "--sample", help="Logs to measure; default 8, or 2 per process.", min=2, max=1000,
+        metavar="K",
+    ),
+    "within": _option(
+        str | None, None, "--within", metavar="TIME",
+        help="Report how many --shard are done in that time: 90s, 30min, 8h, 2d.",
+    ),
+    "campaign:file": _argument(str, "A campaign file (TOML).", "CAMPAIGN.toml"),
+    "out:report": _file("Folder for the report; default beside the campaign file: NAME.report.", metavar="DIR"),
+    # simulation and thesis
+    "what": _argument(
+        list[str], "A scenario file, or the word campaign and the name of a programme.", "SCENARIO | campaign NAME"
+    ),
+    "out:simulated": _file(
+        "Log to write: .mf4, .mcap, .csv or .parquet; of a campaign: folder.", metavar="PATH", default=...
+    ),
+    "seed": _option(
+        int | None, None, "--seed", help="In place of the scenario's.", min=0, max=2**63 - 1, metavar="N"
+    ),
+    "numbers": _argument(list[str], "Figures of the thesis by number (3.6), by chapter (2, 3), or all.", "NUMBER..."),
+    "out:figures": _file("Folder for pages, tables and pictures.", metavar="DIR", default=...),
+    "campaign": _file("Make them from the runs of this campaign.", "--campaign", metavar="CAMPAIGN.toml"),
+    "formats": _option(
+        str, "html,csv", "--format", help="Any of html,csv,png,svg; pictures need the extra images.", metavar="LIST"
+    ),
+    "out:reproduction": _file("Folder for the page and all that it rests on.", metavar="DIR", default=...),
+    "topic": _argument(list[str] | None, "A page, a command, or words to look for.", "TOPIC", default=None),
 }  # fmt: skip
 """Type with help, and default (`...`: must be given), by name; behind a colon, a variant with a help of its own."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import NoReturn
 
 from aqualog.guard.streams import open_streams
 
-__all__ = ["interrupted", "run"]
+__all__ = ["run"]
 
 
 def run() -> None:
@@ -16,13 +15,9 @@ def run() -> None:
     open_streams()
     try:
         from aqualog.cli.main import run as begin
-    except KeyboardInterrupt:
-        interrupted()
-    begin()
 
-
-def interrupted() -> NoReturn:
-    """End at once: nothing has been begun."""
-    sys.stderr.write("interrupted\n")
-    sys.stderr.flush()
-    os._exit(130)
+        begin()
+    except KeyboardInterrupt:  # nothing has been begun: end at once
+        sys.stderr.write("interrupted\n")
+        sys.stderr.flush()
+        os._exit(130)

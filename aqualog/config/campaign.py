@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from aqualog.campaign.definition import Campaign, Run, near_name
-from aqualog.campaign.run_table import RunTable, as_point, decimal_sign, read_table
+from aqualog.campaign.run_table import as_point, decimal_sign, read_table
 from aqualog.config.labels import load_labels
 from aqualog.config.reader import Faults, Key, Row, Table, read
 from aqualog.config.signal_map import load_signal_map
@@ -33,8 +33,6 @@ CAMPAIGN_KEYS = (
     Key("", "run", "tables", "", "", "`[[run]]` tables in the file itself, in place of `runs`"),
 )
 """Keys of the campaign file itself; those of a run are `RUN_KEYS`."""
-_TOP = tuple(k.name for k in CAMPAIGN_KEYS)
-
 
 _ALL = (
     Key("run", "log", "path", "", "", "the log; must be given; several files of one drive as a list, or with "
@@ -78,8 +76,13 @@ def load_campaign(path: Path) -> Campaign:
 
 def read_campaign(path: Path) -> CampaignFile:
     """Read and check a campaign file like `load_campaign`, and keep the place of each run."""
-    file = _file(path)
-    file.check_names(*_TOP)
+    try:
+        file = read(path, "campaign file")
+    except ConfigError as error:
+        if "escape" in error.what.lower() or "Unescaped" in error.what:
+            raise ConfigError(error.what, where=error.where, hint="/ in place of \\ in paths") from error
+        raise
+    file.check_names(*(k.name for k in CAMPAIGN_KEYS))
     texts = {n: _one_line(file, n) for n in ("name", "vehicle", "signals", "runs")}
     named = _NamedFiles(path.parent)
     signals = named.find(texts["signals"], "signals", file)
@@ -117,23 +120,18 @@ class _Read(NamedTuple):
     place: str
 
 
-def _file(path: Path) -> Table:
-    try:
-        return read(path, "campaign file")
-    except ConfigError as error:
-        if "escape" in error.what.lower() or "Unescaped" in error.what:
-            raise ConfigError(error.what, where=error.where, hint="/ in place of \\ in paths") from error
-        raise
-
-
 def _one_line(file: Table, name: str) -> str | None:
     value: str | None = file.get(name)
-    if name not in file or (isinstance(value, str) and value.strip() and value.isprintable()):
+    if name not in file or _is_line(value):
         return value
     is_text = isinstance(value, str) and value.strip()
     wrong = f"is not one line of text{_escape_hint(value)}" if is_text else "is not a text"
     file.add(name, f"{name} = {str(value)[:40]!r} {wrong}")
     return None
+
+
+def _is_line(value: Any) -> bool:
+    return isinstance(value, str) and bool(value.strip()) and value.isprintable()
 
 
 def _escape_hint(value: Any) -> str:
@@ -165,7 +163,9 @@ def _from_table(path: Path, named: _NamedFiles, vehicle: Path | None) -> list[_R
     found: list[_Read] = []
     for line, row in table.rows:
         if len(row) != len(heading):
-            Row({}, faults, line).add("", f"{len(row)} cells, the heading has {len(heading)}{_cells_hint(row, table)}")
+            is_comma = table.separator == "," and len(row) > len(heading)
+            hint = " (a decimal comma? then ; between the cells)" if is_comma else ""
+            Row({}, faults, line).add("", f"{len(row)} cells, the heading has {len(heading)}{hint}")
             continue
         turned = as_point([row[i] for i in numeric]) if sign != "." else [row[i] for i in numeric]
         cells = {
@@ -178,11 +178,6 @@ def _from_table(path: Path, named: _NamedFiles, vehicle: Path | None) -> list[_R
     _check_twice(found)
     faults.raise_if_any()
     return found
-
-
-def _cells_hint(row: tuple[str, ...], table: RunTable) -> str:
-    is_comma = table.separator == "," and len(row) > len(table.heading)
-    return " (a decimal comma? then ; between the cells)" if is_comma else ""
 
 
 def _run(table: Table, named: _NamedFiles, vehicle: Path | None) -> Run | None:
@@ -199,7 +194,7 @@ def _run(table: Table, named: _NamedFiles, vehicle: Path | None) -> Run | None:
             values[name] = _plain(value)
         elif name == "log":
             continue
-        elif not isinstance(value, str) or not value.strip() or not value.isprintable():
+        elif not _is_line(value):
             table.add(name, f"{name} = {str(value)[:40]!r} is not one line of text{_escape_hint(value)}")
         elif name == "wear" and value not in WEAR:
             table.add(name, f"wear = {value[:40]!r} is not one of {', '.join(WEAR)}")
@@ -291,7 +286,7 @@ class _NamedFiles:
 
     def find(self, name: Any, key: str, table: Table) -> Path | None:
         """Return the file; None if no file is named. Its faults are noted where it is named first."""
-        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+        if not _is_line(name):
             return None
         path = _beside(self.base, name.strip())
         if (key, path) in self._seen:

@@ -12,6 +12,7 @@ from aqualog.config.reader import DEEPEST
 from aqualog.core.errors import ConfigError
 from aqualog.detect.slip_slope.history import History, history_from_json, history_to_json
 from aqualog.io.atomic_write import write_text
+from aqualog.io.user_file import read_small
 
 __all__ = ["check_history_file", "load_history", "save_history", "update_history"]
 
@@ -39,12 +40,9 @@ def load_history(path: Path) -> History:
     """
     if not path.exists():
         return History()
-    if not path.is_file():
-        raise ConfigError("is no slip-slope history", where=str(path), expected="a JSON file that aqualog wrote")
-    if path.stat().st_size > MAX_BYTES:
-        raise ConfigError(f"is larger than {MAX_BYTES // 10**6} MB", where=str(path), hint="a history per car")
+    data = read_small(path, what="slip-slope history", expected="a JSON file that aqualog wrote", largest=MAX_BYTES)
     try:
-        document = json.loads(path.read_bytes())
+        document = json.loads(data)
     except RecursionError as error:
         raise ConfigError(f"is nested deeper than {DEEPEST} levels", where=str(path)) from error
     except ValueError as error:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from aqualog.config.reader import Faults, Key, Row, read_csv
+from aqualog.config.reader import Faults, Key, Row, read_csv, reads_as_number
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.evaluate.labels import Label, joined
@@ -67,7 +67,7 @@ def load_labels(path: Path) -> tuple[Label, ...]:
         if label is not None:
             labels.append(label)
     faults.raise_if_any()
-    return _merged([*labels, *_partial_too(labels)])
+    return _merged(labels)
 
 
 _SYNONYMS = {
@@ -84,22 +84,14 @@ def _check_form(first: list[str], path: Path) -> None:
     line = ",".join(first)
     separator = next((s for s in (";", "\t") if s in line and "start_s" in line), None)
     expected = ",".join(_COLUMNS)
-    if separator is not None or (";" in line and _is_number(line.split(";", maxsplit=1)[0].replace(",", "."))):
+    if separator is not None or (";" in line and reads_as_number(line.split(";", maxsplit=1)[0].replace(",", "."))):
         told = "tabs" if separator == "\t" else "semicolons"
         raise ConfigError(
             f"labels file has {told} between its cells", where=f"{path}: line 1",
             expected=f"commas, and points in numbers: {expected}",
         )  # fmt: skip
-    if first and _is_number(first[0]):
+    if first and reads_as_number(first[0]):
         raise ConfigError("labels file has no heading", where=f"{path}: line 1", expected=expected)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _label(cells: Row) -> Label | None:
@@ -120,15 +112,14 @@ def _label(cells: Row) -> Label | None:
     return Label(max(start, 0.0), end, _SYNONYMS.get(effect.lower().replace(" ", "_"), effect), wheel or None)
 
 
-def _partial_too(labels: list[Label]) -> list[Label]:
-    """Add full aquaplaning to partial: of the car, or of wheels, as far as the file's own partial labels are such."""
-    of_wheels = {x.wheel is not None for x in labels if x.effect == "partial"}
-    full = [x for x in labels if x.effect == "full"]
-    return [replace(x, effect="partial") for x in full if not of_wheels or (x.wheel is not None) in of_wheels]
-
-
 def _merged(labels: list[Label]) -> tuple[Label, ...]:
-    """Join overlapping stretches of the same effect on the same wheel, so that none counts twice."""
+    """Join overlapping stretches of the same effect on the same wheel, so that none counts twice.
+
+    Full aquaplaning joins partial: of the car, or of wheels, as far as the file's own partial labels are such.
+    """
+    of_wheels = {x.wheel is not None for x in labels if x.effect == "partial"}
+    full = [x for x in labels if x.effect == "full" and (not of_wheels or (x.wheel is not None) in of_wheels)]
+    labels = [*labels, *(replace(x, effect="partial") for x in full)]
     keys = dict.fromkeys((x.effect, x.wheel) for x in labels)
     return tuple(
         Label(a, b, effect, wheel)

@@ -16,7 +16,20 @@ from typing import Any, Protocol, TypeVar
 from aqualog.core.errors import ConfigError
 from aqualog.io.user_file import read_small
 
-__all__ = ["DEEPEST", "Faults", "Key", "Row", "Table", "is_number", "is_real", "quoted", "read", "read_csv", "tried"]
+__all__ = [
+    "DEEPEST",
+    "Faults",
+    "Key",
+    "Row",
+    "Table",
+    "is_number",
+    "is_real",
+    "quoted",
+    "read",
+    "read_csv",
+    "reads_as_number",
+    "tried",
+]
 
 LARGEST = 16 * 2**20  # [byte]
 LARGEST_TABLE = 64 * 2**20  # [byte]
@@ -209,7 +222,8 @@ class Table:
         if begin is None:  # written in braces, or with points
             return self._parent.line_of(self.name.rpartition(".")[2]) if self._parent else None
         end = next((i for i, _ in headers if i > begin), len(self.lines))
-        body = (i for i in range(begin + 1, end) if _names(self.lines[i], key))
+        names = re.compile(rf"""^\s*["']?{re.escape(key)}["']?\s*[=.]""")
+        body = (i for i in range(begin + 1, end) if names.match(self.lines[i]))
         child = f"{self.name}.{key}" if self.name else key
         tables = (i for i, name in headers if name == child)
         found = next(body, next(tables, begin))
@@ -227,7 +241,8 @@ class Table:
         by_lower = {n.lower(): n for n in sorted(known)}
         near = difflib.get_close_matches(name[:_LONGEST_KEY].lower(), by_lower, n=1, cutoff=0.5)
         told = f' (did you mean "{by_lower[near[0]]}"?)' if near else f" ({hint})" if hint else ""
-        self.add(name, f'unknown {what} "{_cut(name)}"{told}')
+        shown = name if len(name) <= _LONGEST_KEY else f"{name[:_LONGEST_KEY]} ..."
+        self.add(name, f'unknown {what} "{shown}"{told}')
 
     def check_names(self, *known: str) -> None:
         """Note every key that is not one of these."""
@@ -249,7 +264,7 @@ class Table:
         value = self.values[name]
         if is_real(value):
             return float(value)
-        if isinstance(value, str) and _reads_as_number(value):
+        if isinstance(value, str) and reads_as_number(value.strip().replace(",", ".")):
             told = f'"{value[:40]}" is a text, not a number; write it without quotes, with a point'
         else:
             told = f"{str(value)[:40]} is not a number"
@@ -322,17 +337,10 @@ class Row(Table):
         return None
 
 
-def _reads_as_number(text: str) -> bool:
+def reads_as_number(text: str) -> bool:
+    """Return whether a text is a number, as Python writes it."""
     try:
-        float(text.strip().replace(",", "."))
+        float(text)
     except ValueError:
         return False
     return True
-
-
-def _cut(name: str) -> str:
-    return name if len(name) <= _LONGEST_KEY else f"{name[:_LONGEST_KEY]} ..."
-
-
-def _names(line: str, key: str) -> bool:
-    return re.match(rf"""^\s*["']?{re.escape(key)}["']?\s*[=.]""", line) is not None

@@ -118,17 +118,22 @@ def load_scenario(path: Path) -> Scenario:
     _not_all(file, "tyre", ("tyre_front", "tyre_rear"))
     _not_all(file, "pressure_bar", ("pressure_front_bar", "pressure_rear_bar"))
     bar = _value(file, "pressure_bar")
-    loads = [_load(file, f"load_{axle}_kg", vehicle) for axle in ("front", "rear")]
+    loads = {name: _value(file, name) for name in ("load_front_kg", "load_rear_kg")}
+    for name, load in loads.items():
+        if vehicle is not None and load > vehicle.mass:
+            file.add(name, f"{name} = {load:g} is more than the vehicle's own mass, {vehicle.mass:g} kg")
     duration = _value(file, "duration_s")
     speed = _speed(file)
+    if "split_profile" in file and car.drivetrain != "awd" and vehicle is not None:
+        file.add("split_profile", f'split_profile needs an "awd" car; the vehicle is "{car.drivetrain}"')
     scenario = Scenario(
         vehicle=car,
         tyre_front=_tyre(file, "tyre_front") or tyre,
         tyre_rear=_tyre(file, "tyre_rear") or tyre,
         p_front=_value(file, "pressure_front_bar", bar) * 1e5,
         p_rear=_value(file, "pressure_rear_bar", bar) * 1e5,
-        load_front=loads[0],
-        load_rear=loads[1],
+        load_front=loads["load_front_kg"],
+        load_rear=loads["load_rear_kg"],
         duration_s=duration,
         rate_hz=_rate(file),
         seed=_seed(file),
@@ -136,14 +141,14 @@ def load_scenario(path: Path) -> Scenario:
         lanes=_lanes(file),
         steering=_steering(file.table("steering"), vehicle, speed, duration),
         excitation=_excitation(file.table("excitation"), vehicle),
-        brake_torque=_profile(file, "brake_profile", "t [s]", _DAY),
-        extra_torque=_profile(file, "torque_profile", "t [s]", _DAY),
-        split_rear=_split(file, vehicle),
+        brake_torque=_profile(file, "brake_profile"),
+        extra_torque=_profile(file, "torque_profile"),
+        split_rear=_profile(file, "split_profile"),
         grade=_grade(file),
         head_wind=_value(file, "head_wind_kmh") / 3.6,
         water_scatter=_value(file, "water_scatter"),
-        wind=tuple((t, v / 3.6) for t, v in _profile(file, "wind_profile", "t [s]", _DAY)),
-        drive_share=_profile(file, "drive_share_profile", "t [s]", _DAY),
+        wind=tuple((t, v / 3.6) for t, v in _profile(file, "wind_profile")),
+        drive_share=_profile(file, "drive_share_profile"),
         antilock=_choice(file, "brakes", ("plain", "antilock")) == "antilock",
         kicks=tuple(_kick(table) for table in file.tables("kick")),
         sensors=_sensors(file),
@@ -208,7 +213,7 @@ def _not_all(table: Table, common: str, own: tuple[str, str]) -> None:
         table.add(common, f"{common} says nothing beside {own[0]} and {own[1]}")
 
 
-def _profile(file: Table, name: str, over: str, end: float, *, values: str = "") -> Profile:
+def _profile(file: Table, name: str, *, over: str = "t [s]", end: float = _DAY, values: str = "") -> Profile:
     """Return pairs of a strictly increasing number and a value, as they stand in the file."""
     if name not in file:
         return ()
@@ -268,13 +273,6 @@ def _tyre(file: Table, name: str) -> Tyre | None:
     return replace(TYRES[base], **changed)
 
 
-def _load(file: Table, name: str, vehicle: Vehicle | None) -> float:
-    load = _value(file, name)
-    if vehicle is not None and load > vehicle.mass:
-        file.add(name, f"{name} = {load:g} is more than the vehicle's own mass, {vehicle.mass:g} kg")
-    return load
-
-
 # --- drive
 
 
@@ -297,7 +295,7 @@ def _seed(file: Table) -> int:
 
 def _speed(file: Table) -> Profile:
     _one_of(file, ("speed_kmh", "profile"))
-    points = _profile(file, "profile", "t [s]", _DAY, values="v [km/h]")
+    points = _profile(file, "profile", values="v [km/h]")
     if "speed_kmh" not in file:
         return tuple((t, v / 3.6) for t, v in points)
     if isinstance(file.get("speed_kmh"), list):
@@ -306,17 +304,11 @@ def _speed(file: Table) -> Profile:
     return ((0.0, _value(file, "speed_kmh") / 3.6),)
 
 
-def _split(file: Table, vehicle: Vehicle | None) -> Profile:
-    if "split_profile" in file and vehicle is not None and vehicle.drivetrain != "awd":
-        file.add("split_profile", f'split_profile needs an "awd" car; the vehicle is "{vehicle.drivetrain}"')
-    return _profile(file, "split_profile", "t [s]", _DAY)
-
-
 def _grade(file: Table) -> Profile:
     if "grade_percent" in file and "grade_profile" in file:
         file.add("grade_profile", "grade_percent and grade_profile exclude each other")
     percent = _value(file, "grade_percent")
-    points = _profile(file, "grade_profile", "s [m]", _FAR) or (((0.0, percent),) if percent else ())
+    points = _profile(file, "grade_profile", over="s [m]", end=_FAR) or (((0.0, percent),) if percent else ())
     return tuple((s, math.atan(p / 100.0)) for s, p in points)
 
 
@@ -329,7 +321,8 @@ def _lanes(file: Table) -> tuple[Lane, ...]:
         lane = _lane(table)
         if lane is None:
             continue
-        other = next((n for n, k in lanes.items() if _overlap(k, lane)), None)
+        same = ((n, k) for n, k in lanes.items() if k.in_metres == lane.in_metres)
+        other = next((n for n, k in same if k.start < lane.end and lane.start < k.end), None)
         if other is not None:
             unit = "m" if lane.in_metres else "s"
             table.add(
@@ -437,10 +430,6 @@ def _excitation(table: Table, vehicle: Vehicle | None) -> Excitation | None:
         )
     kinds: Any = (kind, _AMPLITUDES.get(name or "", "force"))  # both checked against their lists
     return Excitation(kinds[0], amplitude, kinds[1], period)
-
-
-def _overlap(a: Lane, b: Lane) -> bool:
-    return a.in_metres == b.in_metres and a.start < b.end and b.start < a.end
 
 
 def _top_speed(speed: Profile, duration: float) -> float:

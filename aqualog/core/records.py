@@ -152,6 +152,11 @@ class Quality:
     frozen_samples: int = 0
     unfinalised: bool = False
 
+    @property
+    def has_loss(self) -> bool:
+        """Return whether a file was cut or lost samples."""
+        return self.truncated or self.lost_in_files > 0
+
 
 @dataclass(frozen=True, slots=True)
 class Signals:

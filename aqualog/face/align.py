@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +14,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import names_of, number_of, text_of
 from aqualog.face.drive import Drive, read, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, text_file
-from aqualog.face.tables import flat
+from aqualog.face.result import PathLike, Result, Writers, flat, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -41,13 +40,6 @@ class Alignment(Result):
     refused: Mapping[str, AqualogError]
     quantity: str
     before: SignalMap
-    notes: tuple[str, ...] = ()
-    sources: tuple[Path, ...] = ()
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a source was refused, or a file changed while it was read."""
-        return bool(self.refused or self.notes)
 
     @property
     def offsets(self) -> dict[str, float]:
@@ -67,7 +59,6 @@ class Alignment(Result):
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog align`."""
         from aqualog.report.alignment import alignment_document
 
         return alignment_document(self.compared, {**self.fits, **self.refused}, self.quantity)
@@ -75,15 +66,7 @@ class Alignment(Result):
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """`sources`: a row for each, columns as the fields of `ClockFit`, intervals as `..._low` and `..._high`."""
-        import polars as pl
-
-        return {"sources": pl.DataFrame([flat(s) for s in self.document["sources"]], infer_schema_length=None)}
-
-    def text(self) -> str:
-        """Return offset, drift, scale and match of each source."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
+        return {"sources": rows_table(flat(s) for s in self.document["sources"])}
 
     def _report(self) -> Report:
         from aqualog.report.alignment import alignment_report
@@ -91,7 +74,6 @@ class Alignment(Result):
         return alignment_report(self.compared, {**self.fits, **self.refused}, self.quantity)
 
     def headline(self) -> str:
-        """Return the offset of each source with its interval."""
         reference = self.compared[0]
         lines = [f"{self.quantity.replace('_', ' ')} against {reference.file} ({reference.label})"]
         for file, fit in self.fits.items():
@@ -119,13 +101,7 @@ class Alignment(Result):
         return {**files, **({"map.toml": text_file(lambda: map_text(self.map))} if self.fits else {})}
 
     def write_map(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the signal map with the clocks that were found.
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given, or no source was aligned.
-        """
+        """Write the signal map with the clocks that were found; a ConfigError if no source was aligned."""
         if not self.fits:
             raise ConfigError("no clock was found", where=str(path), expected="at least one source that matches")
         return self._write_as("map.toml", path, force=force)
@@ -171,10 +147,6 @@ def align(
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
-    Returns
-    -------
-    Alignment
-
     Raises
     ------
     LogError, SignalError, ConfigError
@@ -202,7 +174,12 @@ def align(
         drive = read([*first, *names_of(sources)], map, vehicle, dbc=dbc)
     if len(drive.paths) < 2:
         raise ConfigError("align compares files", expected="a reference and at least one source")
-    _check_channels(channels or {}, [p.name for p in drive.paths])
+    files = [p.name for p in drive.paths]
+    for file, channel in (channels or {}).items():
+        if file not in files or not channel:
+            raise ConfigError(
+                f'channel "{file}={channel}"', expected=f"FILE=CHANNEL with FILE one of {', '.join(files)}"
+            )
     with drive.reading():
         compared = _compared(drive, vehicle_of(vehicle, drive), quantity, channels or {}, hear)
         fits: dict[str, ClockFit] = {}
@@ -215,28 +192,19 @@ def align(
                 refused[source.file] = error
     for file, refusal in refused.items():
         hear.failed(file, refusal.line())
-    return Alignment(tuple(compared), fits, refused, quantity, drive.signal_map, drive.changes(), drive.sources)
+    changes = drive.changes()
+    return Alignment(
+        tuple(compared), fits, refused, quantity, drive.signal_map, notes=changes, has_loss=bool(refused or changes),
+        sources=drive.sources,
+    )  # fmt: skip
 
 
 def check_quantity(quantity: str) -> None:
-    """Refuse a quantity that is not known.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse a quantity that is not known."""
     from aqualog.align.propose import QUANTITIES
 
     if text_of(quantity, "quantity") not in QUANTITIES:
         raise ConfigError(f'quantity "{quantity[:60]}"', expected=" or ".join(QUANTITIES))
-
-
-def _check_channels(channels: Mapping[str, str], files: Sequence[str]) -> None:
-    for file, channel in channels.items():
-        if file not in files or not channel:
-            raise ConfigError(
-                f'channel "{file}={channel}"', expected=f"FILE=CHANNEL with FILE one of {', '.join(files)}"
-            )
 
 
 def _compared(

@@ -6,11 +6,10 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.result import Result, Writers
+from aqualog.face.result import Result, Writers, bars, document_head
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -32,18 +31,11 @@ class KeptSignals(Result):
     place: SignalCache
     entries: tuple[Kept, ...]
     removed: tuple[int, int] | None = None
-    sources: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
-    has_loss: bool = False
 
     @property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog cache`."""
-        from aqualog import __version__
-
         return {
-            "schema_version": 1,
-            "tool_version": __version__,
+            **document_head(),
             "folder": str(self.place.folder),
             "is_default": _is_default(),
             "limit_bytes": self.place.limit,
@@ -84,18 +76,12 @@ class KeptSignals(Result):
         return "\n".join(lines) + "\n"
 
     def headline(self) -> str:
-        """Return where signals are kept, how many and how large."""
         return self.text().rstrip("\n")
 
     def plot(self) -> go.Figure:
         """Return the size of each drive."""
-        import plotly.graph_objects as go
-
         names = [", ".join(e.files) or "?" for e in self.entries]
-        made = go.Figure(go.Bar(x=[e.size / 1e6 for e in self.entries], y=names, orientation="h"))
-        made.update_layout(title=str(self.place.folder), template="plotly_white")
-        made.update_xaxes(title="size [MB]")
-        return made
+        return bars(str(self.place.folder), names, [e.size / 1e6 for e in self.entries], "size [MB]")
 
     def files(self) -> Writers:
         """Return `cache.json`."""

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
-from aqualog.face.drive import Drive, vehicle_needed
+from aqualog.face.drive import Drive, sources_of, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
-from aqualog.face.tables import flat
+from aqualog.face.result import PathLike, Result, Writers, flat, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -38,8 +37,6 @@ class Calibration(Result):
     before: Vehicle
     found: Found
     file_notes: tuple[str, ...] = ()
-    has_loss: bool = False
-    sources: tuple[Path, ...] = ()
 
     @cached_property
     def vehicle(self) -> Vehicle:
@@ -48,14 +45,8 @@ class Calibration(Result):
 
         return calibrated(self.before, self.found.parameters, self.found.transfers, self.found.spread)
 
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on the logs and on the calibration."""
-        return (*self.file_notes, *self.found.notes)
-
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog calibrate`."""
         from aqualog.report.calibration import calibration_document
 
         logs = [str(p) for d in self.drives for p in d.paths]
@@ -69,8 +60,7 @@ class Calibration(Result):
         """
         import polars as pl
 
-        parameters = [flat(p) for p in self.document["parameters"]]
-        drives = [flat({k: v for k, v in d.items() if k != "left_out_s"}) for d in self.document["drives"]]
+        drives = [{k: v for k, v in d.items() if k != "left_out_s"} for d in self.document["drives"]]
         residuals = [
             pl.DataFrame({n: getattr(d, n) for n in ("v", "force", "before", "after")}).select(
                 pl.lit(d.name).alias("drive"), pl.all()
@@ -78,16 +68,10 @@ class Calibration(Result):
             for d in self.found.drives
         ]
         return {
-            "parameters": pl.DataFrame(parameters, infer_schema_length=None),
-            "drives": pl.DataFrame(drives, infer_schema_length=None),
+            "parameters": rows_table(flat(p) for p in self.document["parameters"]),
+            "drives": rows_table(flat(d) for d in drives),
             "residuals": pl.concat(residuals),
         }
-
-    def text(self) -> str:
-        """Return parameters, drives and polynomials, and what could not be estimated."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
 
     def _report(self) -> Report:
         from aqualog.report.calibration import calibration_report
@@ -95,7 +79,6 @@ class Calibration(Result):
         return calibration_report(self.found, self.file_notes)
 
     def headline(self) -> str:
-        """Return the estimated parameters of the car, and the names of those that the drives do not determine."""
         from aqualog.report.calibration import parameter_cells
 
         found = self.found
@@ -124,33 +107,20 @@ class Calibration(Result):
     def files(self) -> Writers:
         """Return `calibration.json`, `calibrated.toml` and `calibration.html`."""
         from aqualog.config.vehicle import calibrated_toml
-        from aqualog.report.page import report_page
 
         title = f"{self.found.vehicle_name}, {len(self.drives)} drives"
         return {
             "calibration.json": self._json_file(),
             "calibrated.toml": text_file(lambda: calibrated_toml(self.before, self.found)),
-            "calibration.html": page_file(lambda: report_page(self._report(), title=title)),
+            "calibration.html": self._page(title),
         }
 
     def write_vehicle(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the vehicle file with the calibrated values, each with its interval and where it comes from.
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given, or it is a source of this result.
-        """
+        """Write the vehicle file with the calibrated values, each with its interval and where it comes from."""
         return self._write_as("calibrated.toml", path, force=force)
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the page with tables and residuals (HTML).
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given, or it is a source of this result.
-        """
+        """Write the page with tables and residuals (HTML)."""
         return self._write_as("calibration.html", path, force=force)
 
 
@@ -177,10 +147,6 @@ def calibrate(
         Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-].
     progress : callable, optional
         Called with each step of the work, such as `print`.
-
-    Returns
-    -------
-    Calibration
 
     Raises
     ------
@@ -211,9 +177,9 @@ def calibrate(
         return run(list(signals.values()), list(signals), car, fixed)
 
     found = loaded.tried(work, hear)
-    changes = loaded.changes
-    used = loaded.used
-    has_loss = loaded.has_loss or bool(changes) or len(found.drives) < len(used)
-    files = dict.fromkeys(p for d in all_drives for p in d.sources)
-    own = (*files, *(Path(x) for x in (vehicle,) if isinstance(x, str | Path)))
-    return Calibration(tuple(used), car, found, (*loaded.notes, *changes), has_loss, own)
+    used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes)
+    return Calibration(
+        used, car, found, notes, notes=(*notes, *found.notes),
+        has_loss=loaded.has_loss or bool(loaded.changes) or len(found.drives) < len(used),
+        sources=sources_of((p for d in all_drives for p in d.sources), vehicle),
+    )  # fmt: skip

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import file_of, names_of, number_of, text_of, whole_number
-from aqualog.face.campaign_runs import CampaignRuns
-from aqualog.face.campaign_store import bring_up_to_date, is_campaign, refuse_in_store, split
-from aqualog.face.listener import Progress, listener
-from aqualog.face.paths import expand, list_files, refuse_existing
+from aqualog.face.arguments import file_of, number_of, text_of, whole_number
+from aqualog.face.campaign_inputs import CampaignInputs
+from aqualog.face.campaign_runs import CampaignRuns, runs_of
+from aqualog.face.listener import Counted, Progress, listener
 from aqualog.face.result import PathLike
 
 if TYPE_CHECKING:
-    import polars as pl
-
-    from aqualog.campaign.jobs import Configured
-    from aqualog.campaign.place import Address
-    from aqualog.face.matrix import Matrix
+    from aqualog.face.inspect import Matrix
     from aqualog.face.plan import BatchPlan
     from aqualog.face.propose import Proposal
-    from aqualog.face.simulate import SimulatedCampaign
+    from aqualog.guard.worker import Limits, WorkOn
+    from aqualog.model.campaign import CampaignOutcome
 
-__all__ = ["Campaign"]
+__all__ = ["Campaign", "SimulatedCampaign"]
 
 
-class Campaign:
+class Campaign(CampaignInputs):
     """A campaign file, or logs of which each is a drive of its own. Nothing is measured before `run`.
 
     Parameters
@@ -58,39 +56,6 @@ class Campaign:
     >>> runs.slip_slope(by="tyre").rows
     """
 
-    def __init__(
-        self,
-        inputs: PathLike | Sequence[PathLike],
-        *,
-        vehicle: PathLike | None = None,
-        map: PathLike | None = None,
-        dbc: PathLike | Sequence[PathLike] = (),
-        thresholds: PathLike | None = None,
-        store: PathLike | None = None,
-    ) -> None:
-        from aqualog.config.configured import configure, configure_logs
-
-        names = names_of(inputs)
-        if not names:
-            raise ConfigError("no log is named", expected="a campaign file, or at least one log")
-        databases = [file_of(p, "dbc") for p in names_of(dbc, "dbc")]
-        map_file = None if map is None else file_of(map, "map")
-        limits = None if thresholds is None else file_of(thresholds, "thresholds")
-        if is_campaign(names):
-            if vehicle is not None:
-                raise ConfigError("vehicle beside a campaign", where=names[0], expected="it in the campaign's runs")
-            found = configure(file_of(names[0], "inputs"), map_file=map_file, dbc=databases, thresholds=limits)
-        elif vehicle is None:
-            raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
-        else:
-            found = configure_logs(
-                expand(names), file_of(vehicle, "vehicle"), map_file=map_file, dbc=databases, thresholds=limits,
-                lists=tuple(list_files(names)),
-            )  # fmt: skip
-        self.inputs = tuple(names)
-        self.configured: Configured = found
-        self._store = None if store is None else names_of(store, "store")[0]
-
     @staticmethod
     def propose(
         folder: PathLike,
@@ -100,7 +65,7 @@ class Campaign:
         dbc: PathLike | Sequence[PathLike] = (),
         force: bool = False,
         progress: Progress = None,
-    ) -> Proposal:
+    ) -> Proposal[Campaign]:
         """Look at every log in a folder and below it, and propose a campaign file; `Proposal.write` writes it.
 
         Parameters
@@ -123,109 +88,50 @@ class Campaign:
         """
         from aqualog.face.propose import propose
 
-        return propose(folder, out, vehicle=vehicle, dbc=dbc, force=force, progress=progress)
+        return propose(Campaign, folder, out, vehicle=vehicle, dbc=dbc, force=force, progress=progress)
 
     @staticmethod
     def simulate(
         programme: str, folder: PathLike, *, jobs: int | None = None, force: bool = False, progress: Progress = None
     ) -> SimulatedCampaign:
-        """Simulate the drives of a programme, `thesis` or `situations`, into a folder.
+        """Simulate the drives of a programme into a folder, with vehicle files and a campaign file.
 
-        See `aqualog.face.simulate.simulate_campaign`; the campaign is `.campaign` of what is returned.
+        A folder in which the same programme was begun is completed. A drive that fails is left out, and `progress`
+        hears why.
+
+        Parameters
+        ----------
+        programme : str
+            `thesis` (the measuring campaign of the thesis) or `situations` (38 situations, most without water).
+        folder : str or Path
+            It is made if it does not exist.
+        jobs : int, optional
+            Drives at a time; default one per core.
+        force : bool
+            Simulate all drives again.
+        progress : callable, optional
+            Called with each step of the work, such as `print`.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such programme, or the folder holds something else.
 
         Examples
         --------
         >>> aq.Campaign.simulate("thesis", "thesis", jobs=8).campaign.run()
         """
-        from aqualog.face.simulate import simulate_campaign
+        from aqualog.io.write_log import SUFFIXES
+        from aqualog.model.campaign import simulate_campaign
 
-        return simulate_campaign(programme, folder, jobs=jobs, force=force, progress=progress)
-
-    @property
-    def name(self) -> str:
-        """Name of the campaign."""
-        return self.configured.campaign.name
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys by which the runs can be grouped."""
-        return self.configured.campaign.keys
-
-    @property
-    def store(self) -> Address:
-        """Folder or URL of the results: the one given, else a folder beside the campaign file.
-
-        Raises
-        ------
-        ConfigError
-            For logs without a campaign file, which have no place of their own.
-        """
-        if self._store is not None:
-            from aqualog.campaign.place import address_of
-
-            return address_of(self._store)
-        path = self.configured.campaign.path
-        if path.suffix.lower() != ".toml":
-            raise ConfigError(
-                "logs without a campaign file have no place for results", expected="a folder or URL as store"
-            )
-        return path.with_suffix(".store")
-
-    @property
-    def sources(self) -> tuple[Path, ...]:
-        """All files that the campaign reads, which no result may overwrite."""
-        from aqualog.config.configured import files_of
-
-        return files_of(self.configured)
-
-    @property
-    def runs(self) -> pl.DataFrame:
-        """A row for each run: log and what the campaign says of it."""
-        import polars as pl
-
-        runs = self.configured.campaign.runs
-        rows = [{"log": "; ".join(map(str, r.logs)), "vehicle": str(r.vehicle), **r.values} for r in runs]
-        return pl.DataFrame(rows, infer_schema_length=None)
-
-    def check_bins(self, by: str | Sequence[str] = (), *, bin_width: float = 10.0, road: str = "wet") -> Any:
-        """Check keys and bins before any work, and return the plan that they make.
-
-        Raises
-        ------
-        ConfigError
-        """
-        from aqualog.campaign.bins import check_plan
-
-        bin_width = number_of(bin_width, "bin_width", 1.0, 100.0, "km/h")
-        return check_plan(self.configured.campaign, split(by), width_kmh=bin_width, road=road)
-
-    def check_targets(self, targets: Sequence[Path], *, force: bool) -> None:
-        """Refuse results that are in the way of something, that the campaign reads, or that lie in a store.
-
-        Raises
-        ------
-        ConfigError
-        """
-        places = [self.store] if self._store is not None else []
-        if self.configured.campaign.path.suffix.lower() == ".toml":
-            places.append(self.configured.campaign.path.with_suffix(".store"))
-        for target in targets:
-            refuse_in_store(target, [p for p in places if isinstance(p, Path)])
-        refuse_existing(targets, force=force, sources=self.sources)
-
-    def check_report(self, folder: Path, *, force: bool) -> None:
-        """Refuse a folder for the report that holds other files, or files that the campaign reads.
-
-        Raises
-        ------
-        ConfigError
-        """
-        from aqualog.campaign.jobs import name_of
-        from aqualog.report.campaign.folder import check_folder, targets_of
-
-        check_folder(folder, force=force)
-        campaign = self.configured.campaign
-        self.check_targets(targets_of(folder, [name_of(campaign, r.logs) for r in campaign.runs]), force=True)
+        began, hear, out = time.monotonic(), listener(progress), file_of(folder, "folder")
+        if out.suffix.lower() in SUFFIXES:
+            raise ConfigError("is the name of a log", where=str(out), expected="a folder for the campaign")
+        processes = os.cpu_count() or 1 if jobs is None else whole_number(jobs, "jobs", 1, 1024)
+        outcome = simulate_campaign(programme, out, jobs=processes, force=force, report=Counted(hear, "drives"))
+        for name, reason in outcome.failed.items():
+            hear.failed(name, reason)
+        return SimulatedCampaign(out, outcome, time.monotonic() - began)
 
     def matrix(self) -> Matrix:
         """Return the test matrix: what was driven how often and how fast, and what is missing.
@@ -235,7 +141,7 @@ class Campaign:
         ConfigError
             For logs without a campaign file.
         """
-        from aqualog.face.matrix import matrix
+        from aqualog.face.inspect import matrix
 
         path = self.configured.campaign.path
         if path.suffix.lower() != ".toml":
@@ -309,7 +215,7 @@ class Campaign:
         from aqualog.campaign.definition import part_of, shard_of
         from aqualog.guard.worker import Limits
 
-        began = time.monotonic()
+        began, hear = time.monotonic(), listener(progress)
         if jobs is not None:
             jobs = whole_number(jobs, "jobs", 1, 1024)
         if limit_s is not None:
@@ -329,12 +235,76 @@ class Campaign:
             from aqualog.campaign.results import CampaignData
             from aqualog.campaign.store import Store
 
-            return CampaignRuns(self, CampaignData(configured, Store(self.store), ()), BatchOutcome(0, 0, {}), part)
-        data, outcome = bring_up_to_date(
-            configured, self.store, listener(progress), jobs=jobs, force=force, shard=part, cluster=cluster,
-            limits=Limits(limit_s, limit_mb),
-        )  # fmt: skip
-        return CampaignRuns(self, data, outcome, part, time.monotonic() - began)
+            data = CampaignData(configured, Store(self.store), ())
+            return runs_of(self, data, BatchOutcome(0, 0, {}), part, 0.0)
+        from aqualog.core.user_folders import has_kept_code
+        from aqualog.guard.worker import most_processes
+
+        if jobs is not None and jobs > most_processes():
+            hear.note(f"jobs {jobs}: {most_processes()} processes are the most on this machine")
+        hear("looking at the logs")
+        from aqualog.campaign.batch import run_batch
+        from aqualog.campaign.results import load_results
+        from aqualog.campaign.store import Store
+        from aqualog.config.configured import files_of
+
+        if cluster is None and not has_kept_code():
+            hear.note("the first logs wait while the detectors are compiled, once after an installation")
+        store = Store(self.store, part.name if part is not None else "")
+        if any(store.holds(p) for p in files_of(configured)):
+            raise ConfigError("holds a source of this campaign", where=store.name, expected="a folder of its own")
+        limits = Limits(limit_s, limit_mb)
+        with _workers_at(cluster, limits, hear) as elsewhere:
+            outcome = run_batch(
+                configured, store, jobs=jobs or os.cpu_count() or 1, force=force, limits=limits,
+                elsewhere=elsewhere, report=Counted(hear, "logs"), told=hear.failed,
+            )  # fmt: skip
+        hear.settled(store.at("manifest.json"))
+        hear("loading the results")
+        data = load_results(configured, store)
+        return runs_of(self, data, outcome, part, time.monotonic() - began)
+
+
+@contextmanager
+def _workers_at(address: str | None, limits: Limits, hear: Callable[[str], None]) -> Iterator[WorkOn | None]:
+    if address is None:
+        yield None
+        return
+    from aqualog.campaign.cluster import on_cluster
+
+    with on_cluster(address, limits=limits, tell=lambda text: hear(f"{address}: {text}")) as work_on:
+        yield work_on
+
+
+@dataclass(frozen=True)
+class SimulatedCampaign:
+    """A simulated campaign in a folder: `outcome` counts the drives made, kept and failed; `seconds` it took."""
+
+    folder: Path
+    outcome: CampaignOutcome
+    seconds: float
+
+    @property
+    def path(self) -> Path:
+        """The campaign file."""
+        return self.folder / "campaign.toml"
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign, to run."""
+        return Campaign(self.path)
+
+    @property
+    def has_loss(self) -> bool:
+        """Whether a drive failed."""
+        return bool(self.outcome.failed)
+
+    def headline(self) -> str:
+        """Return how many drives were simulated, and where the campaign is."""
+        o = self.outcome
+        kept = f", {o.kept} were there already" if o.kept else ""
+        failed = f", {len(o.failed)} failed" if o.failed else ""
+        return f"{o.made} drives simulated in {self.seconds:.0f} s{kept}{failed}; the campaign is {self.path}"
 
     def __repr__(self) -> str:
-        return f"campaign {self.name}: {len(self.configured.campaign.runs)} runs, keys {', '.join(self.keys) or 'none'}"
+        return self.headline()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of
-from aqualog.face.campaign_store import split
-from aqualog.face.listener import Progress, listener
-from aqualog.face.progress import Progress as Counted
-from aqualog.face.result import PathLike, Result, Writers
+from aqualog.face.campaign_inputs import CampaignInputs, split
+from aqualog.face.listener import Counted, Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, document_head, rows_table
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -20,11 +20,159 @@ if TYPE_CHECKING:
 
     from aqualog.campaign.batch import BatchOutcome
     from aqualog.campaign.definition import Shard
+    from aqualog.campaign.full_speed import FullSpeed
+    from aqualog.campaign.means import MeanRow, ResistanceTable
     from aqualog.campaign.results import CampaignData
-    from aqualog.face.bins import BinnedResistance, BinnedSlopes
-    from aqualog.face.campaign import Campaign
+    from aqualog.campaign.slip_slope import SlopeTable
+    from aqualog.campaign.spin_downs import SpinDownRow
+    from aqualog.report.campaign.findings import Curve
+    from aqualog.report.sections import Report
 
-__all__ = ["CampaignRuns"]
+__all__ = ["BinnedResistance", "BinnedSlopes", "CampaignRuns", "check_table", "runs_of"]
+
+
+_SUFFIXES = (".csv", ".parquet")
+
+
+def check_table(path: Path) -> None:
+    """Refuse a table in an unknown format, before any work."""
+    if path.suffix.lower() not in _SUFFIXES:
+        raise ConfigError(f'"{path.suffix}" is no format of a table', where=str(path), expected=" or ".join(_SUFFIXES))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Binned(Result):
+    name: str
+
+    _NAME: ClassVar[str]
+
+    @property
+    def rows(self) -> pl.DataFrame:
+        """The rows of the document; an interval `x_ci95` stands in two columns, `x_low` and `x_high`."""
+        return _frame(self.document["rows"])
+
+    def headline(self) -> str:
+        lines = self.text().rstrip("\n").split("\n")
+        return "\n".join([f"{self.name}: {len(self.document['rows'])} rows", *lines[:6]])
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the rows as one table: .csv or .parquet."""
+        target = file_of(path, "path")
+        check_table(target)
+        return self._write_to(target, partial(_write, self.document["rows"], target.suffix.lower()), force=force)
+
+    def files(self) -> Writers:
+        """Return the document and its rows as CSV and Parquet."""
+        rows = self.document["rows"]
+        return {
+            f"{self._NAME}.json": self._json_file(),
+            **{f"{self._NAME}{s}": partial(_write, rows, s) for s in _SUFFIXES},
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BinnedSlopes(_Binned):
+    """Slip slopes in bins of speed, and speeds of full aquaplaning."""
+
+    slopes: SlopeTable
+    speeds: Sequence[FullSpeed]
+    spin_ups: Sequence[tuple[MeanRow, MeanRow]]
+    spin_downs: Sequence[SpinDownRow]
+
+    _NAME = "slip_slope"
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        from aqualog.report.campaign.bins import slope_document
+
+        return slope_document(self.name, self.slopes, self.speeds, self.spin_ups, self.spin_downs)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`rows`, `dry`, `full_aquaplaning`, `spin_ups` and `minor_spin_downs`."""
+        names = ("dry", "full_aquaplaning", "spin_ups", "minor_spin_downs")
+        return {"rows": self.rows, **{n: _frame(self.document[n]) for n in names}}
+
+    def _report(self) -> Report:
+        from aqualog.report.campaign.bins import slope_report
+
+        return slope_report(self.slopes, self.speeds, self.spin_ups, self.spin_downs)
+
+    def plot(self) -> go.Figure:
+        """Return slip slope over speed with 95 % intervals, a line for each configuration and wheel."""
+        from aqualog.report.campaign.findings import slope_curves
+
+        return _curves(slope_curves(self.slopes), "slip slope C_s/F_z", self.name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BinnedResistance(_Binned):
+    """Mean resistance measures in bins of speed."""
+
+    table: ResistanceTable
+
+    _NAME = "resistance"
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        from aqualog.report.campaign.bins import resistance_document
+
+        return resistance_document(self.name, self.table)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`rows`."""
+        return {"rows": self.rows}
+
+    def _report(self) -> Report:
+        from aqualog.report.campaign.bins import resistance_report
+
+        return resistance_report(self.table)
+
+    def plot(self) -> go.Figure:
+        """Return the resistance measure over speed with 95 % intervals, a line for each configuration."""
+        from aqualog.report.campaign.findings import resistance_curves
+
+        return _curves(resistance_curves(self.table), "resistance measure [m/s²]", self.name)
+
+
+def _frame(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
+    from aqualog.report.campaign.bins import flat_rows
+
+    return rows_table(flat_rows(rows))
+
+
+def _write(rows: Sequence[Mapping[str, Any]], suffix: str, path: Path) -> None:
+    """Write rows of a document as CSV or Parquet; a text that a spreadsheet would run is made harmless in CSV."""
+    from aqualog.report.campaign.bins import flat_rows
+    from aqualog.report.campaign.folder import safe_cell
+
+    if suffix == ".parquet":
+        _frame(rows).write_parquet(path)
+        return
+    plain = [{k: safe_cell(v) if isinstance(v, str) else v for k, v in row.items()} for row in flat_rows(rows)]
+    rows_table(plain).write_csv(path)
+
+
+def _curves(curves: Sequence[Curve], unit: str, title: str) -> go.Figure:
+    import plotly.graph_objects as go
+
+    from aqualog.report.campaign.labels import group_text
+
+    made = go.Figure()
+    for c in curves:
+        points = [p for p in c.points if p.value == p.value]  # not NaN
+        name = ", ".join(t for t in (group_text(c.group), c.place) if t)
+        made.add_scatter(
+            x=[p.v_kmh for p in points], y=[p.value for p in points], name=name, mode="lines+markers",
+            error_y={"type": "data", "symmetric": False, "thickness": 1.2,
+                     "array": [p.ci[1] - p.value for p in points],
+                     "arrayminus": [p.value - p.ci[0] for p in points]},
+        )  # fmt: skip
+    made.update_layout(title=title, template="plotly_white")
+    made.update_xaxes(title="speed [km/h]")
+    made.update_yaxes(title=unit)
+    return made
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,39 +182,16 @@ class CampaignRuns(Result):
     `data` gives access to runs and samples, `outcome` counts what came of the logs, `seconds` is the time it took.
     """
 
-    campaign: Campaign
+    campaign: CampaignInputs
     data: CampaignData
     outcome: BatchOutcome
     shard: Shard | None = None
     seconds: float = 0.0
 
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Where the results are, and what a shard leaves to do."""
-        notes = (f"results are in {self.data.store.name}, {self.seconds:.0f} s",)
-        if self.shard is None:
-            return notes
-        return (*notes, "the same without a shard makes the tables, when all parts are done")
-
-    @property
-    def sources(self) -> tuple[Path, ...]:  # type: ignore[override]
-        """All files that the campaign reads."""
-        return self.campaign.sources
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a log failed, was cut or lost samples."""
-        lost = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in self.data.done)
-        return bool(self.outcome.failed or lost)
-
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog batch`."""
-        from aqualog import __version__
-
         return {
-            "schema_version": 1,
-            "tool_version": __version__,
+            **document_head(),
             "campaign": self.data.name,
             "store": self.data.store.name,
             "runs": len(self.data.runs),
@@ -96,14 +221,12 @@ class CampaignRuns(Result):
         return {"runs": self.runs, "events": self.events}
 
     def text(self) -> str:
-        """Return how many logs are done, and the events of each detector."""
         from aqualog.report.text import table
 
         rows = [(d, str(n), f"{k} of {len(self.data.done)}") for d, (n, k) in self._counts().items()]
         return f"{self._head()}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
 
     def headline(self) -> str:
-        """Return how many logs are done and failed."""
         failed = [f"  failed: {name}: {reason}" for name, reason in self.outcome.failed.items()]
         return "\n".join([f"{self.data.name}: {self._head()}", *failed])
 
@@ -113,7 +236,9 @@ class CampaignRuns(Result):
 
     def _counts(self) -> dict[str, tuple[int, int]]:
         """Per detector: its events, and the runs that have one."""
-        of = {d: [sum(e["detector"] == d for e in r.events) for r in self.data.done] for d in _detectors()}
+        from aqualog.detect.registry import DETECTORS
+
+        of = {d: [sum(e["detector"] == d for e in r.events) for r in self.data.done] for d in DETECTORS}
         return {d: (sum(x), sum(n > 0 for n in x)) for d, x in of.items()}
 
     def plot(self) -> go.Figure:
@@ -162,9 +287,25 @@ class CampaignRuns(Result):
         ------
         ConfigError
         """
-        from aqualog.face.bins import binned_slopes
+        from aqualog.campaign.bins import plan
+        from aqualog.campaign.full_speed import full_speeds
+        from aqualog.campaign.means import spin_ups
+        from aqualog.campaign.slip_slope import slip_slopes
+        from aqualog.campaign.spin_downs import minor_spin_downs
+        from aqualog.face.campaign_runs import BinnedSlopes
 
-        return binned_slopes(self, split(by), bin_width=bin_width, road=road, robust=robust, hear=listener(progress))
+        data, hear = self.data, listener(progress)
+        self.campaign.check_bins(by, bin_width=bin_width, road=road)
+        hear("regressing")
+        cells = plan(data, split(by), width_kmh=bin_width, road=road)
+        slopes = slip_slopes(data, cells, robust=robust)
+        hear("speeds of full aquaplaning")
+        wet = cells if road != "dry" else plan(data, split(by), width_kmh=bin_width)
+        speeds = full_speeds(data, wet, slopes if road != "dry" else slip_slopes(data, wet, robust=robust))
+        ups = list(zip(spin_ups(data, wet), spin_ups(data, wet, residual=True), strict=True))
+        return BinnedSlopes(
+            data.name, slopes, speeds, ups, minor_spin_downs(data, wet), has_loss=self.has_loss, sources=self.sources
+        )
 
     def resistance(
         self,
@@ -189,12 +330,15 @@ class CampaignRuns(Result):
         ------
         ConfigError
         """
-        from aqualog.face.bins import binned_resistance
+        from aqualog.campaign.bins import plan
+        from aqualog.campaign.means import resistances
+        from aqualog.face.campaign_runs import BinnedResistance
 
-        return binned_resistance(
-            self, split(by), bin_width=bin_width, road=road, robust=robust, relative=not as_measured,
-            hear=listener(progress),
-        )  # fmt: skip
+        self.campaign.check_bins(by, bin_width=bin_width, road=road)
+        listener(progress)("averaging")
+        cells = plan(self.data, split(by), width_kmh=bin_width, road=road)
+        found = resistances(self.data, cells, relative=not as_measured, robust=robust)
+        return BinnedResistance(self.data.name, found, has_loss=self.has_loss, sources=self.sources)
 
     def report(
         self,
@@ -225,7 +369,15 @@ class CampaignRuns(Result):
         return out / "index.html"
 
 
-def _detectors() -> Sequence[str]:
-    from aqualog.detect.registry import DETECTORS
-
-    return DETECTORS
+def runs_of(
+    campaign: CampaignInputs, data: CampaignData, outcome: BatchOutcome, shard: Shard | None, seconds: float
+) -> CampaignRuns:
+    """Return the runs of a batch that has just ended."""
+    notes = [f"results are in {data.store.name}, {seconds:.0f} s"]
+    if shard is not None:
+        notes.append("the same without a shard makes the tables, when all parts are done")
+    lost = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in data.done)
+    return CampaignRuns(
+        campaign, data, outcome, shard, seconds, notes=tuple(notes), has_loss=bool(outcome.failed or lost),
+        sources=campaign.sources,
+    )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,15 +13,16 @@ from typing import TYPE_CHECKING, Any
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import file_of, text_of
-from aqualog.face.drive import Drive, DriveLike, drive_of, vehicle_of
+from aqualog.face.arguments import file_of, text_of, write_whole
+from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file
+from aqualog.face.result import PathLike, Result, Writers, page_file, table
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.align.load import LoadedLong
     from aqualog.detect.slip_slope.watch import Memory
     from aqualog.detect.stream import Settings
     from aqualog.model.term import Model
@@ -44,41 +46,28 @@ class Detection(Result):
     vehicle: Vehicle
     drive_result: DriveResult
     model: Model | None = None
-    sources: tuple[Path, ...] = ()
-    has_changed: bool = False
     memory: Memory | None = None
     drive_key: str = ""
 
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on the log and on the judgement."""
-        return (*self.drive_result.signals.quality.notes, *self.drive_result.notes)
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a file was cut, lost samples or changed while it was read."""
-        quality = self.drive_result.signals.quality
-        return bool(quality.truncated or quality.lost_in_files or self.has_changed)
-
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog detect`."""
         from aqualog.report.drive.document import document
 
-        return {**document(self.drive_result, log=self.drive.name), "model": _model_document(self.model)}
+        effects = None if self.model is None else [
+            {"effect": t.effect.name, "where": t.where, "parameters": dict(t.values),
+             **({"knots": [list(k) for k in t.knots]} if t.knots else {})}
+            for t in self.model.terms
+        ]  # fmt: skip
+        return {**document(self.drive_result, log=self.drive.name), "model": effects}
 
     @property
     def events(self) -> pl.DataFrame:
         """A row for each event: detector, wheel, side, start_s, end_s [s], severity, peak, threshold, evidence."""
-        import polars as pl
-
-        rows = [
-            {**{k: v for k, v in e.items() if k != "evidence"}, "evidence": json.dumps(e["evidence"])}
-            for e in self.document["events"]
-        ]
-        numbers = dict.fromkeys(("start_s", "end_s", "peak", "threshold"), pl.Float64)
-        schema = {n: numbers.get(n, pl.String) for n in _EVENT_COLUMNS}
-        return pl.DataFrame(rows, schema=schema)
+        rows = [{**e, "evidence": json.dumps(e["evidence"])} for e in self.document["events"]]
+        return table(
+            rows, "detector wheel side start_s end_s severity peak threshold evidence",
+            text=("detector", "wheel", "side", "severity", "evidence"),
+        )  # fmt: skip
 
     @property
     def signals(self) -> pl.DataFrame:
@@ -126,19 +115,12 @@ class Detection(Result):
         found = {"events": self.events, "signals": self.signals}
         return {**found, "features": self.features, "tracks": self.tracks} if self.has_samples else found
 
-    def text(self) -> str:
-        """Return the table of events, and what could not be judged."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
-
     def _report(self) -> Report:
         from aqualog.report.drive.report import drive_report
 
         return drive_report(self.drive_result)
 
     def headline(self) -> str:
-        """Return the verdict: how many events, the most important ones, and which detectors could not judge."""
         from aqualog.report.drive.report import verdict
 
         found, signals = verdict(self.drive_result), self.drive_result.signals
@@ -178,13 +160,7 @@ class Detection(Result):
         return files if self.has_samples else {"events.json": files["events.json"]}
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
-
-        Raises
-        ------
-        ConfigError
-            If the suffix is not known, or the file exists and `force` is not given.
-        """
+        """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet."""
         from aqualog.io.write_log import check_suffix
 
         suffix = check_suffix(file_of(path, "path"))
@@ -192,23 +168,10 @@ class Detection(Result):
         return self._write_to(path, lambda p: self._write(p, suffix), force=force)
 
     def _write(self, path: Path, suffix: str) -> None:
-        import numpy as np
-
-        from aqualog.io.write_log import write_log
-        from aqualog.report.drive.document import result_groups
-
-        signals = self.drive_result.signals
-        t_ns = np.arange(signals.frame.height, dtype=np.int64) * signals.dt_ns
-        write_log(path, t_ns, result_groups(self.drive_result), suffix=suffix, start_ns=signals.start_ns)
+        _write_log(self.drive_result, path, suffix)
 
     def remember(self, history: PathLike) -> None:
-        """Add the dry slip slopes of this drive to a history file; the same drive counts once.
-
-        Raises
-        ------
-        ConfigError
-            If the file is no history.
-        """
+        """Add the dry slip slopes of this drive to a history file; the same drive counts once."""
         from aqualog.config.history import update_history
         from aqualog.detect.slip_slope.history import drive_key, remembered
         from aqualog.detect.slip_slope.watch import Memory
@@ -217,11 +180,6 @@ class Detection(Result):
         key = self.drive_key or drive_key(self.drive_result.signals)
         name, slopes = memory.name(self.vehicle), self.drive_result.slopes
         update_history(file_of(history, "history"), lambda h: remembered(h, name, slopes, drive=key))
-
-
-_EVENT_COLUMNS = (
-    "detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence",
-)  # fmt: skip
 
 
 def detect(
@@ -265,10 +223,6 @@ def detect(
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
-    Returns
-    -------
-    Detection
-
     Raises
     ------
     LogError, SignalError, ConfigError
@@ -283,74 +237,121 @@ def detect(
     one = drive_of(drive)
     car = vehicle_of(vehicle, one)
     memory = _memory(history, configuration, reference)
-    settings = _settings(thresholds)
+    settings = None
+    if thresholds is not None:
+        from aqualog.config.thresholds import load_settings
+
+        settings = load_settings(file_of(thresholds, "thresholds"))
     known = model_of(model)
     asked = (("writing a log", whole), ("a model", known is not None), ("a history", history is not None))
     needs = ", ".join(n for n, is_asked in asked if is_asked)
-    sources = (*one.sources, *(Path(x) for x in (vehicle, thresholds, model, history) if isinstance(x, str | Path)))
-    notes: tuple[str, ...] = ()
     key = ""
     with one.reading():
         loaded = one.load_or_open(car, report=hear, note=hear.note, whole_for=needs)
         if isinstance(loaded, Signals):
             check_something_to_do(loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name)
             hear("detecting")
+            past = memory
             if history is not None:
                 from aqualog.detect.slip_slope.history import drive_key
 
                 # what an earlier look at this very drive has left is not what it is compared with
                 key = drive_key(loaded)
-            result, notes = _whole(loaded, car, known, settings, memory, key, hear, samples=samples)
+                past = replace(memory, history=memory.history.without(key))
+            result = _whole(loaded, car, known, settings, past, hear, samples=samples)
         else:
-            from aqualog.face.detect_long import detect_in_windows
-
-            grid = loaded.drive.plan.grid
-            check_something_to_do(loaded.drive.plan.symbols, 1e9 / grid.dt_ns, loaded.drive.plan.notes, car, one.name)
-            hear.detail(f"{grid.rows} samples at {1e9 / grid.dt_ns:g} Hz, gone through in windows")
+            plan = loaded.drive.plan
+            check_something_to_do(plan.symbols, 1e9 / plan.grid.dt_ns, plan.notes, car, one.name)
+            hear.detail(f"{plan.grid.rows} samples at {1e9 / plan.grid.dt_ns:g} Hz, gone through in windows")
             out = None if windows is None else file_of(windows, "windows")
-            result = detect_in_windows(loaded, car, settings=settings, memory=memory, out=out, report=hear)
+            result = _in_windows(loaded, car, settings, memory, out, hear)
         changes = one.changes()
-    result = replace(result, notes=(*notes, *result.notes, *changes))
-    return Detection(one, car, result, known, sources, bool(changes), memory, key)
+    result = replace(result, notes=(*result.notes, *changes))
+    quality = result.signals.quality
+    return Detection(
+        one, car, result, known, memory, key, notes=(*quality.notes, *result.notes),
+        has_loss=quality.has_loss or bool(changes),
+        sources=sources_of(one.sources, vehicle, thresholds, model, history),
+    )  # fmt: skip
 
 
 def _whole(
-    loaded: Signals,
-    vehicle: Vehicle,
-    model: Model | None,
-    settings: Settings | None,
-    memory: Memory,
-    key: str,
-    hear: Listener,
-    *,
-    samples: bool,
-) -> tuple[DriveResult, tuple[str, ...]]:
-    """Detection in one go: the result, and what the model has to say."""
+    signals: Signals, vehicle: Vehicle, model: Model | None, settings: Settings | None, memory: Memory, hear: Listener,
+    *, samples: bool,
+) -> DriveResult:  # fmt: skip
+    """Detection in one go; its notes begin with those of the model."""
     from contextlib import nullcontext
 
     from aqualog.detect.stream import detect_drive
 
-    hear.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
-    for name, origin in loaded.origins.items():
+    hear.detail(f"{len(signals.symbols)} signals, {signals.frame.height} samples at {1e9 / signals.dt_ns:g} Hz")
+    for name, origin in signals.origins.items():
         hear.detail(f"  {name}: {origin.file}:{origin.channel} [{origin.unit}] {origin.rate_hz:.4g} Hz")
     notes: tuple[str, ...] = ()
     if model is not None:
         from aqualog.diagnose.extended import extended_inputs
 
-        loaded, vehicle, notes = extended_inputs(loaded, vehicle, model)
-    with hear.slow("the detectors") if loaded.frame.height < _WHOLE_ROWS else nullcontext():
-        known = replace(memory, history=memory.history.without(key))
-        return detect_drive(loaded, vehicle, settings=settings, memory=known, samples=samples), notes
+        signals, vehicle, notes = extended_inputs(signals, vehicle, model)
+    with hear.slow("the detectors") if signals.frame.height < _WHOLE_ROWS else nullcontext():
+        found = detect_drive(signals, vehicle, settings=settings, memory=memory, samples=samples)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _in_windows(
+    opened: LoadedLong, vehicle: Vehicle, settings: Settings | None, memory: Memory, out: Path | None, hear: Listener
+) -> DriveResult:
+    """Detection on a drive that is longer than memory.
+
+    With a folder `out`, its signals go into `signals.parquet` there: each window as a file, which are then joined.
+    """
+    from contextlib import ExitStack
+
+    from aqualog.detect.long import detect_long
+
+    parts: list[Path] = []
+    rows = 0
+
+    def keep(window: DriveResult) -> None:
+        nonlocal rows
+        parts.append(folder / f"{len(parts):06d}.parquet")
+        _write_log(window, parts[-1], ".parquet", first_row=rows)
+        rows += window.signals.frame.height
+
+    with opened.opened, ExitStack() as scratch:
+        if out is not None:
+            from aqualog.guard.reading import unfinished
+
+            out.mkdir(parents=True, exist_ok=True)
+            made = tempfile.TemporaryDirectory(prefix=".windows-", dir=out, ignore_cleanup_errors=True)
+            folder = Path(scratch.enter_context(made))
+            scratch.enter_context(unfinished(folder))
+        result = detect_long(
+            opened.drive, vehicle, settings=settings, memory=memory, faults=opened.faults,
+            keep=None if out is None else keep, pictured=out is not None,
+            tell=lambda share: hear(f"detecting, {100.0 * share:.0f} %"),
+        )  # fmt: skip
+        if out is not None:
+            from aqualog.io.write_table import join_parquet
+
+            hear("writing the table")
+            write_whole(out / "signals.parquet", lambda path: join_parquet(path, parts))
+    return result
+
+
+def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 0) -> None:
+    """Write signals, statistics and detection bits, the first of which stand in `first_row` of the drive."""
+    import numpy as np
+
+    from aqualog.io.write_log import write_log
+    from aqualog.report.drive.document import result_groups
+
+    signals = found.signals
+    t_ns = (first_row + np.arange(signals.frame.height, dtype=np.int64)) * signals.dt_ns
+    write_log(path, t_ns, result_groups(found), suffix=suffix, start_ns=signals.start_ns)
 
 
 def model_of(model: PathLike | Model | None) -> Model | None:
-    """Return the model behind an argument.
-
-    Raises
-    ------
-    ConfigError
-        If the file is no model.
-    """
+    """Return the model behind an argument."""
     if model is None:
         return None
     from aqualog.model.term import Model
@@ -375,23 +376,10 @@ def _memory(history: PathLike | None, configuration: str, reference: str) -> Mem
     return Memory(known, configuration.strip(), "max" if reference == "max" else "robust")
 
 
-def _settings(thresholds: PathLike | None) -> Settings | None:
-    if thresholds is None:
-        return None
-    from aqualog.config.thresholds import load_settings
-
-    return load_settings(file_of(thresholds, "thresholds"))
-
-
 def check_something_to_do(
     symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Vehicle, name: str
 ) -> None:
-    """Stop with one line if no detector can run.
-
-    Raises
-    ------
-    SignalError
-    """
+    """Stop with one line, a SignalError, if no detector can run."""
     from aqualog.detect.registry import DETECTORS, check_needs
 
     unavailable, _ = check_needs(vehicle, symbols, rate_hz=rate_hz)
@@ -405,18 +393,3 @@ def check_something_to_do(
         expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
         hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
     )
-
-
-def _model_document(model: Model | None) -> list[dict[str, Any]] | None:
-    """The effects that the detectors allowed for; null without a model."""
-    if model is None:
-        return None
-    return [
-        {
-            "effect": t.effect.name,
-            "where": t.where,
-            "parameters": dict(t.values),
-            **({"knots": [list(k) for k in t.knots]} if t.knots else {}),
-        }
-        for t in model.terms
-    ]

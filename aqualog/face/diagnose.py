@@ -12,14 +12,13 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, whole_number
 from aqualog.face.campaign import Campaign
+from aqualog.face.campaign_inputs import is_campaign
 from aqualog.face.campaign_runs import CampaignRuns
-from aqualog.face.campaign_store import is_campaign
 from aqualog.face.detect import model_of
-from aqualog.face.drive import Drive, vehicle_needed
-from aqualog.face.drives import DrivesLike, Grouped, Loaded, drives_of, load_drives, with_own_names
+from aqualog.face.drive import Drive, sources_of, vehicle_needed
+from aqualog.face.drives import DrivesLike, Grouped, NothingUsableError, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
-from aqualog.face.tables import flat, table
+from aqualog.face.result import PathLike, Result, Writers, document_head, flat, page_file, table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -47,8 +46,6 @@ class Diagnosis(Result):
     logs: tuple[str, ...]
     vehicle_name: str
     file_notes: tuple[str, ...] = ()
-    has_loss: bool = False
-    sources: tuple[Path, ...] = ()
     model_file: str | None = None
 
     @property
@@ -61,20 +58,13 @@ class Diagnosis(Result):
         """The extended model, for the argument `model` of `detect`, `simulate` and `diagnose`."""
         return self.found.model
 
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on the logs and on the diagnosis."""
-        return (*self.file_notes, *self.found.notes)
-
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog diagnose`."""
-        from aqualog import __version__
         from aqualog.report.diagnosis.document import diagnosis_document
 
         return diagnosis_document(
-            self.found, logs=self.logs, tool_version=__version__, notes=self.file_notes, vehicle=self.vehicle_name,
-            extended_model=self.model_file,
+            self.found, logs=self.logs, tool_version=document_head()["tool_version"], notes=self.file_notes,
+            vehicle=self.vehicle_name, extended_model=self.model_file,
         )  # fmt: skip
 
     @property
@@ -114,19 +104,12 @@ class Diagnosis(Result):
             "alternatives": table(others, "effects evidence_ratio", text=("effects",)),
         }  # fmt: skip
 
-    def text(self) -> str:
-        """Return the verdict and its basis."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
-
     def _report(self) -> Report:
         from aqualog.report.diagnosis.sections import diagnosis_report
 
         return diagnosis_report(self.document)
 
     def headline(self) -> str:
-        """Return the verdict, the causes with their intervals, and the next drive if one is proposed."""
         from aqualog.report.diagnosis.words import effect_title, sentences
         from aqualog.report.values import interval_text, ordinary, pretty_unit
 
@@ -170,13 +153,7 @@ class Diagnosis(Result):
         }
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write document, model and page into a folder; document and page name the model file there.
-
-        Raises
-        ------
-        ConfigError
-            If a file exists already, or is a source of this result.
-        """
+        """Write document, model and page into a folder; document and page name the model file there."""
         return super(Diagnosis, self.naming(Path(folder) / "model.toml")).save(folder, force=force)
 
     def naming(self, path: PathLike) -> Diagnosis:
@@ -184,23 +161,11 @@ class Diagnosis(Result):
         return replace(self, model_file=str(path))
 
     def write_model(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the extended model, a file that `detect`, `simulate` and `diagnose` take.
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given, or it is a source of this result.
-        """
+        """Write the extended model, a file that `detect`, `simulate` and `diagnose` take."""
         return self._write_as("model.toml", path, force=force)
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the page with the pictures before and after (HTML).
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given, or it is a source of this result.
-        """
+        """Write the page with the pictures before and after (HTML)."""
         return self._write_as("diagnosis.html", path, force=force)
 
 
@@ -259,10 +224,6 @@ def diagnose(
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
-    Returns
-    -------
-    Diagnosis
-
     Raises
     ------
     LogError, SignalError, ConfigError
@@ -279,39 +240,21 @@ def diagnose(
     seed = whole_number(seed, "seed", 0, 2**63 - 1)
     if surrogates is not None:
         surrogates = whole_number(surrogates, "surrogates", 0, 100_000)
+    options: dict[str, Any] = {"seed": seed, "level": level}
+    options |= {} if surrogates is None else {"surrogates": surrogates}
     campaign = _campaign_of(drives, vehicle)
     if campaign is not None:
         if not (isinstance(holdout, Sequence) and not holdout):
             raise ConfigError("holdout beside a campaign", expected="drives, or a campaign alone")
-        return _of_campaign(campaign, model_of(model), model, seed, level, surrogates, hear)
+        return _of_campaign(campaign, model, options, hear)
     assert not isinstance(drives, Campaign | CampaignRuns)
     known = model_of(model)
     named, held = drives_of(drives), drives_of(holdout, is_needed=False)
     check_apart(named, held)
-    repeated = _repeated(named)
     own, unseen = with_own_names(named, held)
     car = vehicle_needed(vehicle, own[0] if own else None)
     loaded = load_drives([*own, *unseen], car, hear)
     names = [d.label for d in unseen]
-    options = {"seed": seed, "level": level, "views": views}
-    if surrogates is not None:
-        options["surrogates"] = surrogates
-    found = _found(loaded, names, car, known, options, hear)
-    changes = loaded.changes
-    used = [d for d in loaded.used if d.label not in names]
-    has_loss = loaded.has_loss or bool(changes) or len(found.drives) < len(used)
-    files = dict.fromkeys(p for d in (*own, *unseen) for p in d.sources)
-    others = (Path(x) for x in (vehicle, model) if isinstance(x, str | Path))
-    return Diagnosis(
-        found, tuple(str(p) for d in used for p in d.paths), car.name, (*repeated, *loaded.notes, *changes), has_loss,
-        (*files, *others),
-    )  # fmt: skip
-
-
-def _found(
-    loaded: Loaded, unseen: Sequence[str], car: Vehicle, known: Model | None, options: dict[str, Any], hear: Listener
-) -> Found:
-    """Return the diagnosis of the drives that can be used."""
 
     def work(signals: dict[str, Signals]) -> Found:
         from aqualog.diagnose.run import Options
@@ -319,32 +262,29 @@ def _found(
         from aqualog.model.term import Model
 
         return run(
-            [(n, s) for n, s in signals.items() if n not in unseen], car, model=known or Model(),
-            holdout=[(n, s) for n, s in signals.items() if n in unseen], options=Options(**options),
+            [(n, s) for n, s in signals.items() if n not in names], car, model=known or Model(),
+            holdout=[(n, s) for n, s in signals.items() if n in names], options=Options(**options, views=views),
             progress=_shares(hear),
         )  # fmt: skip
 
-    return loaded.tried(work, hear, unseen)
+    found = loaded.tried(work, hear, names)
+    used = [d for d in loaded.used if d.label not in names]
+    notes = (*loaded.notes, *loaded.changes)
+    if isinstance(named, Grouped) and named.repeated:
+        notes = (f"{named.repeated} of {named.named} logs given more than once: each counts once", *notes)
+    return Diagnosis(
+        found, tuple(str(p) for d in used for p in d.paths), car.name, notes, notes=(*notes, *found.notes),
+        has_loss=loaded.has_loss or bool(loaded.changes) or len(found.drives) < len(used),
+        sources=sources_of((p for d in (*own, *unseen) for p in d.sources), vehicle, model),
+    )  # fmt: skip
 
 
 def check_apart(drives: Sequence[Drive], unseen: Sequence[Drive]) -> None:
-    """Refuse a file that is diagnosed and held out: a gain on what was fitted means nothing.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse a file that is diagnosed and held out: a gain on what was fitted means nothing."""
     own = {p.resolve() for d in drives for p in d.paths}
     twice = next((p for d in unseen for p in d.paths if p.resolve() in own), None)
     if twice is not None:
         raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives as holdout")
-
-
-def _repeated(drives: Sequence[Drive]) -> list[str]:
-    """Return a note on files that are named more than once, of which each counts once."""
-    if not isinstance(drives, Grouped) or not drives.repeated:
-        return []
-    return [f"{drives.repeated} of {drives.named} logs given more than once: each counts once"]
 
 
 def _shares(hear: Listener) -> Callable[[str, float], None]:
@@ -381,30 +321,21 @@ def _campaign_of(drives: object, vehicle: PathLike | Vehicle | None) -> Campaign
 
 
 def _of_campaign(
-    campaign: Campaign | CampaignRuns,
-    known: Model | None,
-    model: PathLike | Model | None,
-    seed: int,
-    level: float,
-    surrogates: int | None,
-    hear: Listener,
+    campaign: Campaign | CampaignRuns, model: PathLike | Model | None, options: dict[str, Any], hear: Listener
 ) -> Diagnosis:
     """Diagnose the runs of a campaign together: they show what no single drive does."""
-    from aqualog.face.drives import NothingUsableError
     from aqualog.model.term import Model
 
+    known = model_of(model) or Model()
     runs = campaign.run(progress=hear) if isinstance(campaign, Campaign) else campaign
     if not runs.outcome.done:
         raise NothingUsableError([f"{name}: {reason}" for name, reason in runs.outcome.failed.items()])
     from aqualog.diagnose.campaign import diagnose_campaign
 
     configured = runs.campaign.configured
-    drawn: Any = {} if surrogates is None else {"surrogates": surrogates}
-    found = diagnose_campaign(
-        configured.campaign, runs.data, seed=seed, level=level, model=known or Model(), progress=hear, **drawn
-    )
+    found = diagnose_campaign(configured.campaign, runs.data, model=known, progress=hear, **options)
     names = dict.fromkeys(car.name for car in configured.vehicles.values())
-    others = (Path(x) for x in (model,) if isinstance(x, str | Path))
     return Diagnosis(
-        found, runs.campaign.inputs, ", ".join(names), (), runs.has_loss, (*runs.campaign.sources, *others)
-    )
+        found, runs.campaign.inputs, ", ".join(names), notes=tuple(found.notes), has_loss=runs.has_loss,
+        sources=sources_of(runs.campaign.sources, model),
+    )  # fmt: skip

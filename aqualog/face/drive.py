@@ -13,10 +13,9 @@ from aqualog.align.mapping import SignalMap, values_read
 from aqualog.core.errors import AqualogError, ConfigError, LogError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import file_of, names_of, number_of
+from aqualog.face.arguments import expand, file_of, list_files, names_of, number_of, refuse_existing, write_whole
 from aqualog.face.cache import cache_of_user
 from aqualog.face.listener import Progress, listener
-from aqualog.face.paths import expand, list_files, refuse_existing, write_whole
 from aqualog.face.result import PathLike, printable
 from aqualog.io.fingerprint import Seen, changed_files, state_of
 
@@ -83,6 +82,10 @@ class Drive:
         """The signals as a table: `t` [s] and a column for each signal, SI."""
         return self.signals.frame
 
+    @property
+    def _how(self) -> dict[str, Any]:
+        return {"signal_map": self.signal_map, "dbc": self.dbc, "rate_hz": self.rate_hz, "cache": self.cache}
+
     def load(self, vehicle: Vehicle, *, report: Callable[[str], None] = lambda _: None) -> Signals:
         """Read the signals with the radii, steering ratio and torque gain of a vehicle; a second call reads nothing.
 
@@ -96,10 +99,7 @@ class Drive:
         if key not in self._loaded:
             from aqualog.align.load import load_signals
 
-            self._loaded[key] = load_signals(
-                self.paths, vehicle=vehicle, signal_map=self.signal_map, dbc=self.dbc, rate_hz=self.rate_hz,
-                report=report, cache=self.cache,
-            )  # fmt: skip
+            self._loaded[key] = load_signals(self.paths, vehicle=vehicle, report=report, **self._how)
         return self._loaded[key]
 
     def load_or_open(
@@ -123,10 +123,7 @@ class Drive:
             return self.load(vehicle)
         from aqualog.align.load import load_drive
 
-        found = load_drive(
-            self.paths, vehicle=vehicle, signal_map=self.signal_map, dbc=self.dbc, rate_hz=self.rate_hz,
-            report=report, cache=self.cache, note=note, whole_for=whole_for,
-        )  # fmt: skip
+        found = load_drive(self.paths, vehicle=vehicle, report=report, note=note, whole_for=whole_for, **self._how)
         if isinstance(found, Signals):
             self._loaded[key] = found
         return found
@@ -164,18 +161,14 @@ class Drive:
         return signals_figure(self.signals, self.title)
 
     def write(self, path: PathLike, *, decimal_comma: bool = False, force: bool = False) -> Path:
-        """Write the aligned signals as one log, as `aqualog convert` does: .mf4, .mcap, .csv or .parquet.
-
-        Raises
-        ------
-        ConfigError
-            If the suffix is not known, or the file exists and `force` is not given.
-        """
+        """Write the aligned signals as one log, as `aqualog convert` does: .mf4, .mcap, .csv or .parquet."""
         return convert(self, path, decimal_comma=decimal_comma, force=force)
 
     def __repr__(self) -> str:
         try:
-            lines = _lines(self)
+            s = self.signals
+            head = f"{self.title}: {s.duration_s:.1f} s at {1e9 / s.step_ns:g} Hz, {len(s.symbols)} signals"
+            lines = [head, f"  {', '.join(s.symbols)}", *(f"  note: {n}" for n in s.quality.notes[:3])]
         except AqualogError as error:  # a repr shows what there is
             lines = [f"{self.title}: cannot be read", f"  {error.line()}"]
         return "\n".join(printable(line) for line in lines)
@@ -238,27 +231,21 @@ def read(
         if not path.exists():
             raise LogError("no such file or folder", where=str(path), expected="a log")
     databases = tuple(file_of(n, "dbc") for n in names_of(dbc, "dbc"))
-    own = [Path(x) for x in (map, vehicle) if isinstance(x, str | Path)]
+    if map is not None and not isinstance(map, SignalMap):
+        from aqualog.config.signal_map import load_signal_map
+
+        signal_map = load_signal_map(file_of(map, "map", "SignalMap"))
+    else:
+        signal_map = map or SignalMap()
     return Drive(
-        paths,
-        _map_of(map),
-        databases,
-        rate_hz,
-        None if vehicle is None else vehicle_of(vehicle),
-        cache_of_user() if cache else None,
-        (*paths, *list_files(names), *databases, *own),
+        paths, signal_map, databases, rate_hz, None if vehicle is None else vehicle_of(vehicle),
+        cache_of_user() if cache else None, sources_of((*paths, *list_files(names), *databases), map, vehicle),
         state_of(list(paths)),
-    )
+    )  # fmt: skip
 
 
 def check_target(path: Path, *, decimal_comma: bool) -> str:
-    """Return the suffix of a log to be written.
-
-    Raises
-    ------
-    ConfigError
-        If no log has that suffix, or if decimal commas are asked of another format than CSV.
-    """
+    """Return the suffix of a log to be written, and refuse decimal commas in another format than CSV."""
     from aqualog.io.write_log import check_suffix
 
     suffix = check_suffix(path)
@@ -337,33 +324,12 @@ def vehicle_of(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -
 
 
 def vehicle_needed(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -> Vehicle:
-    """Return the vehicle behind an argument, or that of the drive, for work that a default car would make wrong.
-
-    Raises
-    ------
-    ConfigError
-        If neither is given.
-    """
+    """Return the vehicle behind an argument, or that of the drive; a default car would make the work wrong."""
     if vehicle is None and (drive is None or drive.vehicle is None):
         raise ConfigError("no vehicle", expected='a vehicle file or aq.Vehicle.read("car.toml")')
     return vehicle_of(vehicle, drive)
 
 
-def sources_of(drive: Drive, *others: object) -> tuple[Path, ...]:
-    """Return the files that no result may overwrite: those of the drive, and each other argument that is a path."""
-    return (*drive.sources, *(Path(x) for x in others if isinstance(x, str | Path)))
-
-
-def _map_of(given: PathLike | SignalMap | None) -> SignalMap:
-    if given is None or isinstance(given, SignalMap):
-        return given or SignalMap()
-    from aqualog.config.signal_map import load_signal_map
-
-    return load_signal_map(file_of(given, "map", "SignalMap"))
-
-
-def _lines(drive: Drive) -> list[str]:
-    signals = drive.signals
-    rate = 1e9 / signals.step_ns
-    head = f"{drive.title}: {signals.duration_s:.1f} s at {rate:g} Hz, {len(signals.symbols)} signals"
-    return [head, f"  {', '.join(signals.symbols)}", *(f"  note: {n}" for n in signals.quality.notes[:3])]
+def sources_of(files: Iterable[Path], *others: object) -> tuple[Path, ...]:
+    """Return the files that no result may overwrite: those of the drives, and each other argument that is a path."""
+    return (*dict.fromkeys(files), *(Path(x) for x in others if isinstance(x, str | Path)))

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from aqualog.core.errors import AqualogError, ConfigError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import names_of
+from aqualog.face.arguments import expand, list_files, names_of
 from aqualog.face.drive import Drive, DriveLike, drive_of
 from aqualog.face.listener import Listener
-from aqualog.face.paths import expand, list_files
 from aqualog.face.result import PathLike
 from aqualog.io.fingerprint import state_of
 
@@ -83,7 +81,7 @@ class Loaded:
     @property
     def has_loss(self) -> bool:
         """Whether data of a drive were lost, or a drive cannot be used."""
-        return bool(self.failed) or any(s.quality.truncated or s.quality.lost_in_files for s in self.signals.values())
+        return bool(self.failed) or any(s.quality.has_loss for s in self.signals.values())
 
     def drop(self, name: str, reason: str) -> None:
         """Leave a drive out, for a reason that the user sees."""
@@ -183,15 +181,14 @@ def drives_of(drives: DrivesLike, *, is_needed: bool = True) -> list[Drive]:
         if isinstance(one, str | Path):
             found += grouped([one])
         else:
-            found.append(_labelled(drive_of(one), i))
+            drive = drive_of(one)
+            paths, label = drive.paths, drive.label
+            if not paths and label == "signals":
+                label = f"drive {i}"
+            elif paths and not label:
+                label = paths[0].name if len(paths) == 1 else paths[0].parent.name
+            found.append(replace(drive, label=label))
     return found
-
-
-def _labelled(drive: Drive, number: int) -> Drive:
-    paths = drive.paths
-    if not paths:
-        return replace(drive, label=drive.label if drive.label != "signals" else f"drive {number}")
-    return replace(drive, label=drive.label or (paths[0].name if len(paths) == 1 else paths[0].parent.name))
 
 
 def with_own_names(*groups: Sequence[Drive]) -> tuple[list[Drive], ...]:
@@ -221,10 +218,6 @@ def with_own_names(*groups: Sequence[Drive]) -> tuple[list[Drive], ...]:
     return tuple([own(d) for d in drives] for drives in groups)
 
 
-def _step(hear: Listener, name: str, step: str) -> None:
-    hear(f"{name}: {step}")
-
-
 def load_drives(drives: Sequence[Drive], vehicle: Vehicle, hear: Listener) -> Loaded:
     """Read all drives. One that cannot be read is left out with its reason; the others go on.
 
@@ -236,8 +229,12 @@ def load_drives(drives: Sequence[Drive], vehicle: Vehicle, hear: Listener) -> Lo
     loaded = Loaded(drives)
     for drive in drives:
         name = drive.label
+
+        def step(text: str, name: str = name) -> None:
+            hear(f"{name}: {text}")
+
         try:
-            loaded.signals[name] = drive.load(vehicle, report=partial(_step, hear, name))
+            loaded.signals[name] = drive.load(vehicle, report=step)
         except ConfigError:
             raise
         except (AqualogError, OSError) as error:

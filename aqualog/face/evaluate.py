@@ -9,20 +9,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import file_of, names_of
+from aqualog.face.arguments import expand, file_of, list_files, names_of
 from aqualog.face.campaign import Campaign
-from aqualog.face.campaign_store import is_campaign, split
+from aqualog.face.campaign_inputs import is_campaign, split
+from aqualog.face.drive import sources_of
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
+from aqualog.face.result import PathLike, Result, Writers, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.campaign.definition import Run
+    from aqualog.campaign.jobs import Configured
     from aqualog.detect.joint_cusum import JointCusumParams
     from aqualog.evaluate.drives import LogSource
+    from aqualog.evaluate.labels import Label
     from aqualog.evaluate.run import Evaluation
-    from aqualog.face.evaluate_inputs import Inputs
     from aqualog.report.sections import Report
 
 __all__ = ["Comparison", "evaluate"]
@@ -42,23 +45,9 @@ class Comparison(Result):
     joint: JointCusumParams
     late: Mapping[str, str]
     cut: tuple[str, ...] = ()
-    sources: tuple[Path, ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on the drives."""
-        from aqualog.report.evaluation_words import notes_of
-
-        return tuple(notes_of(self.evaluation.records))
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a drive failed, was cut, or has labels after its end."""
-        return bool(self.evaluation.failed or self.late or any(r.is_lossy for r in self.evaluation.records))
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog evaluate`."""
         from aqualog.report.evaluation import evaluation_document
 
         return evaluation_document(self.evaluation, by=self.keys)
@@ -66,18 +55,11 @@ class Comparison(Result):
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """The lists of the document, each as a table."""
-        import polars as pl
-
         lists = {k: v for k, v in self.document.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
-        plain = {k: [{n: x if isinstance(x, _CELL) else str(x) for n, x in row.items()} for row in v]
-                 for k, v in lists.items()}  # fmt: skip
-        return {k: pl.DataFrame(v, infer_schema_length=None, strict=False) for k, v in plain.items()}
-
-    def text(self) -> str:
-        """Return the tables that the command prints."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
+        return {
+            k: rows_table({n: x if isinstance(x, _CELL) else str(x) for n, x in row.items()} for row in rows)
+            for k, rows in lists.items()
+        }
 
     def _report(self) -> Report:
         from aqualog.report.evaluation import evaluation_report
@@ -85,7 +67,6 @@ class Comparison(Result):
         return evaluation_report(self.evaluation, by=self.keys)
 
     def headline(self) -> str:
-        """Return the answer in one sentence."""
         from aqualog.report.evaluation_words import headline
 
         failed = [f"  failed: {name}: {reason}" for name, reason in self.evaluation.failed.items()]
@@ -102,7 +83,7 @@ class Comparison(Result):
         """Return `evaluation.json` and `evaluation.html`; `thresholds.toml` where thresholds were tuned."""
         files = {
             "evaluation.json": self._json_file(),
-            "evaluation.html": page_file(self._page),
+            "evaluation.html": self._page(self.name),
             "thresholds.toml": text_file(self._thresholds),
         }
         if self.evaluation.tuning is None:
@@ -110,27 +91,12 @@ class Comparison(Result):
         return files
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the page to exactly this path.
-
-        Raises
-        ------
-        ConfigError
-        """
-        return self._write_to(path, page_file(self._page), force=force)
+        """Write the page to exactly this path."""
+        return self._write_as("evaluation.html", path, force=force)
 
     def write_thresholds(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the tuned thresholds, which `aq.detect` takes.
-
-        Raises
-        ------
-        ConfigError
-        """
+        """Write the tuned thresholds, which `aq.detect` takes."""
         return self._write_to(path, text_file(self._thresholds), force=force)
-
-    def _page(self) -> str:
-        from aqualog.report.page import report_page
-
-        return report_page(self._report(), title=self.name)
 
     def _thresholds(self) -> str:
         from aqualog.config.thresholds import joint_text, thresholds_text
@@ -208,6 +174,7 @@ def evaluate(
     from aqualog.detect.thresholds import DEFAULT
     from aqualog.evaluate.run import evaluate as evaluate_drives
     from aqualog.evaluate.run import tune as tune_drives
+    from aqualog.report.evaluation_words import notes_of
 
     start, of_rivals = load_thresholds(file_of(thresholds, "thresholds")) if thresholds is not None else (DEFAULT, {})
     sources = given.sources
@@ -217,8 +184,11 @@ def evaluate(
     work = tune_drives if tune else evaluate_drives
     found = work(sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=hear)
     late, cut = _labels_beyond(found, sources)
-    own = (*given.files, *(Path(p) for p in (thresholds,) if p is not None))
-    return Comparison(found, given.name, keys, sources[0].joint, late, cut, own)
+    has_loss = bool(found.failed or late or any(r.is_lossy for r in found.records))
+    return Comparison(
+        found, given.name, keys, sources[0].joint, late, cut, notes=tuple(notes_of(found.records)), has_loss=has_loss,
+        sources=sources_of(given.files, thresholds),
+    )  # fmt: skip
 
 
 def inputs_of(
@@ -229,14 +199,7 @@ def inputs_of(
     dbc: PathLike | Sequence[PathLike] = (),
     labels: PathLike | None = None,
 ) -> Inputs:
-    """Return the drives to evaluate, read and checked completely.
-
-    Raises
-    ------
-    ConfigError, LogError
-    """
-    from aqualog.face.evaluate_inputs import campaign_inputs, log_inputs
-
+    """Return the drives to evaluate, read and checked completely."""
     names = list(inputs.inputs) if isinstance(inputs, Campaign) else names_of(inputs)
     car, map_file, truth = (
         None if p is None else file_of(p, n) for n, p in (("vehicle", vehicle), ("map", map), ("labels", labels))
@@ -249,8 +212,94 @@ def inputs_of(
         if given is not None:
             raise ConfigError(f"{given} beside a campaign", where=names[0], expected="it in the campaign's runs")
         found = inputs if isinstance(inputs, Campaign) else Campaign(names, map=map_file, dbc=databases)
-        return campaign_inputs(found.configured)
-    return log_inputs(names, car, map_file, databases, truth)
+        return _of_campaign(found.configured)
+    return _of_logs(names, car, map_file, databases, truth)
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What is evaluated: `keys` by which it can be grouped, `files` that no result may overwrite."""
+
+    name: str
+    sources: tuple[LogSource, ...]
+    keys: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def _of_campaign(configured: Configured) -> Inputs:
+    """Drives of a campaign; runs on the same log are one drive with several lanes."""
+    from aqualog.campaign.definition import with_load
+    from aqualog.config.configured import files_of
+    from aqualog.evaluate.drives import LogSource
+
+    campaign = configured.campaign
+    base = campaign.path.parent
+    of_log: dict[tuple[Path, ...], list[Run]] = {}
+    for run in campaign.runs:
+        of_log.setdefault(run.logs, []).append(run)
+
+    def source(logs: tuple[Path, ...], runs: Sequence[Run]) -> LogSource:
+        first = runs[0]
+        named = [configured.labels[r.labels] for r in runs if r.labels is not None]
+        return LogSource(
+            name="; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs),
+            paths=logs,
+            vehicle=with_load(configured.vehicles[first.vehicle], first),
+            signal_map=configured.signal_map,
+            dbc=configured.dbc,
+            labels=tuple(dict.fromkeys(x for labels in named for x in labels)) if named else None,
+            lanes=tuple(sorted({r.lane for r in runs if r.lane is not None})),
+            groups=first.groups,
+        )
+
+    sources = tuple(source(logs, runs) for logs, runs in of_log.items())
+    return Inputs(campaign.name, sources, campaign.keys, files_of(configured))
+
+
+def _of_logs(
+    inputs: Sequence[str], vehicle: Path | None, map_file: Path | None, dbc: Sequence[Path], labels: Path | None
+) -> Inputs:
+    """Logs, each a drive of its own."""
+    from aqualog.align.mapping import SignalMap
+    from aqualog.config.signal_map import load_signal_map
+    from aqualog.config.vehicle import load_vehicle
+    from aqualog.evaluate.drives import LogSource
+
+    if vehicle is None:
+        raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
+    paths = expand(inputs)
+    if not paths:
+        raise ConfigError("no log is named", expected="a campaign file, or at least one log")
+    car = load_vehicle(vehicle)
+    signal_map = load_signal_map(map_file) if map_file else SignalMap()
+    given = _labels(labels, paths)
+    sources = tuple(
+        LogSource(str(p), (p,), car, signal_map, tuple(dbc), given.get(p), groups={"vehicle": car.name}) for p in paths
+    )  # fmt: skip
+    name = ", ".join(str(p) for p in paths) if len(paths) <= 2 else f"{paths[0].parent} ({len(paths)} logs)"
+    named = (p for p in (vehicle, map_file, labels) if p)  # of labels in a folder, all that are in it
+    return Inputs(name, sources, ("vehicle",), (*paths, *list_files(inputs), *dbc, *named))
+
+
+def _labels(path: Path | None, logs: Sequence[Path]) -> dict[Path, tuple[Label, ...]]:
+    """Labels of each log: from a folder by the log's name, or from one file."""
+    from aqualog.config.labels import load_labels
+
+    if path is None:
+        return {}
+    if path.is_dir():
+        files = {log: path / f"{log.stem}.csv" for log in logs}
+        missing = [f.name for f in files.values() if not f.is_file()]
+        if missing:
+            raise ConfigError(f"no {', '.join(missing[:5])} in it", where=str(path), expected="one CSV for each log")
+        return {log: load_labels(f) for log, f in files.items()}
+    labels = load_labels(path)
+    if labels and len(logs) > 1:
+        raise ConfigError(
+            f"one labels file for {len(logs)} logs", where=str(path), expected="a folder with one CSV for each log",
+            hint="a file without lines serves all: no water",
+        )  # fmt: skip
+    return dict.fromkeys(logs, labels)
 
 
 def _labels_beyond(found: Evaluation, sources: Sequence[LogSource]) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -1,19 +1,20 @@
-"""`aq.inspect`: what a log holds, and which channel looks like which signal."""
+"""`aq.inspect` and `aq.doctor`: what a log holds, and what is wrong with it; the test matrix of a campaign."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ExitCode
-from aqualog.face.drive import DriveLike, drive_of
+from aqualog.core.vehicle import Vehicle
+from aqualog.face.drive import DriveLike, drive_of, vehicle_of
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, bars, document_head, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
     from aqualog.align.mapping import SignalMap
     from aqualog.align.overview import ChannelOverview
     from aqualog.align.propose import Proposal
+    from aqualog.campaign.definition import Campaign
+    from aqualog.doctor.findings import Examination
     from aqualog.face.drive import Drive
+    from aqualog.report.sections import Report
 
-__all__ = ["Contents", "inspect"]
+__all__ = ["Contents", "Health", "Matrix", "doctor", "exit_code", "inspect", "matrix"]
+
 
 _HEADER = ("channel", "unit", "samples", "Hz", "from s", "to s", "min", "max", "gaps", "faults", "signal?")
 
@@ -38,9 +43,6 @@ class Contents(Result):
     overviews: tuple[ChannelOverview, ...]
     proposals: Mapping[str, Proposal]
     absolute: frozenset[str]
-    notes: tuple[str, ...] = ()
-    has_loss: bool = False
-    sources: tuple[Path, ...] = ()
 
     @property
     def exit_code(self) -> ExitCode:
@@ -56,12 +58,8 @@ class Contents(Result):
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog inspect`."""
-        from aqualog import __version__
-
         return {
-            "schema_version": 1,
-            "tool_version": __version__,
+            **document_head(),
             "files": [{"file": str(p), "format": f} for p, f in zip(self.drive.paths, self.formats, strict=True)],
             "channels": [_plain(dataclasses.asdict(o)) for o in self.overviews],
             "proposed": {
@@ -74,16 +72,11 @@ class Contents(Result):
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """`channels` and `proposed`."""
-        import polars as pl
-
         channels = [{k: v for k, v in c.items() if not isinstance(v, dict)} for c in self.document["channels"]]
         proposed = [{"signal": s, **p} for s, p in self.document["proposed"].items()]
-        return {
-            n: pl.DataFrame(x, infer_schema_length=None) for n, x in (("channels", channels), ("proposed", proposed))
-        }
+        return {"channels": rows_table(channels), "proposed": rows_table(proposed)}
 
     def text(self) -> str:
-        """Return the tables that the command prints."""
         from aqualog.report.text import table
         from aqualog.report.values import CELL, NOTE, cut
 
@@ -113,7 +106,6 @@ class Contents(Result):
         ]
 
     def headline(self) -> str:
-        """Return how many channels there are, and which signals they look like."""
         head = f"{self.drive.title}: {len(self.overviews)} channels"
         return "\n".join([head, *self._proposed()[:6]])
 
@@ -134,26 +126,18 @@ class Contents(Result):
 
     def files(self) -> Writers:
         """Return `inspect.json` and the proposed `map.toml`."""
-        return {"inspect.json": self._json_file(), "map.toml": text_file(self._map_text)}
+
+        def map_file() -> str:
+            from aqualog.config.signal_map import map_text
+
+            comment = f"proposed for {', '.join(p.name for p in self.drive.paths)}: check every line"
+            return map_text(self.map, comments=[comment], remarks={s: p.reason for s, p in self.proposals.items()})
+
+        return {"inspect.json": self._json_file(), "map.toml": text_file(map_file)}
 
     def write_map(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the proposed signal map: read it before you use it.
-
-        Raises
-        ------
-        ConfigError
-            If the file exists and `force` is not given.
-        """
+        """Write the proposed signal map: read it before you use it."""
         return self._write_as("map.toml", path, force=force)
-
-    def _map_text(self) -> str:
-        from aqualog.config.signal_map import map_text
-
-        return map_text(
-            self.map,
-            comments=[f"proposed for {', '.join(p.name for p in self.drive.paths)}: check every line"],
-            remarks={s: p.reason for s, p in self.proposals.items()},
-        )
 
 
 def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
@@ -198,9 +182,9 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
         tuple(found),
         proposals,
         frozenset(c.info.file for c in channels if c.absolute),
-        (*notes, *changes),
-        bool(damaged),
-        one.sources,
+        notes=(*notes, *changes),
+        has_loss=bool(damaged),
+        sources=one.sources,
     )
 
 
@@ -222,3 +206,173 @@ def _faults(o: ChannelOverview) -> str:
     counts["not finite"] = o.not_finite
     text = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
     return ", ".join(t for t in (text, o.remark) if t) or "-"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Health(Result):
+    """What is wrong with the files of one drive."""
+
+    drive: Drive
+    examination: Examination
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Exit code of the command."""
+        return exit_code(self.examination)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        from aqualog.report.examination import examination_document
+
+        return examination_document(self.examination)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """`findings` and `files`."""
+        import polars as pl
+
+        from aqualog.doctor.findings import FileState, Finding
+
+        records = {"findings": Finding, "files": FileState}
+        return {
+            n: pl.DataFrame(self.document[n], None if self.document[n] else [f.name for f in fields(kind)],
+                            infer_schema_length=None)
+            for n, kind in records.items()
+        }  # fmt: skip
+
+    def _report(self) -> Report:
+        from aqualog.report.examination import examination_report
+
+        return examination_report(self.examination)
+
+    def plot(self) -> go.Figure:
+        """Return how many findings each file has, by weight."""
+        import plotly.graph_objects as go
+
+        made = go.Figure()
+        files = [f.file for f in self.examination.files]
+        for level in ("unreadable", "lost", "mended", "doubt"):
+            own = [f.file for f in self.examination.findings if f.level == level]
+            made.add_bar(x=files, y=[own.count(f) for f in files], name=level)
+        made.update_layout(title=self.drive.title, barmode="stack", template="plotly_white")
+        made.update_yaxes(title="findings")
+        return made
+
+    def files(self) -> Writers:
+        """Return `doctor.json` and `doctor.txt`."""
+        return {"doctor.json": self._json_file(), "doctor.txt": text_file(self.text)}
+
+
+def exit_code(found: Examination) -> ExitCode:
+    """Return the exit code: a loss counts more than the absence of signals in the rest, as with `inspect`."""
+    if found.is_unreadable:
+        return ExitCode.FAILED
+    if found.has_loss and any(f.samples for f in found.files):
+        return ExitCode.PARTIAL
+    if any(f.kind == "no_signals" for f in found.findings):
+        return ExitCode.NOTHING_USABLE
+    return ExitCode.PARTIAL if found.has_loss else ExitCode.DONE
+
+
+def doctor(drive: DriveLike, vehicle: PathLike | Vehicle | None = None, *, progress: Progress = None) -> Health:
+    """Report what is wrong with the files of one drive, what was lost, and what to do.
+
+    Every file is read to its end. A file that cannot be read is a finding, not an error.
+
+    Parameters
+    ----------
+    drive : Drive, str, Path or several
+        From `aq.read`, or files of ONE drive that need no signal map.
+    vehicle : Vehicle, str or Path, optional
+        Without it that of the drive, else a default car.
+    progress : callable, optional
+        Called with each step of the work, such as `print`.
+
+    Examples
+    --------
+    >>> aq.doctor("drive.mf4").tables["findings"]
+    """
+    from aqualog.doctor.examine import examine
+
+    one = drive_of(drive)
+    with one.reading():
+        found = examine(
+            list(one.paths), vehicle=vehicle_of(vehicle, one), signal_map=one.signal_map, dbc=one.dbc,
+            report=listener(progress),
+        )  # fmt: skip
+    return Health(one, found, has_loss=found.has_loss, sources=one.sources)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Matrix(Result):
+    """What a campaign file says, held against the logs that exist."""
+
+    campaign: Campaign
+    parts: tuple[Any, ...]
+    logs: int
+    logs_there: int
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        from aqualog.report.campaign.matrix import matrix_document
+
+        return matrix_document(self.campaign, *self.parts)
+
+    def _report(self) -> Report:
+        from aqualog.report.campaign.matrix import matrix_report
+
+        return matrix_report(self.campaign, *self.parts)
+
+    @property
+    def tables(self) -> Mapping[str, pl.DataFrame]:
+        """The lists of the document, each as a table."""
+        return {
+            k: rows_table({n: str(x) if isinstance(x, Mapping | list) else x for n, x in row.items()} for row in v)
+            for k, v in self.document.items()
+            if isinstance(v, Sequence) and v and all(isinstance(row, Mapping) for row in v)
+        }
+
+    def plot(self) -> go.Figure:
+        """Return the number of runs of each configuration."""
+        from aqualog.report.campaign.labels import group_text
+
+        count: dict[str, int] = {}
+        for run in self.campaign.runs:
+            name = group_text(tuple((k, run.groups.get(k)) for k in self.campaign.keys))
+            count[name] = count.get(name, 0) + 1
+        return bars(self.campaign.name, list(count), list(count.values()), "runs")
+
+    def files(self) -> Writers:
+        """Return `matrix.json` and `matrix.txt`."""
+        return {"matrix.json": self._json_file(), "matrix.txt": text_file(self.text)}
+
+
+def matrix(path: PathLike) -> Matrix:
+    """Check a campaign file, and count what was driven.
+
+    Speeds that the campaign file does not give come from a store beside it, if a batch has made one. A missing log is
+    not a fault of the matrix.
+
+    Raises
+    ------
+    ConfigError
+        With all faults of all files in one message.
+    """
+    from aqualog.campaign.definition import log_states
+    from aqualog.campaign.matrix import campaign_matrix, speeds_of
+    from aqualog.campaign.tables import lane_faults, stored_runs
+    from aqualog.config.campaign import read_campaign
+    from aqualog.config.vehicle import load_vehicle
+
+    file = Path(path)
+    read = read_campaign(file)
+    campaign = read.campaign
+    states = log_states(campaign, read.places)
+    measured = stored_runs(campaign, file.with_suffix(".store"))
+    ranges = {i: m.speeds for i, m in measured.items() if m.speeds}
+    found = campaign_matrix(campaign, lambda index, run: speeds_of(run) or ranges.get(index, ()))
+    lanes = lane_faults(campaign, measured, read.places)
+    vehicles = {p.name: load_vehicle(p) for p in dict.fromkeys(r.vehicle for r in campaign.runs)}
+    there = sum(s.size is not None for s in states)
+    parts = (found, states, vehicles, measured, lanes)
+    return Matrix(campaign, parts, len(states), there, has_loss=there < len(states), sources=(file,))

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.campaign import Campaign
+from aqualog.face.arguments import file_of, names_of, refuse_existing, write_text
 from aqualog.face.listener import Progress, listener
-from aqualog.face.paths import refuse_existing, write_text
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.result import PathLike, Result, Writers, document_head, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.align.propose_map import LogFile, MapProposal
+    from aqualog.align.propose_map import MapProposal
     from aqualog.campaign.propose_drives import Drive, Found
     from aqualog.campaign.propose_names import NameTable
 
@@ -27,13 +26,17 @@ __all__ = ["Proposal", "propose"]
 MOST_ROWS = 20  # drives that are printed; the table of runs has all
 
 
+AnyCampaign = TypeVar("AnyCampaign")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Proposal(Result):
+class Proposal(Result, Generic[AnyCampaign]):
     """A campaign file and what belongs beside it, as guessed from names, units and data: read it before you use it.
 
-    `texts` maps each file to its text; the campaign file comes last.
+    `texts` maps each file to its text; the campaign file comes last. `opened` makes a campaign of the file.
     """
 
+    opened: Callable[..., AnyCampaign]
     out: Path
     texts: Mapping[Path, str]
     found: Found
@@ -43,35 +46,98 @@ class Proposal(Result):
     remarks: tuple[str, ...]
     label_notes: tuple[str, ...]
     dbc: tuple[Path, ...] = ()
-    sources: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a log cannot be read."""
-        return bool(self.found.bad)
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog campaign init`."""
-        return _document(self.out, self.texts, self.found, self.drives, self.names, self.signals, self.remarks)
+        from aqualog.campaign.propose_files import blanks
+
+        names, signals = self.names, self.signals
+        return {
+            **document_head(),
+            "campaign": str(self.out),
+            "written": [str(p) for p in self.texts],
+            "drives": [
+                {"files": [f.name for f in d.files], "values": {c: v[i] for c, v in names.columns.items() if v[i]}}
+                for i, d in enumerate(self.drives)
+            ],
+            "rules": dict(names.rules),
+            "signals": {
+                s: {"channel": list(e.channel), "unit": e.unit, "scale": e.scale, "reason": signals.remarks[s]}
+                for s, e in signals.signal_map.entries.items()
+            },
+            "canonical": self._canonical,
+            "blank": blanks(names, len(self.drives)),
+            "unmapped": list(signals.unmapped),
+            "left_out": {**dict(self.found.bad), **signals.left_out},
+            "notes": [*signals.notes, *self.remarks, *names.notes],
+        }
+
+    @property
+    def _canonical(self) -> list[str]:
+        return [s for s in self.signals.found if s not in self.signals.signal_map.entries]
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """`drives`: files and what their names say."""
-        import polars as pl
-
-        rows = [{"files": "; ".join(d["files"]), **d["values"]} for d in self.document["drives"]]
-        return {"drives": pl.DataFrame(rows, infer_schema_length=None)}
+        return {"drives": rows_table({"files": "; ".join(d["files"]), **d["values"]} for d in self.document["drives"])}
 
     def text(self) -> str:
-        """Return what the command prints."""
-        notes = (*self.remarks, *self.label_notes)
-        return _text(self.out, self.texts, self.found, self.drives, self.names, self.signals, notes, self.dbc)
+        from aqualog.report.text import table as text_table
+
+        found, drives, table, signals = self.found, self.drives, self.names, self.signals
+        several = sum(len(d.files) > 1 for d in drives)
+        unreadable = f", {len(found.bad)} cannot be read" if found.bad else ""
+        heading = f"logs: {len(found.logs) + len(found.bad)}{unreadable}; drives: {len(drives)}"
+        lines = [heading + (f", {several} of several files" if several else "")]
+        columns = list(table.columns)
+        rows = [
+            (_short(" + ".join(f.name for f in d.files)), *(table.columns[c][i] or "-" for c in columns))
+            for i, d in enumerate(drives[:MOST_ROWS])
+        ]
+        lines.append(text_table(("drive", *columns), rows))
+        lines += [f"and {len(drives) - len(rows)} more, all in runs.csv"] if len(drives) > len(rows) else []
+        lines += ["", "read from the names:"] if columns else ["", "the names say nothing about how the car was driven"]
+        lines += [f"  {c}: {rule}" for c, rule in table.rules.items()]
+        lines += [f"  same in all names, left out: {', '.join(table.dropped)}"] if table.dropped else []
+        empty = self.document["blank"]
+        lines += ["", "to fill in:", *(f"  {c}: {n} of {len(drives)} blank" for c, n in empty.items())] if empty else []
+        if signals.needed:
+            lines += ["", "signals (map.toml):"]
+            for symbol, entry in signals.signal_map.entries.items():
+                unit = f" [{entry.unit}]" if entry.unit else ""
+                lines.append(f"  {symbol} = {' or '.join(entry.channel)}{unit}  ({signals.remarks[symbol]})")
+        own = self._canonical
+        lines += ["", f"signals with their canonical names: {', '.join(own)}"] if own else []
+        lines += [f"  not in all drives, left out: {s} = {why}" for s, why in signals.left_out.items()]
+        if signals.unmapped and signals.needed:
+            lines += ["", f"channels that are not mapped: {len(signals.unmapped)}, named at the end of map.toml"]
+        elif signals.unmapped:
+            shown = ", ".join(signals.unmapped[:5]) + (", ..." if len(signals.unmapped) > 5 else "")
+            lines += ["", f"channels that are no signal: {len(signals.unmapped)} ({shown})"]
+        remarks = [*signals.notes, *self.remarks, *self.label_notes, *table.notes]
+        if "on_water" not in signals.found:
+            remarks.append(
+                "no signal on_water: fill in lane_start_s and lane_end_s, or labels, of wet runs, "
+                "or map the channel that says it: on_water = ..."
+            )
+        lines += ["", "notes:", *(f"  {n}" for n in remarks)] if remarks else []
+        lines += ["", f"written: {', '.join(str(p) for p in self.texts)}", *self._next()]
+        return "\n".join(lines) + "\n"
+
+    def _next(self) -> list[str]:
+        names = {p.name: p for p in self.texts}
+        edits = [f"{names['vehicle.toml']} (every line marked SET)"] if "vehicle.toml" in names else []
+        edits += [f"{names['map.toml']} (check channels, units, signs)"] if "map.toml" in names else []
+        edits.append(f"{names['runs.csv']} (fill in what is blank)")
+        return [
+            "next:",
+            f"  1. edit {', '.join(edits)}",
+            f"  2. aqualog inspect {self.out}",
+            f"  3. aqualog report {self.out}{''.join(f' --dbc {d}' for d in self.dbc)} -o report",
+        ]
 
     def headline(self) -> str:
-        """Return how many drives there are, and what to do next."""
-        return "\n".join([self.text().split("\n")[0], *_next(self.out, self.texts, self.dbc)])
+        return "\n".join([self.text().split("\n")[0], *self._next()])
 
     def plot(self) -> go.Figure:
         """Return how many drives have each value that the names say."""
@@ -90,7 +156,7 @@ class Proposal(Result):
         """Return the campaign file and the files beside it, by name."""
         return {p.name: text_file(partial(str, text)) for p, text in self.texts.items()}
 
-    def write(self) -> Campaign:
+    def write(self) -> AnyCampaign:
         """Write the files where `propose` was asked to put them, and return the campaign.
 
         Raises
@@ -99,7 +165,7 @@ class Proposal(Result):
             With all that is left to fill in.
         """
         self.write_files()
-        return Campaign(self.out, dbc=self.dbc)
+        return self.opened(self.out, dbc=self.dbc)
 
     def write_files(self) -> None:
         """Write the files where `propose` was asked to put them; the campaign file last."""
@@ -108,6 +174,7 @@ class Proposal(Result):
 
 
 def propose(
+    opened: Callable[..., AnyCampaign],
     folder: PathLike,
     out: PathLike = "campaign.toml",
     *,
@@ -115,10 +182,12 @@ def propose(
     dbc: PathLike | Sequence[PathLike] = (),
     force: bool = False,
     progress: Progress = None,
-) -> Proposal:
-    """Look at every log in a folder and below it, and propose a campaign file; see `Campaign.propose`."""
+) -> Proposal[AnyCampaign]:
+    """Look at every log in a folder and below it, and propose a campaign file; see `Campaign.propose`.
+
+    `opened` makes a campaign of a campaign file.
+    """
     from aqualog.config.vehicle import load_vehicle
-    from aqualog.face.arguments import file_of, names_of
 
     hear, place, target = listener(progress), file_of(folder, "folder"), file_of(out, "out")
     car = None if vehicle is None else file_of(vehicle, "vehicle")
@@ -168,7 +237,13 @@ def propose(
     drives, notes = group_drives(logs, kinds, lambda a, b: wheels[a] and wheels[b])
     signals = propose_signals([d.files for d in drives], options, hear)
     broken = broken_logs(place, found.bad)
-    notes = (*twins, *notes, *_broken_notes(found, broken))
+    kept_names = {f.name for f in broken}
+    notes = (
+        *twins, *notes,
+        *(f"cannot be read, but is in runs.csv (failed in a batch): {n}: {why}"
+          for n, why in found.bad if n in kept_names),
+        *(f"left out: {n}: {why}" for n, why in found.bad if n not in kept_names),
+    )  # fmt: skip
     # a broken log is a run that failed: with its row every batch says so
     drives = tuple(sorted((*drives, *(Drive((f,), (0,)) for f in broken)), key=lambda d: d.files[0].name))
     table = read_names([drive_name(d) for d in drives])
@@ -178,9 +253,11 @@ def propose(
     if force and not signals.needed and targets["map.toml"].exists():
         kept = (f"{targets['map.toml']} exists from before and is not used",)
     own = (*databases, *([car] if car else []), *(f.path for d in drives for f in d.files))
+    left = [n for n in found.labels if n not in labels.values()]
+    label_notes = (f"labels files that no drive's name fits: {', '.join(left[:5])}",) if left else ()
     return Proposal(
-        target, texts, found, drives, table, signals, notes, tuple(_labels_notes(found.labels, labels)), databases,
-        own, kept,
+        opened, target, texts, found, drives, table, signals, notes, label_notes, databases, notes=kept,
+        has_loss=bool(found.bad), sources=own,
     )  # fmt: skip
 
 
@@ -214,121 +291,5 @@ def _texts(
     return texts
 
 
-def _broken_notes(found: Found, broken: tuple[LogFile, ...]) -> list[str]:
-    kept = {f.name for f in broken}
-    return [
-        *(f"cannot be read, but is in runs.csv (failed in a batch): {n}: {why}" for n, why in found.bad if n in kept),
-        *(f"left out: {n}: {why}" for n, why in found.bad if n not in kept),
-    ]
-
-
-def _labels_notes(names: tuple[str, ...], used: dict[int, str]) -> list[str]:
-    left = [n for n in names if n not in used.values()]
-    return [f"labels files that no drive's name fits: {', '.join(left[:5])}"] if left else []
-
-
-def _text(
-    out: Path,
-    texts: Mapping[Path, str],
-    found: Found,
-    drives: tuple[Drive, ...],
-    table: NameTable,
-    signals: MapProposal,
-    notes: tuple[str, ...],
-    dbc: Sequence[Path],
-) -> str:
-    from aqualog.campaign.propose_files import blanks
-    from aqualog.report.text import table as text_table
-
-    several = sum(len(d.files) > 1 for d in drives)
-    unreadable = f", {len(found.bad)} cannot be read" if found.bad else ""
-    heading = f"logs: {len(found.logs) + len(found.bad)}{unreadable}; drives: {len(drives)}"
-    lines = [heading + (f", {several} of several files" if several else "")]
-    columns = list(table.columns)
-    rows = [
-        (_short(" + ".join(f.name for f in d.files)), *(table.columns[c][i] or "-" for c in columns))
-        for i, d in enumerate(drives[:MOST_ROWS])
-    ]
-    lines.append(text_table(("drive", *columns), rows))
-    lines += [f"and {len(drives) - len(rows)} more, all in runs.csv"] if len(drives) > len(rows) else []
-    lines += ["", "read from the names:"] if columns else ["", "the names say nothing about how the car was driven"]
-    lines += [f"  {c}: {rule}" for c, rule in table.rules.items()]
-    lines += [f"  same in all names, left out: {', '.join(table.dropped)}"] if table.dropped else []
-    empty = blanks(table, len(drives))
-    lines += ["", "to fill in:", *(f"  {c}: {n} of {len(drives)} blank" for c, n in empty.items())] if empty else []
-    if signals.needed:
-        lines += ["", "signals (map.toml):"]
-        for symbol, entry in signals.signal_map.entries.items():
-            unit = f" [{entry.unit}]" if entry.unit else ""
-            lines.append(f"  {symbol} = {' or '.join(entry.channel)}{unit}  ({signals.remarks[symbol]})")
-    own = [s for s in signals.found if s not in signals.signal_map.entries]
-    lines += ["", f"signals with their canonical names: {', '.join(own)}"] if own else []
-    lines += [f"  not in all drives, left out: {s} = {why}" for s, why in signals.left_out.items()]
-    lines += ["", _unmapped_line(signals)] if signals.unmapped else []
-    remarks = [*signals.notes, *notes, *table.notes]
-    if "on_water" not in signals.found:
-        remarks.append(
-            "no signal on_water: fill in lane_start_s and lane_end_s, or labels, of wet runs, "
-            "or map the channel that says it: on_water = ..."
-        )
-    lines += ["", "notes:", *(f"  {n}" for n in remarks)] if remarks else []
-    lines += ["", f"written: {', '.join(str(p) for p in texts)}", *_next(out, texts, dbc)]
-    return "\n".join(lines) + "\n"
-
-
-def _unmapped_line(signals: MapProposal) -> str:
-    names = signals.unmapped
-    if signals.needed:
-        return f"channels that are not mapped: {len(names)}, named at the end of map.toml"
-    return f"channels that are no signal: {len(names)} ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''})"
-
-
 def _short(text: str) -> str:
     return text if len(text) <= 70 else f"{text[:30]}...{text[-37:]}"
-
-
-def _next(out: Path, texts: Mapping[Path, str], dbc: Sequence[Path]) -> list[str]:
-    names = {p.name: p for p in texts}
-    edits = [f"{names['vehicle.toml']} (every line marked SET)"] if "vehicle.toml" in names else []
-    edits += [f"{names['map.toml']} (check channels, units, signs)"] if "map.toml" in names else []
-    edits.append(f"{names['runs.csv']} (fill in what is blank)")
-    return [
-        "next:",
-        f"  1. edit {', '.join(edits)}",
-        f"  2. aqualog inspect {out}",
-        f"  3. aqualog report {out}{''.join(f' --dbc {d}' for d in dbc)} -o report",
-    ]
-
-
-def _document(
-    out: Path,
-    texts: Mapping[Path, str],
-    found: Found,
-    drives: tuple[Drive, ...],
-    table: NameTable,
-    signals: MapProposal,
-    notes: tuple[str, ...],
-) -> dict[str, Any]:
-    from aqualog import __version__
-    from aqualog.campaign.propose_files import blanks
-
-    return {
-        "schema_version": 1,
-        "tool_version": __version__,
-        "campaign": str(out),
-        "written": [str(p) for p in texts],
-        "drives": [
-            {"files": [f.name for f in d.files], "values": {c: v[i] for c, v in table.columns.items() if v[i]}}
-            for i, d in enumerate(drives)
-        ],
-        "rules": dict(table.rules),
-        "signals": {
-            s: {"channel": list(e.channel), "unit": e.unit, "scale": e.scale, "reason": signals.remarks[s]}
-            for s, e in signals.signal_map.entries.items()
-        },
-        "canonical": [s for s in signals.found if s not in signals.signal_map.entries],
-        "blank": blanks(table, len(drives)),
-        "unmapped": list(signals.unmapped),
-        "left_out": {**dict(found.bad), **signals.left_out},
-        "notes": [*signals.notes, *notes, *table.notes],
-    }

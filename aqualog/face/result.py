@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.face.arguments import file_of
-from aqualog.face.paths import refuse_existing, write_whole, writing
+from aqualog.face.arguments import file_of, refuse_existing, write_whole, writing
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
     from aqualog.report.sections import Report
 
-__all__ = ["PathLike", "Result", "Writers", "page_file", "printable", "text_file"]
+__all__ = [
+    "PathLike", "Result", "Writers", "bars", "document_head", "flat", "page_file", "printable", "rows_table", "table",
+    "text_file",
+]  # fmt: skip
 
 PathLike = str | Path
 Writers = Mapping[str, Callable[[Path], None]]
@@ -26,8 +29,10 @@ Writers = Mapping[str, Callable[[Path], None]]
 
 _REPR_LINES = 8
 _REPR_WIDTH = 160
+_HEADLINE_LINES = 7  # of the text, where a result has no headline of its own
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(ABC):
     """The result of one call.
 
@@ -35,9 +40,9 @@ class Result(ABC):
     with exit code 3. `sources` are the files that no result may overwrite.
     """
 
-    notes: tuple[str, ...]
-    has_loss: bool
-    sources: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+    has_loss: bool = False
+    sources: tuple[Path, ...] = ()
 
     @property
     @abstractmethod
@@ -49,13 +54,16 @@ class Result(ABC):
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """The result as polars tables, by name; the first is the one that a notebook shows."""
 
-    @abstractmethod
     def text(self) -> str:
         """Return what the command prints for a reader."""
+        from aqualog.report.text import report_text
 
-    @abstractmethod
+        report = self._report()
+        return "" if report is None else report_text(report)
+
     def headline(self) -> str:
         """Return the answer in a few lines, without tables."""
+        return "\n".join(self.text().rstrip("\n").split("\n")[:_HEADLINE_LINES])
 
     @abstractmethod
     def plot(self) -> go.Figure:
@@ -127,6 +135,21 @@ class Result(ABC):
         """The sections that text and page show, where this kind of result has any."""
         return None
 
+    def _page(self, title: str) -> Callable[[Path], None]:
+        """Return the writer of the page of these sections."""
+
+        def page() -> str:
+            from aqualog.report.page import report_page
+
+            report = self._report()
+            assert report is not None
+            return report_page(report, title=title)
+
+        return page_file(page)
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
 
 def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
     """Return a writer of a text file; the text is made when it is written."""
@@ -152,3 +175,62 @@ def printable(line: str) -> str:
     """Return a line that fits and drives no terminal."""
     shown = "".join(c if c.isprintable() or c == "\t" else "\ufffd" for c in line)
     return shown if len(shown) <= _REPR_WIDTH else f"{shown[: _REPR_WIDTH - 1]}…"
+
+
+# --- documents, tables and figures -----------------------------------------------------------------------------------
+
+
+def document_head() -> dict[str, Any]:
+    """Return what every JSON document begins with: the version of its schema and that of aqualog."""
+    from aqualog import __version__
+
+    return {"schema_version": 1, "tool_version": __version__}
+
+
+def rows_table(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
+    """Return rows as a table; all of them decide the kind of a column."""
+    import polars as pl
+
+    return pl.DataFrame(list(rows), infer_schema_length=None, strict=False)
+
+
+def table(
+    rows: Iterable[Mapping[str, Any]], columns: str, *, text: Sequence[str] = (), whole: Sequence[str] = ()
+) -> pl.DataFrame:  # fmt: skip
+    """Return rows as a table of these columns (names with blanks between them): numbers, but for `text` and `whole`.
+
+    NaN becomes null, and a value that a row does not have is null.
+    """
+    import polars as pl
+
+    names = columns.split()
+    kinds: dict[str, Any] = {**dict.fromkeys(text, pl.String), **dict.fromkeys(whole, pl.Int64)}
+    schema = {n: kinds.get(n, pl.Float64) for n in names}
+    return pl.DataFrame([{n: r.get(n) for n in names} for r in rows], schema=schema).fill_nan(None)
+
+
+def flat(entry: Mapping[str, Any], stem: str = "") -> dict[str, Any]:
+    """Return a row: `ci95` becomes `low` and `high`; an inner mapping gives columns with its name before theirs.
+
+    Lists other than intervals are left out.
+    """
+    row: dict[str, Any] = {}
+    for name, value in entry.items():
+        if isinstance(value, Mapping):
+            row |= flat(value, f"{stem}{name}_")
+        elif name == "ci95" or name.endswith("_ci95"):
+            low, high = value or (None, None)
+            row |= {f"{stem}{name[:-4]}low": low, f"{stem}{name[:-4]}high": high}
+        elif not isinstance(value, list | tuple):
+            row[stem + name] = value
+    return row
+
+
+def bars(title: str, names: Sequence[str], values: Sequence[float], axis: str) -> go.Figure:
+    """Return horizontal bars, one for each name."""
+    import plotly.graph_objects as go
+
+    made = go.Figure(go.Bar(x=values, y=names, orientation="h"))
+    made.update_layout(title=title, template="plotly_white")
+    made.update_xaxes(title=axis)
+    return made

@@ -1,8 +1,7 @@
-"""`aq.simulate`: one drive of a scenario; and the drives of a whole programme."""
+"""`aq.simulate`: one drive of a scenario."""
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,27 +9,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, whole_number
-from aqualog.face.campaign import Campaign
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive
-from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.progress import Progress as Counted
-from aqualog.face.result import PathLike, Result, Writers
+from aqualog.face.listener import Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, document_head
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
     from aqualog.core.records import Signals
-    from aqualog.model.campaign import CampaignOutcome
     from aqualog.model.scenario import Scenario
     from aqualog.model.simulate import Simulation as Made
     from aqualog.model.term import Model
 
-__all__ = ["SimulatedCampaign", "Simulation", "check_programme_folder", "simulate", "simulate_campaign"]
+__all__ = ["Simulation", "simulate"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,8 +41,6 @@ class Simulation(Result):
     name: str
     comment: str
     log: str
-    sources: tuple[Path, ...] = ()
-    has_loss: bool = False
 
     @property
     def scenario(self) -> Scenario:
@@ -84,28 +77,14 @@ class Simulation(Result):
         return pl.DataFrame({"t": grid_of(self.made) * 1e-9, **columns}).fill_nan(None)
 
     @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on lanes that the drive does not reach."""
-        end = self.scenario.duration_s
-        return tuple(
-            f"the lane from {lane.start:g} s begins after the drive, which ends at {end:g} s"
-            for lane in self.scenario.lanes
-            if not lane.in_metres and lane.start >= end
-        )
-
-    @property
     def channels(self) -> list[str]:
         """Signals of the log, the truth among them."""
         return [n for g in self.made.measured for n in g.columns]
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog simulate`."""
-        from aqualog import __version__
-
         return {
-            "schema_version": 1,
-            "tool_version": __version__,
+            **document_head(),
             "log": self.log,
             "duration_s": self.scenario.duration_s,
             "sample_rate_hz": self.scenario.rate_hz,
@@ -119,12 +98,7 @@ class Simulation(Result):
         """`signals` and `truth`."""
         return {"signals": self.signals.frame, "truth": self.truth}
 
-    def text(self) -> str:
-        """Return an empty text: the command prints no table."""
-        return ""
-
     def headline(self) -> str:
-        """Return length, rate, seed, car and lanes."""
         s = self.scenario
         lanes = f"{len(s.lanes)} lane{'s' if len(s.lanes) != 1 else ''} with water or another surface"
         return "\n".join(
@@ -147,28 +121,15 @@ class Simulation(Result):
         }
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write log and document into a folder; the document names the log there.
-
-        Raises
-        ------
-        ConfigError
-            If a file exists already, or is a source of this result.
-        """
-        named = self.naming(Path(folder) / f"{self.name}.mf4")
-        return super(Simulation, named).save(folder, force=force)
+        """Write log and document into a folder; the document names the log there."""
+        return super(Simulation, self.naming(Path(folder) / f"{self.name}.mf4")).save(folder, force=force)
 
     def naming(self, path: PathLike) -> Simulation:
         """Return the same with `path` as the log that the document names."""
         return replace(self, log=str(path))
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the drive as a log: .mf4, .mcap, .csv or .parquet.
-
-        Raises
-        ------
-        ConfigError
-            If the suffix is not known, the file exists and `force` is not given, or it is a source.
-        """
+        """Write the drive as a log: .mf4, .mcap, .csv or .parquet."""
         from aqualog.io.write_log import check_suffix
 
         suffix = check_suffix(file_of(path, "path"))
@@ -202,10 +163,6 @@ def simulate(
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
-    Returns
-    -------
-    Simulation
-
     Raises
     ------
     ConfigError
@@ -219,11 +176,11 @@ def simulate(
     """
     hear = listener(progress)
     hear("reading")
+    from aqualog.model.scenario import Scenario
     from aqualog.model.term import Model
 
     sources: list[Path] = []
     name = "simulated"
-    from aqualog.model.scenario import Scenario
 
     if not isinstance(scenario, Scenario):
         from aqualog.config.scenario import load_scenario, vehicle_of
@@ -238,113 +195,22 @@ def simulate(
     if isinstance(model, str | Path):
         sources.append(Path(model))
         named = f", model {Path(model).stem}"
-    made, factor = _simulated(scenario, known, hear)
-    for group in made.measured:
-        hear.detail(f"  {group.name}: {group.t.size} samples")
-    from aqualog import __version__
-
-    comment = f"simulated by aqualog {__version__}: scenario {name}{named}, seed {scenario.seed}"
-    return Simulation(made, factor, name, comment, f"{name}.mf4", tuple(sources))
-
-
-def _simulated(scenario: Scenario, model: Model, hear: Listener) -> tuple[Made, float]:
-    """Return the drive, and how many times faster than real it was, without the compiling that a first run needs."""
     hear("preparing")
-    with hear.slow("the simulation"):
+    with hear.slow("the simulation"):  # without the compiling that a first run needs
         from aqualog.model.simulate import simulate as run
 
         run(replace(scenario, duration_s=min(scenario.duration_s, 0.2)))
     hear(f"simulating {scenario.duration_s:g} s")
     start = time.perf_counter()
-    made = run(scenario, model)
-    return made, scenario.duration_s / max(time.perf_counter() - start, 1e-9)
-
-
-# --- programmes ------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class SimulatedCampaign:
-    """A simulated campaign in a folder: `outcome` counts the drives made, kept and failed; `seconds` it took."""
-
-    folder: Path
-    outcome: CampaignOutcome
-    seconds: float
-
-    @property
-    def path(self) -> Path:
-        """The campaign file."""
-        return self.folder / "campaign.toml"
-
-    @property
-    def campaign(self) -> Campaign:
-        """The campaign, to run."""
-        return Campaign(self.path)
-
-    @property
-    def has_loss(self) -> bool:
-        """Whether a drive failed."""
-        return bool(self.outcome.failed)
-
-    def headline(self) -> str:
-        """Return how many drives were simulated, and where the campaign is."""
-        o = self.outcome
-        kept = f", {o.kept} were there already" if o.kept else ""
-        failed = f", {len(o.failed)} failed" if o.failed else ""
-        return f"{o.made} drives simulated in {self.seconds:.0f} s{kept}{failed}; the campaign is {self.path}"
-
-    def __repr__(self) -> str:
-        return self.headline()
-
-
-def check_programme_folder(folder: PathLike) -> Path:
-    """Refuse the name of a log as the folder of a campaign.
-
-    Raises
-    ------
-    ConfigError
-    """
-    from aqualog.io.write_log import SUFFIXES
-
-    out = file_of(folder, "folder")
-    if out.suffix.lower() in SUFFIXES:
-        raise ConfigError("is the name of a log", where=str(out), expected="a folder for the campaign")
-    return out
-
-
-def simulate_campaign(
-    programme: str, folder: PathLike, *, jobs: int | None = None, force: bool = False, progress: Progress = None
-) -> SimulatedCampaign:
-    """Simulate the drives of a programme into a folder, with vehicle files and a campaign file.
-
-    A folder in which the same programme was begun is completed. A drive that fails is left out, and `progress` hears
-    why.
-
-    Parameters
-    ----------
-    programme : str
-        `thesis` (the measuring campaign of the thesis) or `situations` (38 situations, most without water).
-    folder : str or Path
-        It is made if it does not exist.
-    jobs : int, optional
-        Drives at a time; default one per core.
-    force : bool
-        Simulate all drives again.
-    progress : callable, optional
-        Called with each step of the work, such as `print`.
-
-    Raises
-    ------
-    ConfigError
-        If there is no such programme, or the folder holds something else.
-    """
-    from aqualog.model.campaign import simulate_campaign as run
-
-    hear, out = listener(progress), check_programme_folder(folder)
-    began = time.monotonic()
-    if jobs is not None:
-        jobs = whole_number(jobs, "jobs", 1, 1024)
-    outcome = run(programme, out, jobs=jobs or os.cpu_count() or 1, force=force, report=Counted(hear, "drives"))
-    for name, reason in outcome.failed.items():
-        hear.failed(name, reason)
-    return SimulatedCampaign(out, outcome, time.monotonic() - began)
+    made = run(scenario, known)
+    factor = scenario.duration_s / max(time.perf_counter() - start, 1e-9)
+    for group in made.measured:
+        hear.detail(f"  {group.name}: {group.t.size} samples")
+    version, end = document_head()["tool_version"], made.setup.scenario.duration_s
+    comment = f"simulated by aqualog {version}: scenario {name}{named}, seed {scenario.seed}"
+    notes = tuple(
+        f"the lane from {lane.start:g} s begins after the drive, which ends at {end:g} s"
+        for lane in made.setup.scenario.lanes
+        if not lane.in_metres and lane.start >= end
+    )
+    return Simulation(made, factor, name, comment, f"{name}.mf4", notes=notes, sources=tuple(sources))

@@ -6,21 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file, text_file
-from aqualog.face.tables import table
+from aqualog.face.result import PathLike, Result, Writers, table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
-    from aqualog.detect.slip_slope.direct_records import DirectResult, Recursion
+    from aqualog.detect.slip_slope.direct_records import DirectResult
     from aqualog.detect.slip_slope.regression import Line
     from aqualog.report.sections import Report
 
@@ -40,17 +38,9 @@ class SlipSlope(Result):
     vehicle: Vehicle
     slopes: DirectResult
     file_notes: tuple[str, ...] = ()
-    has_loss: bool = False
-    sources: tuple[Path, ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Sentences on the log and on the estimate."""
-        return (*self.file_notes, *self.slopes.notes)
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog slip-slope`."""
         from aqualog.report.slope import slope_document
 
         return slope_document(self.slopes, log=self.drive.name, notes=self.file_notes)
@@ -71,7 +61,7 @@ class SlipSlope(Result):
         parts = [_row(p.place, (s.start_s, s.end_s), s.seconds, s.line) for p in self.slopes.places for s in p.segments]
         recursive = [
             {"place": r.place, "slope": r.slope, "slope_sd": r.slope_sd, "learnt_s": r.seconds, "changes": r.alarms}
-            for r in self._recursions
+            for r in self.slopes.recursions or [p.recursion for p in self.slopes.places]
         ]
         samples = [
             pl.DataFrame({"t": p.t, "mu": p.mu, "slip": p.slip}).select(pl.lit(p.place).alias("place"), pl.all())
@@ -84,23 +74,12 @@ class SlipSlope(Result):
             "samples": pl.concat(samples) if samples else table([], "place t mu slip", text=("place",)),
         }
 
-    @property
-    def _recursions(self) -> tuple[Recursion, ...]:
-        return self.slopes.recursions or tuple(p.recursion for p in self.slopes.places)
-
-    def text(self) -> str:
-        """Return slopes, stability, and which part of the drive was used."""
-        from aqualog.report.text import report_text
-
-        return report_text(self._report())
-
     def _report(self) -> Report:
         from aqualog.report.slope import slope_report
 
         return slope_report(self.slopes, self.file_notes)
 
     def headline(self) -> str:
-        """Return a line for each place: slope, 95 % interval, stability."""
         from aqualog.report.slope import slope_lines, way_sentence
 
         found = self.slopes
@@ -121,13 +100,12 @@ class SlipSlope(Result):
 
     def files(self) -> Writers:
         """Return `slip_slope.json`, `slip_slope.csv` and `slip_slope.html`."""
-        from aqualog.report.page import report_page
         from aqualog.report.slope import slope_csv
 
         return {
             "slip_slope.json": self._json_file(),
             "slip_slope.csv": text_file(lambda: slope_csv(self.slopes)),
-            "slip_slope.html": page_file(lambda: report_page(self._report(), title=self.drive.title)),
+            "slip_slope.html": self._page(self.drive.title),
         }
 
 
@@ -172,10 +150,6 @@ def slip_slope(
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
-    Returns
-    -------
-    SlipSlope
-
     Raises
     ------
     LogError, SignalError, ConfigError
@@ -201,6 +175,8 @@ def slip_slope(
         changes = one.changes()
         hear("estimating")
         found = slip_slopes(loaded, car, method=method, traction=traction, mu_max=mu_max, delay=delay)
-    quality = loaded.quality
-    has_loss = bool(quality.truncated or quality.lost_in_files or changes)
-    return SlipSlope(one, car, found, (*quality.notes, *changes), has_loss, sources_of(one, vehicle))
+    notes = (*loaded.quality.notes, *changes)
+    return SlipSlope(
+        one, car, found, notes, notes=(*notes, *found.notes), has_loss=loaded.quality.has_loss or bool(changes),
+        sources=sources_of(one.sources, vehicle),
+    )  # fmt: skip

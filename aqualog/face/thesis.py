@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import AqualogError, ConfigError
 from aqualog.core.units import displayed_text, displayed_unit
-from aqualog.face.arguments import file_of
+from aqualog.face.arguments import file_of, refuse_existing, write_whole
 from aqualog.face.campaign import Campaign
 from aqualog.face.campaign_runs import CampaignRuns
-from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.paths import refuse_existing, write_whole
-from aqualog.face.progress import Progress as Counted
-from aqualog.face.result import PathLike, Result, Writers, text_file
+from aqualog.face.listener import Counted, Listener, Progress, listener
+from aqualog.face.result import PathLike, Result, Writers, bars, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -54,17 +53,9 @@ class Figures(Result):
     formats: tuple[str, ...] = ("html", "csv")
     written: tuple[Path, ...] = ()
     runs: CampaignRuns | None = None
-    sources: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a figure could not be made."""
-        return bool(self.not_made)
 
     @property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog figures`."""
         from aqualog.thesis.export import figures_document
 
         return figures_document(self.made, [str(p) for p in self.written], self.not_made)
@@ -86,7 +77,7 @@ class Figures(Result):
         rows = [{"figure": f["figure"], **{k: v if k != "ci95" else str(v) for k, v in c.items()}}
                 for f in self.document["figures"] for c in f["findings"]]  # fmt: skip
         drawn = {f.number: pl.read_csv(StringIO(figure_csv(f)), infer_schema_length=None) for f in self.made}
-        return {"findings": pl.DataFrame(rows, infer_schema_length=None, strict=False), **drawn}
+        return {"findings": rows_table(rows), **drawn}
 
     def text(self, *, width: int = _WHOLE) -> str:
         """Return claim, figure, verdict and finding; `width` cuts the findings."""
@@ -109,7 +100,6 @@ class Figures(Result):
         return table(head, rows, most=_WHOLE) + "\n" if rows else ""
 
     def headline(self) -> str:
-        """Return the figures and the verdicts on their claims."""
         return "\n".join(
             [*(f"figure {f.number}: {f.title}" for f in self.made[:3]), *self.text(width=90).split("\n")[2:6]]
         )
@@ -235,7 +225,7 @@ def figures(
 
         evidence = Evidence(runs.data)
     made, not_made, written = _make_all(chosen_numbers, folder, evidence, wanted, hear)
-    found = Figures(made, not_made, wanted, tuple(written), runs, sources)
+    found = Figures(made, not_made, wanted, tuple(written), runs, has_loss=bool(not_made), sources=sources)
     if folder is not None and len(made) > 1 and "html" in wanted:
         hear("one page of all")
         write_whole(folder / _ALL_ON_ONE, found.files()[_ALL_ON_ONE])
@@ -244,13 +234,7 @@ def figures(
 
 
 def check_formats(formats: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats in their order.
-
-    Raises
-    ------
-    ConfigError
-        If one is unknown, or the list is empty.
-    """
+    """Return the formats in their order; an unknown one is a ConfigError, as is none at all."""
     asked = [f.strip().lower() for f in formats if f.strip()]
     if not asked or set(asked) - set(FORMATS):
         raise ConfigError(
@@ -318,18 +302,12 @@ def _make_all(
     return tuple(made), not_made, written
 
 
-@contextmanager
-def _pictures(formats: Sequence[str]) -> Iterator[Pictures | None]:
+def _pictures(formats: Sequence[str]) -> AbstractContextManager[Pictures | None]:
     """One browser for all pictures; None where none is asked for."""
     from aqualog.thesis.image import FORMATS as PICTURES
-
-    if not set(formats) & set(PICTURES):
-        yield None
-        return
     from aqualog.thesis.image import Pictures
 
-    with Pictures() as pictures:
-        yield pictures
+    return Pictures() if set(formats) & set(PICTURES) else nullcontext()
 
 
 def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures | None) -> list[Path]:
@@ -342,13 +320,9 @@ def _drawn(found: Figure, out: Path, formats: Sequence[str], pictures: Pictures 
             continue
         names = image_names(found, suffix)
         for name, picture in zip(names, pictures.draw(found, suffix), strict=True):
-            write_whole(out / name, partial(_put, picture))
+            write_whole(out / name, methodcaller("write_bytes", picture))
             written.append(out / name)
     return written
-
-
-def _put(data: bytes, path: Path) -> None:
-    path.write_bytes(data)
 
 
 def _value(c: Check) -> str:
@@ -369,17 +343,9 @@ class Reproduction(Result):
     made: Made
     facts: tuple[str, ...]
     folder: Path
-    sources: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def has_loss(self) -> bool:  # type: ignore[override]
-        """Whether a figure could not be made."""
-        return bool(self.made.missing)
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The JSON document of `aqualog reproduce`."""
         from aqualog.thesis.export import claims_document
 
         return claims_document(self.conclusions, self.made.figures, self.made.missing, {"conditions": list(self.facts)})
@@ -412,7 +378,6 @@ class Reproduction(Result):
         return table(("claim", "verdict", "found"), rows) + f"\n{self.headline()}\n"
 
     def headline(self) -> str:
-        """Return how many claims there are of each verdict."""
         from aqualog.thesis.export import counts_of
 
         counts = ", ".join(f"{n} {verdict}" for verdict, n in counts_of(self.conclusions).items())
@@ -420,15 +385,10 @@ class Reproduction(Result):
 
     def plot(self) -> go.Figure:
         """Return how many claims there are of each verdict."""
-        import plotly.graph_objects as go
-
         from aqualog.thesis.export import counts_of
 
         counts = counts_of(self.conclusions)
-        made = go.Figure(go.Bar(x=list(counts.values()), y=list(counts), orientation="h"))
-        made.update_layout(title="Claims of the thesis", template="plotly_white")
-        made.update_xaxes(title="claims")
-        return made
+        return bars("Claims of the thesis", list(counts), list(counts.values()), "claims")
 
     def files(self) -> Writers:
         """Return the page, the claims as CSV, the document, and the tables behind the figures."""
@@ -472,16 +432,11 @@ def reproduce(folder: PathLike, *, jobs: int | None = None, progress: Progress =
     if simulated.has_loss or runs.outcome.failed:
         raise AqualogError("the campaign is not whole", where=str(campaign), hint="the same command once more")
     made = make_all(runs.data, jobs=processes, report=Counted(hear, "figures and checks"))
-    return Reproduction(conclude(made), made, _facts(len(runs.data.runs)), out)
+    return Reproduction(conclude(made), made, _facts(len(runs.data.runs)), out, has_loss=bool(made.missing))
 
 
 def check_reproduction(folder: PathLike, *, force: bool) -> None:
-    """Refuse a folder that holds an earlier reproduction, before any work.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse a folder that holds an earlier reproduction, before any work."""
     refuse_existing([Path(folder) / name for name in (_PAGE, _CLAIMS, _JSON)], force=force)
 
 

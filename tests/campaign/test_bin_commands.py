@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from aqualog.cli.bins import bin_resistance, bin_slipslope
+from aqualog.cli.campaign import bin_resistance, bin_slipslope
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN

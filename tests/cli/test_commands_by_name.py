@@ -52,9 +52,7 @@ def test_help_has_examples_and_loads_nothing_heavy():
     first, *others = re.split(r"^LOADED (.*)\n", done.stdout, flags=re.MULTILINE)[:-1]
     loaded = others.pop(0).split()
     assert "Commands:" in first
-    assert {m for m in loaded if m.startswith("aqualog.cli.")} == {
-        f"aqualog.cli.{m}" for m in ("main", "commands", "start")
-    }
+    assert {m for m in loaded if m.startswith("aqualog.cli.")} == {f"aqualog.cli.{m}" for m in ("main", "commands")}
     for name, text in zip(COMMANDS, others[::2], strict=True):
         assert name == "campaign" or f"aqualog {name}" in text.split("Examples:")[1], name
     heavy = {"numpy", "polars", "numba", "plotly", "jinja2", "scipy", "asammdf", "mcap"}

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from aqualog.cli.console import Console
+from aqualog.cli.console import Console, Heard
 from aqualog.cli.main import app
 from aqualog.config.scenario import load_scenario
 from aqualog.core.errors import ConfigError
@@ -313,11 +313,11 @@ def test_a_lane_after_the_drive_is_told(tmp_path):
 
 def test_compiling_is_told_only_where_it_takes_long(monkeypatch, capsys):
     monkeypatch.setattr("aqualog.cli.console.SLOW_S", 0.05)
-    with Console().told_if_slow("the simulation"):
+    with Heard(Console(), "off").slow("the simulation"):
         pass
     time.sleep(0.15)
     assert capsys.readouterr().err == ""
-    with Console().told_if_slow("the simulation"):
+    with Heard(Console(), "off").slow("the simulation"):
         time.sleep(0.4)
     assert "compiling" in capsys.readouterr().err
 

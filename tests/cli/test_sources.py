@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
-from aqualog.face import paths as files
-from aqualog.face.paths import expand, refuse_existing
+from aqualog.face import arguments as files
+from aqualog.face.arguments import expand, refuse_existing
 from tests.commands import run
 
 LABELS = "start_s,end_s,effect,wheel\n"

@@ -79,13 +79,6 @@ effect = "road_grade"
         assert part in line
 
 
-@pytest.mark.parametrize(
-    "text", ["term = 3", "[term]\neffect = 'head_wind'", "term = [3]", "[[term]]\neffect = []", "="]
-)
-def test_absurd_models_are_configuration_errors(tmp_path, text):
-    refused(tmp_path, text)
-
-
 @st.composite
 def models(draw):
     model = Model()

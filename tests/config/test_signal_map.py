@@ -79,12 +79,3 @@ def test_written_maps_read_back(tmp_path_factory, names, scale, offset, remark, 
     assert after.clocks == before.clocks
     assert (after.time_channel, after.time_unit) == ("t_ms", "ms")
     assert after.csv == csv
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["[time]\nchannel = 3", "[time]\nchannel = []", f'[signals]\na_x = {{ channel = "x", invalid = [{"9" * 400}] }}'],
-)
-def test_absurd_maps_are_configuration_errors(tmp_path, text):
-    with pytest.raises(ConfigError):
-        load_signal_map(write(tmp_path, text))

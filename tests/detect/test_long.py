@@ -85,7 +85,6 @@ def test_table_and_page_of_the_command(tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
     from aqualog.cli.main import app
-    from aqualog.face import detect_long as command
 
     def detect(out):
         found = CliRunner().invoke(
@@ -98,7 +97,7 @@ def test_table_and_page_of_the_command(tmp_path, monkeypatch):
     events, table = detect(tmp_path / "whole")
     monkeypatch.setattr(load, "LONG", 1)
     monkeypatch.setattr(load_drive, "__kwdefaults__", {**load_drive.__kwdefaults__, "least": 1})
-    monkeypatch.setattr(command, "detect_long", lambda *a, **k: detect_long(*a, **k, rows=300))
+    monkeypatch.setattr("aqualog.detect.long.detect_long", lambda *a, **k: detect_long(*a, **k, rows=300))
     long_events, long_table = detect(tmp_path / "long")
     assert long_events == events
     assert long_table.equals(table)

@@ -14,7 +14,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
 from aqualog.doctor.findings import Examination, FileState, Finding
-from aqualog.face.doctor import exit_code
+from aqualog.face.inspect import exit_code
 from aqualog.io.write_mdf import MdfGroup, write_mf4
 from tests.conftest import ROOT
 

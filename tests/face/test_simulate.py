@@ -7,7 +7,6 @@ import pytest
 
 import aqualog as aq
 from aqualog.config.scenario import load_scenario
-from aqualog.face.simulate import simulate_campaign
 from aqualog.model import campaign as programmes
 from aqualog.model.campaign import CampaignOutcome
 from tests.both_ways import check_shown, command
@@ -111,7 +110,7 @@ def test_a_programme(monkeypatch, tmp_path):
     assert result.path == tmp_path / "c" / "campaign.toml"
     assert "1 drives simulated in 0 s, 1 failed" in repr(result)
     assert "error: wet: no car" in heard
-    assert simulate_campaign("thesis", tmp_path / "c", force=True).outcome.made == 1
+    assert aq.Campaign.simulate("thesis", tmp_path / "c", force=True).outcome.made == 1
     assert calls[-1][2:] == (os.cpu_count(), True)
     with pytest.raises(aq.AqualogError, match="is the name of a log"):
-        simulate_campaign("thesis", tmp_path / "c.mf4")
+        aq.Campaign.simulate("thesis", tmp_path / "c.mf4")

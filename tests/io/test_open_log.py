@@ -3,7 +3,7 @@
 import pytest
 
 from aqualog.core.errors import LogError
-from aqualog.face.paths import expand
+from aqualog.face.arguments import expand
 from aqualog.io.open_log import sniff
 
 ONE = (["a_0.mcap", "a_1.mcap"], ["a.db3"], ["a.mcap"], ["a_0.db3", "notes.txt"], ["metadata.yaml"])

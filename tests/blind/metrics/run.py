@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
-from aqualog.face.progress import lasting
+from aqualog.face.listener import lasting
 from aqualog.guard.worker import Crashed, work_on
 from tests.blind.metrics.plan import Job
 from tests.blind.metrics.rows import Row

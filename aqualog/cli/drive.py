@@ -1,65 +1,30 @@
-"""`aqualog detect`."""
+"""Commands on one drive."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from aqualog.cli.frame import Output, Run, command
 
 if TYPE_CHECKING:
     from aqualog.face.detect import Detection
 
-__all__ = ["detect"]
+__all__ = ["detect", "slip_slope"]
 
 
 @command(
-    "logs vehicle signals dbc out write rate history configuration reference thresholds model fail_on_event cache json "
-    "force"
+    "logs vehicle signals dbc out:results write rate history configuration reference thresholds model "
+    "fail_on_event cache json force"
 )
 def detect(
     run: Run,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
-    ] = None,
-    write: Annotated[
-        Path | None,
-        typer.Option(
-            "--write",
-            help="Signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.",
-            metavar="FILE",
-        ),
-    ] = None,
-    history: Annotated[
-        Path | None,
-        typer.Option(
-            "--history",
-            help="Dry slip slopes of this car from earlier drives (JSON); read, and written back with this drive's.",
-            metavar="FILE",
-        ),
-    ] = None,
-    configuration: Annotated[
-        str,
-        typer.Option(
-            "--configuration",
-            help="What the dry slope belongs to: tyre, pressure, load, in any words; default the vehicle's name.",
-            metavar="TEXT",
-        ),
-    ] = "",
-    reference: Annotated[
-        str,
-        typer.Option(
-            "--reference",
-            help="Dry slope of the history: robust (upper quartile of the periods' means) or max (as the thesis).",
-            metavar="RULE",
-        ),
-    ] = "robust",
-    fail_on_event: Annotated[
-        bool, typer.Option("--fail-on-event", help="Exit with 5 if anything was detected.")
-    ] = False,
+    out: Path | None,
+    write: Path | None,
+    history: Path | None,
+    configuration: str,
+    reference: str,
+    fail_on_event: bool,
 ) -> Output:
     """Detect aquaplaning in one drive.
 
@@ -76,8 +41,8 @@ def detect(
       aqualog detect drive.mf4 --vehicle car.toml --model model.toml
     """
     from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.face.arguments import refuse_existing
     from aqualog.face.detect import DETECT_FILES, detect
-    from aqualog.face.paths import refuse_existing
     from aqualog.io.write_log import check_suffix
 
     targets = [out / name for name in DETECT_FILES] if out else []
@@ -103,22 +68,17 @@ def detect(
             result.write(write, force=True)
         if history is not None:
             result.remember(history)
-    notes = [
-        *([] if run.vehicle else ["no --vehicle: a default RWD car is taken, and what needs its mass is not judged"]),
-        *_model_notes(result, run.model),
+    notes = [] if run.vehicle else ["no --vehicle: a default RWD car is taken, and what needs its mass is not judged"]
+    if result.model is not None:
+        effects = ", ".join(t.effect.name for t in result.model.terms) or "no effect"
+        notes.append(f"model {run.model}: the detectors allow for {effects}; signals and features are corrected for it")
+    notes += [
         *_history_notes(result, history, configuration),
         *result.notes,
         *([f"results are in {out}: {', '.join(DETECT_FILES)}"] if out is not None else []),
     ]
     has_tripped = fail_on_event and bool(result.drive_result.events)
     return Output(result, notes, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)
-
-
-def _model_notes(result: Detection, path: Path | None) -> list[str]:
-    if result.model is None:
-        return []
-    effects = ", ".join(t.effect.name for t in result.model.terms) or "no effect"
-    return [f"model {path}: the detectors allow for {effects}; signals and features are corrected for it"]
 
 
 def _history_notes(result: Detection, path: Path | None, configuration: str) -> list[str]:
@@ -138,3 +98,31 @@ def _history_notes(result: Detection, path: Path | None, configuration: str) -> 
         return [text]
     shown = ", ".join(f'"{n}"' for n in known[:5]) + (", ..." if len(known) > 5 else "")
     return [f"{text}; the name is new, known are {shown}"]
+
+
+@command("logs vehicle:needed signals dbc out:slopes method traction mu_max delay rate cache json force")
+def slip_slope(run: Run, out: Path | None, method: str, traction: str, mu_max: float, delay: float | None) -> Output:
+    """Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same.
+
+    Slip is regressed on traction over straight, unbraked driving; the intervals are from blocks of the drive left out
+    in turn. The files named are ONE drive. The vehicle file must be given: it says which axle is driven.
+
+    \b
+    Examples:
+      aqualog slip-slope drive.mf4 --vehicle car.toml
+      aqualog slip-slope wheels.csv imu.csv --signals map.toml --vehicle car.toml -o out
+      aqualog slip-slope drive.mcap --vehicle awd.toml --method velocity --json
+      aqualog slip-slope drive.mcap --vehicle awd.toml --method velocity --delay 0.12
+      aqualog slip-slope track.mf4 --vehicle car.toml --traction accelerometer --mu-max 0.5
+    """
+    from aqualog.face.slip_slope import SLIP_SLOPE_FILES, slip_slope
+
+    run.need_vehicle("which axle is driven, radii, where the mass is")
+    drive = run.drive([out / n for n in SLIP_SLOPE_FILES] if out else [])
+    with run.hearing() as hear:
+        result = slip_slope(drive, method=method, traction=traction, mu_max=mu_max, delay=delay, progress=hear)
+        hear("writing")
+        if out is not None:
+            result.save(out, force=True)
+    where = [f"results are in {out}: {', '.join(SLIP_SLOPE_FILES)}"] if out is not None else []
+    return Output(result, [*result.notes, *where])

@@ -1,0 +1,218 @@
+"""Commands on several drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aqualog.cli.frame import Output, Run, command
+
+if TYPE_CHECKING:
+    from aqualog.face.diagnose import Diagnosis
+
+__all__ = ["calibrate", "diagnose", "evaluate"]
+
+
+@command("logs:drives vehicle:needed signals dbc out:vehicle fix page:calibration rate cache json force")
+def calibrate(run: Run, out: Path | None, fix: list[str] | None, page: Path | None) -> Output:
+    """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
+
+    Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
+    rods and steering. The drives must be dry and with the same load; four or more show how drives differ. The vehicle
+    file must be given: it says which axle is driven.
+
+    \b
+    Examples:
+      aqualog calibrate dry1.mf4 dry2.mf4 dry3.mf4 dry4.mf4 --vehicle car.toml -o calibrated.toml
+      aqualog calibrate dry*.mcap --vehicle car.toml --fix mass=1482 --json
+      aqualog calibrate monday/ tuesday/ --vehicle car.toml --signals map.toml --page calibration.html
+    """
+    from aqualog.core.errors import ExitCode
+    from aqualog.face.calibrate import calibrate
+    from aqualog.face.drives import NothingUsableError, grouped
+
+    run.need_vehicle("which axle is driven, radii, axle distances")
+    fixed = _fixed(fix or [])
+    targets = [p for p in (out, page) if p is not None]
+    drive = run.drive(targets)
+    try:
+        with run.hearing("nothing was written") as hear:
+            result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, progress=hear)
+    except NothingUsableError:  # each reason was reported
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    if out is not None:
+        result.write_vehicle(out, force=True)
+    if page is not None:
+        result.write_page(page, force=True)
+    return Output(result, [*result.notes, *(f"written: {path}" for path in targets)])
+
+
+def _fixed(texts: list[str]) -> dict[str, float]:
+    """Return `mass=1400` as a mapping; the estimator checks names and bounds."""
+    from aqualog.calibrate.derive import check_fixed
+    from aqualog.core.errors import ConfigError
+
+    fixed: dict[str, float] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            raise ConfigError(f'--fix "{text}"', expected="KEY=VALUE, such as mass=1482") from None
+        if name.strip() in fixed:
+            raise ConfigError(f"--fix {name.strip()} is given twice", expected="one value for each key")
+        fixed[name.strip()] = number
+    check_fixed(fixed)
+    return fixed
+
+
+@command(
+    "logs:diagnosed vehicle:believed model:known signals dbc holdout out:model page:diagnosis level seed:drawn "
+    "surrogates bootstrap rate cache json force"
+)
+def diagnose(
+    run: Run,
+    holdout: list[str] | None,
+    out: Path | None,
+    page: Path | None,
+    level: float,
+    seed: int,
+    surrogates: int | None,
+    bootstrap: bool,
+) -> Output:
+    """Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.
+
+    The vehicle file is what the simulation believes. The verdict is one of: no_effect, named, compound, cannot_tell
+    (the log does not separate the causes; a drive that would is named), unexplained, not_testable. The extended model
+    is a file that simulate, detect and diagnose take with --model.
+
+    \b
+    Examples:
+      aqualog diagnose drive.mf4 --vehicle car.toml
+      aqualog diagnose monday/ tuesday.mcap --vehicle car.toml --holdout friday.mf4 -o model.toml --page diagnosis.html
+      aqualog diagnose drive.csv --vehicle car.toml --signals map.toml --model model.toml --json
+      aqualog diagnose drive.mf4 --vehicle car.toml --no-bootstrap
+      aqualog diagnose campaign.toml --page campaign.html
+    """
+    from aqualog.core.errors import ConfigError
+    from aqualog.face.campaign_inputs import is_campaign
+
+    if surrogates is not None and not bootstrap:
+        raise ConfigError("--surrogates beside --no-bootstrap", expected="one of them")
+    if not is_campaign(run.logs):
+        drawn = surrogates if bootstrap else 0
+        return _drives(run, holdout or [], out, page, {"level": level, "seed": seed, "surrogates": drawn})
+    strange = {
+        "--holdout": bool(holdout),
+        "--rate": run.rate is not None,
+        "--no-bootstrap": not bootstrap,
+        "--cache": run.cache is True,
+    }
+    given = next((option for option, is_given in strange.items() if is_given), None)
+    if given is not None:
+        raise ConfigError(f"{given} does not apply to a campaign", expected="what a campaign takes: --help")
+    return _campaign(run, out, page, {"level": level, "seed": seed, "surrogates": surrogates})
+
+
+def _drives(run: Run, holdout: list[str], out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
+    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.face.arguments import expand, list_files
+    from aqualog.face.diagnose import diagnose
+    from aqualog.face.drives import NothingUsableError, grouped
+
+    run.need_vehicle("it is what the simulation believes")
+    unseen = expand(holdout)
+    others = [*unseen, *list_files(holdout), *([run.model] if run.model is not None else [])]
+    drive = run.drive([p for p in (out, page) if p is not None], others=others)
+    missing = next((p for p in unseen if not p.exists()), None)
+    if missing is not None:
+        raise ConfigError(
+            "no such file or folder", where=f"--holdout {missing}", expected="a drive to measure the gain on"
+        )
+    try:
+        with run.hearing("nothing was written") as hear:
+            result = diagnose(
+                grouped(run.logs, drive), drive.vehicle, holdout=grouped(holdout, drive), model=run.model,
+                views=page is not None, progress=hear, **options,
+            )  # fmt: skip
+    except NothingUsableError:  # each reason was reported
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    return Output(*_written(result, out, page))
+
+
+def _campaign(run: Run, out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
+    """Diagnose a campaign's runs together, which show what no single drive does."""
+    from aqualog.face.arguments import refuse_existing
+    from aqualog.face.detect import model_of
+    from aqualog.face.diagnose import diagnose
+
+    campaign = run.campaign()
+    targets = [p for p in (out, page) if p is not None]
+    campaign.check_targets(targets, force=run.force)
+    refuse_existing(targets, force=True, sources=[run.model] if run.model is not None else [])
+    known = model_of(run.model)
+    runs = run.measured(campaign)
+    if not runs.outcome.done:
+        return run.of_runs(runs)
+    with run.hearing() as hear:
+        result = diagnose(runs, model=known, progress=hear, **options)
+    result, notes = _written(result, out, page)
+    return run.of_runs(runs, result=result, notes=notes)
+
+
+def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[Diagnosis, list[str]]:
+    """Write the files; return the result, which then names its model file, and its notes."""
+    if model is not None:
+        result = result.naming(model)
+        result.write_model(model, force=True)
+    if page is not None:
+        result.write_page(page, force=True)
+    return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]
+
+
+@command("logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune out:page json force")
+def evaluate(
+    run: Run, labels: Path | None, by: str, rivals: bool, roc: bool, tune: Path | None, out: Path | None
+) -> Output:
+    """Compare what the detectors find with what was there: recall, latency, false alarms, confusion.
+
+    What was there comes from a labels file, from the truth in a simulated log, from the signal on_water, or from the
+    lane's times in the campaign. A log that cannot be read is named; the others are evaluated.
+
+    \b
+    Examples:
+      aqualog evaluate campaign.toml -o evaluation.html
+      aqualog evaluate campaign.toml --by tyre,depth --rivals --roc -o evaluation.html
+      aqualog evaluate campaign.toml --tune thresholds.toml
+      aqualog evaluate drive.mf4 --vehicle car.toml --labels labels.csv --json
+      aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
+    """
+    from aqualog.core.errors import ExitCode
+    from aqualog.evaluate.judge import ODD_LABELS
+    from aqualog.face.arguments import refuse_existing
+    from aqualog.face.evaluate import evaluate, inputs_of
+
+    given = inputs_of(run.logs, run.vehicle, map=run.signals, dbc=run.dbc, labels=labels)
+    own = [*given.files, *(p for p in (run.thresholds,) if p)]
+    refuse_existing([p for p in (tune, out) if p], force=run.force, sources=own)
+    with run.hearing("nothing was written") as hear:
+        found = evaluate(
+            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals, roc=roc,
+            thresholds=run.thresholds, tune=tune is not None, progress=hear,
+        )  # fmt: skip
+    has_records = bool(found.evaluation.records)
+    if tune is not None and has_records and found.evaluation.tuning is not None:
+        found.write_thresholds(tune, force=True)
+    if out is not None and has_records:
+        found.write_page(out, force=True)
+    for name, reason in found.evaluation.failed.items():
+        run.console.error(reason if name in reason else f"{name}: {reason}")
+    if not has_records:
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    for name, reason in found.late.items():
+        run.console.error(f"{name}: {reason}")
+    odd = [n for n in found.notes if ODD_LABELS in n]
+    written = [f"the page is {out}"] if out is not None else []
+    written += [f"the thresholds are in {tune}"] if tune is not None else []
+    details = [f"note: {n}" for n in (*found.notes, *found.cut) if n not in odd]
+    return Output(found, [*odd, *written], details)

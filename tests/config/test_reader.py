@@ -1,0 +1,51 @@
+"""Files that no reader of settings can take: each is one line of a ConfigError."""
+
+import os
+
+import pytest
+
+from aqualog.config.model import load_model
+from aqualog.config.scenario import load_scenario
+from aqualog.config.signal_map import load_signal_map
+from aqualog.config.vehicle import load_vehicle
+from aqualog.core.errors import ConfigError
+
+NINES = "9" * 400
+
+
+@pytest.mark.parametrize(
+    ("load", "text", "said"),
+    [
+        (load_vehicle, "mass = ", "TOML"), (load_vehicle, "\x00", "TOML"), (load_vehicle, "mass = nan", "not a number"),
+        (load_vehicle, 'drivetrain = ["rwd"]', "drivetrain"), (load_vehicle, "drivetrain = {}", "drivetrain"),
+        (load_vehicle, f"mass = {NINES}", "64 bits"), (load_vehicle, f"mass = {'9' * 6000}", "TOML"),
+        (load_vehicle, "[tie_rod]\nc0 = nan", "c0"), (load_vehicle, f"[tie_rod]\nc_y = [{NINES}]", "64 bits"),
+        (load_vehicle, f"x = {'[' * 3000}{']' * 3000}", "deeper than 100 levels"),
+        (load_vehicle, "mass = " + "[" * 5000, "x.toml: vehicle file is nested deeper than 100 levels"),
+        (load_vehicle, "mass = " + "{a = " * 5000 + "1" + "}" * 5000, "file is nested deeper than 100 levels"),
+        (load_scenario, "seed = 0x" + "f" * 5000, "64 bits"),
+        (load_scenario, "speed_kmh = 92233720368547758070", "64 bits"),
+        (load_scenario, "tyre = {a = [0x" + "f" * 9000 + "]}", "64 bits"),
+        (load_model, "term = 3", "list of tables"), (load_model, "[term]\neffect = 'head_wind'", "list of tables"),
+        (load_model, "term = [3]", "list of tables"), (load_model, "[[term]]\neffect = []", "effect"),
+        (load_model, "=", "TOML"),
+        (load_signal_map, "[time]\nchannel = 3", "channel"), (load_signal_map, "[time]\nchannel = []", "channel"),
+        (load_signal_map, f'[signals]\na_x = {{ channel = "x", invalid = [{NINES}] }}', "64 bits"),
+    ],
+)  # fmt: skip
+def test_absurd_files_are_configuration_errors(tmp_path, load, text, said):
+    (tmp_path / "x.toml").write_text(text + "\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load(tmp_path / "x.toml")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "s.toml").write_text('vehicle = "pipe"\nspeed_kmh = 80.0\n')
+    for load, name, said in (
+        (load_vehicle, "none.toml", "not found"), (load_vehicle, "", "folder"), (load_scenario, "s.toml", "pipe"),
+    ):  # fmt: skip
+        with pytest.raises(ConfigError, match=said):
+            load(tmp_path / name)
