@@ -10,8 +10,7 @@ import numpy as np
 
 from aqualog.core.intervals import poisson, wilson
 from aqualog.detect.registry import RIVALS, all_of
-from aqualog.evaluate.judge import Hit
-from aqualog.evaluate.records import Cell, RunRecord
+from aqualog.evaluate.records import Cell, Hit, RunRecord
 
 __all__ = [
     "JOINT", "TARGETS", "Better", "Coverage", "Rate", "Recall", "Score", "better_rivals", "confusion", "coverage",

@@ -240,4 +240,4 @@ def observe(
     velocity, acceleration, corrected, motion = _scan(
         p, state[:4], kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
     )
-    return velocity, acceleration, corrected, VelocityState(*motion, kappa, age)
+    return velocity, acceleration, corrected, VelocityState._make((*motion, kappa, age))

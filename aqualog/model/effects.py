@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def wheels_at(where: str | None) -> tuple[int, ...]:
     return tuple(WHEELS.index(w) for w in names)
 
 
-def _changed(x: FloatArray, where: str | None, change: np.ufunc, by: float) -> FloatArray:
+def _changed(x: FloatArray, where: str | None, change: np.ufunc, by: float) -> Any:  # for `_replace`
     out, at = x.copy(), list(wheels_at(where))
     out[at] = change(out[at], by)
     return out
