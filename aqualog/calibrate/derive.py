@@ -13,7 +13,10 @@ from aqualog.calibrate.spread import Spread, half_width
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import KEYS, Vehicle
 
-__all__ = ["FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "derived", "estimates", "told"]
+__all__ = [
+    "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "derived", "estimates",
+    "identified_values",
+]  # fmt: skip
 
 FIXABLE: Mapping[str, tuple[float, float]] = {
     **{n: (KEYS[n].low, KEYS[n].high) for n in ("mass", "rolling_resistance", "drag_area")},
@@ -112,7 +115,7 @@ _KEYS = {
 }  # fmt: skip
 
 
-def told(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
+def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
     """Return the identified values by key of the vehicle file (`wheels.r_e_f`), each with the parameter it comes from.
 
     A ratio of radii without their size keeps the file's mean radius. The torque gain applies to the torques as they
@@ -141,7 +144,7 @@ def calibrated(
     Identified keys count as given. So do the loaded radii, once the effective ones are: forces depend on those that the
     calibration has used. A spread from drive to drive that the drives do not show stays that of the file.
     """
-    values = told(parameters, vehicle)
+    values = identified_values(parameters, vehicle)
     radii = {"wheels.r_l_f", "wheels.r_l_r"} if "wheels.r_e_f" in values else set()
     changed = {key.rsplit(".", 1)[-1]: value for key, (value, _) in values.items()}
     polynomials = {section: {**fit.coefficients, "sigma": (fit.sigma,)} for section, fit in (transfers or {}).items()}

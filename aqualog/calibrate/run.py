@@ -147,8 +147,8 @@ def calibrate(
     skipped = [
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]
-    told = {p.name for p in parameters if p.identified and p.name not in fixed}
-    differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in SPREAD and n in told and sd > 0.0}
+    shown = {p.name for p in parameters if p.name in SPREAD and p.identified and p.name not in fixed}
+    differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0}
     notes = (*words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing

@@ -56,8 +56,8 @@ def transfers(
                 reasons.append(f"{section} polynomial ({d.name}): {error.line()}")
         if fits:
             found[section] = max(fits, key=lambda f: f.seconds * f.explained)
-    told = tuple(r for r in reasons if r.split(" ", 1)[0] not in found)
-    return found, told
+    causes = tuple(r for r in reasons if r.split(" ", 1)[0] not in found)
+    return found, causes
 
 
 def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:

@@ -122,10 +122,10 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     Keys that neither the old file gives nor the drives identify stand as comments: no default looks like a given value.
     Values have seven digits.
     """
-    from aqualog.calibrate.derive import calibrated, told
+    from aqualog.calibrate.derive import calibrated, identified_values
 
     new = calibrated(vehicle, calibration.parameters, calibration.transfers, calibration.spread)
-    values = told(calibration.parameters, vehicle)
+    values = identified_values(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
     lines = [f"# calibrated from {drives}", f'name = "{name}"', f'drivetrain = "{new.drivetrain}"']

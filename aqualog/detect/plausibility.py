@@ -20,8 +20,8 @@ LEAST_WINDOWS = 40
 LEAST_SAMPLES = 50
 MOST = 1 << 17  # samples of which a median is taken
 RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
-MOVING = 3.0  # [m/s] from which a ratio of speeds tells something
-LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less tells no drivetrain
+MOVING = 3.0  # [m/s] from which a ratio of speeds means something
+LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less shows no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 
 

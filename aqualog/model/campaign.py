@@ -160,10 +160,10 @@ def _work(
     simulate(Scenario(Vehicle(), duration_s=0.2))  # compiles once, before several processes do
     tasks = {r.name: (r, str(_log(folder, r.name)), digests[r.name]) for r in runs}
 
-    def told(name: str, outcome: Done | str | Crashed) -> None:
+    def recorded(name: str, outcome: Done | str | Crashed) -> None:
         record(name, "its process ended: out of memory, or killed" if isinstance(outcome, Crashed) else outcome)
 
-    work_on(tasks, _one, jobs=jobs, record=told)
+    work_on(tasks, _one, jobs=jobs, record=recorded)
 
 
 def _one(run: Run, path: str, digest: str) -> Done | str:

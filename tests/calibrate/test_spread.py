@@ -14,15 +14,7 @@ from aqualog.calibrate.spread import (
     spread_of,
     stratified,
 )  # fmt: skip
-from aqualog.core.intervals import variance_ratio_chance
 from tests.calibrate.test_balance import RHO, drives
-
-
-@pytest.mark.parametrize(("ratio", "dof", "below"), [(3.708, 3, 10), (4.534, 4, 6), (2.214, 5, 1000.0), (161.4, 1, 1)])
-def test_chance_of_a_variance_ratio(ratio, dof, below):
-    """Tables of F: 5 %."""
-    expected = 0.05 if below < 1000 else 0.0508
-    assert variance_ratio_chance(ratio, dof, below) == pytest.approx(expected, abs=3e-4)
 
 
 @pytest.mark.parametrize(

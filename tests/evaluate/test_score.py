@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from aqualog.core.intervals import poisson, wilson
+from aqualog.core.intervals import wilson
 from aqualog.evaluate.judge import beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.labels import Label, Labels
 from aqualog.evaluate.records import Cell, DetectorRun, RunRecord
@@ -125,43 +125,3 @@ def test_missed_episodes_are_infinitely_late():
 def test_configurations_are_sorted_as_numbers():
     records = [record(str(i), tyre, 1.0, ()) for i, tyre in enumerate(("10", "9", "", "1.5"))]
     assert [k[0] for k in grouped(records, ["tyre"])] == ["1.5", "9", "10", "-"]
-
-
-# Garwood's exact limits as tabulated (Pearson and Hartley, Biometrika Tables 1, table 40)
-@pytest.mark.parametrize(
-    ("k", "low", "high"),
-    [(0, 0.0, 3.69), (1, 0.0253, 5.57), (2, 0.242, 7.22), (5, 1.62, 11.67), (10, 4.80, 18.39), (30, 20.24, 42.83),
-     (50, 37.11, 65.92)],
-)  # fmt: skip
-def test_poisson_limits_are_the_tabulated_ones(k, low, high):
-    assert poisson(k) == pytest.approx((low, high), abs=0.006)
-
-
-@pytest.mark.parametrize("k", [1, 3, 40, 2500])
-def test_poisson_limits_leave_the_tails(k):
-    low, high = poisson(k, 0.9)
-
-    def at_most(n, mean):
-        return sum(math.exp(i * math.log(mean) - mean - math.lgamma(i + 1)) for i in range(n + 1))
-
-    assert at_most(k, high) == pytest.approx(0.05, abs=1e-9)
-    assert 1.0 - at_most(k - 1, low) == pytest.approx(0.05, abs=1e-9)
-
-
-def test_wilson_solves_its_equation():
-    z = 1.959963984540054
-    for k, n in ((1, 10), (9, 10), (50, 100), (990, 1000)):
-        for p in wilson(k, n):
-            assert abs(k / n - p) == pytest.approx(z * math.sqrt(p * (1 - p) / n))
-    assert wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
-    assert wilson(10, 10) == pytest.approx((0.7225, 1.0), abs=1e-4)
-    assert wilson(0, 0) == (0.0, 1.0)
-
-
-def test_intervals_against_scipy():
-    stats = pytest.importorskip("scipy.stats")
-    for k in (0, 1, 7, 123):
-        low = stats.chi2.ppf(0.025, 2 * k) / 2 if k else 0.0
-        assert poisson(k) == pytest.approx((low, stats.chi2.ppf(0.975, 2 * k + 2) / 2), rel=1e-9)
-        wanted = stats.binomtest(k, 200).proportion_ci(method="wilson")
-        assert wilson(k, 200) == pytest.approx((wanted.low, wanted.high), abs=1e-12)

@@ -55,6 +55,24 @@ def test_hill_is_there_where_its_knots_say():
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "parameter", "value", "field"),
+    [
+        ("head_wind", "speed", 3.0, "head_wind"), ("aero_drag", "delta_drag_area", 0.2, "drag_area"),
+        ("cornering_drag", "coefficient", 0.01, "cornering_drag"), ("load_sensitivity", "delta", 0.1, "load_sensitivity"),
+        ("relaxation_length", "length", 0.4, "relaxation_length"), ("tyre_radius_growth", "growth", 2e-6, "radius_growth"),
+        ("brake_drag", "torque", 12.0, "brake_drag"),
+    ],
+)  # fmt: skip
+def test_an_effect_adds_its_parameter(name, parameter, value, field):
+    """To the quantity of the car, or of the rear axle's wheels alone."""
+    where = "r" if EFFECTS[name].places else None
+    plain = assemble(SCENARIO)
+    with_it = Model().with_term(Term(EFFECTS[name], {parameter: value}, where)).apply(plain)
+    gained = np.subtract(getattr(with_it.plant, field), getattr(plain.plant, field))
+    assert gained == pytest.approx(value if where is None else np.array([0.0, 0.0, value, value]), rel=1e-9)
+
+
 def test_two_tables_add_up():
     other = one("unexplained_force", ((10.0, 50.0), (22.0, 100.0)))
     plant = other.apply(one("unexplained_force", HUMP).apply(assemble(SCENARIO))).plant
