@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from aqualog.align.freezes import StandWatch, Stretch
+from aqualog.align.freezes import StandWatch
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
@@ -54,7 +54,7 @@ def examine(
     An unreadable file is a finding and no error. So is a drive without signals, and a file that changes.
     """
     before = state_of(paths)
-    found = _examined(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc, report=report)
+    found = _examined(paths, vehicle, signal_map, dbc, report)
     advice = "run the command again when the file no longer changes"
     changed = [
         Finding("lost", "changed", Path(name).name, "", "changed while it was read", advice)
@@ -64,12 +64,7 @@ def examine(
 
 
 def _examined(
-    paths: Sequence[Path],
-    *,
-    vehicle: Vehicle,
-    signal_map: SignalMap,
-    dbc: Sequence[Path],
-    report: Callable[[str], None],
+    paths: Sequence[Path], vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], report: Callable[[str], None]
 ) -> Examination:
     files, findings = [], []
     speeds: list[Quantity] = []
@@ -116,25 +111,20 @@ def _file(
     end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
     speed = speed_of(channels, signal_map=signal_map, vehicle=vehicle) if channels else None
+    watch = StandWatch()  # without a speed in the file nobody knows when the car stood
+    if speed is not None:
+        watch.push(speed.t_ns, speed.x)
     samples = sum(c.values.size for c in channels)
     state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
     advice = "copy the file again: the copy may be damaged"
     findings = [Finding("lost", "lost_group", path.name, "", what, advice) for what in lost]
-    findings += [*_of_file(path.name, kind, faults), *channel_findings(found, channels, _standing(speed))]
+    findings += [*_of_file(path.name, kind, faults), *channel_findings(found, channels, watch.finish())]
     findings += [
         Finding("doubt", "mounting", path.name, "", text.removeprefix(f"{path.name}:")) for text in find_mounting(found)
     ]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
     return state, findings, speed
-
-
-def _standing(speed: Quantity | None) -> tuple[Stretch, ...]:
-    """Return the times at standstill; unknown in a file without a speed."""
-    watch = StandWatch()
-    if speed is not None:
-        watch.push(speed.t_ns, speed.x)
-    return watch.finish()
 
 
 def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
