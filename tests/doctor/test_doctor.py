@@ -247,7 +247,7 @@ def test_nobody_saw_a_signal_stand_over_a_pause_or_at_a_stamp_from_elsewhere():
 @pytest.mark.parametrize("is_found", [True, False])
 def test_a_damaged_group_of_an_mdf_costs_that_group_only(tmp_path, capsys, monkeypatch, is_found):
     if not is_found:  # a group that cannot be decoded for any other reason
-        monkeypatch.setattr("aqualog.io.mdf.columns.damaged_blocks", lambda *_: frozenset())
+        monkeypatch.setattr("aqualog.io.mdf.reader.damaged_blocks", lambda *_: frozenset())
     t = np.arange(2000) * 0.01
     rng = np.random.default_rng(3)
     omega = {f"omega_{w}": ("rad/s", "", 60.0 + rng.normal(0.0, 0.1, t.size)) for w in ("fl", "fr", "rl", "rr")}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from aqualog.core.errors import AqualogError
-from aqualog.guard import worker as pool
+from aqualog.guard import worker
 from aqualog.guard.reading import ReadLimits, reading
 from aqualog.guard.worker import NO_LIMITS, Bounds, Crashed, Limits, kept_worker, work_on
 
@@ -91,15 +91,15 @@ def test_too_much_memory_is_an_error_of_one_item():
 
 
 def test_a_process_that_is_idle_ends(monkeypatch):
-    monkeypatch.setattr(pool, "_IDLE_S", 0.3)
+    monkeypatch.setattr(worker, "_IDLE_S", 0.3)
     with kept_worker(Bounds(NO_LIMITS, ReadLimits())) as do:
-        worker = do(os.getpid)
-        assert do(os.getpid) == worker
+        number = do(os.getpid)
+        assert do(os.getpid) == number
     for _ in range(100):
-        if not Path(f"/proc/{worker}").exists():
+        if not Path(f"/proc/{number}").exists():
             break
         time.sleep(0.1)
-    assert not Path(f"/proc/{worker}").exists()
+    assert not Path(f"/proc/{number}").exists()
 
 
 def read_badly(path, kind):

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, TimeArray
 from aqualog.io.can import BitField, Dbc, decode_signal, is_decodable, load_dbc, selected
-from aqualog.io.mdf import columns as blocks
 from aqualog.io.mdf import frames as can
 from aqualog.io.mdf.blocks import Channel as MdfChannel
 from aqualog.io.mdf.blocks import Group, Survey, short
+from aqualog.io.mdf.columns import damaged_blocks, is_sound_field
 from aqualog.io.mdf.conversion import refusal
 from aqualog.io.mdf.groups import Columns, GroupReader
 from aqualog.io.reader import FaultLog, Part, ReadOptions, one_piece, part_of
@@ -201,7 +201,7 @@ class MdfReader(GroupReader):
         """Seek packed blocks that make the file unreadable; raise the error if there is no such block."""
         if self._damaged or not self._survey.packed:
             raise error
-        self._damaged = blocks.damaged_blocks(self._path, self._survey.packed)
+        self._damaged = damaged_blocks(self._path, self._survey.packed)
         if not self._damaged:
             raise error
 
@@ -425,7 +425,7 @@ class MdfReader(GroupReader):
 
 
 def _fits(group: Group, channel: MdfChannel) -> bool:
-    return channel.is_virtual or blocks.is_sound_field(channel.field, group.size)
+    return channel.is_virtual or is_sound_field(channel.field, group.size)
 
 
 def _behind(pieces: Iterator[Columns], records: int) -> Iterator[Columns]:
