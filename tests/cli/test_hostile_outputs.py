@@ -17,7 +17,7 @@ from aqualog.report.campaign.folder import safe_cell
 from tests import commands
 
 CAR = Path(__file__).resolve().parents[2] / "sample_logs" / "vehicle.toml"
-LONG = "y" * 1_000_000
+LONG = "y" * 100_000  # more than MOST
 NAMES = {
     "markup": "</script><script>alert(1)</script><img src=x onerror=alert(1)>",
     "terminal": "[bold]red[/] \x1b[31mred\x1b[0m \x07 \u202eback\u2066 \x9b31m",

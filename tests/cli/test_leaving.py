@@ -79,13 +79,12 @@ app()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "told", "number"),
     [
-        (("calibrate", "a.csv", "-o", "x.toml"), "interrupted, nothing was written"),
-        (("evaluate", "a.csv", "-o", "x.html"), "interrupted, nothing was written"),
-        (("detect", "a.csv", "-o", "x"), "interrupted"),
+        (("calibrate", "a.csv", "-o", "x.toml"), "interrupted, nothing was written", signal.SIGINT),
+        (("evaluate", "a.csv", "-o", "x.html"), "interrupted, nothing was written", signal.SIGTERM),
+        (("detect", "a.csv", "-o", "x"), "interrupted", signal.SIGINT),
     ],
 )
 def test_interrupted(tmp_path, command, told, number):
