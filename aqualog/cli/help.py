@@ -40,8 +40,7 @@ def help_pages(run: Run, topic: list[str] | None) -> Output:
 
 def _text(asked: list[str]) -> str:
     """What is to be shown."""
-    from aqualog.book.search import search
-    from aqualog.book.topics import find, nearest, topics
+    from aqualog.book.topics import find, nearest, search, topics
     from aqualog.cli.commands import COMMANDS
     from aqualog.core.errors import ConfigError
 

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aqualog.book.search import search
-from aqualog.book.topics import DOCS, SECTIONS, find, nearest, plain, topics
+from aqualog.book.topics import DOCS, SECTIONS, find, nearest, plain, search, topics
 
 
 @pytest.fixture

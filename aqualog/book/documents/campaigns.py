@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from aqualog.book.documents.fields import (
+    BIN,
     HEAD,
+    PLACE_KEYS,
     Document,
     Field,
     anything,
@@ -15,12 +17,12 @@ from aqualog.book.documents.fields import (
     maybe,
     number,
     obj,
+    open_ci,
     or_null,
     rows,
     several,
     text,
 )
-from aqualog.book.documents.shared import BIN, PLACE_KEYS
 from aqualog.core.notation import WHEELS
 
 __all__ = ["BATCH", "BIN_RESISTANCE", "BIN_SLIP_SLOPE", "HISTORY", "INIT", "INSPECT", "MANIFEST", "PLAN"]
@@ -210,10 +212,8 @@ def _ci(name: str, unit: str) -> Field:
 _SLOPE = (
     *_PLACE,
     *BIN,
-    number("slope", "-", "slope of F_x / F_z over slip within `mu_range`", null=True),
-    _ci("slope_ci95", "-"),
-    number("intercept", "-", "slip without traction", null=True),
-    _ci("intercept_ci95", "-"),
+    *open_ci("slope", "-", "slope of F_x / F_z over slip within `mu_range`"),
+    *open_ci("intercept", "-", "slip without traction"),
     number("r2", "-", "share of the variance that the line explains", null=True),
     interval("mu_range", "-", "5 to 95 % of the traction driven; null without samples", null=True),
     number("attenuation", "-", "factor by which noise of the traction flattens slip over traction", null=True),
@@ -221,8 +221,7 @@ _SLOPE = (
     number("dof", "-", "degrees of freedom (Satterthwaite [satterthwaite1946])", null=True),
     flag("reliable", "3 runs or more, an interval within a factor of 3, and a line that explains more than a constant"),
     text("reason", "why there is no slope or no interval; null if there is", null=True),
-    number("slope_dry", "-", "the same off the water, all speeds together", null=True),
-    _ci("slope_dry_ci95", "-"),
+    *open_ci("slope_dry", "-", "the same off the water, all speeds together"),
     count("runs_dry", "runs behind it"),
     interval("mu_range_dry", "-", "range of the traction behind it", null=True),
     *or_null(
@@ -251,8 +250,7 @@ BIN_SLIP_SLOPE = Document(
         rows("dry", "the same off the water", _SLOPE, keys=PLACE_KEYS),
         rows("delays", "by how much v_x is late, by car", (
             text("vehicle", "car"),
-            number("delay_s", "s", "delay", null=True),
-            _ci("delay_s_ci95", "s"),
+            *open_ci("delay_s", "s", "delay"),
             count("runs", "runs behind it"),
             count("samples", "samples behind it"),
             text("reason", "why there is no value; null if there is one", null=True),
@@ -270,9 +268,8 @@ BIN_SLIP_SLOPE = Document(
         ), keys=PLACE_KEYS),
         rows("spin_ups", "traction coefficient of spinning wheels", (
             *_PLACE, *BIN,
-            number("mu", "-", "traction coefficient when the wheel begins to spin", null=True), _ci("mu_ci95", "-"),
-            number("mu_residual", "-", "least traction coefficient while it spins", null=True),
-            _ci("mu_residual_ci95", "-"),
+            *open_ci("mu", "-", "traction coefficient when the wheel begins to spin"),
+            *open_ci("mu_residual", "-", "least traction coefficient while it spins"),
             flag("reliable", "3 runs or more"),
             text("reason", "why there is no value; null if there is one", null=True),
         ), keys=PLACE_KEYS),
@@ -283,9 +280,9 @@ BIN_SLIP_SLOPE = Document(
             count("passes", "passes over the water at this speed"),
             number("seconds", "s", "time on the water at this speed", null=True),
             count("events", "minor spin-downs"),
-            number("per_s", "1/s", "minor spin-downs per second", null=True), _ci("per_s_ci95", "1/s"),
+            *open_ci("per_s", "1/s", "minor spin-downs per second"),
             number("per_100_m", "1/(100 m)", "minor spin-downs per 100 m", null=True),
-            number("share", "-", "share of the passes with one", null=True), _ci("share_ci95", "-"),
+            *open_ci("share", "-", "share of the passes with one"),
             count("passes_with_full_spin_down", "passes in which the wheel stopped"),
             number("deepest_slip_median", "-", "median of the deepest slip of the events", null=True),
         ), keys=PLACE_KEYS),
@@ -301,7 +298,7 @@ BIN_RESISTANCE = Document(
         flag("less_own_dry_level", "whether each run's level before the lane was taken off (not with `--as-measured`)"),
         rows("rows", "resistance by configuration and bin of speed; `-o FILE` writes these rows as a table", (
             *_PLACE, *BIN,
-            number("delta_a_x", "m/s^2", "mean resistance measure (2.9)", null=True), _ci("delta_a_x_ci95", "m/s^2"),
+            *open_ci("delta_a_x", "m/s^2", "mean resistance measure (2.9)"),
             number("scatter", "m/s^2", "scatter of the runs", null=True),
             number("dof", "-", "degrees of freedom (Satterthwaite [satterthwaite1946])", null=True),
             flag("reliable", "3 runs or more and an interval"),

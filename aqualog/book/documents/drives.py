@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from aqualog.book.documents.fields import (
+    EVENT,
+    EVIDENCE,
+    FAULTS,
     HEAD,
+    LACKING,
+    TERMS,
     Document,
     by_name,
     count,
@@ -17,8 +22,8 @@ from aqualog.book.documents.fields import (
     rows,
     several,
     text,
+    with_ci,
 )
-from aqualog.book.documents.shared import EVENT, EVIDENCE, FAULTS, LACKING, TERMS
 from aqualog.core.notation import WHEELS
 
 __all__ = ["ALIGN", "CACHE", "CALIBRATE", "DETECT", "DOCTOR", "INSPECT", "SIMULATE", "SLIP_SLOPE"]
@@ -91,12 +96,9 @@ DETECT = Document(
 )  # fmt: skip
 
 _LINE = (
-    number("slope", "-", "slip slope C_s / F_z; null where it cannot be estimated", null=True),
-    interval("slope_ci95", "-", "95 % interval"),
-    number("inverse_slope", "-", "1 / slope, which the regression estimates", null=True),
-    interval("inverse_slope_ci95", "-", "95 % interval"),
-    number("offset", "-", "offset of the slip", null=True),
-    interval("offset_ci95", "-", "95 % interval"),
+    *with_ci("slope", "-", "slip slope C_s / F_z; null where it cannot be estimated"),
+    *with_ci("inverse_slope", "-", "1 / slope, which the regression estimates"),
+    *with_ci("offset", "-", "offset of the slip"),
     number("scatter", "-", "standard deviation of the slip about the line", null=True),
     number("attenuation", "-", "factor by which noise of the traction flattens slip over traction", null=True),
     flag("attenuation_corrected", "whether that was taken out"),
@@ -122,8 +124,7 @@ _STABILITY = (
         number("change", "-", "relative change over the drive"),
     ),
     interval("change_ci95", "-", "95 % interval"),
-    number("change_per_hour", "1/h", "relative change per hour; null below half an hour", null=True),
-    interval("change_per_hour_ci95", "1/h", "95 % interval"),
+    *with_ci("change_per_hour", "1/h", "relative change per hour; null below half an hour"),
 )
 
 SLIP_SLOPE = Document(

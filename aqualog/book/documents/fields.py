@@ -1,4 +1,4 @@
-"""Fields of documents as data: from one table come the reference and the JSON Schema."""
+"""Fields of documents as data, with those that several documents have: reference and JSON Schema come from them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from aqualog.core.notation import WHEELS
+from aqualog.detect.registry import DETECTORS
+
 __all__ = [
-    "HEAD", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe",
-    "number", "obj", "or_null", "paths", "rows", "schema", "several", "text",
+    "BIN", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "LACKING", "PLACE_KEYS", "TERMS", "Document", "Field",
+    "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number", "obj", "open_ci",
+    "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
 ]  # fmt: skip
 
 Kind = Literal["number", "whole number", "text", "true or false", "interval", "object", "list", "by name", "any"]
@@ -89,6 +93,17 @@ def flag(name: str, meaning: str) -> Field:
 def interval(name: str, unit: str, meaning: str, *, null: bool = False) -> Field:
     """Two numbers, each null where that end is open; `null`: the whole may be null."""
     return Field(name, "interval", meaning, unit, null)
+
+
+def with_ci(name: str, unit: str, meaning: str) -> tuple[Field, Field]:
+    """A number, null where there is none, and its interval `NAME_ci95`."""
+    return number(name, unit, meaning, null=True), interval(f"{name}_ci95", unit, "95 % interval")
+
+
+def open_ci(name: str, unit: str, meaning: str) -> tuple[Field, Field]:
+    """As `with_ci`, where the interval may be null too."""
+    ci = interval(f"{name}_ci95", unit, "95 % interval; null without one", null=True)
+    return number(name, unit, meaning, null=True), ci
 
 
 def obj(name: str, meaning: str, fields: Sequence[Field], *, null: bool = False, keys: Sequence[str] = ()) -> Field:
@@ -199,3 +214,99 @@ def _kind(field: Field) -> dict[str, Any]:
     if field.kind == "list":
         return {"type": "array", "items": held}
     return {"type": "object", "additionalProperties": held}
+
+
+_WHEEL = text("wheel", "wheel; null where the event belongs to the car or a side", WHEELS, null=True)
+_SIDE = text("side", "side; null where it does not apply", ("left", "right", "axle"), null=True)
+
+_EVIDENCE = (
+    *or_null(
+        number("v_x", "m/s", "speed at the begin"),
+        number("v_x_min", "m/s", "least speed"),
+        number("v_x_max", "m/s", "greatest speed"),
+        number("slip_min", "-", "least slip of the wheel; of the joint detector over all wheels"),
+        number("slip_max", "-", "greatest slip; of the slip-slope drop the greatest amount"),
+        number("a_w_delta_min", "m/s^2", "least acceleration of the wheel against the car (2.3)"),
+        number("a_w_delta_max", "m/s^2", "greatest acceleration of the wheel against the car"),
+        number("variance_max", "(m/s^2)^2", "greatest variance of that difference"),
+        number("mu", "-", "traction coefficient of the wheel at the begin"),
+        number("mu_min", "-", "least traction coefficient"),
+        number("delta_a_x_max", "m/s^2", "greatest resistance measure while not braking (2.9)"),
+        number("force_residual_min", "N", "least residual of the tie-rod force"),
+        number("force_residual_max", "N", "greatest residual of the tie-rod force"),
+        number("torque_residual_min", "N*m", "least residual of the steering torque"),
+        number("torque_residual_max", "N*m", "greatest residual of the steering torque"),
+        number("slope_min", "-", "least slip slope"),
+        number("slope_ref", "-", "dry slip slope that it is compared with"),
+        number("term_spin_up", "-", "greatest term of the sum (2.11), 0 to 1: spin-up"),
+        number("term_spin_down", "-", "the same: spin-down"),
+        number("term_resistance", "-", "the same: resistance"),
+        number("term_minor_spin_down", "-", "the same: variance of minor spin-downs"),
+        number("term_slip_slope_drop", "-", "the same: lost slip slope"),
+    ),
+    flag("braking", "whether the wheel was braked at any time of the event"),
+    flag("braking_at_start", "whether it was braked at the begin"),
+    flag("from_steering_torque", "whether the steering torque stood in for tie rods"),
+    flag("criterion_1", "whether criterion 1, spin-down, was met at any time"),
+    flag("criterion_2", "the same: minor spin-down"),
+    flag("criterion_3", "the same: spin-up"),
+    flag("criterion_4", "the same: slip-slope drop"),
+    flag("criterion_5", "the same: resistance alone"),
+    flag("full", "whether a wheel went as far as full aquaplaning"),
+    several("decided_by", "detectors that decided when the warning began"),
+)
+
+EVENT = (
+    text("detector", "which detector", DETECTORS),
+    _WHEEL,
+    _SIDE,
+    number("start_s", "s", "begin, from the log's first sample"),
+    number("end_s", "s", "end"),
+    text("severity", "full: a wheel has lost a quarter of its speed, or a spinning one transmits less than 0.02",
+         ("partial", "full")),
+    number("peak", "unit of the statistic", "greatest value of the detector's statistic", null=True),
+    number("threshold", "unit of the statistic", "threshold of that statistic"),
+)  # fmt: skip
+EVIDENCE = maybe(*_EVIDENCE)
+"""What an event of any detector may have as evidence."""
+
+LACKING = (
+    text("detector", "which detector", DETECTORS),
+    several("missing", "signals that it lacks, or `vehicle.KEY`, or a rate"),
+)
+
+TERMS = (
+    text("effect", "effect, see the page of effects"),
+    text("where", "its place; null for the whole car", null=True),
+    mapping("parameters", "values, SI", number("", "SI", "", null=True)),
+    *maybe(several("knots", "points of a function", several("", "", number("", "SI", "", null=True)))),
+)
+"""Terms of a model."""
+
+FAULT_COUNTS = (
+    count("duplicates", "samples with the time stamp of another one"),
+    count("back_steps", "time stamps that go back a little; sorted"),
+    count("resets", "clocks that begin anew; what follows goes on 1 s later"),
+    count("wraps", "counters that wrap; unwrapped"),
+    count("pauses", "pauses of the logger; they stay gaps"),
+    count("drifts", "clocks in one file that run apart"),
+    count("strays", "samples with a time stamp from elsewhere; left out"),
+)
+FAULTS = (*FAULT_COUNTS, mapping("first_s", "place of the first fault of each kind, from the source's first sample",
+                                 number("", "s", "", null=True)))  # fmt: skip
+
+PLACE_KEYS = (
+    "^(tyre|wear|manoeuvre|vehicle|tread_depth_mm|pressure_(front|rear)_bar|water_depth(_left)?_mm"
+    "|load_(front|rear)_kg|lane_(start|end)_s)$",
+    "^x_",
+)
+"""Grouping keys of a row: keys of the campaign's runs."""
+
+BIN = (
+    text("road", "wet or dry; both where they are taken together", ("wet", "dry", "both")),
+    number("v_low_kmh", "km/h", "lower end of the bin of speed", null=True),
+    number("v_high_kmh", "km/h", "upper end", null=True),
+    number("v_mean_kmh", "km/h", "mean speed of the samples", null=True),
+    count("runs", "runs in the row: the unit of the interval"),
+    count("samples", "samples of 0.1 s"),
+)

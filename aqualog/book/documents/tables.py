@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aqualog.book.documents.fields import Field, count, flag, number, text
-from aqualog.book.documents.shared import FAULT_COUNTS
+from aqualog.book.documents.fields import FAULT_COUNTS, Field, count, flag, number, text
+from aqualog.config.campaign import RUN_KEYS
 
 __all__ = ["TABLES", "Table"]
 
@@ -31,18 +31,8 @@ _RUNS = Table(
         text("state", "done, failed or to do"),
         text("reason", "why it failed"),
         text("vehicle", "vehicle file"),
-        text("tyre", "key of the run"),
-        text("wear", "key of the run"),
-        text("manoeuvre", "key of the run"),
-        number("tread_depth_mm", "mm", "key of the run"),
-        number("pressure_front_bar", "bar", "key of the run"),
-        number("pressure_rear_bar", "bar", "key of the run"),
-        number("water_depth_mm", "mm", "key of the run"),
-        number("water_depth_left_mm", "mm", "key of the run"),
-        number("load_front_kg", "kg", "key of the run"),
-        number("load_rear_kg", "kg", "key of the run"),
-        number("lane_start_s", "s", "key of the run"),
-        number("lane_end_s", "s", "key of the run"),
+        *(text(n, "key of the run") for n in ("tyre", "wear", "manoeuvre")),
+        *(number(k.name, k.unit, "key of the run") for k in RUN_KEYS.values() if k.unit),
         text("x_...", "keys of your own"),
         count("start_ns", "absolute time of the first sample since 1970", "ns"),
         number("duration_s", "s", "length"),
