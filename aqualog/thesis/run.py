@@ -21,10 +21,7 @@ __all__ = ["Made", "conclude", "make", "make_all"]
 
 _FROM_CAMPAIGN = ("2.2", *OF_CAMPAIGN)
 """Scenes of single drives are simulated again: their claims need twenty seeds, and a campaign has one or three."""
-_CHECKS = (
-    "contact", "wheels", "resistance_rules", "slope_rules", "joint_rules", "differential", "estimator", "excitation",
-    "spins", "resistance", "slip_slope", "joint",
-)  # fmt: skip
+_CHECKS = ("contact", "wheels", "resistance", "slip_slope", "joint", "differential", "estimator", "excitation", "spins")
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from aqualog.thesis.checks.joint import (
     VARIANTS,
     Row,
     compared,
-    drives,
+    drawn_items,
     rows_of,
     variants_of,
     with_velocity,
@@ -35,7 +35,7 @@ WITHOUT = ("none (estimated from wheels and accelerometer)", "mean of the four w
 
 @pytest.fixture(scope="module")
 def records():
-    return [variants_of(item) for item in drives(20, FIRST_SEED, TUNING_POOL)]
+    return [variants_of(item) for item in drawn_items(20, FIRST_SEED, TUNING_POOL)]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_c70_the_alarms_on_top_are_those_of_antilock_braking(records):
 
 
 def test_velocities_are_what_they_say():
-    d = joint._drive(drives(1, FIRST_SEED, TUNING_POOL)[0])
+    d = joint._drive(drawn_items(1, FIRST_SEED, TUNING_POOL)[0])
     v = d.signals.array("v_x")
     fast = with_velocity(d, VARIANTS["2 % too fast"]).signals.array("v_x")
     np.testing.assert_allclose(fast, 1.02 * v)

@@ -5,8 +5,6 @@ Each compares the package's function with numbers, with a tyre model solved by h
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import activation, estimator
@@ -15,8 +13,6 @@ from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation
 from aqualog.physics import differential
-from aqualog.physics.slip import wheel_slip
-from aqualog.physics.tyre_brush import brush_force
 
 DT = 0.01
 CAR = HalfCar()
@@ -26,22 +22,6 @@ SNOW = SurfaceChange(20.0, 10.0, 10.0, 0.4)
 
 def uniform(low, high, n=200, seed=1):
     return np.random.default_rng(seed).uniform(low, high, n)
-
-
-def linear_axles(n=200, seed=0):
-    """Random linear tyres in the micro-slip region on both axles, with the slips and rim speeds that they show."""
-    C_F, C_R, mu_F, mu_R, d_F, d_R, v = (
-        uniform(low, high, n, 10 * seed + i)
-        for i, (low, high) in enumerate(
-            [(8, 60), (8, 60), (-0.2, 0.2), (-0.2, 0.2), (-5e-3, 5e-3), (-5e-3, 5e-3), (8, 60)]
-        )
-    )
-    s_F, s_R = mu_F / C_F + d_F, mu_R / C_R + d_R
-    v_F, v_R = v / (1.0 - s_F), v / (1.0 - s_R)
-    return {
-        "C_F": C_F, "C_R": C_R, "mu_F": mu_F, "mu_R": mu_R, "d_F": d_F, "d_R": d_R, "v": v, "s_F": s_F, "s_R": s_R,
-        "v_F": v_F, "v_R": v_R, "rho": v_R / v_F,
-    }  # fmt: skip
 
 
 def inputs(r, every=10):
@@ -73,196 +53,12 @@ def estimate(run, tuning=TUNING, every=10, slope=30.0, noise=False):
     return estimator.scan(Params.make(tuning, dt), state, y, mu_i, rho_mu_j, np.ones(y.size, dtype=bool))[0]
 
 
-# --- differential slip and traction -----------------------------------------------------------------------------------
-
-
-def test_C83_linear_tyre():
-    """3.14: "the linear tire model [...] relies on two parameters: the slip slope parameter and a slip-offset".
-
-    E8: with the sign of its reference [15], mu = C (s - delta). As printed, mu = C (s + delta), delta turns its sign.
-    """
-    a = linear_axles()
-    s = differential.linear_slip(a["mu_F"], slope=a["C_F"], offset=a["d_F"])
-    assert a["C_F"] * (s - a["d_F"]) == pytest.approx(a["mu_F"], rel=1e-12)
-    printed = differential.linear_slip(a["mu_F"], slope=a["C_F"], offset=-a["d_F"])
-    assert a["C_F"] * (printed + a["d_F"]) == pytest.approx(a["mu_F"], rel=1e-12)
-    # at rest of the force the slip is the offset; a slope is force over slip
-    assert differential.linear_slip(np.zeros(1), slope=np.ones(1), offset=np.full(1, 3e-3)) == pytest.approx(3e-3)
-    assert differential.linear_slip(np.full(1, 0.3), slope=np.full(1, 30.0), offset=np.zeros(1)) == pytest.approx(0.01)
-
-
-@pytest.mark.parametrize("size", [1e-3, 0.05, 0.5])
-def test_C84_the_velocity_drops_out(size):
-    """3.15, 3.16: "used to eliminate the longitudinal velocity by substituting both slip definitions into each other"."""
-    v, s_F, s_R = uniform(5, 60), uniform(-size, size, seed=2), uniform(-size, size, seed=3)
-    r_F, r_R = 0.31, 0.33
-    omega_F, omega_R = v / (r_F * (1 - s_F)), v / (r_R * (1 - s_R))
-    assert wheel_slip(omega_F, v, r_F) == pytest.approx(s_F, abs=1e-14)
-    s_delta = differential.differential_slip(r_F * omega_F, r_R * omega_R)
-    rho = differential.speed_ratio(r_F * omega_F, r_R * omega_R)
-    assert s_delta == pytest.approx((r_F * omega_F - r_R * omega_R) / (r_F * omega_F), abs=1e-14)
-    assert rho == pytest.approx(r_R * omega_R / (r_F * omega_F), rel=1e-14)
-    assert s_delta == pytest.approx(s_F - rho * s_R, abs=1e-13)
-    assert s_F == pytest.approx(s_delta + rho * s_R, abs=1e-13)
-    # positive where the front axle runs faster
-    assert (np.sign(s_delta) == np.sign(r_F * omega_F - r_R * omega_R)).all()
-
-
 def test_C84_standstill_tells_nothing():
     """3.15: a quotient of wheel speeds, without meaning where the divisor stands still."""
     still, rolling = np.array([0.0, 0.5, np.nan]), np.full(3, 10.0)
     for quotient in (differential.differential_slip, differential.speed_ratio):
         assert np.isnan(quotient(still, rolling)).all()
         assert np.isfinite(quotient(rolling, np.zeros(3))).all()
-
-
-def test_C85_slope_ratio():
-    """3.17: "a slip slope ratio lambda of the (normalized) slip slope on the front and rear axle"."""
-    C_F, C_R, F_F, F_R = (
-        uniform(9e4, 3e5),
-        uniform(9e4, 3e5, seed=2),
-        uniform(5e3, 1e4, seed=3),
-        uniform(5e3, 1e4, seed=4),
-    )
-    ratio = differential.slope_ratio(C_F / F_F, C_R / F_R)
-    assert ratio == pytest.approx((C_R / F_R) / (C_F / F_F), rel=1e-14)
-    assert ratio * (C_F / F_F) == pytest.approx(C_R / F_R, rel=1e-14)
-    # "it can be assumed that this change is proportional on both axles": a common drop leaves the ratio
-    assert differential.slope_ratio(C_F / F_F / 3, C_R / F_R / 3) == pytest.approx(ratio, rel=1e-14)
-
-
-def test_C85_a_common_drop_leaves_ratio_and_offset_in_the_estimator():
-    """3.2: "slowly varying differences between front and rear axle [...] while sudden drops on both axles"."""
-    change = SurfaceChange(20.0, 10.0, 10.0, 1.0)
-    run = HalfCarRun(30.0, v0=20.0, nu=0.3, excitation=Excitation("sine", 0.05, "mu", 4.0), surface=(change,))
-    e = estimate(run)
-    assert e.slope[1999] == pytest.approx(30.0, rel=0.05)
-    assert e.slope[-1] == pytest.approx(10.0, rel=0.05)
-    assert np.ptp(e.beta) < 0.02
-    assert np.ptp(e.offset) < 5e-4
-
-
-@pytest.mark.parametrize("front", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_C86_differential_slip_of_linear_tyres(front, seed):
-    """3.18, 3.19: differential slip = differential traction / slope + offset, from 3.14, 3.16 and 3.17 alone.
-
-    E8: with s = mu / C + delta the offset is delta_i - rho delta_j as printed; with 3.14 as printed it is minus that.
-    """
-    a = linear_axles(seed=seed)
-    i, j = ("F", "R") if front else ("R", "F")
-    v_i, v_j, d_i, d_j, C_i = a[f"v_{i}"], a[f"v_{j}"], a[f"d_{i}"], a[f"d_{j}"], a[f"C_{i}"]
-    ratio = differential.slope_ratio(a["C_F"], a["C_R"])
-    beta = np.array([differential.beta_of_ratio(x, front=front) for x in ratio])
-    rho = differential.speed_ratio(v_i, v_j)
-    # as printed: 1 / lambda and rho at the front, lambda and 1 / rho at the rear axle
-    assert rho == pytest.approx(a["rho"] if front else 1 / a["rho"], rel=1e-14)
-    assert beta == pytest.approx(1 / ratio if front else ratio, rel=1e-14)
-    mu_delta = differential.differential_traction(a[f"mu_{i}"], a[f"mu_{j}"], rho=rho, beta=beta)
-    predicted = differential.predicted_differential_slip(
-        a[f"mu_{i}"], rho * a[f"mu_{j}"], inverse_slope=1 / C_i, beta=beta, offset=d_i - rho * d_j
-    )
-    measured = differential.differential_slip(v_i, v_j)
-    assert predicted == pytest.approx(measured, abs=1e-12)
-    assert mu_delta / C_i + d_i - rho * d_j == pytest.approx(measured, abs=1e-12)
-
-
-@pytest.mark.parametrize(("nu", "front"), [(0.0, True), (1.0, False)])
-@pytest.mark.parametrize("surface", [(), (SurfaceChange(2.0, 10.0, 10.0, 0.4),)])
-def test_C87_one_driven_axle(nu, front, surface):
-    """3.2: "In the case of just one driven axle the slip-free wheel speed of the opposite axle is equal to the absolute
-    vehicle speed", so that the slope is the true one; front drive with 3.18, rear drive with 3.19."""
-    r = simulate_half_car(CAR, HalfCarRun(4.0, a_x=1.0, nu=nu, surface=surface))
-    v_F, v_R = r.omega_f * R_E, r.omega_r * R_E
-    v_i, v_j = (v_F, v_R) if front else (v_R, v_F)
-    mu_i, mu_j, s_i = (r.mu_f, r.mu_r, r.s_f) if front else (r.mu_r, r.mu_f, r.s_r)
-    # but for the ms in which the wheels take up the change of the surface
-    calm = (r.t < 2.0) | (r.t > 2.1)
-    assert differential.differential_slip(v_i, v_j)[calm] == pytest.approx(s_i[calm], abs=2e-5)
-    assert s_i.min() > 5e-3
-    rho = differential.speed_ratio(v_i, v_j)
-    # whatever ratio is assumed
-    for beta in (0.5, 1.0, 2.0):
-        mu_delta = differential.differential_traction(mu_i, mu_j, rho=rho, beta=beta)
-        assert mu_delta[calm] == pytest.approx(mu_i[calm], abs=1e-3)
-
-
-@pytest.mark.parametrize(("nu", "front"), [(0.0, True), (1.0, False)])
-def test_C87_true_slope_of_the_driven_axle(nu, front):
-    """3.2: "the direct estimation of the true slip slope of the driven axle similar to [...] [15]"."""
-    # traction varies by acceleration: several runs in a row
-    parts = [simulate_half_car(CAR, HalfCarRun(4.0, v0=20.0, a_x=a, nu=nu)) for a in (0.1, 0.3, -0.3, 0.2, -0.4, 0.3)]
-    axle = ("f", "r") if front else ("r", "f")
-    v_i, v_j, mu_i, mu_j = (
-        np.concatenate([getattr(p, name)[::10] for p in parts])
-        for name in (f"omega_{axle[0]}", f"omega_{axle[1]}", f"mu_{axle[0]}", f"mu_{axle[1]}")
-    )
-    y, rho = differential.differential_slip(v_i, v_j), differential.speed_ratio(v_i, v_j)
-    p, state = Params.make(TUNING, DT), estimator.initial_state(TUNING, slope=36.0, beta=1.3)
-    e, _ = estimator.scan(p, state, y, mu_i, rho * mu_j, np.ones(y.size, dtype=bool))
-    assert e.slope[-1] == pytest.approx(30.0, rel=0.05)
-    assert e.beta == pytest.approx(1.3, abs=0.01)
-
-
-def test_C87_each_side_by_itself():
-    """3.2: "with single wheel speeds and traction coefficients of opposite tires at one vehicle side enabling individual
-    estimation of slip slope at both sides of the vehicle"."""
-    n = 6000
-    t = np.arange(n) * DT
-    v, mu_F, mu_R = 25.0, 0.05 + 0.05 * np.sin(t), 0.04 + 0.04 * np.sin(1.7 * t)
-    found = {}
-    for side, C in (("left", 14.0), ("right", 33.0)):  # water in the left track
-        v_F, v_R = v / (1 - mu_F / C), v / (1 - mu_R / C)
-        y, rho = differential.differential_slip(v_F, v_R), differential.speed_ratio(v_F, v_R)
-        state = estimator.initial_state(TUNING, slope=30.0)
-        e, _ = estimator.scan(Params.make(TUNING, DT), state, y, mu_F, rho * mu_R, np.ones(n, dtype=bool))
-        found[side] = e.slope[-1]
-    assert found == {"left": pytest.approx(14.0, rel=0.03), "right": pytest.approx(33.0, rel=0.03)}
-
-
-# --- the filter's output equation -------------------------------------------------------------------------------------
-
-
-def test_C88_both_forms_are_the_same_road():
-    """3.20, 3.21: "beta_F = 1 / lambda and beta_R = lambda": both forms predict the same pair of wheel speeds."""
-    assert differential.beta_of_ratio(0.8, front=True) == 1.25
-    assert differential.beta_of_ratio(0.8, front=False) == 0.8
-    a = linear_axles(seed=5)
-    ratio = a["C_R"] / a["C_F"]
-    at_front = differential.predicted_differential_slip(
-        a["mu_F"],
-        a["rho"] * a["mu_R"],
-        inverse_slope=1 / a["C_F"],
-        beta=1 / ratio,
-        offset=a["d_F"] - a["rho"] * a["d_R"],
-    )
-    at_rear = differential.predicted_differential_slip(
-        a["mu_R"], a["mu_F"] / a["rho"], inverse_slope=1 / a["C_R"], beta=ratio, offset=a["d_R"] - a["d_F"] / a["rho"]
-    )
-    # s_delta_F = 1 - rho, s_delta_R = 1 - 1 / rho
-    assert 1 - at_front == pytest.approx(a["rho"], rel=1e-12)
-    assert 1 / (1 - at_rear) == pytest.approx(a["rho"], rel=1e-12)
-    assert at_rear == pytest.approx(-at_front / a["rho"], abs=1e-12)
-
-
-traction = st.floats(-0.5, 0.5)
-
-
-@settings(max_examples=300, deadline=None)
-@given(traction, traction, st.floats(0.01, 0.2), st.floats(0.3, 3.0), st.floats(-0.02, 0.02))
-def test_C88_jacobian(mu_i, rho_mu_j, k, beta, delta):
-    """3.22: the derivatives by x = [1 / C, beta, delta], which the thesis does not print, against differences."""
-    x = np.array([k, beta, delta])
-
-    def h(z):
-        return differential.predicted_differential_slip(mu_i, rho_mu_j, inverse_slope=z[0], beta=z[1], offset=z[2])
-
-    H = differential.jacobian(mu_i, rho_mu_j, inverse_slope=k, beta=beta)
-    for axis, step in enumerate((1e-4, 1e-3, 1e-4)):
-        d = np.zeros(3)
-        d[axis] = step
-        # h is linear in each parameter: central differences are exact but for rounding
-        assert H[axis] == pytest.approx((h(x + d) - h(x - d)) / (2 * step), abs=1e-10)
 
 
 # --- change detection -------------------------------------------------------------------------------------------------
@@ -276,20 +72,6 @@ def sums_by_hand(nu, zeta, *, clamp):
         g = np.maximum(g, 0.0) if clamp else g
         rows.append(g)
     return np.array(rows)
-
-
-def test_C89_two_sided_cusum_with_drift():
-    """3.23, 3.24: "The positive and negative prediction error is accumulated"; clamped at zero (E11)."""
-    nu = np.random.default_rng(3).normal(0.0, 2e-3, 3000) + np.where(np.arange(3000) > 1500, 3e-3, -2e-3)
-    p = cusum.CusumParams(1e-3, np.inf, np.inf, DT)
-    up, _, _ = cusum.scan(p, cusum.initial_state(), nu)
-    down, _, _ = cusum.scan(p, cusum.initial_state(), -nu)
-    hand = sums_by_hand(nu, 1e-3, clamp=True)
-    assert np.column_stack([up, down]) == pytest.approx(hand, abs=1e-15)
-    assert hand[-1, 0] > 10 * hand[-1, 1]
-    # as printed, without the clamp, a sum without cause falls for ever
-    assert sums_by_hand(np.zeros(3000), 1e-3, clamp=False)[-1] == pytest.approx(-1e-3 * 30.0)
-    assert (cusum.scan(p, cusum.initial_state(), np.zeros(3000))[0] == 0.0).all()
 
 
 def test_C89_threshold_and_reset_in_the_estimator():
@@ -470,111 +252,6 @@ def test_C91_bounds_of_differential_traction_and_slip(sample, status):
 
 
 # --- sensitivity ------------------------------------------------------------------------------------------------------
-
-W = 16_000.0  # load of both axles [N]
-SHARE = {"F": 0.4, "R": 0.6}
-
-
-def brush_axles(F_sum, nu, *, C_F=30.0, C_R=30.0, mu=1.0, share=SHARE):
-    """Slips and traction coefficients of both axles under a fixed split; the brush solved for its slip by hand."""
-    sides = []
-    for axle, F_x, C in (("F", (1.0 - nu) * F_sum, C_F), ("R", nu * F_sum, C_R)):
-        F_z = share[axle] * W
-        s = np.sign(F_x) * 3.0 * mu / C * (1.0 - np.cbrt(1.0 - np.abs(F_x) / (mu * F_z)))
-        assert brush_force(s, np.full_like(s, F_z), mu=mu, C_s=C * F_z) == pytest.approx(F_x, abs=1e-6)
-        sides += [s, F_x / F_z]
-    s_F, mu_F, s_R, mu_R = sides
-    v_F, v_R = 25.0 / (1.0 - s_F), 25.0 / (1.0 - s_R)
-    rho = differential.speed_ratio(v_F, v_R)
-    s_delta = differential.differential_slip(v_F, v_R)
-    beta = differential.beta_of_ratio(float(differential.slope_ratio(C_F, C_R)), front=True)
-    return s_F, s_R, s_delta, differential.differential_traction(mu_F, mu_R, rho=rho, beta=beta), rho
-
-
-@pytest.mark.parametrize(("C_F", "C_R"), [(30.0, 30.0), (30.0, 20.0), (10.0, 14.0)])
-def test_C92_the_scaled_rear_curve_has_the_front_slope(C_F, C_R):
-    """Figure 3.3: "The original slip curve of the rear axle is scaled along the traction coefficient and slip axis";
-    "The slip slope (of the front tire) can now be determined directly"."""
-    s_F, s_R, s_delta, mu_delta, rho = brush_axles(np.array([2.0]), 0.3, C_F=C_F, C_R=C_R)
-    beta = C_F / C_R
-    # at 2 N the brush is linear to 2e-4
-    scaled_slip, scaled_mu = rho * s_R, beta * rho * 0.3 * 2.0 / (0.6 * W)
-    assert scaled_mu / scaled_slip == pytest.approx(C_F, rel=1e-3)
-    assert s_delta == pytest.approx(s_F - scaled_slip, abs=1e-15)
-    assert mu_delta / s_delta == pytest.approx(C_F, rel=1e-3)
-
-
-@pytest.mark.parametrize(("mu", "C_F", "lam"), [(1.0, 30.0, 1.0), (0.4, 10.0, 1.0), (1.0, 30.0, 0.7), (0.4, 10.0, 1.3)])
-def test_C93_initial_slope_of_the_projected_line(mu, C_F, lam):
-    """Figure 3.4: loads 40 / 60, split 0.3, friction 1.0 and 0.4, stiffness reduced by two thirds on both axles: the
-    estimator "detects the initial (differential slip) slope of the projected lines"."""
-    for F_sum in (-30.0, -3.0, 3.0, 30.0):
-        _, _, s_delta, mu_delta, _ = brush_axles(np.array([F_sum]), 0.3, C_F=C_F, C_R=lam * C_F, mu=mu)
-        # the brush leaves its tangent by C |s| / (3 mu)
-        assert mu_delta / s_delta == pytest.approx(C_F, rel=3 * abs(F_sum) / (0.4 * W * mu))
-
-
-def test_C93_surfaces_can_be_told_apart():
-    """3.2: "the red and blue lines can be distinguished clearly"."""
-    F_sum = np.linspace(20.0, 2500.0, 200)
-    _, _, s_dry, mu_dry, _ = brush_axles(F_sum, 0.3)
-    _, _, s_snow, mu_snow, _ = brush_axles(F_sum, 0.3, C_F=10.0, C_R=10.0, mu=0.4)
-    at = np.linspace(0.001, 0.005, 9)
-    assert (np.interp(at, s_dry, mu_dry) > 2.5 * np.interp(at, s_snow, mu_snow)).all()
-
-
-def test_C94_one_driven_axle():
-    """Figure 3.5: "In pure front-wheel drive configuration the differential slip is equal to the absolute slip on the
-    front axle"; "Pure rear-wheel drive results in a straight trajectory above the s_F = 0 axis"."""
-    F_sum = np.linspace(-2000.0, 2000.0, 41)
-    s_F, s_R, s_delta, mu_delta, _ = brush_axles(F_sum, 0.0)
-    assert (s_R == 0.0).all()
-    assert s_delta == pytest.approx(s_F, abs=1e-15)
-    assert mu_delta == pytest.approx(F_sum / (0.4 * W))
-    s_F, s_R, s_delta, _, rho = brush_axles(F_sum, 1.0)
-    assert (s_F == 0.0).all()
-    assert s_delta == pytest.approx(-rho * s_R, abs=1e-15)
-    assert rho == pytest.approx(1.0 / (1.0 - s_R), rel=1e-14)
-
-
-def test_C94_fixed_splits_go_through_the_origin():
-    """3.2: "all lines cross the origin at zero (differential) slip and differential traction coefficient"."""
-    turned = []
-    for nu in np.linspace(0.0, 1.0, 11):
-        s_F, s_R, s_delta, mu_delta, _ = brush_axles(np.array([-1.0, 0.0, 1.0]), nu)
-        assert s_delta[1] == mu_delta[1] == s_F[1] == s_R[1] == 0.0
-        turned.append((s_delta[2] - s_delta[0], s_F[2] - s_F[0]))
-    # "The torque distribution mainly influences the orientation": the direction in (s_delta, s_F) turns one way
-    angle = np.unwrap(np.arctan2(*np.transpose(turned)))
-    assert (np.diff(angle) < 0).all()
-    assert angle[0] == pytest.approx(np.pi / 4, abs=1e-3)  # "a diagonal trajectory"
-    assert angle[-1] == pytest.approx(-np.pi / 2, abs=1e-3)
-
-
-def test_C94_variation_of_the_split_at_a_fixed_force():
-    """3.2: "a variation of the torque distribution for a fixed longitudinal acceleration" shows the slope as well."""
-    points = [brush_axles(np.array([200.0]), nu)[2:4] for nu in np.linspace(0.0, 1.0, 11)]
-    s_delta, mu_delta = np.array(points)[:, :, 0].T
-    assert (np.diff(s_delta) < 0).all()
-    assert np.polyfit(s_delta, mu_delta, 1)[0] == pytest.approx(30.0, rel=0.05)
-
-
-@pytest.mark.parametrize("rear", [0.4, 0.5, 0.6])
-@pytest.mark.parametrize("mu", [1.0, 0.4])
-def test_C95_blind_at_the_split_of_the_loads(rear, mu):
-    """3.2: "differential traction coefficient paths with a distribution close to nu = 0.6 [...] cannot be reliably
-    detected. In such situations, the slip on both axles is similar": at equal tyres nu is the rear share of the load."""
-    share = {"F": 1.0 - rear, "R": rear}
-    F_sum = np.array([300.0, 1500.0, -800.0])
-    s_F, s_R, s_delta, mu_delta, _ = brush_axles(F_sum, rear, mu=mu, share=share)
-    assert s_F == pytest.approx(s_R, rel=1e-12)
-    assert s_delta == pytest.approx(0.0, abs=1e-14)
-    assert mu_delta == pytest.approx(0.0, abs=1e-14)
-    # and at no other split, of either sign around it
-    for off in (-0.1, 0.1):
-        _, _, s_delta, mu_delta, _ = brush_axles(F_sum, rear + off, mu=mu, share=share)
-        assert (np.sign(s_delta) == -np.sign(off * F_sum)).all()
-        assert (np.abs(mu_delta) > 1e-3).all()
 
 
 def rear_share(a_x):

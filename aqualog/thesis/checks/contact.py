@@ -137,33 +137,25 @@ def _wedge(_: Plan) -> Checks:
     below = float((mu - C)[inside].min())
     at = [[float(v[np.argmax(curve < 0.8)] / KMH) for curve in curves] for curves in (C, mu)]
     order = below > 0.0 and all(c < m for c, m in zip(*at, strict=True)) and at[0] == sorted(at[0])
+    bars = ", ".join(f"{p / 1e5:g}" for p in pressures)
+    of_slope, of_friction = (", ".join(f"{x:.0f}" for x in speeds) for speeds in at)
+    growth = (
+        f"least growth over 2 km/h {over_v:.1e}, over the steps of {len(heights)} heights from 0.6 to 3 mm "
+        f"{over_h:.1e}, at {bars} bar"
+    )
+    lead = (
+        f"20 % lost at {of_slope} km/h (slope) and {of_friction} km/h (friction) at {bars} bar; least lead {below:.1e}"
+    )
     return (
-        judge(
-            "C9.theory",
-            f"least growth over 2 km/h {over_v:.1e}, over the steps of {len(heights)} heights from 0.6 to 3 mm "
-            f"{over_h:.1e}, at {', '.join(f'{p / 1e5:g}' for p in pressures)} bar",
-            whole=False,
-            part=grows,
-            value=min(over_v, over_h),
-        ),
-        judge(
-            "C10.theory",
-            f"20 % lost at {', '.join(f'{x:.0f}' for x in at[0])} km/h (slope) and "
-            f"{', '.join(f'{x:.0f}' for x in at[1])} km/h (friction) at "
-            f"{', '.join(f'{p / 1e5:g}' for p in pressures)} bar; least lead {below:.1e}",
-            whole=False,
-            part=order,
-            value=at[1][0] - at[0][0],
-        ),
+        judge("C9.theory", growth, part=grows, value=min(over_v, over_h)),
+        judge("C10.theory", lead, part=order, value=at[1][0] - at[0][0]),
     )
 
 
 # C1: slip as measured on a road, 5 times a second for 10 s, with the offset of the radii unknown
 _NOISE, _POINTS, _SLOPE = 5e-4, 50, 30.0
-_GOOD, _DRY_RANGE = (
-    0.10,
-    limits("dry_range", "C1.theory"),
-)  # [-] spread of mu_max that may be called known; utilisation at which it is
+_GOOD = 0.10  # [-] spread of mu_max that may be called known
+_DRY_RANGE = limits("dry_range", "C1.theory")  # [-] utilisation at which it is
 _UTILISATION = np.arange(0.30, 0.96, 0.05)
 
 

@@ -29,20 +29,11 @@ def _identity(key: str, worst: float, *, most: float = _EXACT) -> Check:
 def _axles(plan: Plan) -> dict[str, FloatArray]:
     """Random linear tyres on both axles, arrays (n,): slopes, traction, offsets, slips and rim speeds."""
     rng = np.random.default_rng(plan.seeds[0])
-    x = {
-        name: rng.uniform(low, high, _N)
-        for name, low, high in (
-            ("C_F", 8.0, 60.0),
-            ("C_R", 8.0, 60.0),
-            ("mu_F", -0.3, 0.3),
-            ("mu_R", -0.3, 0.3),
-            ("d_F", -5e-3, 5e-3),
-            ("d_R", -5e-3, 5e-3),
-            ("v", 8.0, 60.0),
-            ("r_F", 0.28, 0.38),
-            ("r_R", 0.28, 0.38),
-        )
-    }
+    bounds = {
+        "C_F": (8.0, 60.0), "C_R": (8.0, 60.0), "mu_F": (-0.3, 0.3), "mu_R": (-0.3, 0.3), "d_F": (-5e-3, 5e-3),
+        "d_R": (-5e-3, 5e-3), "v": (8.0, 60.0), "r_F": (0.28, 0.38), "r_R": (0.28, 0.38),
+    }  # fmt: skip
+    x = {name: rng.uniform(low, high, _N) for name, (low, high) in bounds.items()}
     for axle in "FR":
         x[f"s_{axle}"] = x[f"mu_{axle}"] / x[f"C_{axle}"] + x[f"d_{axle}"]
         x[f"omega_{axle}"] = x["v"] / (1.0 - x[f"s_{axle}"]) / x[f"r_{axle}"]
@@ -64,24 +55,17 @@ def _slips(plan: Plan) -> Checks:
     c80 = float(np.abs((rim - car) / rim - wheel_slip(x["omega_F"] * x["r_F"], x["v"], 1.0)).max())
     rho = differential.speed_ratio(x["v_F"], x["v_R"])
     s_delta = differential.differential_slip(x["v_F"], x["v_R"])
-    c84 = float(
-        max(
-            np.abs(s_delta + rho * x["s_R"] - x["s_F"]).max(),
-            np.abs(rho - (x["r_R"] * x["omega_R"]) / (x["r_F"] * x["omega_F"])).max(),
-        )
-    )
+    of_slip = np.abs(s_delta + rho * x["s_R"] - x["s_F"]).max()
+    c84 = float(max(of_slip, np.abs(rho - (x["r_R"] * x["omega_R"]) / (x["r_F"] * x["omega_F"])).max()))
     # no velocity: the same wheel speeds from a car at another speed with other slips
     worst = 0.0
     for i, j, front in (("F", "R", True), ("R", "F", False)):
         ratio = differential.slope_ratio(x["C_F"], x["C_R"])
         beta = np.array([differential.beta_of_ratio(float(r), front=front) for r in ratio])
         ratio_v = differential.speed_ratio(x[f"v_{i}"], x[f"v_{j}"])
+        inverse, offset = 1.0 / x[f"C_{i}"], x[f"d_{i}"] - ratio_v * x[f"d_{j}"]
         predicted = differential.predicted_differential_slip(
-            x[f"mu_{i}"],
-            ratio_v * x[f"mu_{j}"],
-            inverse_slope=1.0 / x[f"C_{i}"],
-            beta=beta,
-            offset=x[f"d_{i}"] - ratio_v * x[f"d_{j}"],
+            x[f"mu_{i}"], ratio_v * x[f"mu_{j}"], inverse_slope=inverse, beta=beta, offset=offset
         )
         worst = max(worst, float(np.abs(predicted - (1.0 - x[f"v_{j}"] / x[f"v_{i}"])).max()))
     # the printed pair of 3.14 and 3.18, taken literally
@@ -170,14 +154,11 @@ def _half_car(_: Plan) -> Check:
     for waveform in ("triangle", "sine", "ramp", "step"):
         for a_x in (0.0, 0.5, 1.0):
             car = SUV._replace(r_l_f=SUV.r_e_f, r_l_r=SUV.r_e_r)
-            ride = HalfCarRun(
-                12.0,
-                v0=20.0,
-                a_x=a_x,
-                nu=0.6,
-                excitation=Excitation(waveform, 250.0, "force", 8.0),
-                surface=(SurfaceChange(6.0, LOW_SLOPE, LOW_SLOPE, 0.4),),
+            excitation, change = (
+                Excitation(waveform, 250.0, "force", 8.0),
+                SurfaceChange(6.0, LOW_SLOPE, LOW_SLOPE, 0.4),
             )
+            ride = HalfCarRun(12.0, v0=20.0, a_x=a_x, nu=0.6, excitation=excitation, surface=(change,))
             r = simulate_half_car(car, ride)
             drag = 0.5 * car.drag_area * car.air_density * r.v_x**2
             worst_force = max(worst_force, float(np.abs(car.mass * r.a_x - r.F_x_f - r.F_x_r + drag).max()))
@@ -185,8 +166,7 @@ def _half_car(_: Plan) -> Check:
             kinetic = 0.5 * (car.mass * r.v_x**2 + car.inertia_f * r.omega_f**2 + car.inertia_r * r.omega_r**2)
             power = r.torque_f * r.omega_f + r.torque_r * r.omega_r - drag * r.v_x
             for axle in "fr":
-                F, s, F_z = getattr(r, f"F_x_{axle}"), getattr(r, f"s_{axle}"), getattr(r, f"F_z_{axle}")
-                omega = getattr(r, f"omega_{axle}")
+                F, s, F_z, omega = (getattr(r, f"{name}_{axle}") for name in ("F_x", "s", "F_z", "omega"))
                 power = power - F * s * omega * car.r_e_f - car.r_w * F_z * car.r_e_f * omega
             gained = np.sum(0.5 * (power[1:] + power[:-1]) * ride.dt)
             worst_energy = max(worst_energy, float(abs(kinetic[-1] - kinetic[0] - gained) / kinetic[0]))

@@ -10,18 +10,7 @@ from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.physics.tyre_brush import brush_force
 from aqualog.thesis.claims import Check, judge
-from aqualog.thesis.evidence.half_car import (
-    DT,
-    HIGH_SLOPE,
-    LOW_SLOPE,
-    ROAD_NOISE,
-    Case,
-    drive,
-    estimated,
-    first_alarm,
-    inputs,
-    noise,
-)
+from aqualog.thesis.evidence import half_car
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, ratio_of_counts, share
 
 __all__ = ["CHECKS"]
@@ -31,7 +20,7 @@ def _linear_tyre(plan: Plan) -> Check:
     """Error of the line of 3.14 on the brush, and the purpose of its offset."""
     mu = np.linspace(-0.2, 0.2, 401)
     s = np.linspace(-0.03, 0.03, 20001)
-    force = brush_force(s, np.ones(1), mu=1.0, C_s=HIGH_SLOPE)
+    force = brush_force(s, np.ones(1), mu=1.0, C_s=half_car.HIGH_SLOPE)
     slip = np.interp(mu, force, s)
     line = np.linalg.lstsq(np.column_stack([mu, np.ones_like(mu)]), slip, rcond=None)[0]
     left = float(np.abs(slip - line[0] * mu - line[1]).max())
@@ -39,12 +28,12 @@ def _linear_tyre(plan: Plan) -> Check:
     errors: dict[bool, list[float]] = {True: [], False: []}
     for _ in range(len(plan.seeds)):
         x = rng.uniform(0.02, 0.15, 200)
-        y = x / HIGH_SLOPE + rng.normal(0.0, 3e-3) + ROAD_NOISE * rng.standard_normal(200)
+        y = x / half_car.HIGH_SLOPE + rng.normal(0.0, 3e-3) + half_car.ROAD_NOISE * rng.standard_normal(200)
         for free in (True, False):
             design = np.column_stack([x, np.ones(200)]) if free else x[:, None]
-            errors[free].append(1.0 / float(np.linalg.lstsq(design, y, rcond=None)[0][0]) / HIGH_SLOPE - 1.0)
+            errors[free].append(1.0 / float(np.linalg.lstsq(design, y, rcond=None)[0][0]) / half_car.HIGH_SLOPE - 1.0)
     spread = {free: 0.5 * float(np.subtract(*np.quantile(e, [0.84, 0.16]))) for free, e in errors.items()}
-    fits = left < ROAD_NOISE
+    fits = left < half_car.ROAD_NOISE
     whole = fits and spread[True] < 0.1 < spread[False]
     outcome = (
         f"at most {left:.1e} of slip left; slope within {100 * spread[True]:.1f} % with the offset, "
@@ -59,20 +48,19 @@ def _common_drop(plan: Plan) -> Check:
     found: dict[str, list[tuple[float, float, float]]] = {"slow": [], "fast": []}
     # as free as the slope: neither slowed by its process noise nor held where the data do not determine it
     fast = TUNING._replace(q_beta=1e-4, sd_beta=0.3, told_beta=np.inf)
-    d = drive(Case("sine", 0.05, "mu", 4.0, a_x=0.3, nu=0.3, low_mu=1.0))
-    s_delta, mu_i, rho_mu_j = inputs(d)
+    d = half_car.drive(half_car.Case("sine", 0.05, "mu", 4.0, a_x=0.3, nu=0.3, low_mu=1.0))
+    s_delta, mu_i, rho_mu_j = half_car.inputs(d)
     true_beta = 1.0
     seeds = plan.first(40)
     for seed in seeds:
-        y = s_delta + noise(np.random.default_rng([seed, 85]), d.t.size)
+        y = s_delta + half_car.noise(np.random.default_rng([seed, 85]), d.t.size)
         for name, tuning in (("slow", TUNING), ("fast", fast)):
-            e = estimated(tuning, y, mu_i, rho_mu_j)
+            e = half_car.estimated(tuning, y, mu_i, rho_mu_j)
             late = d.t > 4.0
-            found[name].append(
-                (first_alarm(d, e), float(np.abs(e.beta - true_beta)[late].max()), float(np.median(e.slope[late])))
-            )
+            off = float(np.abs(e.beta - true_beta)[late].max())
+            found[name].append((half_car.first_alarm(d, e), off, float(np.median(e.slope[late]))))
     table = {n: np.array(rows) for n, rows in found.items()}
-    right = {n: int(np.sum(np.abs(x[:, 2] / LOW_SLOPE - 1.0) < 0.15)) for n, x in table.items()}
+    right = {n: int(np.sum(np.abs(x[:, 2] / half_car.LOW_SLOPE - 1.0) < 0.15)) for n, x in table.items()}
     soon = int(np.sum(table["slow"][:, 0] < 4.0))
     moved = {n: float(np.median(x[:, 1])) for n, x in table.items()}
     n = len(seeds)
@@ -89,22 +77,22 @@ def _change_detection(plan: Plan) -> Check:
     """C89: identity of the sums, and purpose of the detection, shown without it."""
     rng = np.random.default_rng(plan.seeds[0])
     nu = rng.normal(0.0, 2e-3, 3000) + np.where(np.arange(3000) > 1500, 3e-3, -2e-3)
-    p = cusum.CusumParams(1e-3, np.inf, np.inf, DT)
+    p = cusum.CusumParams(1e-3, np.inf, np.inf, half_car.DT)
     worst = 0.0
     for sign in (1.0, -1.0):
         # clamped sum as the rise of the walk above its running minimum
-        walk = np.concatenate([[0.0], np.cumsum((sign * nu - 1e-3) * DT)])
+        walk = np.concatenate([[0.0], np.cumsum((sign * nu - 1e-3) * half_car.DT)])
         rise = (walk - np.minimum.accumulate(walk))[1:]
         worst = max(worst, float(np.abs(cusum.scan(p, cusum.initial_state(), sign * nu)[0] - rise).max()))
-    d = drive(Case("sine", 0.05, "mu", 4.0, a_x=0.3, nu=0.3, low_mu=1.0))
-    s_delta, mu_i, rho_mu_j = inputs(d)
+    d = half_car.drive(half_car.Case("sine", 0.05, "mu", 4.0, a_x=0.3, nu=0.3, low_mu=1.0))
+    s_delta, mu_i, rho_mu_j = half_car.inputs(d)
     seeds = plan.first(40)
     settled: dict[str, list[float]] = {"with": [], "without": []}
     for seed in seeds:
-        y = s_delta + noise(np.random.default_rng([seed, 89]), d.t.size)
+        y = s_delta + half_car.noise(np.random.default_rng([seed, 89]), d.t.size)
         for name, tuning in (("with", TUNING), ("without", TUNING._replace(h=1e9))):
-            e = estimated(tuning, y, mu_i, rho_mu_j)
-            near = np.abs(e.slope / LOW_SLOPE - 1.0) < 0.2
+            e = half_car.estimated(tuning, y, mu_i, rho_mu_j)
+            near = np.abs(e.slope / half_car.LOW_SLOPE - 1.0) < 0.2
             after = np.flatnonzero(~near & (d.t > 0.0))
             settled[name].append(float(d.t[min(after[-1] + 1, d.t.size - 1)]) if after.size else 0.0)
     t = {n: float(np.median(x)) for n, x in settled.items()}
@@ -113,9 +101,8 @@ def _change_detection(plan: Plan) -> Check:
         f"largest deviation {worst:.1e} over 6000 samples; settled after {t['with']:.1f} s with, "
         f"{t['without']:.1f} s without (median of {len(seeds)} runs, {d.t[-1]:.0f} s at most)"
     )
-    ci95 = bootstrap(
-        np.array([settled["with"], settled["without"]]).T, lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1]))
-    )
+    both = np.array([settled["with"], settled["without"]]).T
+    ci95 = bootstrap(both, lambda x: float(np.median(x[:, 0]) / np.median(x[:, 1])))
     return judge("C89.half_car", outcome, whole=False, part=right, value=t["with"] / t["without"], ci95=ci95)
 
 
@@ -125,7 +112,7 @@ def _activation(plan: Plan) -> Check:
     wrong = {"with": 0, "without": 0}
     off: dict[str, list[float]] = {"with": [], "without": []}
     n = 6000
-    t = np.arange(n) * DT
+    t = np.arange(n) * half_car.DT
     for seed in seeds:
         rng = np.random.default_rng([seed, 91])
         mu = 0.08 * np.sin(2.0 * np.pi * t / rng.uniform(3.0, 8.0)) + 0.02
@@ -138,17 +125,17 @@ def _activation(plan: Plan) -> Check:
         v = np.where(is_slow, 3.0, v)
         spins = np.where(is_spin, 15.0, 0.0)
         # the brush's slip, water-thin ice for the spin, a tooth of the pick-up at walking pace
-        slip = 3.0 / HIGH_SLOPE * np.sign(mu) * (1.0 - np.cbrt(1.0 - np.abs(mu)))
-        y = slip + np.where(is_spin, 0.2, 0.0) + noise(rng, n) * np.where(is_slow, 20.0, 1.0)
+        slip = 3.0 / half_car.HIGH_SLOPE * np.sign(mu) * (1.0 - np.cbrt(1.0 - np.abs(mu)))
+        y = slip + np.where(is_spin, 0.2, 0.0) + half_car.noise(rng, n) * np.where(is_slow, 20.0, 1.0)
         reason = activation.inactive_reason(
             v_x=v, a_x=a, a_y=np.zeros(n), yaw_rate=np.zeros(n), a_w_delta=spins, is_braking=braking
         )
         open_ = TUNING._replace(mu_min=0.0, mu_max=1.0, s_max=1.0)
         for name, tuning, active in (("with", TUNING, reason == 0), ("without", open_, np.ones(n, dtype=np.bool_))):
-            e = estimated(tuning, y, mu, np.zeros(n), active=active)
+            e = half_car.estimated(tuning, y, mu, np.zeros(n), active=active)
             wrong[name] += int(np.count_nonzero(e.alarm))
             calm = reason == 0
-            off[name].append(float(np.sqrt(np.mean((e.slope[calm] / HIGH_SLOPE - 1.0) ** 2))))
+            off[name].append(float(np.sqrt(np.mean((e.slope[calm] / half_car.HIGH_SLOPE - 1.0) ** 2))))
     rms = {k: float(np.median(v)) for k, v in off.items()}
     whole = wrong["with"] <= 0.1 * wrong["without"] and wrong["without"] > 0 and rms["with"] < 0.5 * rms["without"]
     outcome = (
@@ -157,17 +144,18 @@ def _activation(plan: Plan) -> Check:
         f"{100 * rms['without']:.0f} % (medians)"
     )
     ci95 = ratio_of_counts(wrong["with"], wrong["without"])
-    part = wrong["with"] < wrong["without"] and rms["with"] < rms["without"]
-    return judge(
-        "C91.half_car", outcome, whole=whole, part=part, value=wrong["with"] / max(wrong["without"], 1), ci95=ci95
+    part, value = (
+        wrong["with"] < wrong["without"] and rms["with"] < rms["without"],
+        wrong["with"] / max(wrong["without"], 1),
     )
+    return judge("C91.half_car", outcome, whole=whole, part=part, value=value, ci95=ci95)
 
 
 def _slow_and_sudden(plan: Plan) -> Check:
     """C115: radii and slope ratio that drift slowly raise nothing; a sudden drop does."""
     seeds = plan.first(40)
     n, minutes = 60_000, 10.0
-    t = np.arange(n) * DT
+    t = np.arange(n) * half_car.DT
     alarms = {"drift": 0, "sudden": 0}
     worst, delays = [], []
     for seed in seeds:
@@ -176,16 +164,16 @@ def _slow_and_sudden(plan: Plan) -> Check:
         mu_R = -0.05 * np.sin(2.0 * np.pi * t / 8.0) + rng.uniform(0.01, 0.05)
         radius = rng.choice([-1.0, 1.0]) * 3e-3 * t / (60.0 * minutes)  # 0.3 % in ten minutes
         ratio = 1.0 + rng.choice([-1.0, 1.0]) * 0.05 * t / (60.0 * minutes)
-        blur = noise(rng, n)
+        blur = half_car.noise(rng, n)
         at = 60.0 * minutes - 20.0
         for name in alarms:
-            C = np.where((t > at) & (name == "sudden"), LOW_SLOPE, HIGH_SLOPE)
+            C = np.where((t > at) & (name == "sudden"), half_car.LOW_SLOPE, half_car.HIGH_SLOPE)
             y = mu_F / C - mu_R / (C * ratio) + radius + blur
-            e = estimated(TUNING, y, mu_F, mu_R)
+            e = half_car.estimated(TUNING, y, mu_F, mu_R)
             before = int(np.count_nonzero(e.alarm[t <= at]))
             if name == "drift":
                 alarms[name] += int(np.count_nonzero(e.alarm) > 0)
-                worst.append(float(np.abs(e.slope[2000:] / HIGH_SLOPE - 1.0).max()))
+                worst.append(float(np.abs(e.slope[2000:] / half_car.HIGH_SLOPE - 1.0).max()))
             else:
                 found = t[(e.alarm > 0.0) & (t > at)] - at
                 alarms[name] += int(found.size > 0 and found[0] < 5.0 and before == 0)

@@ -1,19 +1,29 @@
-"""The slip slope of the driven rear tyres, by passes, and the detector that finds its loss."""
+"""The slip slope of the driven rear tyres, by passes; the detector of its loss, its reference, and other causes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aqualog.core.intervals import wilson
-from aqualog.core.records import FloatArray
+from aqualog.core.records import DriveResult, FloatArray
+from aqualog.core.vehicle import KEYS, Vehicle
+from aqualog.detect.slip_slope.history import History, Rule, remembered
+from aqualog.detect.slip_slope.watch import Memory
+from aqualog.detect.stream import detect_drive
+from aqualog.model.drawing import SCORING_POOL
+from aqualog.model.effects import EFFECTS
 from aqualog.model.programme import scene
-from aqualog.model.scenario import Lane, Profile, Scenario
+from aqualog.model.scenario import SURFACES, Lane, Profile, Scenario
+from aqualog.model.term import Model, Term
+from aqualog.model.tyre import TYRES
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
-from aqualog.thesis.claims import Check, Checks, judge, limit
-from aqualog.thesis.evidence.passes import HIGH, KMH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass
+from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge, limit
+from aqualog.thesis.evidence.drives import drives, made, variants
+from aqualog.thesis.evidence.passes import HIGH, KMH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass, figures_of
 from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, known, run_of
 from aqualog.thesis.evidence.seeds import (
     PASS_SEEDS,
@@ -22,12 +32,15 @@ from aqualog.thesis.evidence.seeds import (
     Rows,
     Statistic,
     Table,
+    bootstrap,
     by_passes,
     cells_of,
     estimate,
     mean,
+    mean_of,
     said,
     scatter,
+    share,
     spread_over,
     told,
 )
@@ -54,10 +67,6 @@ def slopes_of(table: Table, p: Pass, speeds: Sequence[float], wheel: str = "rr")
     return cells_of(table, at_speeds(p, speeds), f"slope_{wheel}")
 
 
-def _gradient(values: FloatArray, speeds: Sequence[float]) -> Statistic:
-    return lambda rows: float(np.polyfit(speeds, np.nanmean(values[:, rows], axis=1), 1)[0])
-
-
 def _c48(table: Table) -> Check:
     wet, dry = table[VERY_WORN].of("slope_rr"), mean(table[DRY_VERY_WORN].of("slope_rr"))
     value, ci = estimate(lambda r: mean(wet[r]) / dry, wet.size)
@@ -67,12 +76,9 @@ def _c48(table: Table) -> Check:
         f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
         "higher"
     )
-    fields = {
-        "away": "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
-    }
-    return judge(
-        "C48.passes", outcome, whole=ci[1] < 0.8 and is_near, part=value < 1.0, value=value, ci95=ci, fields=fields
-    )
+    late = "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
+    whole, fields = ci[1] < 0.8 and is_near, {"away": late}
+    return judge("C48.passes", outcome, whole=whole, part=value < 1.0, value=value, ci95=ci, fields=fields)
 
 
 def _full_speed(p: Pass) -> float:
@@ -135,12 +141,17 @@ def _c50(table: Table) -> Check:
     return judge("C50.passes", outcome, whole=all(inside), part=sum(inside) > len(inside) / 2, value=value, ci95=ci)
 
 
+def _gradient(values: FloatArray) -> Statistic:
+    """Gradient over `SLOW` of the mean over some of the seeds; values (speeds, seeds)."""
+    return lambda rows: float(np.polyfit(SLOW, np.nanmean(values[:, rows], axis=1), 1)[0])
+
+
 def _c51(table: Table) -> Check:
     found = {}
     for name in FALLING:
         for w in ("rl", "rr"):
-            values = slopes_of(table, _wiggling(name), SLOW, w)
-            found[f"{name} {w}"] = estimate(_gradient(values, SLOW), values.shape[1])
+            x = slopes_of(table, _wiggling(name), SLOW, w)
+            found[f"{name} {w}"] = estimate(_gradient(x), x.shape[1])
     falling = [x < 0.0 for x, _ in found.values()]
     value, ci = max(found.values())
     outcome = "per km/h: " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items())
@@ -223,7 +234,7 @@ def _c55(table: Table) -> Check:
     base = slopes_of(table, replace(UNLOADED, wiggles=True), FEW)
     cases = {k: slopes_of(table, replace(p, wiggles=True), FEW) for k, p in LOADED.items()}
     change = {k: np.nanmean(x, axis=0) - np.nanmean(base, axis=0) for k, x in cases.items()}
-    found = {k: estimate(_mean_of(x), x.size) for k, x in change.items()}
+    found = {k: estimate(mean_of(x), x.size) for k, x in change.items()}
     above = [x > 0.0 for x, _ in found.values()]
     share = max(x for x, _ in found.values()) / float(np.nanmean(base))
     is_slight = share <= SLIGHT
@@ -235,10 +246,6 @@ def _c55(table: Table) -> Check:
     return judge("C55.passes", outcome, whole=whole, part=sum(above) >= 2, value=value, ci95=ci, fields={"more": more})
 
 
-def _mean_of(values: FloatArray) -> Statistic:
-    return lambda rows: float(np.nanmean(values[rows]))
-
-
 SCENE = "2.25"  # rear-wheel drive, worn summer tyres, low pressure, 0.8 mm
 RUNS = 12
 ENTRY, EXIT, END = 12.0, 18.0, 20.0  # [s]
@@ -246,9 +253,8 @@ MANOEUVRES: dict[str, Profile] = {
     "constant speed": ((0.0, 100.0 * KMH),),
     "moderate acceleration": ((0.0, 92.0 * KMH), (ENTRY, 92.0 * KMH), (END, 92.0 * KMH + 0.8 * (END - ENTRY))),
 }
-HIGH_UTILISATION = limit(
-    "high", "C47.drives"
-)  # [-] utilisation that is high: what estimators of the maximum friction need (thesis 1)
+# [-] utilisation that is high: what estimators of the maximum friction need (thesis 1)
+HIGH_UTILISATION = limit("high", "C47.drives")
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,10 +307,8 @@ def _check(manoeuvre: str, found: list[Found]) -> Check:
         f"{k} of {n} ({len(there)} found at all), {when}; traction coefficient at most {max(f.mu for f in found):.3f}, "
         f"utilisation {max(f.utilisation for f in found):.2f}; found before the lane in {early}"
     )
-    fields = {
-        "manoeuvre": manoeuvre,
-        "speed": "100 km/h" if manoeuvre == "constant speed" else "0.8 m/s^2 from 92 km/h",
-    }
+    speed = "100 km/h" if manoeuvre == "constant speed" else "0.8 m/s^2 from 92 km/h"
+    fields = {"manoeuvre": manoeuvre, "speed": speed}
     return judge("C47.drives", outcome, whole=whole, part=k >= SOME * n, value=k / n, ci95=wilson(k, n), fields=fields)
 
 
@@ -322,6 +326,132 @@ def _winter() -> Iterator[Pass]:
         yield from at_speeds(Pass(90, tyre="new_winter", h=h, wiggles=True), WINTER_SPEEDS)
 
 
+_CAR = replace(SCORING_POOL.vehicles[0], given=frozenset({"name", *KEYS}))
+_UNKNOWN = replace(_CAR, given=_CAR.given - {"tyre.slip_slope_f", "tyre.slip_slope_r"})
+_GAINS = (0.45, 1.8)  # slope of the tyres on the car over that in the vehicle file: soft winter tyres, stiff worn ones
+_DRY_S, _WET_S, _ENTRY = 45.0, 40.0, 25.0  # [s]
+
+
+def _drive(
+    gain: float, seed: int, memory: Memory | None = None, *, car: Vehicle = _CAR, snow: bool = False,
+    seconds: float = _DRY_S, draw: int = 56,
+) -> DriveResult:  # fmt: skip
+    """A drive on tyres of another slope, with speeds drawn from `draw`, under the detectors."""
+    rng = np.random.default_rng([seed, draw])
+    speed = tuple((float(t), float(rng.uniform(70.0, 105.0)) / 3.6) for t in np.arange(0.0, seconds + 8.0, 8.0))
+    lanes = (Lane(_ENTRY, seconds, surface=SURFACES["snow"]),) if snow else ()
+    tyre, of_noise = TYRES["worn_summer"], seed + 500 * (draw - 56)
+    scenario = Scenario(car, tyre, tyre, duration_s=seconds, seed=of_noise, speed=speed, lanes=lanes)
+    model = Model((Term(EFFECTS["slip_stiffness"], {"gain": gain}, None),))
+    d = made("reference", seed, scenario, car, model)
+    return detect_drive(d.signals, d.vehicle, memory=memory)
+
+
+def _drops(result: DriveResult, after: float = 0.0) -> bool:
+    return any(e.detector == "slip_slope_drop" and e.start_s >= after for e in result.events)
+
+
+def _history(plan: Plan) -> Check:
+    """C56: reference from the vehicle file against the largest slope of the configuration's history."""
+    false: dict[str, int] = {"file": 0, "max": 0, "robust": 0}
+    missed = dict(false)
+    n = 0
+    for gain in _GAINS:
+        for seed in plan.first(4):
+            n += 1
+            dry = _drive(gain, seed)
+            rules: tuple[Rule, ...] = ("max", "robust")
+            # the file's own slope is removed, so that the first drive alone determines the slope of these tyres
+            learnt = remembered(History(), _CAR.name, _drive(gain, seed, car=_UNKNOWN, draw=57).slopes)
+            memories: dict[str, Memory | None] = {"file": None, **{r: Memory(learnt, rule=r) for r in rules}}
+            false["file"] += int(_drops(dry))
+            for name, memory in memories.items():
+                if name != "file":
+                    false[name] += int(_drops(_drive(gain, seed + 1, memory)))
+                snow = _drive(gain, seed + 2, memory, snow=True, seconds=_WET_S)
+                missed[name] += int(not _drops(snow, _ENTRY))
+    wrong = {k: false[k] + missed[k] for k in false}
+    whole = wrong["max"] <= 0.1 * 2 * n and wrong["file"] >= 3 * max(wrong["max"], 1)
+    outcome = (
+        f"false drops on dry road {false['file']} (file), {false['max']} (largest of the history), "
+        f"{false['robust']} (upper quartile of its means, the default) of {n} drives; snow missed "
+        f"{missed['file']}, {missed['max']}, {missed['robust']} of {n}"
+    )
+    ci95 = wilson(wrong["max"], 2 * n)
+    part = wrong["max"] < wrong["file"]
+    return judge("C56.drives", outcome, whole=whole, part=part, value=wrong["max"] / (2 * n), ci95=ci95)
+
+
+_YIELDING = ("snow_entry", "snow", "deep_snow", "gravel")
+
+
+def _not_unique(plan: Plan) -> Check:
+    """C57: roads that yield lower the slope; results of the drop alone and of the joint detector."""
+    rows = {}
+    for name in _YIELDING:
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 6 if name == "snow_entry" else 3)]
+        rows[name] = (len(found), *(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")))
+    n, drops, joint = (sum(r[i] for r in rows.values()) for i in range(3))
+    whole = drops >= 0.5 * n and joint <= 0.05 * n
+    outcome = (
+        f"drop alone {share(drops, n)}, joint detector 1 {share(joint, n)} of the drives ("
+        + ", ".join(f"{k.replace('_', ' ')} {r[1]} and {r[2]} of {r[0]}" for k, r in rows.items())
+        + ")"
+    )
+    part = joint <= 0.2 * drops and drops > 0
+    return judge("C57.drives", outcome, whole=whole, part=part, value=drops / n, ci95=wilson(drops, n))
+
+
+def _unchanged(plan: Plan) -> Checks:
+    """C58: a damp road and dry ice must not be reported; that their slope is that of dry road is put in, not found."""
+    rows = {}
+    for name in ("damp", "ice"):
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 8)]
+        rows[name] = (*(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")), len(found))
+    false = sum(r[0] for r in rows.values())
+    joint = sum(r[1] for r in rows.values())
+    n = sum(r[2] for r in rows.values())
+    whole = false <= 0.05 * n and joint == 0
+    outcome = (
+        f"drop reported in {share(false, n)} of the drives (damp {rows['damp'][0]} of {rows['damp'][2]}, dry ice "
+        f"{rows['ice'][0]} of {rows['ice'][2]}), joint warning in {joint}"
+    )
+    assumed = "the simulator's damp road and dry ice have the slope of the dry one by assumption"
+    ci95 = wilson(false, n)
+    return (
+        judge("C58.drives_detection", outcome, whole=whole, part=joint == 0, value=false / n, ci95=ci95),
+        judge("C58.drives_road", assumed, verdict=NEEDS_DATA),
+    )
+
+
+def _pressure_and_tread(plan: Plan) -> Check:
+    """C118: share of the slope that is lost between 70 and 102 km/h."""
+    seeds = plan.first(8)
+
+    def lost(p: Pass, fast: float) -> list[float]:
+        out = []
+        for seed in seeds:
+            slow_, fast_ = (figures_of(replace(p, kmh=v), seed).slope_rr for v in (70.0, fast))
+            if math.isfinite(slow_) and math.isfinite(fast_):
+                out.append(1.0 - fast_ / slow_)
+        return out
+
+    base = Pass(70.0, wiggles=True)
+    low, high = lost(base, 102.0), lost(replace(base, p=HIGH), 102.0)
+    winter = lost(replace(base, tyre="new_winter", p=LOW), 110.0)
+    ratio = float(np.mean(high) / np.mean(low))
+    less, none = ratio < 0.7, abs(float(np.mean(winter))) < 0.05
+    whole = less and none
+    interval = bootstrap(np.array([low, high]).T, lambda x: float(x[:, 1].mean() / x[:, 0].mean()))
+    outcome = (
+        f"reduction {100 * np.mean(low):.0f} % at low and {100 * np.mean(high):.0f} % at high pressure; new "
+        f"winter {100 * np.mean(winter):+.1f} % ({100 * min(winter):+.1f} to {100 * max(winter):+.1f} %, "
+        f"{len(winter)} runs)"
+    )
+    ci95 = (min(interval), max(interval))
+    return judge("C118.drives", outcome, whole=whole, part=less or none, value=ratio, ci95=ci95)
+
+
 CHECKS = (
     Maker(("C47",), detected, PASS_SEEDS, spreads=True),
     by_passes("C48", lambda: (VERY_WORN, DRY_VERY_WORN), _c48),
@@ -335,4 +465,8 @@ CHECKS = (
         "C55",
         lambda: (replace(q, wiggles=True) for p in (UNLOADED, *LOADED.values()) for q in at_speeds(p, FEW)), _c55,
     ),
+    Maker(("C56",), _history, spreads=True),
+    Maker(("C57",), _not_unique, spreads=True),
+    Maker(("C58",), _unchanged, spreads=True),
+    Maker(("C118",), _pressure_and_tread, spreads=True),
 )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +20,8 @@ from aqualog.thesis.evidence.seeds import (
     estimate,
     first_speed,
     mean,
+    mean_of,
+    number,
     said,
     share,
     told,
@@ -33,11 +34,8 @@ DRY = Pass(80, h=0.0, wiggles=True)
 FLOODED = Pass(150, even=True, scatter=0.0)
 KICKED = tuple(Pass(v, kick=T) for T in (1000.0, 2000.0) for v in range(70, 140, 6))
 SOON, RESISTANCE, SLOPE_LOSS = 0.5, 0.2, 0.2  # [s], [m/s^2], [-]
-NO_FORCE, OVERLOAD_S, SPUN = (
-    limit("no_force", "C4.passes_full"),
-    limit("overload_s", "C4.passes_partial"),
-    0.1,
-)  # [-], [s], [-]
+NO_FORCE, OVERLOAD_S = limit("no_force", "C4.passes_full"), limit("overload_s", "C4.passes_partial")  # [-], [s]
+SPUN = 0.1  # [-]
 
 
 def _c3(table: Table) -> Check:
@@ -56,13 +54,11 @@ def _c3(table: Table) -> Check:
     v = {k: f(np.arange(n)) for k, f in at.items()}
     early = max(v["resistance"], v["slope -20 %"])
     lead, ci = estimate(lambda r: at["first dip"](r) - max(at["resistance"](r), at["slope -20 %"](r)), n)
-    whole = early < v["first dip"] < v["full"] < np.inf
+    whole, part = early < v["first dip"] < v["full"] < np.inf, max(early, v["first dip"]) < v["full"] < np.inf
     outcome = (
         "; ".join(f"{k} {said(f, n)}" for k, f in at.items()) + f" km/h; first dip after both by {told(lead, ci)} km/h"
     )
-    return judge(
-        "C3.passes", outcome, whole=whole, part=max(early, v["first dip"]) < v["full"] < np.inf, value=lead, ci95=ci
-    )
+    return judge("C3.passes", outcome, whole=whole, part=part, value=lead, ci95=ci)
 
 
 def _c4(table: Table) -> Checks:
@@ -74,22 +70,15 @@ def _c4(table: Table) -> Checks:
     balanced = 0.5 * (hit + spared)
     k, n = int(partial.sum()), int(partial.size)
     ok = n > 0 and k >= 0.8 * n
+    most = f"at most {force:.2e} of the load (118, 122 and 150 km/h)"
+    outcome = (
+        f"{k} of {n} begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} passes, found "
+        f"{hit:.3f}, spared {spared:.3f}"
+    )
+    whole, value = ok and balanced >= 0.9, k / n if n else None
     return (
-        judge(
-            "C4.passes_full",
-            f"at most {force:.2e} of the load (118, 122 and 150 km/h)",
-            whole=force < NO_FORCE,
-            value=force,
-        ),
-        judge(
-            "C4.passes_partial",
-            f"{k} of {n} begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} passes, found "
-            f"{hit:.3f}, spared {spared:.3f}",
-            whole=ok and balanced >= 0.9,
-            part=ok,
-            value=k / n if n else None,
-            ci95=wilson(k, n),
-        ),
+        judge("C4.passes_full", most, whole=force < NO_FORCE, value=force),
+        judge("C4.passes_partial", outcome, whole=whole, part=ok, value=value, ci95=wilson(k, n)),
     )
 
 
@@ -103,12 +92,6 @@ def _c5(table: Table) -> Check:
     value = middle if np.isfinite(middle) else None
     ci95 = (float(times.min()), float(times.max()))
     return judge("C5.passes", outcome, whole=stops == times.size, part=2 * stops >= times.size, value=value, ci95=ci95)
-
-
-def _c3_needs() -> Iterator[Pass]:
-    yield DRY
-    for v in GRID:
-        yield from (Pass(v), Pass(v, wiggles=True))
 
 
 FINE = tuple(range(84, 124, 2))
@@ -174,10 +157,8 @@ def _c17(table: Table) -> Check:
     value, ci = estimate(lambda r: full(r) - minor(r), n)
     there = np.isfinite(value)
     outcome = f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h"
-    part = bool(there and 10.0 <= value <= 30.0)
-    ci95 = ci if np.all(np.isfinite(ci)) else None
-    whole = bool(there and ci[0] >= 15.0 and ci[1] <= 25.0)
-    return judge("C17.passes", outcome, whole=whole, part=part, value=value if there else None, ci95=ci95)
+    whole, part = bool(there and ci[0] >= 15.0 and ci[1] <= 25.0), bool(there and 10.0 <= value <= 30.0)
+    return judge("C17.passes", outcome, whole=whole, part=part, **number(value, ci))
 
 
 def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
@@ -217,24 +198,20 @@ def _c18(table: Table) -> Check:
         some = rolling[:, rows]
         return aic_gain(v[:, rows][some], y[:, rows][some])
 
-    def part(k: int) -> Statistic:
-        return lambda rows: fit(rows)[k]
-
-    gain, ci = estimate(part(0), n)
-    whole = gain > AIC_SURE and ci[0] > 0.0
-    outcome = f"better by {told(gain, ci)} over {int(rolling.sum())} of {v.size} passes, v0 = {said(part(2), n)} km/h"
+    gain, ci = estimate(lambda rows: fit(rows)[0], n)
+    whole, v0 = gain > AIC_SURE and ci[0] > 0.0, said(lambda rows: fit(rows)[2], n)
+    outcome = f"better by {told(gain, ci)} over {int(rolling.sum())} of {v.size} passes, v0 = {v0} km/h"
     return judge("C18.passes", outcome, whole=whole, part=gain > 0.0, value=gain, ci95=ci)
 
 
+NEW_WINTER = tuple(Pass(v, tyre="new_winter") for v in (89, 98, 106, 118, 130))
+
+
 def _c19(table: Table) -> Check:
-    dips = cells_of(table, list(_c19_needs()), "dips")
+    dips = cells_of(table, NEW_WINTER, "dips")
     k, n = int((dips > 0).sum()), dips.size
     outcome = f"{int(dips.sum())} dips in {n} passes"
     return judge("C19.passes", outcome, whole=k == 0, part=k < 0.05 * n, value=k / n, ci95=wilson(k, n))
-
-
-def _c19_needs() -> Iterator[Pass]:
-    return (Pass(v, tyre="new_winter") for v in (89, 98, 106, 118, 130))
 
 
 KICKS = (500.0, 1000.0, 1500.0, 2000.0)  # [N m]
@@ -272,9 +249,7 @@ def _c20(table: Table) -> Check:
     outcome = (
         ", ".join(f"{T:.0f} N m: {said(f, n)}" for T, f in at.items()) + f" km/h; {told(fall, ci)} km/h sooner in all"
     )
-    value = fall if np.isfinite(fall) else None
-    ci95 = ci if np.isfinite(ci).all() else None
-    return judge("C20.passes", outcome, whole=whole, part=bool(v[-1] < v[0]), value=value, ci95=ci95)
+    return judge("C20.passes", outcome, whole=whole, part=bool(v[-1] < v[0]), **number(fall, ci))
 
 
 def _c21(table: Table) -> Check:
@@ -289,41 +264,25 @@ def _c21(table: Table) -> Check:
     share = spun.mean(axis=1)
     mixed = int(((share > 0.1) & (share < 0.9)).sum())
     value, ci = estimate(spread, n)
-    whole = bool(value >= SPREAD_KMH and mixed >= IRREGULAR)
+    is_wide, is_mixed = bool(value >= SPREAD_KMH), mixed >= IRREGULAR
     outcome = (
         f"{int(spun.sum())} of {spun.size} passes spin up; speeds spread over {told(value, ci)} km/h; {mixed} of "
         f"{share.size} cases are mixed"
     )
-    return judge(
-        "C21.passes", outcome, whole=whole, part=bool(value >= SPREAD_KMH or mixed >= IRREGULAR), value=value, ci95=ci
-    )
+    return judge("C21.passes", outcome, whole=is_wide and is_mixed, part=is_wide or is_mixed, value=value, ci95=ci)
 
 
 def _c22(table: Table) -> Check:
     spins = cells_of(table, PUSHED, "spins")
     n = spins.shape[1]
-    ranks: dict[str, tuple[float, tuple[float, float]]] = {}
-    text = []
+    ranks, text = [], []
     for k, w in enumerate(("rl", "rr")):
-        v, mu = _bins(spins, k, np.arange(n))
-        ranks[w] = estimate(_rank(spins, k), n)
-        text.append(
-            f"{w}: "
-            + ", ".join(f"{a:.0f}: {b:.3f}" for a, b in zip(v, mu, strict=True))
-            + f", rank {told(*ranks[w], 2)}"
-        )
-    value, ci = max(ranks.values())
-    whole = all(r < 0.0 for r, _ in ranks.values())
-    there = bool(np.isfinite(value))
-    outcome = "; ".join(text)
-    part = any(r < 0.0 for r, _ in ranks.values())
-    return judge(
-        "C22.passes", outcome, whole=whole, part=part, value=value if there else None, ci95=ci if there else None
-    )
-
-
-def _rank(spins: FloatArray, wheel: int) -> Statistic:
-    return lambda rows: rank_correlation(*_bins(spins, wheel, rows))
+        rank = estimate(lambda rows, k=k: rank_correlation(*_bins(spins, k, rows)), n)  # type: ignore[misc]
+        bins = ", ".join(f"{a:.0f}: {b:.3f}" for a, b in zip(*_bins(spins, k, np.arange(n)), strict=True))
+        ranks.append(rank)
+        text.append(f"{w}: {bins}, rank {told(*rank, 2)}")
+    falls = [r < 0.0 for r, _ in ranks]
+    return judge("C22.passes", "; ".join(text), whole=all(falls), part=any(falls), **number(*max(ranks)))
 
 
 def _difference(spins: FloatArray) -> Statistic:
@@ -345,8 +304,7 @@ def _c23(table: Table) -> Check:
     apart = bool(np.isfinite(a) and (ci[0] > 0.0 or ci[1] < 0.0))
     whole = apart and bool(np.isfinite(b) and abs(a) > 3.0 * abs(b))
     outcome = f"left minus right {told(a, ci, 3)}; alike on both sides {told(b, ci_even, 3)} (3 m/s², 102 to 126 km/h)"
-    ci95 = ci if np.isfinite(a) else None
-    return judge("C23.passes", outcome, whole=whole, part=apart, value=a if np.isfinite(a) else None, ci95=ci95)
+    return judge("C23.passes", outcome, whole=whole, part=apart, **number(a, ci))
 
 
 _DIFFERENT = Pass(106, kick=1000.0)
@@ -358,17 +316,13 @@ _FACTORS = {
 }
 
 
-def _mean_of(values: FloatArray) -> Statistic:
-    return lambda rows: float(values[rows].mean())
-
-
 def _c6(table: Table) -> Check:
     found = {}
     for name, passes in _FACTORS.items():
         for effect, unit in (("dips", "spin-downs"), ("rear_spin", "rear spin-ups"), ("delta_a", "m/s^2")):
             values = cells_of(table, passes, effect)
             counted = (values > SPUN).astype(np.float64) if effect == "rear_spin" else values
-            sizes = [estimate(_mean_of(x), x.size) for x in counted]
+            sizes = [estimate(mean_of(x), x.size) for x in counted]
             least, most = min(sizes), max(sizes)
             found[name, unit] = least[1][1] < most[1][0], f"{least[0]:.2f} to {most[0]:.2f} {unit}"
     differ = {name: [text for (n, _), (is_apart, text) in found.items() if n == name and is_apart] for name in _FACTORS}
@@ -379,7 +333,7 @@ def _c6(table: Table) -> Check:
 
 CHECKS = (
     by_passes("C6", lambda: (p for passes in _FACTORS.values() for p in passes), _c6),
-    by_passes("C3", _c3_needs, _c3),
+    by_passes("C3", lambda: (DRY, *(Pass(v, wiggles=w) for v in GRID for w in (False, True))), _c3),
     by_passes("C4", lambda: (FLOODED, Pass(118), Pass(122), *KICKED), _c4),
     by_passes("C5", lambda: (FLOODED,), _c5),
     by_passes("C13", lambda: (Pass(v) for v in SHOWN), _c13),
@@ -388,7 +342,7 @@ CHECKS = (
     by_passes("C16", lambda: (Pass(118),), _c16),
     by_passes("C17", lambda: (Pass(v) for v in FINE), _c17),
     by_passes("C18", lambda: (*CURVE, *CURVE_A), _c18),
-    by_passes("C19", _c19_needs, _c19),
+    by_passes("C19", lambda: NEW_WINTER, _c19),
     by_passes("C20", lambda: (Pass(v, kick=T) for v in KICK_SPEEDS for T in KICKS), _c20),
     by_passes("C21", lambda: PUSHED, _c21),
     by_passes("C22", lambda: PUSHED, _c22),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from aqualog.detect import cusum, ewvar, minor_spin_down, spin
 from aqualog.features.stream import FeatureStream
 from aqualog.model.situations import SCORING_POOL, draw
 from aqualog.thesis.claims import Check, judge
-from aqualog.thesis.evidence.drives import WATER, Score, Taken, detected, drives, made, score, starts, threshold_for
+from aqualog.thesis.evidence.drives import WATER, Taken, detected, drives, made, scored, starts, threshold_for
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap, share, spread_over
 
 __all__ = ["CHECKS"]
@@ -72,9 +71,8 @@ def _sign_of_speed(plan: Plan) -> Check:
         f"the detections, in {len(water)} drives on water"
     )
     part = shares["with"] < shares["without"]
-    return judge(
-        "C25.drives", outcome, whole=whole, part=part, value=shares["with"], ci95=wilson(wrong["with"], n["with"])
-    )
+    ci95 = wilson(wrong["with"], n["with"])
+    return judge("C25.drives", outcome, whole=whole, part=part, value=shares["with"], ci95=ci95)
 
 
 def _sums(d: Taken) -> dict[str, FloatArray]:
@@ -98,31 +96,24 @@ def _summed_up(plan: Plan) -> Check:
     """C26: false alarms of both at the recall that the sum has at its threshold."""
     water = [(d, _sums(d)) for d in drives(WATER, plan, _PER_WATER)]
     other = [(d, _sums(d)) for d in drives(_SHAKEN, plan, _PER_OTHER)]
-
-    def of(name: str, threshold: float) -> Score:
-        return score([(d, s[name] > threshold) for d, s in water], [(d, s[name] > threshold) for d, s in other])
-
+    summed, direct = (scored(water, other, lambda _, s, x, n=n: s[n] > x) for n in ("summed", "direct"))  # type: ignore[misc]
     threshold = spin.SpinParams.make(-1.0, _DT).cusum.h
-    wanted = of("summed", threshold)
-    grids = {"summed": np.geomspace(0.2, 15.0, 30), "direct": np.geomspace(1.0, 60.0, 30)}
-    best = {
-        name: threshold_for(wanted.recall, [float(x) for x in grid], partial(of, name)) for name, grid in grids.items()
-    }
-    (limit_sum, by_sum), (limit_direct, direct) = best["summed"], best["direct"]
+    recall = summed(threshold).recall
+    limit_sum, by_sum = threshold_for(recall, np.geomspace(0.2, 15.0, 30).tolist(), summed)
+    limit_direct, at_once = threshold_for(recall, np.geomspace(1.0, 60.0, 30).tolist(), direct)
     # how near dry roads come to either threshold
-    near = {
-        name: max(float(np.nanmax(values[name])) for _, values in other) / at
+    near_sum, near_direct = (
+        max(float(np.nanmax(values[name])) for _, values in other) / at
         for name, at in (("summed", limit_sum), ("direct", limit_direct))
-    }
-    no_more = by_sum.episodes > 20 and by_sum.false <= direct.false
-    ratio = near["summed"] / near["direct"]
+    )
+    no_more = by_sum.episodes > 20 and by_sum.false <= at_once.false
+    ratio = near_sum / near_direct
     outcome = (
-        f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}, dry roads up to {near['summed']:.0%} of it; direct, "
-        f"beyond {limit_direct:.1f} m/s²: {direct.in_words()}, up to {near['direct']:.0%}"
+        f"sum, beyond {limit_sum:.2f} m/s: {by_sum.in_words()}, dry roads up to {near_sum:.0%} of it; direct, "
+        f"beyond {limit_direct:.1f} m/s²: {at_once.in_words()}, up to {near_direct:.0%}"
     )
-    return judge(
-        "C26.drives", outcome, whole=no_more and ratio < 1.0, part=no_more, value=ratio, fields={"threshold": threshold}
-    )
+    whole, fields = no_more and ratio < 1.0, {"threshold": threshold}
+    return judge("C26.drives", outcome, whole=whole, part=no_more, value=ratio, fields=fields)
 
 
 def _moving_variance(plan: Plan) -> Check:
@@ -171,14 +162,12 @@ def _variance_difference(plan: Plan) -> Check:
                 level = result.features[f"variance_{track.wheel}"].to_numpy()[500:]
                 ratios.append(float(np.nanmean(track.statistic[500:]) / np.nanmean(level)))
     left = float(np.mean(np.abs(ratios)))
-    exact = worst < 1e-11 and common == 0.0
+    exact, ci95 = worst < 1e-11 and common == 0.0, bootstrap(np.abs(ratios))
     outcome = (
         f"{worst:.1e} over 20 pairs of series, {common:g} for the same signal; on broken asphalt "
         f"{100 * left:.0f} % left ({100 * min(ratios):.0f} to {100 * max(ratios):.0f} % over {len(ratios)} sides)"
     )
-    return judge(
-        "C31.drives", outcome, whole=exact and left < 0.5, part=exact, value=left, ci95=bootstrap(np.abs(ratios))
-    )
+    return judge("C31.drives", outcome, whole=exact and left < 0.5, part=exact, value=left, ci95=ci95)
 
 
 _SLIP = 0.05  # [-] a wheel that spins
@@ -189,22 +178,14 @@ _KICKED = 20  # seeds of each
 def _spun(d: Taken, *, limited: bool) -> BoolArray:
     """Spin-up bits of any wheel, with the limit of the traction coefficient or without it."""
     result = detected(d)
-    bits = np.zeros(d.t.size, dtype=bool)
+    bits, always = np.zeros(d.t.size, dtype=bool), np.ones(d.t.size, dtype=bool)
     for track in result.tracks:
-        if track.detector == "spin_up":
-            if limited:
-                bits |= track.active
-            else:
-                f = result.features
-                _, found, _ = spin.scan(
-                    spin.SpinParams.make(1.0, d.signals.dt),
-                    spin.initial_state(),
-                    f[f"a_w_delta_{track.wheel}"].to_numpy(),
-                    f[f"v_w_delta_{track.wheel}"].to_numpy(),
-                    f["v_x_hat"].to_numpy(),
-                    np.ones(d.t.size, dtype=bool),
-                )
-                bits |= found
+        if track.detector == "spin_up" and limited:
+            bits |= track.active
+        elif track.detector == "spin_up":
+            names = (f"a_w_delta_{track.wheel}", f"v_w_delta_{track.wheel}", "v_x_hat")
+            a, dv, v = (result.features[n].to_numpy() for n in names)
+            bits |= spin.scan(spin.SpinParams.make(1.0, d.signals.dt), spin.initial_state(), a, dv, v, always)[1]
     return bits
 
 
@@ -215,17 +196,8 @@ def _kicked(name: str, seed: int) -> Taken:
     mu = lane.surface.mu or 1.0
     force = 1.5 * mu * drawn.scenario.vehicle.mass * 9.80665  # [N] beyond what any number of wheels can hold
     torque = force * drawn.scenario.vehicle.r_l_r
-    kick = (
-        (0.0, 0.0),
-        (15.0, 0.0),
-        (15.5, torque),
-        (16.5, torque),
-        (16.8, 0.0),
-        (25.0, 0.0),
-        (25.5, torque),
-        (26.5, torque),
-        (26.8, 0.0),
-    )
+    push = ((0.0, 0.0), (0.5, torque), (1.5, torque), (1.8, 0.0))
+    kick = ((0.0, 0.0), *((start + t, x) for start in (15.0, 25.0) for t, x in push))
     scenario = replace(drawn.scenario, extra_torque=kick, duration_s=32.0)
     return made(name, seed, scenario, drawn.believed, drawn.model)
 
@@ -246,13 +218,11 @@ def _traction_limit(plan: Plan) -> Check:
         rows[name] = (len(spun), sum(f[1] for f in spun), sum(f[2] for f in spun))
     n_water = [0, 0, 0]
     for d in drives(WATER, plan, _PER_WATER):
-        for w in d.vehicle.driven:
-            up = (d.truth[f"slip_{w}"] > _SLIP) & (d.truth[f"contact_{w}"] < 0.3)
-            if up.sum() * d.signals.dt < 0.2:
-                continue
-            n_water[0] += 1
-            n_water[1] += int(_spun(d, limited=False).any())
-            n_water[2] += int(_spun(d, limited=True).any())
+        ups = [(d.truth[f"slip_{w}"] > _SLIP) & (d.truth[f"contact_{w}"] < 0.3) for w in d.vehicle.driven]
+        wheels = sum(up.sum() * d.signals.dt >= 0.2 for up in ups)
+        if wheels:
+            reported = (_spun(d, limited=limited).any() for limited in (False, True))
+            n_water = [n + wheels * k for n, k in zip(n_water, (1, *map(int, reported)), strict=True)]
     quiet = {k: rows[k][2] <= 0.1 * rows[k][0] for k in rows}
     seen = all(rows[k][1] > 0.5 * rows[k][0] > 0 for k in rows)
     kept = n_water[2] >= 0.9 * n_water[1] > 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,12 +28,13 @@ from aqualog.model.term import Model
 from aqualog.thesis.evidence.seeds import Plan, spread_over
 
 __all__ = [
-    "NUISANCE", "WATER", "Score", "Taken", "bits_of", "detected", "drives", "made", "score", "threshold_for",
+    "NUISANCE", "WATER", "Score", "Taken", "bits_of", "detected", "drives", "made", "score", "scored", "threshold_for",
     "variants",
 ]  # fmt: skip
 
 WATER = tuple(n for n, s in SITUATIONS.items() if s.kind == "aquaplaning")
 NUISANCE = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
+T = TypeVar("T")
 _GAP_S = 1.0  # alarms closer than that are one
 
 
@@ -146,6 +148,14 @@ def score(
     return Score(found, episodes, false, seconds)
 
 
+def scored(
+    water: Sequence[tuple[Taken, T]], other: Sequence[tuple[Taken, T]], bits: Callable[[Taken, T, float], BoolArray],
+    effect: str = "full",
+) -> Callable[[float], Score]:  # fmt: skip
+    """`score` over a threshold; `bits` of a drive, of what is known of it, and of the threshold."""
+    return lambda x: score([(d, bits(d, k, x)) for d, k in water], [(d, bits(d, k, x)) for d, k in other], effect)
+
+
 def threshold_for(recall: float, values: Sequence[float], of: Callable[[float], Score]) -> tuple[float, Score]:
     """The largest threshold whose recall is at least that, and its score; where none has it, the one of largest recall.
 
@@ -159,38 +169,28 @@ def threshold_for(recall: float, values: Sequence[float], of: Callable[[float], 
 _HOLD_S = 0.5  # [s] as long as a joint warning outlasts its criteria
 
 
+@lru_cache(maxsize=320)
 def variants(name: str, seed: int) -> Mapping[str, BoolArray]:
     """Bits (n,) of a drawn drive by the name of a variant.
 
     `joint_criteria`, `ungated` (criteria 1 to 4 without the gate), `gate`, `resistance`, `criterion_1` to
     `criterion_5`, `spin_up`, `spin_down` (criterion 1 under braking forces too) and `slope`.
     """
-    return _variants(name, seed)
-
-
-@lru_cache(maxsize=320)
-def _variants(name: str, seed: int) -> Mapping[str, BoolArray]:
     return bits_of(taken(name, seed))
 
 
 def bits_of(d: Taken) -> Mapping[str, BoolArray]:
     """As `variants`, of any drive."""
     result = detected(d)
-    n = d.t.size
-    f = {c: np.ascontiguousarray(result.features[c].to_numpy()) for c in result.features.columns}
-    none = np.zeros(n, dtype=np.bool_)
-    out: dict[str, BoolArray] = {}
-    for detector in ("joint_criteria", "joint_cusum", "resistance", "spin_down", "spin_up"):
-        out[detector] = _any(result, detector, none)
-    for k in CRITERIA.values():
-        out[f"criterion_{k}"] = f.get(f"criterion_{k}", none.astype(np.float64)) > 0.0
-    out["gate"] = f.get("joint_gate", none.astype(np.float64)) > 0.0
+    none = np.zeros(d.t.size, dtype=np.bool_)
+
+    def feature(name: str) -> BoolArray:
+        return result.features[name].to_numpy() > 0.0 if name in result.features.columns else none
+
+    out = {f"criterion_{k}": feature(f"criterion_{k}") for k in CRITERIA.values()} | {"gate": feature("joint_gate")}
+    for name in ("joint_criteria", "joint_cusum", "resistance", "spin_down", "spin_up", "slip_slope_drop"):
+        out[name] = np.any([none, *(t.active for t in result.tracks if t.detector == name)], axis=0)
+    out["slope"] = out.pop("slip_slope_drop")
     met = np.any([out[f"criterion_{k}"] for k in GATED], axis=0)
     out["ungated"], _ = hold_on(met, 0, seconds=_HOLD_S, dt=d.signals.dt)
-    out["slope"] = _any(result, "slip_slope_drop", none)
     return out
-
-
-def _any(result: DriveResult, detector: str, none: BoolArray) -> BoolArray:
-    bits: BoolArray = np.any([none, *(t.active for t in result.tracks if t.detector == detector)], axis=0)
-    return bits

@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.detect.slip_slope import estimator
 from aqualog.detect.slip_slope.estimator import Estimate, initial_state, scan
 from aqualog.detect.slip_slope.tuning import TUNING, Params, Tuning
 from aqualog.model.half_car import HalfCar, HalfCarRun, SurfaceChange, simulate_half_car
@@ -24,7 +23,7 @@ __all__ = [
 HIGH_SLOPE, LOW_SLOPE = 30.0, 10.0  # C_s / F_z on both axles before and after the change (thesis 3.3) [-]
 HIGH_MU, LOW_MU = 1.0, 0.4  # [-] thesis Fig. 3.4
 REAR_SHARE = 0.6  # of the load and of the torque: both axles slip alike, which excitation must change (C95)
-RATE_HZ = 100.0
+RATE_HZ, DT = 100.0, 0.01  # [Hz], [s]
 STEP_S = 1e-3
 T_START = -10.0  # the change is at t = 0 and the excitation's phase zero there
 V_CHANGE = 20.0  # [m/s]
@@ -104,12 +103,7 @@ def inputs(d: Drive, car: HalfCar = SUV) -> tuple[FloatArray, FloatArray, FloatA
 
 def estimate(case: Case) -> Estimate:
     """The estimator over the drive, noise-free as in the thesis."""
-    s_delta, mu_i, rho_mu_j = inputs(drive(case), case.car)
-    state = initial_state(case.tuning, slope=HIGH_SLOPE)
-    result, _ = scan(
-        Params.make(case.tuning, 1.0 / RATE_HZ), state, s_delta, mu_i, rho_mu_j, np.ones(s_delta.size, dtype=np.bool_)
-    )
-    return result
+    return estimated(case.tuning, *inputs(drive(case), case.car))
 
 
 def first_alarm(d: Drive, e: Estimate) -> float:
@@ -144,7 +138,6 @@ def adaption_time(d: Drive, e: Estimate, *, within: float = 0.1, after: float = 
     return float((outside[-1] + 1) / RATE_HZ) if outside.size else 0.0
 
 
-DT = 0.01  # [s]
 ROAD_NOISE = 5e-4  # [-] rms of the slip as measured on a road (V, Gustafsson [gustafsson2000])
 _KEEP = 0.48 ** (DT / 0.2)  # its memory from sample to sample: a correlation of 0.48 after 0.2 s
 
@@ -158,11 +151,11 @@ def estimated(
     slope: float = HIGH_SLOPE,
     beta: float = 1.0,
     active: BoolArray | None = None,
-) -> estimator.Estimate:
+) -> Estimate:
     """The estimator over samples (n,), from a slope and ratio at the start; `active` everywhere by default."""
     used = np.ones(s_delta.size, dtype=np.bool_) if active is None else active
-    state = estimator.initial_state(tuning, slope=slope, beta=beta)
-    return estimator.scan(Params.make(tuning, DT), state, s_delta, mu_i, rho_mu_j, used)[0]
+    state = initial_state(tuning, slope=slope, beta=beta)
+    return scan(Params.make(tuning, DT), state, s_delta, mu_i, rho_mu_j, used)[0]
 
 
 def noise(rng: np.random.Generator, n: int) -> FloatArray:

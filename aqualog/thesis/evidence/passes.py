@@ -94,12 +94,6 @@ def drive_pass(p: Pass, seed: int) -> tuple[FloatArray, Mapping[str, FloatArray]
     return truth.t, truth.columns, scenario
 
 
-def wheel_dip(c: Mapping[str, FloatArray], wheel: str) -> FloatArray:
-    """(omega r_e - v) / v of a wheel, array (n,). [-]"""
-    dip: FloatArray = (c[f"omega_{wheel}"] * SEDAN.r_e(wheel) - c["true_v_x"]) / c["true_v_x"]
-    return dip
-
-
 def events(t: FloatArray, x: FloatArray, level: float, gap: float = _GAP_S) -> list[tuple[float, float]]:
     """Start [s] and extreme of each stretch where x < level; stretches closer than `gap` [s] are one."""
     below = np.flatnonzero(x < level)
@@ -195,7 +189,7 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
     # the wheels settle at both ends, and the rear axle comes later
     inner = (t > ENTRY + 0.2) & (t < EXIT - 0.1)
     before = (t > 0.5) & (t < ENTRY)
-    slip = {w: wheel_dip(c, w) for w in WHEELS}
+    slip = {w: (c[f"omega_{w}"] * SEDAN.r_e(w) - c["true_v_x"]) / c["true_v_x"] for w in WHEELS}
     dips = [e for w in ("fl", "fr") for e in events(t[on], slip[w][on], DIP)]
     rear = np.maximum(slip["rl"], slip["rr"])
     spin = _first(t, on & (rear > SPIN_UP))
@@ -206,7 +200,9 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
     v = c["true_v_x"] / KMH
     calm = on & (t < _first(t, on & ((rear > SPIN_UP) | (np.minimum(slip["fl"], slip["fr"]) < STOP))))
     k = int(np.searchsorted(t, spin)) if np.isfinite(spin) else -1
+    spun = "rl" if slip["rl"][k] > slip["rr"][k] else "rr"
     dt = float(t[1] - t[0])
+    partial = (s for w in WHEELS for s in spans_of(t, c[f"true_contact_{w}"] < CONTACT_PARTIAL))
     slopes, moments = _slopes(t, c, scenario, inner)
     return PassFigures(
         dips=len(dips),
@@ -217,14 +213,12 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
         rear_spin=float(rear[on].max()),
         rear_spin_s=spin - ENTRY,
         rear_spin_v=float(v[k]) if k >= 0 else np.nan,
-        rear_contact=float(c["true_contact_rl" if slip["rl"][k] > slip["rr"][k] else "true_contact_rr"][k])
-        if k >= 0
-        else np.nan,
+        rear_contact=float(c[f"true_contact_{spun}"][k]) if k >= 0 else np.nan,
         rear_stop_s=_first(t, on & (np.minimum(slip["rl"], slip["rr"]) < STOP)) - ENTRY,
         overload_s=max(float(np.count_nonzero(on & (_demand(c, w, scenario) > 1.0))) * dt for w in ("rl", "rr")),
         afloat_force=_afloat(c, on),
         gone_still_s=still - gone if np.isfinite(still) else np.inf,
-        is_partial=_is_partial(t, c),
+        is_partial=any(b - a >= PARTIAL_S - 1e-9 for a, b in partial),
         mean_kmh=float(v[on].mean()),
         speed_change=float(np.abs(v[calm] - v[np.searchsorted(t, ENTRY)]).max()) if calm.any() else 0.0,
         delta_a=level,
@@ -282,11 +276,6 @@ def _afloat(c: Mapping[str, FloatArray], on: BoolArray) -> float:
             force = np.hypot(c[f"true_force_x_{w}"][gone], c[f"true_force_y_{w}"][gone])
             largest = max(largest, float((force / c[f"true_load_{w}"][gone]).max()))
     return largest
-
-
-def _is_partial(t: FloatArray, c: Mapping[str, FloatArray]) -> bool:
-    spans = (s for w in WHEELS for s in spans_of(t, c[f"true_contact_{w}"] < CONTACT_PARTIAL))
-    return any(b - a >= PARTIAL_S - 1e-9 for a, b in spans)
 
 
 def _slip_313(dip: FloatArray) -> FloatArray:

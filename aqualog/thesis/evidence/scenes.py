@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -27,8 +26,8 @@ from aqualog.thesis.claims import limit
 from aqualog.thesis.evidence.campaign import DriveRun
 
 __all__ = [
-    "MANY", "SEEDS", "SOME", "SceneRun", "in_runs", "known", "residual", "run_of", "runs", "scatter", "share", "spread",
-    "stretches", "words_of",
+    "MANY", "SEEDS", "SOME", "SceneRun", "dry_and_wet", "in_runs", "known", "residual", "run_of", "runs", "scatter",
+    "share", "spread", "stretches",
 ]  # fmt: skip
 
 Speed = tuple[tuple[float, float], ...]  # (t [s], v [m/s])
@@ -147,19 +146,15 @@ def scatter(r: SceneRun, wheel: str) -> float:
     return float(np.sqrt(np.nanmean(residual(r, wheel)[r.within(_SETTLED_S, r.entry)] ** 2)))
 
 
+def dry_and_wet(r: SceneRun, signal: str) -> tuple[float, float]:
+    """Median of a signal on the settled dry road before the entry, and on the lane."""
+    x = r.signal(signal)
+    return float(np.nanmedian(x[r.within(2.0 * _SETTLED_S, r.entry)])), float(np.nanmedian(x[r.on_lane()]))
+
+
 def share(all_runs: Sequence[SceneRun], holds: Callable[[SceneRun], bool]) -> float:
     """Share of the runs of which something is true. [-]"""
     return float(np.mean([holds(r) for r in all_runs]))
-
-
-def words_of(all_runs: Sequence[SceneRun]) -> dict[str, Any]:
-    """What the caption of a figure names: entry, and which seeds are drawn and judged."""
-    seed, last = all_runs[0].seed, all_runs[-1].seed
-    drawn = (
-        f"Drawn: seed {seed}; judged over seeds {seed} to {last}, which differ in sensor noise and in how the contact "
-        "fluctuates along the lane."
-    )
-    return {"entry": all_runs[0].entry, "drawn": drawn}
 
 
 def in_runs(x: float) -> str:

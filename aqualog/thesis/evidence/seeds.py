@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from aqualog.thesis.evidence.passes import Pass, PassFigures, figures_of
 
 __all__ = [
     "PASS_SEEDS", "Maker", "Plan", "Rows", "Statistic", "Table", "bootstrap", "by_passes", "cells_of", "estimate",
-    "first_speed", "mean", "ratio_of_counts", "said", "scatter", "share", "spread_over", "told",
+    "first_speed", "mean", "mean_of", "number", "ratio_of_counts", "said", "scatter", "share", "spread_over", "told",
 ]  # fmt: skip
 
 PASS_SEEDS, RULE_SEEDS = range(12000, 12200), range(11000, 11200)  # that reported numbers are from
@@ -157,6 +157,11 @@ def mean(values: FloatArray) -> float:
     return float(there.mean()) if there.size else math.nan
 
 
+def mean_of(values: FloatArray) -> Statistic:
+    """Mean over some of the seeds; values (seeds,)."""
+    return lambda rows: float(np.nanmean(values[rows]))
+
+
 def scatter(values: FloatArray) -> float:
     """Standard deviation of the finite values over the seeds; NaN with fewer than two."""
     there = values[np.isfinite(values)]
@@ -201,6 +206,19 @@ def estimate(statistic: Statistic, n: int) -> tuple[float, tuple[float, float]]:
     if not drawn.size:
         return value, (value, value)
     return value, (float(drawn[int(0.025 * drawn.size)]), float(drawn[math.ceil(0.975 * drawn.size) - 1]))
+
+
+class Number(TypedDict):
+    """The number of a check with its interval."""
+
+    value: float | None
+    ci95: tuple[float, float] | None
+
+
+def number(value: float, ci95: tuple[float, float]) -> Number:
+    """A number for a check; None where it, or an end of its interval, is not finite."""
+    there = math.isfinite(value)
+    return {"value": value if there else None, "ci95": ci95 if there and np.isfinite(ci95).all() else None}
 
 
 def told(value: float, ci95: tuple[float, float], digits: int = 1) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.detect.slip_slope.estimator import initial_state, scan
-from aqualog.detect.slip_slope.tuning import TUNING, Params
+from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.physics.differential import differential_traction
 from aqualog.report.theme import THRESHOLD
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import judge, limit
-from aqualog.thesis.evidence.half_car import HIGH_SLOPE, LOW_SLOPE, RATE_HZ, SUV, Case, drive, inputs
+from aqualog.thesis.evidence.half_car import HIGH_SLOPE, LOW_SLOPE, RATE_HZ, SUV, Case, drive, estimated, inputs
 from aqualog.thesis.figures.timeline import COLOURS, TIME
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 
@@ -39,29 +38,29 @@ def _held_filter(error: float) -> tuple[FloatArray, FloatArray, FloatArray, Floa
     d = drive(_CASE)
     believed = SUV._replace(r_e_f=SUV.r_e_f * (1.0 + error))
     s_delta, mu_i, rho_mu_j = inputs(d, believed)
-    state = initial_state(_HELD, slope=HIGH_SLOPE)
-    e, _ = scan(Params.make(_HELD, 1.0 / RATE_HZ), state, s_delta, mu_i, rho_mu_j, np.ones(d.t.size, dtype=np.bool_))
+    e = estimated(_HELD, s_delta, mu_i, rho_mu_j)
     # the offset before the sample's own update, as the estimator takes it
     offset = np.concatenate(([0.0], e.offset[:-1]))
     mu_delta = differential_traction(mu_i, rho_mu_j, rho=np.ones_like(mu_i), beta=e.beta)
     return d.t, e.innovation, s_delta, offset, mu_delta, np.asarray(e.status <= 1.0, dtype=np.float64)
 
 
+def _sums(error: float) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Time (n,) [s], and by its input the sum (n,) [s] where the front radius is wrong by a share."""
+    t, innovation, s_delta, offset, mu_delta, used = _held_filter(error)
+    directions = {"s_delta": s_delta, "s_delta - delta_hat": s_delta - offset, "mu_delta": mu_delta}
+    found = {"epsilon": np.maximum(sums(innovation, used), sums(-innovation, used))}
+    return t, found | {f"sgn({n}) epsilon": sums(np.sign(x) * innovation, used) for n, x in directions.items()}
+
+
 def figure_3_02() -> Figure:
     """Geometry of the prediction error, and the sums over a run with sign-alternating excitation."""
-    t, innovation, s_delta, offset, mu_delta, used = _held_filter(0.0)
-    g_plain = np.maximum(sums(innovation, used), sums(-innovation, used))
-    g_adapted = sums(np.sign(s_delta - offset) * innovation, used)
-    _, innovation_e, s_delta_e, offset_e, mu_delta_e, used_e = _held_filter(_RADIUS_ERROR)
-    g_raw = sums(np.sign(s_delta_e) * innovation_e, used_e)
-    g_corrected = sums(np.sign(s_delta_e - offset_e) * innovation_e, used_e)
-    g_traction = sums(np.sign(mu_delta_e) * innovation_e, used_e)
-
+    (t, right), (_, wrong) = _sums(0.0), _sums(_RADIUS_ERROR)
     k = int(np.searchsorted(t, _AFTER - 1e-6))
-    plain, adapted, raw, corrected, by_traction = (
-        float(g[k]) for g in (g_plain, g_adapted, g_raw, g_corrected, g_traction)
-    )
-    peak = float(g_plain[: k + 1].max())
+    by_slip, by_offset, by_traction = list(right)[1:]
+    at, off = ({n: float(g[k]) for n, g in of.items()} for of in (right, wrong))
+    plain, adapted, raw, corrected = at["epsilon"], at[by_offset], off[by_slip], off[by_offset]
+    peak = float(right["epsilon"][: k + 1].max())
     outcome = (
         f"adapted {1e3 * adapted:.1f}e-3 s, plain {1e3 * plain:.1f}e-3 s (at most {1e3 * peak:.1f}e-3 s), threshold "
         f"{1e3 * TUNING.h:.0f}e-3 s"
@@ -70,57 +69,27 @@ def figure_3_02() -> Figure:
     c90 = judge("C90.figure", outcome, whole=whole, part=adapted > peak, value=adapted / max(peak, 1e-12))
     outcome = (
         f"sgn(s_delta) {1e3 * raw:.1f}e-3 s, sgn(s_delta - delta_hat) {1e3 * corrected:.1f}e-3 s, sgn(mu_delta) "
-        f"{1e3 * by_traction:.1f}e-3 s; without an error "
-        f"{1e3 * adapted:.1f}e-3 s"
+        f"{1e3 * off[by_traction]:.1f}e-3 s; without an error {1e3 * adapted:.1f}e-3 s"
     )
-    e12 = judge(
-        "C90.figure_offset", outcome, whole=raw >= 0.9 * adapted, part=corrected >= 0.9 * adapted, value=raw / adapted
-    )
+    whole, part = raw >= 0.9 * adapted, corrected >= 0.9 * adapted
+    e12 = judge("C90.figure_offset", outcome, whole=whole, part=part, value=raw / adapted)
     past = t >= -2.0 - 1e-9
-    lines = tuple(
-        Line(name, t[past], 1e3 * g[past], colour=c, dash=dash)
-        for name, g, c, dash in (
-            ("epsilon (3.23)", g_plain, COLOURS[1], "solid"),
-            ("sgn(s_delta - delta_hat) epsilon (3.25)", g_adapted, COLOURS[0], "solid"),
-            ("radius 0.5 % wrong: sgn(s_delta) epsilon", g_raw, COLOURS[4], "dash"),
-            ("radius 0.5 % wrong: sgn(s_delta - delta_hat) epsilon", g_corrected, COLOURS[2], "dot"),
-            ("radius 0.5 % wrong: sgn(mu_delta) epsilon", g_traction, COLOURS[3], "dashdot"),
-        )
+    drawn = (
+        ("epsilon (3.23)", right["epsilon"], COLOURS[1], "solid"),
+        ("sgn(s_delta - delta_hat) epsilon (3.25)", right[by_offset], COLOURS[0], "solid"),
+        *((f"radius 0.5 % wrong: {n}", wrong[n], COLOURS[i], dash)
+          for n, i, dash in ((by_slip, 4, "dash"), (by_offset, 2, "dot"), (by_traction, 3, "dashdot"))),
+    )  # fmt: skip
+    lines = [Line(name, t[past], 1e3 * g[past], colour=c, dash=dash) for name, g, c, dash in drawn]
+    ends = np.array([-2.0, _CASE.t_end])
+    lines.append(Line("threshold", ends, np.full(2, 1e3 * TUNING.h), colour=THRESHOLD, width=1.0, dash="dash"))
+    table = Table(
+        f"Sums {_AFTER:g} s after the change [1e-3 s]",
+        ("input", "radii right", f"radius {100 * _RADIUS_ERROR:g} % wrong"),
+        tuple((n, f"{1e3 * at[n]:.2f}", f"{1e3 * off[n]:.2f}") for n in right),
     )
-    limit = Line(
-        "threshold", np.array([-2.0, _CASE.t_end]), np.full(2, 1e3 * TUNING.h), colour=THRESHOLD, width=1.0, dash="dash"
-    )
-    return figure_of(
-        "3.2",
-        (_geometry(), Panel("Sums g over time", TIME, Axis("g", "1e-3 s"), (*lines, limit))),
-        (c90, e12),
-        (
-            Table(
-                f"Sums {_AFTER:g} s after the change [1e-3 s]",
-                ("input", "radii right", f"radius {100 * _RADIUS_ERROR:g} % wrong"),
-                (
-                    ("epsilon", f"{1e3 * plain:.2f}", f"{1e3 * _plain_with_error():.2f}"),
-                    (
-                        "sgn(s_delta) epsilon",
-                        f"{1e3 * float(sums(np.sign(s_delta) * innovation, used)[k]):.2f}",
-                        f"{1e3 * raw:.2f}",
-                    ),
-                    ("sgn(s_delta - delta_hat) epsilon", f"{1e3 * adapted:.2f}", f"{1e3 * corrected:.2f}"),
-                    (
-                        "sgn(mu_delta) epsilon",
-                        f"{1e3 * float(sums(np.sign(mu_delta) * innovation, used)[k]):.2f}",
-                        f"{1e3 * by_traction:.2f}",
-                    ),
-                ),
-            ),
-        ),
-    )
-
-
-def _plain_with_error() -> float:
-    t, innovation, _, _, _, used = _held_filter(_RADIUS_ERROR)
-    k = int(np.searchsorted(t, _AFTER - 1e-6))
-    return float(np.maximum(sums(innovation, used), sums(-innovation, used))[k])
+    panels = (_geometry(), Panel("Sums g over time", TIME, Axis("g", "1e-3 s"), tuple(lines)))
+    return figure_of("3.2", panels, (c90, e12), (table,))
 
 
 def _geometry() -> Panel:

@@ -16,7 +16,7 @@ from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 from aqualog.thesis.evidence.measures import Effect, fall
-from aqualog.thesis.figures.run_panels import PALETTE, V_KMH
+from aqualog.thesis.figures.panels import PALETTE, V_KMH
 from aqualog.thesis.figures.slip_slopes import Slopes, measured_slopes
 from aqualog.thesis.record import Axis, Figure, Line, Note, Panel, RunsUsed
 
@@ -177,12 +177,9 @@ def _measured(found: Slopes) -> tuple[list[Line], list[Check]]:
     least = max(falls.values(), key=lambda e: e.high)
     whole = len(down) == len(falls)
     outcome = "; ".join(f"{w} {e.words(0)} %" for w, e in falls.items())
-    value = least.value
+    part, value, ci95 = bool(down), least.value, least.ci
     fields = {"level": ", ".join(w for w in falls if w not in down)}
-    finding = judge(
-        "C10.figure_measured", outcome, whole=whole, part=bool(down), value=value, ci95=least.ci, fields=fields
-    )
-    return lines, [finding]
+    return lines, [judge("C10.figure_measured", outcome, whole=whole, part=part, value=value, ci95=ci95, fields=fields)]
 
 
 def figure_2_02(number: str = "2.2", evidence: Evidence | None = None) -> Figure:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.records import BoolArray
 from aqualog.detect.joint_criteria import GATE_HOLD, GATED, HOLD, SLOPE, Criteria
 from aqualog.detect.registry import BY_NAME
 from aqualog.detect.spin import MU_FULL, MU_SPIN_UP
@@ -17,8 +17,8 @@ from aqualog.report.theme import INK, MUTED, THRESHOLD, WATER, WHEEL_COLOURS
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit, limits
 from aqualog.thesis.evidence.campaign import DriveRun
-from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, in_runs, runs, spread, stretches, words_of
-from aqualog.thesis.figures.time_panels import bit_panel, feature_lines, panel, speed_panel
+from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, dry_and_wet, in_runs, runs, spread, stretches
+from aqualog.thesis.figures.panels import bit_panel, by_seed, feature_lines, panel, scene_figure, speed_panel
 from aqualog.thesis.record import Axis, Figure, Line, Note, Panel, Table, seconds
 
 __all__ = ["FIGURES", "panels_2_25"]
@@ -115,15 +115,12 @@ def _c64() -> tuple[Check, Table]:
         for k in GATED
     )  # fmt: skip
     outcome = (
-        f"{agree} of {n} combinations agree; criterion 5 stands for itself: {'yes' if alone else 'no'}. Where "
-        "the loss of "
-        "slope does not go with speed and resistance as water's does, criterion 4 alone gives no warning, which is "
+        f"{agree} of {n} combinations agree; criterion 5 stands for itself: {'yes' if alone else 'no'}. Where the loss "
+        "of slope does not go with speed and resistance as water's does, criterion 4 alone gives no warning, which is "
         "stricter than the thesis"
     )
-    return (
-        judge("C64.figure", outcome, whole=whole, part=agree == n, value=agree / n, fields={"n": n}),
-        Table("What a criterion does", ("criterion", "gate open", "gate closed"), rows),
-    )
+    finding = judge("C64.figure", outcome, whole=whole, part=agree == n, value=agree / n, fields={"n": n})
+    return finding, Table("What a criterion does", ("criterion", "gate open", "gate closed"), rows)
 
 
 def figure_2_24() -> Figure:
@@ -134,16 +131,12 @@ def figure_2_24() -> Figure:
 
 _COLOURS = (*WHEEL_COLOURS.values(), "#E69F00")
 _WORDS = {1: "large spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip-slope drop", 5: "resistance"}
-_DIP, _STOP = (
-    limit("dip", "C72.figure"),
-    limit("stop", "C72.figure"),
-)  # [-] slip of a minor spin-down, and of a wheel that has lost the road
+_DIP = limit("dip", "C72.figure")  # [-] slip of a minor spin-down
+_STOP = limit("stop", "C72.figure")  # [-] of a wheel that has lost the road
 _REAR = limit("rear", "C72.figure")  # times the dry slip that the rear wheel has on the lane
 _SOON = limit("soon")  # [s] criterion 2
-_SLOPE_S, _RESISTANCE_S = (
-    limit("slope_s", "C74.figure"),
-    limit("resistance_s", "C76.figure"),
-)  # [s] "after approximately 1.5 s" and "2.5 s after", half a second more each
+# [s] "after approximately 1.5 s" and "2.5 s after", half a second more each
+_SLOPE_S, _RESISTANCE_S = limit("slope_s", "C74.figure"), limit("resistance_s", "C76.figure")
 _KEPT = limit("kept")  # of the time that the text has a bit active
 _ACTIVE_2 = limits("active_2", "C73.figure")  # [s] after the entry: 24.5 to 27.5 s
 _RISE = limit("rise", "C77.figure")  # of its threshold that the sum must reach when it "increases"
@@ -172,32 +165,16 @@ def _times(r: SceneRun) -> Times:
     return Times(one, two, four, five, rise, r.after_entry(r.active("joint_cusum")))
 
 
-def _rear_rises(r: SceneRun) -> bool:
-    slip = r.signal("true_slip_rr")
-    dry, wet = np.nanmedian(slip[r.within(10.0, r.entry)]), np.nanmedian(slip[r.on_lane()])
-    return bool(wet > _REAR * dry)
-
-
-def _is_minor(r: SceneRun) -> bool:
-    slip = r.signal("true_slip_fr")
-    return len(stretches(r, (slip < _DIP) & r.on_lane())) > 1 and bool(np.nanmin(slip[r.on_lane()]) > _STOP)
-
-
 def _kept(r: SceneRun, k: int, start: float, end: float) -> float:
     """Share of a time after the entry in which a criterion is met. [-]"""
     span = r.within(r.entry + start, r.entry + end)
     return float(np.mean(_bit(r, k)[span])) if span.any() else 0.0
 
 
-def _loss(r: SceneRun, wheel: str) -> FloatArray:
-    """Lost share of the dry slip slope where it is judged, NaN elsewhere, array (n,). [-]"""
+def _judged_s(r: SceneRun, wheel: str) -> float:
+    """Time on the lane in which the lost share of the dry slip slope is judged. [s]"""
     track = next(t for t in r.result.tracks if t.detector == "slip_slope_drop" and t.wheel == wheel)
-    return track.statistic
-
-
-def _resistance(r: SceneRun) -> float:
-    """Median resistance measure on the lane. [m/s²]"""
-    return float(np.nanmedian(r.feature("delta_a_x")[r.on_lane()]))
+    return float(np.mean(np.isfinite(track.statistic[r.on_lane()]))) * (r.exit - r.entry)
 
 
 def _share(bits: list[bool]) -> float:
@@ -213,11 +190,13 @@ def _value(x: float) -> float | None:
     return x if np.isfinite(x) else None
 
 
-_LANE = "The contact fluctuates along the lane; where it is worst is another place in every run."
-
-
 def _c72(all_runs: tuple[SceneRun, ...]) -> Check:
-    rear, minor = [_rear_rises(r) for r in all_runs], [_is_minor(r) for r in all_runs]
+    rear, minor = [], []
+    for r in all_runs:
+        dry, wet = dry_and_wet(r, "true_slip_rr")
+        rear.append(wet > _REAR * dry)
+        slip, on = r.signal("true_slip_fr"), r.on_lane()
+        minor.append(len(stretches(r, (slip < _DIP) & on)) > 1 and bool(np.nanmin(slip[on]) > _STOP))
     both = _share([a and b for a, b in zip(rear, minor, strict=True)])
     outcome = (
         f"both in {in_runs(both)} runs: rear slip {in_runs(_share(rear))}, minor spin-downs {in_runs(_share(minor))}"
@@ -242,7 +221,7 @@ def _c74(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
         for r, t in zip(all_runs, four, strict=True)
     ]
     right = _share([bool((r.active("slip_slope_drop", "rr") & r.on_lane()).any()) for r in all_runs])
-    judged_s = [float(np.mean(np.isfinite(_loss(r, "rr")[r.on_lane()]))) * (r.exit - r.entry) for r in all_runs]
+    judged_s = [_judged_s(r, "rr") for r in all_runs]
     whole = found >= MANY and _median(four) <= _SLOPE_S and _share(ends) >= MANY and right >= MANY
     outcome = (
         f"met in {in_runs(found)} runs, after {spread(four)} s; kept in {in_runs(_share(ends))}; by the rear right "
@@ -265,27 +244,23 @@ def _c75(times: list[Times]) -> Check:
 def _c76(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
     five = [t.five for t in times]
     order = _share([t.two < t.four < t.five for t in times])
-    pairs = {"2 before 4": [t.two < t.four for t in times], "4 before 5": [t.four < t.five for t in times]}
+    pairs = (("2 before 4", [t.two < t.four for t in times]), ("4 before 5", [t.four < t.five for t in times]))
     in_time = _median(five) <= _RESISTANCE_S
     whole = in_time and order >= MANY
     outcome = (
-        f"criterion 5 after {spread(five)} s; order in {in_runs(order)} runs ("
-        + ", ".join(f"{n} {in_runs(_share(x))}" for n, x in pairs.items())
-        + ")"
+        f"criterion 5 after {spread(five)} s; order in {in_runs(order)} runs "
+        f"({', '.join(f'{n} {in_runs(_share(x))}' for n, x in pairs)})"
     )
     part = in_time or order >= MANY
-    fields = {"drag": spread([_resistance(r) for r in all_runs]), "threshold": DEFAULT.resistance}
+    drag = [float(np.nanmedian(r.feature("delta_a_x")[r.on_lane()])) for r in all_runs]  # [m/s^2]
+    fields = {"drag": spread(drag), "threshold": DEFAULT.resistance}
     return judge("C76.figure", outcome, whole=whole, part=part, value=_value(_median(five)), fields=fields)
-
-
-def _active_stretches(r: SceneRun) -> int:
-    return len(stretches(r, r.active("joint_cusum") & r.on_lane()))
 
 
 def _c77(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
     in_order = _share([t.rise < t.cross for t in times])
     crosses = _share([_SOON < t.cross <= _CROSS_S for t in times])
-    again = _share([_active_stretches(r) > 1 for r in all_runs])
+    again = _share([len(stretches(r, r.active("joint_cusum") & r.on_lane())) > 1 for r in all_runs])
     active = _share([np.isfinite(t.cross) for t in times])
     whole = in_order >= MANY and crosses >= MANY and again >= SOME
     outcome = (
@@ -301,11 +276,9 @@ def panels_2_25(r: DriveRun) -> tuple[Panel, ...]:
     """Speeds, bits of the criteria, and the sum with its terms."""
     total, threshold = r.statistic("joint_cusum")
     bits = {f"{k}: {_WORDS[k]}": (float(k), _bit(r, k), c) for k, c in zip(_WORDS, _COLOURS, strict=True)}
+    names = ("spin_down", "minor_spin_down", "spin_up", "slip_slope_drop", "resistance")
     terms = {
-        n.replace("_", " "): (r.feature(f"joint_term_{n}"), c, "dot")
-        for n, c in zip(
-            ("spin_down", "minor_spin_down", "spin_up", "slip_slope_drop", "resistance"), _COLOURS, strict=True
-        )
+        n.replace("_", " "): (r.feature(f"joint_term_{n}"), c, "dot") for n, c in zip(names, _COLOURS, strict=True)
     }
     lines = {
         "sum": (total, INK, "solid"), **terms,
@@ -324,29 +297,14 @@ def figure_2_25() -> Figure:
     """Speeds, bits of the criteria and the sum of one run; C72 to C77 over all runs."""
     all_runs = runs("2.25")
     times = [_times(r) for r in all_runs]
-    r = all_runs[0]
-    table = Table(
-        "First time after the entry [s]",
-        ("seed", "criterion 2", "criterion 4", "criterion 1", "criterion 5", "sum rises", "sum active"),
-        tuple(
-            (str(x.seed), *(seconds(v) for v in (t.two, t.four, t.one, t.five, t.rise, t.cross)))
-            for x, t in zip(all_runs, times, strict=True)
-        ),
-    )
-    return figure_of(
-        "2.25",
-        panels_2_25(r),
-        (
-            _c72(all_runs),
-            _c73(all_runs, times),
-            _c74(all_runs, times),
-            _c75(times),
-            _c76(all_runs, times),
-            _c77(all_runs, times),
-        ),
-        (table,),
-        **words_of(all_runs),
-    )
+    columns = {
+        name: [seconds(getattr(t, key)) for t in times]
+        for name, key in (("criterion 2", "two"), ("criterion 4", "four"), ("criterion 1", "one"),
+                          ("criterion 5", "five"), ("sum rises", "rise"), ("sum active", "cross"))
+    }  # fmt: skip
+    table = by_seed("First time after the entry [s]", all_runs, columns)
+    of_times = (_c73(all_runs, times), _c74(all_runs, times), _c75(times), _c76(all_runs, times), _c77(all_runs, times))
+    return scene_figure("2.25", panels_2_25, (_c72(all_runs), *of_times), (table,))
 
 
 FIGURES = {"2.24": figure_2_24, "2.25": figure_2_25}

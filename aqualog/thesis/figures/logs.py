@@ -14,14 +14,13 @@ from aqualog.thesis.catalogue import rows
 from aqualog.thesis.evidence.campaign import KMH, DriveRun, Evidence, free_wheels
 from aqualog.thesis.evidence.selection import FAMILIES, NotInCampaign, label, value_of
 from aqualog.thesis.figures.joint import panels_2_25
-from aqualog.thesis.figures.tie_rods import panels_2_23
-from aqualog.thesis.figures.time_panels import WHEEL_WORDS, speed_panel, tie_rod_panels
+from aqualog.thesis.figures.panels import FRONT, WHEEL_WORDS
+from aqualog.thesis.figures.tie_rods import panels_2_23, rod_panels
 from aqualog.thesis.figures.wheel_spins import panels_2_08, panels_2_09
 from aqualog.thesis.record import Figure, Panel, RunsUsed, Table
 
 __all__ = ["FIGURES"]
 
-_FRONT = ("fl", "fr")
 _TURNING = 0.1  # share of the samples on water that makes a drive a slalom, where the manoeuvre is not given
 _SLALOM = ("slalom", "sine", "sinus")
 _DRIVEN = 0.1  # share of the torque below which an axle of an all-wheel-drive car counts as not driven
@@ -69,7 +68,7 @@ def _minor(evidence: Evidence, info: RunInfo) -> tuple[Score, Shown] | None:
 
 
 def _rods(info: RunInfo) -> bool:
-    has = all(f"tie_rod_{w}" in info.about.get("signals", ()) for w in _FRONT)
+    has = all(f"tie_rod_{w}" in info.about.get("signals", ()) for w in FRONT)
     return has and "tie_rod" not in info.about.get("unavailable", {})
 
 
@@ -94,8 +93,8 @@ def _rod_score(*, is_driven: bool, is_slalom: bool) -> Callable[[Evidence, RunIn
         if not is_slalom and _front_is_driven(info) != is_driven:
             return None
         kinds = ("spin_down", "minor_spin_down", "spin_up") if is_driven else ("spin_down", "minor_spin_down")
-        spins = len(evidence.events(info, *kinds, wheels=_FRONT))
-        return ((float(spins),), _FRONT) if spins else None
+        spins = len(evidence.events(info, *kinds, wheels=FRONT))
+        return ((float(spins),), FRONT) if spins else None
 
     return score
 
@@ -108,15 +107,11 @@ def _joint(evidence: Evidence, info: RunInfo) -> tuple[Score, Shown] | None:
     return (float(not full), float(kinds), float(len(evidence.events(info, "minor_spin_down")))), ()
 
 
-def _rods_of(r: DriveRun, _: Shown) -> tuple[Panel, ...]:
-    return (speed_panel(r, _FRONT), *tie_rod_panels(r))
-
-
 _HOW: dict[str, LogFigure] = {
     "2.8": LogFigure(_down_and_up, lambda r, w: panels_2_08(r, w[0], w[1])),
     "2.9": LogFigure(_minor, lambda r, w: panels_2_09(r, w[0][1])),
-    "2.21": LogFigure(_rod_score(is_driven=False, is_slalom=False), _rods_of),
-    "2.22": LogFigure(_rod_score(is_driven=True, is_slalom=False), _rods_of),
+    "2.21": LogFigure(_rod_score(is_driven=False, is_slalom=False), lambda r, _: rod_panels(r)),
+    "2.22": LogFigure(_rod_score(is_driven=True, is_slalom=False), lambda r, _: rod_panels(r)),
     "2.23": LogFigure(_rod_score(is_driven=False, is_slalom=True), lambda r, _: panels_2_23(r)),
     "2.25": LogFigure(_joint, lambda r, _: panels_2_25(r)),
 }

@@ -6,21 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.detect.slip_slope.tuning import TUNING, Tuning
+from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.thesis.catalogue import figure_of
-from aqualog.thesis.claims import judge
+from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.half_car import GATE_OFF, Case, adaption_time, drive, estimate, first_alarm, inputs
 from aqualog.thesis.figures.timeline import (
     COLOURS,
-    SLOPE,
-    TIME,
     detection_time,
-    estimate_lines,
     false_alarms_of,
     listed,
     slope_after,
+    slope_panel,
     told,
-    true_slope,
 )
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table, seconds
 
@@ -39,12 +36,10 @@ _VARIANTS = {
 }  # fmt: skip
 
 
-def _tuned(tuning: Tuning, zeta: float, h: float) -> Tuning:
-    return tuning._replace(zeta=zeta * tuning.zeta, h=h * tuning.h)
-
-
-def _times(case: Case, periods: tuple[float, ...]) -> list[float]:
-    return [detection_time(replace(case, period=p)) for p in periods]
+def _times(case: Case, periods: tuple[float, ...], zeta: float = 1.0, h: float = 1.0) -> list[float]:
+    """Detection times over the period, with drift and threshold scaled. [s]"""
+    tuning = case.tuning._replace(zeta=zeta * case.tuning.zeta, h=h * case.tuning.h)
+    return [detection_time(replace(case, period=p, tuning=tuning)) for p in periods]
 
 
 def _fastest(periods: tuple[float, ...], times: list[float]) -> float:
@@ -71,99 +66,73 @@ def _at_alarm(case: Case) -> tuple[float, float, float]:
 
 def figure_3_09() -> Figure:
     """Estimates over six octaves of the period, and the detection time over a finer grid."""
+    short = {n: n.split(",")[0] for n in PANELS}
     octaves = {n: _times(c, OCTAVES) for n, c in PANELS.items()}
     best = {n: _fastest(OCTAVES, t) for n, t in octaves.items()}
-    fine = {
-        n: {v: _times(replace(c, tuning=_tuned(c.tuning, *k)), _FINE) for v, k in _VARIANTS.items()}
-        for n, c in PANELS.items()
-    }
+    fine = {n: {v: _times(c, _FINE, *k) for v, k in _VARIANTS.items()} for n, c in PANELS.items()}
     fine_best = {n: {v: _fastest(_FINE, t) for v, t in f.items()} for n, f in fine.items()}
     outcome = (
         "; ".join(
-            f"{n.split(',')[0]}: {listed(octaves[n])} s, least at {_period(best[n])} (finer grid: "
+            f"{short[n]}: {listed(octaves[n])} s, least at {_period(best[n])} (finer grid: "
             f"{_period(fine_best[n]['as tuned'])})"
             for n in PANELS
         )
         + f" for {' / '.join(f'{p:g}' for p in OCTAVES)} s"
     )
-    c108 = judge(
-        "C108.figure",
-        outcome,
-        whole=all(_falls_and_rises(t) for t in octaves.values()),
-        part=all(b == 8.0 for b in best.values()),
-        value=_finite(best["sine, minimum of differential traction"]),
-        fields={
-            "first": "; ".join(f"{n.split(',')[0]} down to {_period(_first_half(fine[n]['as tuned']))}" for n in PANELS)
-        },
-    )
+    first = "; ".join(f"{short[n]} down to {_period(_first_half(fine[n]['as tuned']))}" for n in PANELS)
+    whole, part = all(map(_falls_and_rises, octaves.values())), all(b == 8.0 for b in best.values())
+    value = _finite(best["sine, minimum of differential traction"])
+    c108 = judge("C108.figure", outcome, whole=whole, part=part, value=value, fields={"first": first})
+    spreads = [_spread(list(b.values())) for b in fine_best.values()]
+    moved = [s > 1.4 for s in spreads]
     outcome = "; ".join(
-        f"{n.split(',')[0]}: " + ", ".join(f"{v} {_period(p)}" for v, p in fine_best[n].items()) for n in PANELS
+        f"{short[n]}: " + ", ".join(f"{v} {_period(p)}" for v, p in fine_best[n].items()) for n in PANELS
     )
-    optimum = judge(
-        "C108.figure_tuning",
-        outcome,
-        whole=all(_spread(b) > 1.4 for b in fine_best.values()),
-        part=any(_spread(b) > 1.4 for b in fine_best.values()),
-        value=_finite(max(_spread(b) for b in fine_best.values())),
-    )
+    optimum = judge("C108.figure_tuning", outcome, whole=all(moved), part=any(moved), value=_finite(max(spreads)))
     alarms = {n: [_at_alarm(replace(c, period=p)) for p in OCTAVES] for n, c in PANELS.items()}
-    spreads = {n: _spread_of([a[2] for a in rows]) for n, rows in alarms.items()}
-    slowest = max((a[2] for rows in alarms.values() for a in rows if not np.isnan(a[2])), default=0.0)
+    c109 = _c109(short, alarms)
+    panels = [
+        slope_panel(
+            f"Estimated slope: {n}",
+            {f"{p:g} s": (replace(c, period=p), hue, "solid") for p, hue in zip(OCTAVES, COLOURS, strict=True)},
+            t_end=_END, is_split=c.tuning is TUNING,
+        )
+        for n, c in PANELS.items()
+    ]  # fmt: skip
+    for n, f in fine.items():
+        curves = tuple(
+            Line(v, np.array(_FINE), np.array(t), colour=colour, mode="lines+markers", size=5.0,
+                 width=3.0 if v == "as tuned" else 1.5)
+            for (v, t), colour in zip(f.items(), COLOURS, strict=False)
+        )  # fmt: skip
+        axes = Axis("period", "s", log_base=2), Axis("detection time", "s")
+        panels.append(Panel(f"Detection time: {n}", *axes, curves))
+    header = ("period [s]", "drop found [s]", "|mu_delta| there [-]", "adaption time [s]")
+    tables = [
+        Table(f"Adaption: {n}", header, tuple(
+            (f"{p:g}", seconds(t), "–" if np.isnan(mu) else f"{mu:.4f}", seconds(a))
+            for p, (t, mu, a) in zip(OCTAVES, rows, strict=True)
+        ))
+        for n, rows in alarms.items()
+    ]  # fmt: skip
+    return figure_of("3.9", panels, (c108, optimum, c109), tables)
+
+
+def _c109(short: dict[str, str], alarms: dict[str, list[tuple[float, float, float]]]) -> Check:
     differ = {n: _difference([a[2] for a in rows]) for n, rows in alarms.items()}
     found = {n: _difference([a[0] for a in rows]) for n, rows in alarms.items()}
+    slowest = max((a[2] for rows in alarms.values() for a in rows if not np.isnan(a[2])), default=0.0)
     outcome = (
         "; ".join(
-            f"{n.split(',')[0]}: {listed([a[2] for a in alarms[n]])} s, ratio {spreads[n]:.0f}, apart by "
+            f"{short[n]}: {listed([a[2] for a in rows])} s, ratio {_spread([a[2] for a in rows]):.0f}, apart by "
             f"{differ[n]:.2f} s and detection by {found[n]:.2f} s"
-            for n in PANELS
+            for n, rows in alarms.items()
         )
         + f"; none above {slowest:.1f} s"
     )
-    less = [differ[n] < found[n] for n in PANELS]
-    whole, part = all(less), any(less)
-    value, why = _finite(max(differ.values())), _why_adaption(alarms)
-    c109 = judge("C109.figure", outcome, whole=whole, part=part, value=value, fields={"why": why})
-    panels = []
-    for n, c in PANELS.items():
-        lines: list[Line] = []
-        for p, colour in zip(OCTAVES, COLOURS, strict=True):
-            lines += estimate_lines(
-                f"{p:g} s", replace(c, period=p), colour=colour, t_end=_END, is_split=c.tuning is TUNING
-            )
-        panels.append(Panel(f"Estimated slope: {n}", TIME, SLOPE, (*lines, true_slope(_END))))
-    period = np.array(_FINE)
-    for n in PANELS:
-        curves = tuple(
-            Line(
-                v,
-                period,
-                np.array(t),
-                colour=colour,
-                mode="lines+markers",
-                size=5.0,
-                width=3.0 if v == "as tuned" else 1.5,
-            )
-            for (v, t), colour in zip(fine[n].items(), COLOURS, strict=False)
-        )
-        panels.append(
-            Panel(f"Detection time: {n}", Axis("period", "s", log_base=2), Axis("detection time", "s"), curves)
-        )
-    return figure_of(
-        "3.9",
-        tuple(panels),
-        (c108, optimum, c109),
-        tuple(
-            Table(
-                f"Adaption: {n}",
-                ("period [s]", "drop found [s]", "|mu_delta| there [-]", "adaption time [s]"),
-                tuple(
-                    (f"{p:g}", seconds(t), "–" if np.isnan(mu) else f"{mu:.4f}", seconds(a))
-                    for p, (t, mu, a) in zip(OCTAVES, alarms[n], strict=True)
-                ),
-            )
-            for n in PANELS
-        ),
-    )
+    less = [differ[n] < found[n] for n in alarms]
+    value, fields = _finite(max(differ.values())), {"why": _why_adaption(alarms)}
+    return judge("C109.figure", outcome, whole=all(less), part=any(less), value=value, fields=fields)
 
 
 def _first_half(times: list[float]) -> float:
@@ -185,11 +154,7 @@ def _difference(values: list[float]) -> float:
     return max(known) - min(known) if known else float("inf")
 
 
-def _spread(best: dict[str, float]) -> float:
-    return _spread_of(list(best.values()))
-
-
-def _spread_of(values: list[float]) -> float:
+def _spread(values: list[float]) -> float:
     """Largest over smallest of the available ones; infinite if one of them is zero or all are missing."""
     known = [v for v in values if not np.isnan(v)]
     return max(known) / min(known) if known and min(known) > 0.0 else float("inf")
@@ -244,49 +209,31 @@ def figure_3_11() -> Figure:
         f"over q_k {_percent(by_q_near)} (to 10000 times: {_percent(by_q)}), over h {_percent(by_h)}; false alarms: "
         f"{false}"
     )
-    value = by_h if np.isfinite(by_h) else None
-    whole = by_q_near > _CHANGE and by_h > _CHANGE
-    fields = {
-        "q_k": TUNING.q_k,
-        "known": told(known),
-        "tuned": told(_TUNED),
-        "fast": slope_after(_tuned_case(1e4, 1.0), 2.0),
-        "slow": slope_after(_TUNED, 2.0),
+    fields = {"q_k": TUNING.q_k, "known": told(known), "tuned": told(_TUNED),
+              "fast": slope_after(_tuned_case(1e4, 1.0), 2.0), "slow": slope_after(_TUNED, 2.0)}  # fmt: skip
+    whole, part = by_q_near > _CHANGE and by_h > _CHANGE, by_h > _CHANGE and by_q > _CHANGE
+    c114 = judge("C114.figure", outcome, whole=whole, part=part, value=_finite(by_h), fields=fields)
+    over_q = {f"q_k x {q:g}": (_tuned_case(q, 1.0), c, "solid") for q, c in zip(Q, COLOURS, strict=True)}
+    over_h = {
+        f"h x {h:g}, q_k x {q:g}": (_tuned_case(q, h), c, dash)
+        for h, dash in zip(THRESHOLDS, _DASHES, strict=True)
+        for q, c in ((1.0, COLOURS[1]), (1e3, COLOURS[4]))
     }
-    c114 = judge(
-        "C114.figure", outcome, whole=whole, part=by_h > _CHANGE and by_q > _CHANGE, value=value, fields=fields
-    )
-    over_q: list[Line] = []
-    for q, c in zip(Q, COLOURS, strict=True):
-        over_q += estimate_lines(f"q_k x {q:g}", _tuned_case(q, 1.0), colour=c, t_end=_END, is_split=True)
-    over_h: list[Line] = []
-    for h, dash in zip(THRESHOLDS, _DASHES, strict=True):
-        for q, c in ((1.0, COLOURS[1]), (1e3, COLOURS[4])):
-            over_h += estimate_lines(
-                f"h x {h:g}, q_k x {q:g}", _tuned_case(q, h), colour=c, dash=dash, t_end=_END, is_split=True
-            )
     curves = tuple(
         Line(f"h x {h:g}", np.array(Q), np.array([times[q, h] for q in Q]), colour=c, mode="lines+markers", dash=dash)
         for h, c, dash in zip(THRESHOLDS, COLOURS, _DASHES, strict=False)
     )
-    return figure_of(
-        "3.11",
-        (
-            Panel("Estimated slope over the process noise", TIME, SLOPE, (*over_q, true_slope(_END))),
-            Panel("Estimated slope over the threshold", TIME, SLOPE, (*over_h, true_slope(_END))),
-            Panel("Detection time", Axis("q_k over the tuning's", log_base=10), Axis("detection time", "s"), curves),
-        ),
-        (c114,),
-        (
-            Table(
-                "Detection time [s]",
-                ("q_k over the tuning's", *(f"h x {h:g}" for h in THRESHOLDS)),
-                tuple((f"{q:g}", *(seconds(times[q, h]) for h in THRESHOLDS)) for q in Q),
-            ),
-        ),
-        q_k=TUNING.q_k,
-        h=TUNING.h,
+    panels = (
+        slope_panel("Estimated slope over the process noise", over_q, t_end=_END, is_split=True),
+        slope_panel("Estimated slope over the threshold", over_h, t_end=_END, is_split=True),
+        Panel("Detection time", Axis("q_k over the tuning's", log_base=10), Axis("detection time", "s"), curves),
     )
+    table = Table(
+        "Detection time [s]",
+        ("q_k over the tuning's", *(f"h x {h:g}" for h in THRESHOLDS)),
+        tuple((f"{q:g}", *(seconds(times[q, h]) for h in THRESHOLDS)) for q in Q),
+    )
+    return figure_of("3.11", panels, (c114,), (table,), q_k=TUNING.q_k, h=TUNING.h)
 
 
 def _percent(change: float) -> str:

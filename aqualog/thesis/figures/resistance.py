@@ -13,30 +13,18 @@ from aqualog.campaign.results import RunInfo
 from aqualog.report.theme import INK, MUTED, THRESHOLD
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence
-from aqualog.thesis.evidence.measures import (
-    TEN,
-    Effect,
-    additive,
-    bin_means,
-    common,
-    difference,
-    lines_through,
-    pool_of,
-    resistance_of,
-    trend,
-)
 from aqualog.thesis.evidence.selection import Level, NotInCampaign, Selected, depth_mm, marks, pairs
-from aqualog.thesis.figures.run_panels import (
-    TIME,
+from aqualog.thesis.figures.panels import (
+    ALIGNED,
     V_KMH,
-    aligned,
+    Window,
     means_line,
     means_table,
     shifts,
     spread_over,
     styles,
-    water_of,
 )
 from aqualog.thesis.record import Axis, Figure, Line, Panel
 
@@ -61,27 +49,22 @@ class Resistance:
         """Levels that have samples."""
         return tuple(x for x in self.selected.levels if x.name in self.pools)
 
-    def difference(self, a: Level, b: Level) -> tuple[Effect, Effect] | None:
+    def difference(self, a: Level, b: Level) -> tuple[measures.Effect, measures.Effect] | None:
         """Level and gradient of b less those of a."""
-        return difference(self.pools[a.name], self.pools[b.name])
+        return measures.difference(self.pools[a.name], self.pools[b.name])
 
 
 def measured(number: str, evidence: Evidence) -> Resistance:
-    """Choose runs and take their samples.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Choose runs and take their samples."""
     selected = evidence.choose(number, evidence.has_resistance)
-    columns = resistance_of()
-    pools = {x.name: pool for x in selected.levels if (pool := pool_of(evidence, x.runs, columns)) is not None}
+    columns = measures.resistance_of()
+    pools = {x.name: pool for x in selected.levels if (pool := measures.pool_of(evidence, x.runs, columns)) is not None}
     return Resistance(selected, pools)
 
 
 def rising(found: Resistance) -> Check | None:
     """C39: the measure rises with speed, at every level."""
-    slopes = {x.name: trend(found.pools[x.name]) for x in found.levels}
+    slopes = {x.name: measures.trend(found.pools[x.name]) for x in found.levels}
     told = {n: e for n, e in slopes.items() if e.ci is not None}
     if not told:
         return None
@@ -98,14 +81,9 @@ def rising(found: Resistance) -> Check | None:
 
 
 def over_speed(number: str, evidence: Evidence) -> Figure:
-    """Means over speed, level by level, with C39 and the figure's own claims.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Means over speed, level by level, with C39 and the figure's own claims."""
     found = measured(number, evidence)
-    means = {x.name: bin_means(found.pools[x.name]) for x in found.levels}
+    means = {x.name: measures.bin_means(found.pools[x.name]) for x in found.levels}
     style, shift = styles(found.selected), shifts(found.levels)
     lines = [means_line(x.name, means[x.name], style[x.name], shift=shift[x.name]) for x in found.levels]
     panel = Panel("Resistance measure over speed", V_KMH, _MEASURE, (*lines, _threshold(lines)))
@@ -124,11 +102,11 @@ def _threshold(lines: Sequence[Line]) -> Line:
 _MUCH = limit("much", "C42.figure")  # of the worn tyre's resistance that is left, for "(much) lower"
 
 
-def _treads(found: Resistance) -> list[tuple[str, str, Effect, Effect, float]]:
+def _treads(found: Resistance) -> list[tuple[str, str, measures.Effect, measures.Effect, float]]:
     """Water, both tyres, new less worn in level and gradient, and level over the worn tyre's, where both ran."""
     rows = []
     for words, worn, new in pairs(found.levels, found.selected.wish):
-        effect, both = found.difference(worn, new), common(found.pools[worn.name], found.pools[new.name])
+        effect, both = found.difference(worn, new), measures.common(found.pools[worn.name], found.pools[new.name])
         if effect is not None and both is not None:
             old, deep = (float(np.mean(p.columns["y"])) for p in both)
             names = f"{new.name.split(',')[0]} less {worn.name.split(',')[0]}"
@@ -172,11 +150,11 @@ _SHOWN = (-1.0, 2.0)  # [m/s^2]
 
 
 def _c37(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
-    pool = pool_of(evidence, runs, resistance_of())
+    pool = measures.pool_of(evidence, runs, measures.resistance_of())
     if pool is None:
         return None
     v = pool.columns["v_x"]
-    level = lines_through(pool, [np.ones(v.size), (v - v.mean()) / TEN])[0]
+    level = measures.lines_through(pool, [np.ones(v.size), (v - v.mean()) / measures.TEN])[0]
     if level.ci is None:
         return None
     outcome = f"{level.words(3)} {UNIT} at {v.mean() / KMH:.0f} km/h"
@@ -184,33 +162,30 @@ def _c37(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
 
 
 def figure_2_10(number: str, evidence: Evidence) -> Figure:
-    """The measure of one pass over time; C37 over all passes at constant speed of the configuration.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """The measure of one pass over time; C37 over all passes at constant speed of the configuration."""
     selected = evidence.choose(number, evidence.has_resistance)
     constant = [r for r in selected.runs if evidence.of(r).is_constant]
     if not constant:
         raise NotInCampaign(f"needs {needs_of(number)}: none in {selected.fixed}", where=f"figure {number}")
     shown = spread_over(constant, evidence, [_SPEED])[0]
     r = evidence.drive(shown)
-    part, t = aligned(r)
-    raw = r.feature("delta_a_x")[part]
+    window = Window.aligned(r)
+    ends = r.t[window.part][[0, -1]]
     samples = evidence.data.samples(shown)
-    near = (samples.t >= r.t[part][0]) & (samples.t <= r.t[part][-1])
+    near = (samples.t >= ends[0]) & (samples.t <= ends[1])
     width = max(1, round(0.5 / samples.step_s))
     mean = np.convolve(np.nan_to_num(samples.array("delta_a_x")), np.ones(width) / width, mode="same")[near]
     lines = (
-        Line("as measured", t, raw, colour=MUTED, width=0.8, opacity=0.6),
+        Line("as measured", window.t, r.feature("delta_a_x")[window.part], colour=MUTED, width=0.8, opacity=0.6),
         Line("mean over 0.5 s", np.round(samples.t[near] - r.entry + 1.0, 4), mean, colour=INK, width=2.2),
-        Line("threshold of the thesis", t[[0, -1]], np.full(2, _THRESHOLD), colour=THRESHOLD, dash="dot", width=1.2),
-    )
+        Line("threshold of the thesis", window.t[[0, -1]], np.full(2, _THRESHOLD), colour=THRESHOLD, dash="dot",
+             width=1.2),
+        window.water(*_SHOWN),
+    )  # fmt: skip
     axis = Axis("resistance measure", UNIT, limits=_SHOWN)
     shown_as = {i.index: "counted" if i in constant else "not at constant speed" for i in selected.runs}
     return figure_of(
-        number, (Panel("Resistance measure", TIME, axis, (*lines, water_of(r, *_SHOWN))),), [_c37(evidence, constant)],
+        number, (Panel("Resistance measure", ALIGNED, axis, lines),), [_c37(evidence, constant)],
         runs=selected.used(shown_as | {shown.index: "drawn, and counted"}), fixed=selected.fixed, run=shown.name,
         kmh=evidence.of(shown).v / KMH, passes=len(constant),
     )  # fmt: skip
@@ -250,7 +225,7 @@ def _c38(found: Resistance) -> Check | None:
     return judge("C38.figure", words, whole=whole, part=part, value=rise[0].value, ci95=rise[0].ci, fields=fields)
 
 
-def _reason(flat: tuple[Effect, Effect] | None, rise: tuple[Effect, Effect]) -> str:
+def _reason(flat: tuple[measures.Effect, measures.Effect] | None, rise: tuple[measures.Effect, measures.Effect]) -> str:
     words = []
     if flat is not None and not flat[0].is_none(_LEVEL):
         words.append("the level rises already within the shallow waters")
@@ -281,7 +256,7 @@ def _c45(found: Resistance) -> Check | None:
     names, rows = marks(found.levels, found.selected.wish)
     if not names:
         return None
-    effects = dict(zip(names, additive([found.pools[x.name] for x in found.levels], rows), strict=True))
+    effects = dict(zip(names, measures.additive([found.pools[x.name] for x in found.levels], rows), strict=True))
     down = [n for n, e in effects.items() if e.is_below]
     whole = len(down) == len(effects)
     first = effects[names[0]]

@@ -18,6 +18,7 @@ from aqualog.thesis.evidence.campaign import Evidence
 from aqualog.thesis.evidence.measures import (
     TEN,
     Effect,
+    Means,
     fall,
     full_speed,
     line_of_logs,
@@ -27,13 +28,11 @@ from aqualog.thesis.evidence.measures import (
     usable,
 )
 from aqualog.thesis.evidence.selection import FAMILIES, Level, NotInCampaign, Selected, keys_of, marks, pairs, value_of
-from aqualog.thesis.figures.run_panels import V_KMH, Style, shifts, styles
-from aqualog.thesis.figures.time_panels import WHEEL_WORDS
+from aqualog.thesis.figures.panels import V_KMH, WHEEL_WORDS, Style, means_line, shifts, styles
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 
 __all__ = ["FIGURES", "Slopes", "measured_slopes"]
 
-_SLOPE = Axis("slip slope", "-")
 _FAMILIES = tuple(FAMILIES)
 
 
@@ -57,16 +56,12 @@ class Slopes:
 
 
 def measured_slopes(number: str, evidence: Evidence) -> Slopes:
-    """Choose runs and estimate their slopes, with dry references of the same configuration where the campaign has them.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Choose runs and estimate their slopes, with dry references of the same configuration where there are some."""
     selected = evidence.choose(number, evidence.has_slope)
     runs = {r.index: r for r in (*selected.runs, *_dry(evidence, selected))}
-    keys = tuple(k for k in ("vehicle", *keys_of(_FAMILIES)) if any(_has(r, k) for r in runs.values()))
-    table = slip_slopes(evidence.part([runs[i] for i in sorted(runs)]), Plan(tuple(dict.fromkeys(keys))))
+    given = {k for r in runs.values() for k in ("vehicle", *r.run.values)}
+    keys = dict.fromkeys(k for k in ("vehicle", *keys_of(_FAMILIES)) if k in given)
+    table = slip_slopes(evidence.part([runs[i] for i in sorted(runs)]), Plan(tuple(keys)))
     of = {r.index: x.name for x in selected.levels for r in x.runs}
     groups = {_group(r, table.plan.keys): of[r.index] for r in selected.runs}
     found = {
@@ -78,10 +73,6 @@ def measured_slopes(number: str, evidence: Evidence) -> Slopes:
         why = next((r.reason for x in found.values() for r in x if r.reason), "no bin of speed has enough samples")
         raise NotInCampaign(f"needs {needs_of(number)}: no slope can be estimated ({why})", where=f"figure {number}")
     return slopes
-
-
-def _has(info: RunInfo, key: str) -> bool:
-    return key == "vehicle" or key in info.run.values
 
 
 def _group(info: RunInfo, keys: Sequence[str]) -> tuple[tuple[str, float | str | None], ...]:
@@ -100,22 +91,14 @@ def _dry(evidence: Evidence, selected: Selected) -> list[RunInfo]:
 
 def slope_line(name: str, rows: Sequence[SlopeRow], style: Style, *, shift: float) -> Line:
     """Slopes with an estimate, with their intervals where available."""
-    colour, dash, symbol = style
     told = sorted((r for r in rows if r.told), key=lambda r: r.low_kmh)
-    low, high = (np.array([r.slope_ci[i] if r.reliable else np.nan for r in told]) for i in (0, 1))
-    return Line(
-        name, np.array([0.5 * (r.low_kmh + r.high_kmh) + shift for r in told]), np.array([r.slope for r in told]),
-        low=low, high=high, colour=colour, dash=dash, width=1.6, mode="lines+markers", symbol=symbol,
-    )  # fmt: skip
+    ends = [r.slope_ci if r.reliable else (np.nan, np.nan) for r in told]
+    bins = [(0.5 * (r.low_kmh + r.high_kmh), r.slope, *ci, r.runs, r.samples) for r, ci in zip(told, ends, strict=True)]
+    return means_line(name, Means(*np.array(bins, dtype=np.float64).reshape(-1, 6).T), style, shift=shift)
 
 
 def over_speed(number: str, evidence: Evidence) -> Figure:
-    """Slopes over speed, a panel per driven wheel, with the figure's claims.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Slopes over speed, a panel per driven wheel, with the figure's claims."""
     found = measured_slopes(number, evidence)
     style, shift = styles(found.selected), shifts(found.levels)
     panels = []
@@ -123,7 +106,9 @@ def over_speed(number: str, evidence: Evidence) -> Figure:
         lines = [slope_line(x.name, found.of(x, wheel), style[x.name], shift=shift[x.name]) for x in found.levels]
         drawn = tuple(line for line in lines if line.x.size)
         if drawn:
-            panels.append(Panel(f"Slip slope, {WHEEL_WORDS[wheel]}", V_KMH, _limited(drawn), drawn))
+            # a little above the largest slope: bars of the least certain bins may leave the picture
+            limits = 0.0, 1.35 * max(float(np.nanmax(line.y)) for line in drawn)
+            panels.append(Panel(f"Slip slope, {WHEEL_WORDS[wheel]}", V_KMH, Axis("slip slope", "-", limits), drawn))
     late = "; ".join(
         f"v_x of {d.vehicle} is {d.value:.3f} s late [{d.ci[0]:.3f}, {d.ci[1]:.3f}]" if d.told
         else f"delay of v_x of {d.vehicle} left open ({d.reason})"
@@ -133,12 +118,6 @@ def over_speed(number: str, evidence: Evidence) -> Figure:
     delays = f"{late[0].upper()}{late[1:]}." if late else ""
     used, fixed = found.selected.used(), found.selected.fixed
     return figure_of(number, panels, checks, (_table(found),), runs=used, fixed=fixed, delays=delays)
-
-
-def _limited(lines: Sequence[Line]) -> Axis:
-    """From zero to a little above the largest slope; bars of the least certain bins may leave the picture."""
-    top = max(float(np.nanmax(line.y)) for line in lines)
-    return Axis(_SLOPE.label, _SLOPE.unit, limits=(0.0, 1.35 * top))
 
 
 def _table(found: Slopes) -> Table:
@@ -213,35 +192,21 @@ def _panel_of_wheel(evidence: Evidence, found: Slopes, row: SlopeRow) -> Panel:
             )
         if fit is not None and fit.told and s.size:
             mu = np.array([0.0, float(m.max())])
-            lines.append(
-                Line(
-                    f"{name}, slope {fit.slope:.1f}",
-                    100.0 * (mu / fit.slope + fit.intercept),
-                    mu,
-                    colour=colour,
-                    width=3.0,
-                )
-            )
+            slip = 100.0 * (mu / fit.slope + fit.intercept)
+            lines.append(Line(f"{name}, slope {fit.slope:.1f}", slip, mu, colour=colour, width=3.0))
     return Panel(f"Traction over slip, {WHEEL_WORDS[row.wheel]}", Axis("slip", "%"), _MU, tuple(lines))
 
 
 def figure_2_16(number: str, evidence: Evidence) -> Figure:
-    """Samples and lines, dry and wet, a panel per driven wheel; C48.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Samples and lines, dry and wet, a panel per driven wheel; C48."""
     found = measured_slopes(number, evidence)
     level = found.levels[0]
     full = full_speed(passes_of(evidence, found.selected.runs))
     v = full - _BELOW if math.isfinite(full) else _DEFAULT
     told = [r for r in found.of(level) if r.told and math.isfinite(r.slope_dry)]
     if not told:
-        needs = needs_of(number)
-        raise NotInCampaign(
-            f"needs {needs}: no slope, or no dry one, in {found.selected.fixed}", where=f"figure {number}"
-        )
+        why = f"needs {needs_of(number)}: no slope, or no dry one, in {found.selected.fixed}"
+        raise NotInCampaign(why, where=f"figure {number}")
     best = min({(r.low_kmh, r.high_kmh) for r in told}, key=lambda b: (
         -any(r.reliable for r in told if r.low_kmh == b[0]), abs(0.5 * (b[0] + b[1]) * KMH - v)))  # fmt: skip
     at = [r for r in told if r.low_kmh == best[0]]
@@ -288,9 +253,8 @@ def _c50(found: Slopes) -> Check | None:
     none = [w for w, e in ratios.items() if e.low <= 1.0 <= e.high or (e.low >= 1 - _SAME and e.high <= 1 + _SAME)]
     worst = min(ratios.values(), key=lambda e: e.value)
     outcome = f"{levels[-1].name} over {levels[0].name}: " + "; ".join(f"{w} {e.words(2)}" for w, e in ratios.items())
-    return judge(
-        "C50.figure", outcome, whole=len(none) == len(ratios), part=bool(none), value=worst.value, ci95=worst.ci
-    )
+    whole, part = len(none) == len(ratios), bool(none)
+    return judge("C50.figure", outcome, whole=whole, part=part, value=worst.value, ci95=worst.ci)
 
 
 def _c51(found: Slopes) -> Check | None:
@@ -304,11 +268,9 @@ def _c51(found: Slopes) -> Check | None:
         f"below 0 in {len(down)} of {len(falls)} curves, with the interval in {sure}; changes "
         f"{min(e.value for e in falls.values()):.0f} to {least.value:.0f} % per 10 km/h; the least one"
     )
-    part = 2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values())
-    return judge(
-        "C51.figure", outcome, whole=len(down) == len(falls), part=part, value=least.value, ci95=least.ci,
-        fields={"level": ", ".join(n for n in falls if n not in down)},
-    )  # fmt: skip
+    whole, part = len(down) == len(falls), 2 * len(down) >= len(falls) and not any(e.is_above for e in falls.values())
+    fields = {"level": ", ".join(n for n in falls if n not in down)}
+    return judge("C51.figure", outcome, whole=whole, part=part, value=least.value, ci95=least.ci, fields=fields)
 
 
 def _c52(found: Slopes) -> Check | None:
@@ -334,14 +296,10 @@ def _c52(found: Slopes) -> Check | None:
         + "; ".join(e.words(2) for e in effects)
         + f"; left less uniform in {rougher} of {len(rough)}"
     )
-    part = is_higher or is_rougher
-    whole = is_higher and is_rougher
-    reason = (
-        ""
-        if is_higher and is_rougher
-        else f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
-        + ("." if is_rougher else "; the right wheels, on more water, scatter as much.")
-    )
+    whole, part = is_higher and is_rougher, is_higher or is_rougher
+    reason = f"Above 1 at {len(most)} of {len(effects)} levels, significantly above it at {len(higher)}"
+    reason += "." if is_rougher else "; the right wheels, on more water, scatter as much."
+    reason = "" if whole else reason
     return judge("C52.figure", outcome, whole=whole, part=part, value=mean.value, ci95=mean.ci, reason=reason)
 
 
@@ -369,8 +327,7 @@ def _c53(found: Slopes) -> Check | None:
     ]  # fmt: skip
     outcome = (
         f"{levels[-1].name} over {levels[0].name}: {slow[0].words(2)} below {_SLOW_KMH:g} km/h, fall per 10 km/h "
-        "less "
-        f"by {over_all[1].words(1)} %{middle}"
+        f"less by {over_all[1].words(1)} %{middle}"
     )
     part = is_less or is_flatter
     fields = {"lacking": ", ".join(lacking)}
@@ -429,17 +386,11 @@ def _c55(found: Slopes) -> Check | None:
     name, first = next(iter(effects.items()))
     whole = len(up) == len(effects) and slight
     outcome = "; ".join(f"{n}: {e.words(1)} %" for n, e in effects.items())
-    value = first.value
-    fields = {"name": name}
-    reason = (
-        ""
-        if whole
-        else "Not higher by " + ", ".join(n for n in effects if n not in up) + "."
-        if len(up) < len(effects)
-        else "More than slightly."
-    )
+    lacking = ", ".join(n for n in effects if n not in up)
+    reason = "" if whole else f"Not higher by {lacking}." if lacking else "More than slightly."
+    fields, part = {"name": name}, bool(up)
     return judge(
-        "C55.figure", outcome, whole=whole, part=bool(up), value=value, ci95=first.ci, reason=reason, fields=fields
+        "C55.figure", outcome, whole=whole, part=part, value=first.value, ci95=first.ci, reason=reason, fields=fields
     )
 
 

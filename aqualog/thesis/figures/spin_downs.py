@@ -12,20 +12,10 @@ from aqualog.core.intervals import wilson
 from aqualog.core.records import FloatArray
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence, free_wheels
-from aqualog.thesis.evidence.measures import (
-    TEN,
-    begins,
-    full_speed,
-    half_speeds,
-    has_full,
-    has_minor,
-    over_passes,
-    passes_of,
-)
 from aqualog.thesis.evidence.selection import NotInCampaign, Selected, is_winter, label, value_of, wear_rank
-from aqualog.thesis.figures.run_panels import V_KMH, clouds, speed_panels, spread_over
-from aqualog.thesis.figures.time_panels import WHEEL_WORDS
+from aqualog.thesis.figures.panels import V_KMH, WHEEL_WORDS, clouds, speed_panels, spread_over
 from aqualog.thesis.record import Axis, Figure, Panel
 
 __all__ = ["FIGURES"]
@@ -50,18 +40,11 @@ def _shares(found: Sequence[Pass], kmh: float, holds: Callable[[Pass], bool], cl
 
 
 def _full(found: Sequence[Pass]) -> str:
-    v = full_speed(found)
+    v = measures.full_speed(found)
     return f"{v / KMH:.0f} km/h" if np.isfinite(v) else "no speed that was driven"
 
 
-def at_89(found: Sequence[Pass]) -> Check | None:
-    """C14: minor spin-downs at 89 km/h."""
-    return _shares(
-        found, 89.0, has_minor, "C14", "with minor spin-downs of a free wheel",
-    )  # fmt: skip
-
-
-def at_118(evidence: Evidence, found: Sequence[Pass]) -> Check | None:
+def _at_118(evidence: Evidence, found: Sequence[Pass]) -> Check | None:
     """C16: full spin-down at once at 118 km/h, and the rear spins up."""
 
     def at_once(p: Pass) -> bool:
@@ -81,40 +64,34 @@ def at_118(evidence: Evidence, found: Sequence[Pass]) -> Check | None:
 
 def rising_number(found: Sequence[Pass]) -> Check | None:
     """C15: number and depth of the minor spin-downs rise with speed, up to full aquaplaning."""
-    calm = [p for p in found if not has_full(p)]
-    v_first = min((p.v_mean for p in calm if has_minor(p)), default=np.nan)
-    part = [p for p in calm if p.v_mean >= v_first - TEN]
+    calm = [p for p in found if not measures.has_full(p)]
+    v_first = min((p.v_mean for p in calm if measures.has_minor(p)), default=np.nan)
+    part = [p for p in calm if p.v_mean >= v_first - measures.TEN]
     if not np.isfinite(v_first) or len(part) < _LEAST:
         return None
-    v = np.array([p.v_mean for p in part]) / TEN
+    v = np.array([p.v_mean for p in part]) / measures.TEN
     columns = [np.ones(v.size), v - v.mean()]
-    number = over_passes(columns, np.array([sum(p.minor.values()) / p.seconds for p in part]))
+    number = measures.over_passes(columns, np.array([sum(p.minor.values()) / p.seconds for p in part]))
     deepest = np.array([-min(x for x in p.deepest.values()) for p in part])
-    depth = over_passes(columns, 100.0 * deepest)
+    depth = measures.over_passes(columns, 100.0 * deepest)
     if number is None or depth is None:
         return None
     both = [number[1].is_above, depth[1].is_above]
     outcome = (
         f"per 10 km/h {number[1].words(2)} more spin-downs a second, {depth[1].words(1)} % deeper slip "
-        f"({len(part)} "
-        "passes)"
+        f"({len(part)} passes)"
     )
-    value = number[1].value
-    reason = (
-        ""
-        if all(both)
-        else "Several short dips merge into one longer spin-down."
-        if both[1]
-        else "The passes are few, or cover little speed."
-    )
-    return judge("C15.figure", outcome, whole=all(both), part=any(both), value=value, ci95=number[1].ci, reason=reason)
+    value, ci95, whole = number[1].value, number[1].ci, all(both)
+    why = "Several short dips merge into one longer spin-down." if both[1] else ""
+    reason = "" if whole else why or "The passes are few, or cover little speed."
+    return judge("C15.figure", outcome, whole=whole, part=any(both), value=value, ci95=ci95, reason=reason)
 
 
 def before_full(found: Sequence[Pass]) -> Check | None:
     """C17: minor spin-downs from 20 km/h below full aquaplaning on."""
     if len(found) < _LEAST:
         return None
-    (first, firsts), (full, fulls) = half_speeds(found, [begins, has_full])
+    (first, firsts), (full, fulls) = measures.half_speeds(found, [measures.begins, measures.has_full])
     if not (np.isfinite(first) and np.isfinite(full)):
         return None
     away = (full - first) / KMH
@@ -124,42 +101,32 @@ def before_full(found: Sequence[Pass]) -> Check | None:
     outcome = (
         f"full at {full / KMH:.0f} km/h, minor from {first / KMH:.0f} km/h on: {away:.0f} km/h ({len(found)} passes)"
     )
-    part = low <= hi and high >= lo
-    return judge(
-        "C17.figure", outcome, whole=whole, part=part, value=away, ci95=(low, high), fields={"lo": lo, "hi": hi}
-    )
+    part, fields = low <= hi and high >= lo, {"lo": lo, "hi": hi}
+    return judge("C17.figure", outcome, whole=whole, part=part, value=away, ci95=(low, high), fields=fields)
 
 
 def exponential(found: Sequence[Pass]) -> Check | None:
     """C18: the deepest slip grows with speed like an exponential."""
-    part = [p for p in found if not has_full(p)]
+    part = [p for p in found if not measures.has_full(p)]
     deepest = np.array([-min(p.deepest.values()) for p in part])
-    v = np.array([p.v_mean for p in part]) / TEN
+    v = np.array([p.v_mean for p in part]) / measures.TEN
     good = np.isfinite(deepest) & (deepest > 0.0)
     v, deepest = v[good], deepest[good]
-    grown = over_passes([np.ones(v.size), v - v.mean()], np.log(deepest)) if v.size > _LEAST else None
+    grown = measures.over_passes([np.ones(v.size), v - v.mean()], np.log(deepest)) if v.size > _LEAST else None
     if grown is None:
         return None
     rate = grown[1].mapped(lambda x: 100.0 * math.expm1(x))
-    curve, line = _rms_exponential(v, deepest), _rms_line(v, deepest)
+    x = np.stack([np.ones(v.size), v - v.mean()], axis=1)
+    line = float(np.sqrt(np.mean((deepest - x @ np.linalg.lstsq(x, deepest)[0]) ** 2)))
+    curve = _rms_exponential(v, deepest)
     whole = rate.is_above and curve < line
     outcome = (
         f"{rate.words(0)} % deeper per 10 km/h; rms about the exponential {100 * curve:.2f} %, about the line "
         f"{100 * line:.2f} % of slip ({v.size} passes)"
     )
-    reason = (
-        ""
-        if whole
-        else "The slip rises, but not faster than a straight line."
-        if rate.is_above
-        else "No rise exceeds the scatter."
-    )
+    why = "The slip rises, but not faster than a straight line." if rate.is_above else "No rise exceeds the scatter."
+    reason = "" if whole else why
     return judge("C18.figure", outcome, whole=whole, part=rate.is_above, value=rate.value, ci95=rate.ci, reason=reason)
-
-
-def _rms_line(v: FloatArray, y: FloatArray) -> float:
-    x = np.stack([np.ones(v.size), v - v.mean()], axis=1)
-    return float(np.sqrt(np.mean((y - x @ np.linalg.lstsq(x, y)[0]) ** 2)))
 
 
 def _rms_exponential(v: FloatArray, y: FloatArray) -> float:
@@ -173,7 +140,7 @@ def _rms_exponential(v: FloatArray, y: FloatArray) -> float:
 
 def _where(found: Sequence[Pass]) -> str:
     """In which water and at which wheels they are."""
-    with_one = [p for p in found if begins(p)]
+    with_one = [p for p in found if measures.begins(p)]
     depths = sorted({label("depth", value_of(p.info, "depth")) for p in with_one})
     wheels = sorted({WHEEL_WORDS[w] for p in with_one for w in p.minor if p.minor[w] or p.full[w]})
     there = sum(label("depth", value_of(p.info, "depth")) in depths for p in found)
@@ -184,48 +151,38 @@ def new_tread(found: Sequence[Pass], words: str) -> Check | None:
     """C19: no minor spin-downs on new winter tyres."""
     if len(found) < _LEAST:
         return None
-    hit = sum(begins(p) for p in found)
+    hit = sum(measures.begins(p) for p in found)
     low, high = wilson(hit, len(found))
     top = max(p.v_mean for p in found) / KMH
     outcome = f"{hit} of {len(found)} passes of {words}, up to {top:.0f} km/h"
-    fields = {"where": _where(found)}
-    part = hit <= 0.05 * len(found)
-    return judge(
-        "C19.figure", outcome, whole=hit == 0, part=part, value=hit / len(found), ci95=(low, high), fields=fields
-    )
+    part, share, fields = hit <= 0.05 * len(found), hit / len(found), {"where": _where(found)}
+    return judge("C19.figure", outcome, whole=hit == 0, part=part, value=share, ci95=(low, high), fields=fields)
 
 
 _BELOW = (29.0, 20.0, 12.0, 0.0)  # [km/h] below full aquaplaning: the thesis' 89, 98, 106 and 118 km/h
 
 
 def figure_2_03(number: str, evidence: Evidence) -> Figure:
-    """Four passes at constant speed over time; C14 to C17 over all passes of the configuration.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Four passes at constant speed over time; C14 to C17 over all passes of the configuration."""
     selected = evidence.choose(number, evidence.has_water)
-    found = passes_of(evidence, selected.runs)
+    found = measures.passes_of(evidence, selected.runs)
     constant = [p.info for p in found if evidence.of(p.info).is_constant]
     if len(constant) < 2:
         raise NotInCampaign(f"needs {needs_of(number)}: {len(constant)} in {selected.fixed}", where=f"figure {number}")
-    v_full = full_speed(found)
+    v_full = measures.full_speed(found)
     top = v_full if np.isfinite(v_full) else max(p.v_mean for p in found)
     shown = spread_over(constant, evidence, [top - b * KMH for b in _BELOW])
     what = "the speed at which half of the passes have a full spin-down" if np.isfinite(v_full) else "the fastest pass"
-    words = {r.index: "drawn, and counted" for r in shown}
-    at_speeds = (at_89(found), at_118(evidence, found)) if selected.is_thesis else (None, None)
-    checks = (at_speeds[0], rising_number(found), at_speeds[1], before_full(found))
+    at_89 = at_118 = None
+    if selected.is_thesis:
+        at_89 = _shares(found, 89.0, measures.has_minor, "C14", "with minor spin-downs of a free wheel")
+        at_118 = _at_118(evidence, found)
+    checks = (at_89, rising_number(found), at_118, before_full(found))
+    counted = {r.index: "drawn, and counted" if r in shown else "counted" for r in selected.runs}
     return figure_of(
-        number,
-        tuple(speed_panels(evidence, shown)),
-        checks,
-        runs=selected.used({r.index: words.get(r.index, "counted") for r in selected.runs}),
-        fixed=selected.fixed,
-        top=top / KMH,
-        what=what,
-    )
+        number, speed_panels(evidence, shown), checks, runs=selected.used(counted), fixed=selected.fixed,
+        top=top / KMH, what=what,
+    )  # fmt: skip
 
 
 def _deep(evidence: Evidence, selected: Selected) -> Check | None:
@@ -238,30 +195,21 @@ def _deep(evidence: Evidence, selected: Selected) -> Check | None:
     ]  # fmt: skip
     if not runs:
         return None
-    return new_tread(passes_of(evidence, runs), label("tyre", value_of(runs[0], "tyre")))
+    return new_tread(measures.passes_of(evidence, runs), label("tyre", value_of(runs[0], "tyre")))
 
 
 def figure_2_04(number: str, evidence: Evidence) -> Figure:
-    """Clouds of slips of the free wheels; C17 to C19.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Clouds of slips of the free wheels; C17 to C19."""
     selected = evidence.choose(number, evidence.has_water)
     lines = clouds(evidence, selected.runs, "slip_min", free_wheels(selected.runs[0]))
     if not lines:
         raise NotInCampaign(
             "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"
         )
-    found = passes_of(evidence, selected.runs)
-    return figure_of(
-        number,
-        (Panel("Slip of the free wheels", V_KMH, Axis("slip", "%"), tuple(lines)),),
-        (before_full(found), exponential(found), _deep(evidence, selected)),
-        runs=selected.used(),
-        fixed=selected.fixed,
-    )
+    found = measures.passes_of(evidence, selected.runs)
+    panel = Panel("Slip of the free wheels", V_KMH, Axis("slip", "%"), tuple(lines))
+    checks = (before_full(found), exponential(found), _deep(evidence, selected))
+    return figure_of(number, (panel,), checks, runs=selected.used(), fixed=selected.fixed)
 
 
 FIGURES = {"2.3": figure_2_03, "2.4": figure_2_04}

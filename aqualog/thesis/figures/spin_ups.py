@@ -9,26 +9,22 @@ import numpy as np
 
 from aqualog.campaign.bins import Plan, Pool
 from aqualog.campaign.means import is_spinning, spin_ups
-from aqualog.campaign.results import RunInfo, RunSamples
-from aqualog.core.records import BoolArray, FloatArray
+from aqualog.campaign.results import RunInfo
 from aqualog.report.theme import wheel_colour
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence
-from aqualog.thesis.evidence.measures import (
-    TEN,
-    Effect,
-    bin_means,
-    difference,
-    full_speed,
-    over_passes,
-    passes_of,
-    pool_of,
-    trend,
-)
 from aqualog.thesis.evidence.selection import FAMILIES, NotInCampaign, Selected, value_of
-from aqualog.thesis.figures.run_panels import V_KMH, clouds, means_line, means_table, speed_panels, spread_over
-from aqualog.thesis.figures.time_panels import WHEEL_WORDS
+from aqualog.thesis.figures.panels import (
+    V_KMH,
+    WHEEL_WORDS,
+    clouds,
+    means_line,
+    means_table,
+    speed_panels,
+    spread_over,
+)
 from aqualog.thesis.record import Axis, Figure, Line, Panel
 
 __all__ = ["FIGURES"]
@@ -40,12 +36,7 @@ _LEAST_STEPS = 2  # of 0.1 s that a wheel spins
 
 
 def chosen_spin_ups(evidence: Evidence, number: str) -> tuple[Selected, list[RunInfo]]:
-    """Runs of the configuration that is shown, and those of them in which a driven wheel spins up.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Runs of the configuration that is shown, and those of them in which a driven wheel spins up."""
     runs = evidence.data.runs
     with_some = [r for r in runs if r.is_done and not evidence.has_water(r) and spins(evidence, r)]
     if not with_some:
@@ -76,48 +67,39 @@ def far_below(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     hit = np.array([float(spins(evidence, r)) for r in runs])
     if len(runs) < _LEAST or not hit.any():
         return None
-    full = full_speed(passes_of(evidence, runs))
+    full = measures.full_speed(measures.passes_of(evidence, runs))
     known = bool(np.isfinite(full))
     away = ((full if known else float(v.max())) - float(v[hit > 0].min())) / KMH
     demand = np.array([_demand(evidence, r) for r in runs])
     there = np.isfinite(demand)
     effects = (
-        over_passes([np.ones(v.size)[there], (v[there] - v[there].mean()) / TEN, demand[there] / 0.01], hit[there])
+        measures.over_passes(
+            [np.ones(v.size)[there], (v[there] - v[there].mean()) / measures.TEN, demand[there] / 0.01], hit[there]
+        )
         if there.sum() > _LEAST
         else None
     )
     by_torque = effects[2] if effects is not None else None
-    is_far, is_driven = away >= _FAR, by_torque is not None and by_torque.is_above
+    is_far = away >= _FAR
     what = (
         f"full aquaplaning at {full / KMH:.0f} km/h"
         if known
         else f"the fastest pass, {v.max() / KMH:.0f} km/h, still below full aquaplaning"
     )
-    told = (
-        f"; share of passes with a spin-up per 0.01 of traction demanded before the water, at equal speed: "
-        f"{by_torque.words(3)}"
-        if by_torque is not None
-        else "; the traction demanded is not known"
-    )
+    if by_torque is None:
+        is_driven, value, ci95, unit, told = False, None, None, "", "the traction demanded is not known"
+    else:
+        is_driven, value, ci95, unit = by_torque.is_above, by_torque.value, by_torque.ci, "per 0.01"
+        told = "share of passes with a spin-up per 0.01 of traction demanded before the water, at equal speed: "
+        told += by_torque.words(3)
     outcome = (
-        f"slowest pass with a spin-up {v[hit > 0].min() / KMH:.0f} km/h; {what}{told}; {int(hit.sum())} of "
-        f"{hit.size} "
-        "passes spin up"
+        f"slowest pass with a spin-up {v[hit > 0].min() / KMH:.0f} km/h; {what}; {told}; {int(hit.sum())} of "
+        f"{hit.size} passes spin up"
     )
-    return judge(
-        "C20.figure",
-        outcome,
-        whole=is_far and is_driven,
-        part=is_far or is_driven,
-        value=None if by_torque is None else by_torque.value,
-        ci95=None if by_torque is None else by_torque.ci,
-        unit="per 0.01" if by_torque is not None else "",
-        reason=""
-        if is_far and is_driven
-        else "The influence of the torque does not exceed the scatter."
-        if is_far
-        else "Spin-ups begin close to full aquaplaning.",
-    )
+    whole, part = is_far and is_driven, is_far or is_driven
+    close = "The influence of the torque does not exceed the scatter." if is_far else ""
+    reason = "" if whole else close or "Spin-ups begin close to full aquaplaning."
+    return judge("C20.figure", outcome, whole=whole, part=part, value=value, ci95=ci95, unit=unit, reason=reason)
 
 
 def _demand(evidence: Evidence, info: RunInfo) -> float:
@@ -142,18 +124,9 @@ def irregular(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     return judge("C21.figure", outcome, whole=whole, part=mixed > 0.0, value=mixed if np.isfinite(mixed) else None)
 
 
-def spin_up_pool(evidence: Evidence, runs: Sequence[RunInfo], wheel: str) -> Pool | None:
-    """Traction coefficient of a wheel from its torque during its spin-ups on water; None without."""
-
-    def columns(info: RunInfo, samples: RunSamples) -> tuple[BoolArray, FloatArray]:
-        return is_spinning(samples, wheel) & (samples.on_water == 1.0), samples.array(f"mu_{wheel}")
-
-    return pool_of(evidence, runs, columns)
-
-
 def falling_traction(pools: dict[str, Pool]) -> Check | None:
     """C22: the traction coefficient in spin-ups falls with speed."""
-    effects = {w: e for w, p in pools.items() if (e := trend(p)).ci is not None}
+    effects = {w: e for w, p in pools.items() if (e := measures.trend(p)).ci is not None}
     if not effects:
         return None
     down = [w for w, e in effects.items() if e.is_below]
@@ -164,7 +137,7 @@ def falling_traction(pools: dict[str, Pool]) -> Check | None:
     return judge("C22.figure", outcome, whole=whole, part=bool(down), value=worst.value, ci95=worst.ci, fields=fields)
 
 
-def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
+def _unsure(effects: Mapping[str, measures.Effect], pools: Mapping[str, Pool]) -> str:
     rising = [w for w, e in effects.items() if e.is_above]
     if rising:
         return f"It rises at {', '.join(rising)}."
@@ -176,71 +149,53 @@ def _unsure(effects: Mapping[str, Effect], pools: Mapping[str, Pool]) -> str:
 def sides_differ(pools: dict[str, Pool]) -> Check | None:
     """C23: left and right differ, because there is less water on the left."""
     left, right = (next((p for w, p in pools.items() if w[1] == side), None) for side in "lr")
-    found = difference(right, left) if left is not None and right is not None else None
+    found = measures.difference(right, left) if left is not None and right is not None else None
     if found is None:
         return None
     level = found[0]
     outcome = f"left less right {level.words(4)}"
-    part = level.value > 0.0
-    reason = (
-        ""
-        if level.is_above
-        else "The two sides do not differ significantly."
-        if level.low <= 0.0 <= level.high
-        else "The right wheel carries more."
-    )
-    return judge(
-        "C23.figure", outcome, whole=level.is_above, part=part, value=level.value, ci95=level.ci, reason=reason
-    )
+    whole, part = level.is_above, level.value > 0.0
+    unsure = level.low <= 0.0 <= level.high
+    reason = "The two sides do not differ significantly." if unsure else "The right wheel carries more."
+    reason = "" if whole else reason
+    return judge("C23.figure", outcome, whole=whole, part=part, value=level.value, ci95=level.ci, reason=reason)
 
 
 _PANELS = 4
 
 
 def figure_2_05(number: str, evidence: Evidence) -> Figure:
-    """Four passes with spin-ups over time; C20 and C21 over all passes of the configuration.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Four passes with spin-ups over time; C20 and C21 over all passes of the configuration."""
     selected, spun = chosen_spin_ups(evidence, number)
     v = [evidence.of(r).v for r in spun]
     shown = spread_over(spun, evidence, list(np.linspace(min(v), max(v), _PANELS)))
-    drawn = {r.index for r in shown}
+    counted = {r.index: "drawn, and counted" if r in shown else "counted" for r in selected.runs}
+    checks = (far_below(evidence, selected.runs), irregular(evidence, selected.runs))
     return figure_of(
-        number,
-        tuple(speed_panels(evidence, shown)),
-        (far_below(evidence, selected.runs), irregular(evidence, selected.runs)),
-        runs=selected.used({r.index: "drawn, and counted" if r.index in drawn else "counted" for r in selected.runs}),
-        fixed=selected.fixed,
-        slowest=min(v) / KMH,
-        fastest=max(v) / KMH,
-    )
+        number, speed_panels(evidence, shown), checks, runs=selected.used(counted), fixed=selected.fixed,
+        slowest=min(v) / KMH, fastest=max(v) / KMH,
+    )  # fmt: skip
 
 
 def figure_2_06(number: str, evidence: Evidence) -> Figure:
-    """Clouds of slips of the driven wheels; C20 and C21.
-
-    Raises
-    ------
-    NotInCampaign
-    """
+    """Clouds of slips of the driven wheels; C20 and C21."""
     selected, spun = chosen_spin_ups(evidence, number)
     lines = clouds(evidence, selected.runs, "slip_max", selected.runs[0].vehicle.driven)
     if not lines:
         raise NotInCampaign(
             "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"
         )
+    panel = Panel("Slip of the driven wheels", V_KMH, Axis("slip", "%"), tuple(lines))
+    checks = (far_below(evidence, selected.runs), irregular(evidence, selected.runs))
     return figure_of(
-        number,
-        (Panel("Slip of the driven wheels", V_KMH, Axis("slip", "%"), tuple(lines)),),
-        (far_below(evidence, selected.runs), irregular(evidence, selected.runs)),
-        runs=selected.used({r.index: "with spin-up" if r in spun else "without spin-up" for r in selected.runs}),
-        fixed=selected.fixed,
-        spun=len(spun),
-        passes=len(selected.runs),
-    )
+        number, (panel,), checks, runs=selected.used(_with_or_without(selected, spun)), fixed=selected.fixed,
+        spun=len(spun), passes=len(selected.runs),
+    )  # fmt: skip
+
+
+def _with_or_without(selected: Selected, spun: Sequence[RunInfo]) -> dict[int, str]:
+    """What each run is shown as, by its index."""
+    return {r.index: "with spin-up" if r in spun else "without spin-up" for r in selected.runs}
 
 
 _MU = Axis("traction coefficient")
@@ -261,37 +216,32 @@ def _lower_bound(evidence: Evidence, spun: Sequence[RunInfo]) -> list[Line]:
     return lines
 
 
-def figure_2_07(number: str, evidence: Evidence) -> Figure:
-    """Mean traction coefficient per bin of speed and wheel; C22 and C23.
+def _traction_of(wheel: str) -> measures.Columns:
+    """Traction coefficient of a wheel from its torque, while it spins on water."""
+    return lambda _, s: (is_spinning(s, wheel) & (s.on_water == 1.0), s.array(f"mu_{wheel}"))
 
-    Raises
-    ------
-    NotInCampaign
-    """
+
+def figure_2_07(number: str, evidence: Evidence) -> Figure:
+    """Mean traction coefficient per bin of speed and wheel; C22 and C23."""
     selected, spun = chosen_spin_ups(evidence, number)
     wheels = selected.runs[0].vehicle.driven
-    pools = {w: p for w in wheels if (p := spin_up_pool(evidence, spun, w)) is not None}
-    means = {w: m for w, p in pools.items() if (m := bin_means(p)).v_kmh.size}
+    pools = {w: p for w in wheels if (p := measures.pool_of(evidence, spun, _traction_of(w))) is not None}
+    means = {w: m for w, p in pools.items() if (m := measures.bin_means(p)).v_kmh.size}
     if not means:
         raise NotInCampaign(
             "needs the torque of the driven wheels in spin-ups on water: no traction in any", where=f"figure {number}"
         )  # fmt: skip
-    lines = [
+    lines = tuple(
         means_line(WHEEL_WORDS[w], m, (wheel_colour(w), "solid", "circle"), shift=0.4 * (2 * i - 1))
         for i, (w, m) in enumerate(means.items())
-    ]
-    low = tuple(_lower_bound(evidence, spun))
-    return figure_of(
-        number,
-        (
-            Panel("Traction coefficient in spin-ups, from the torque", V_KMH, _MU, tuple(lines)),
-            *([Panel("Less the water's share of the torque (lower bound)", V_KMH, _MU, low)] if low else []),
-        ),
-        (falling_traction(pools), sides_differ(pools)),
-        (means_table("Traction coefficient [-]", {WHEEL_WORDS[w]: m for w, m in means.items()}, 4),),
-        runs=selected.used({r.index: "with spin-up" if r in spun else "without spin-up" for r in selected.runs}),
-        fixed=selected.fixed,
     )
+    panels = [Panel("Traction coefficient in spin-ups, from the torque", V_KMH, _MU, lines)]
+    if low := _lower_bound(evidence, spun):
+        panels.append(Panel("Less the water's share of the torque (lower bound)", V_KMH, _MU, tuple(low)))
+    table = means_table("Traction coefficient [-]", {WHEEL_WORDS[w]: m for w, m in means.items()}, 4)
+    used = selected.used(_with_or_without(selected, spun))
+    checks = (falling_traction(pools), sides_differ(pools))
+    return figure_of(number, panels, checks, (table,), runs=used, fixed=selected.fixed)
 
 
 FIGURES = {"2.5": figure_2_05, "2.6": figure_2_06, "2.7": figure_2_07}

@@ -12,7 +12,6 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.model.drawing import KMH
 from aqualog.model.programme import scene
 from aqualog.report.theme import INK, MUTED
-from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence.campaign import DriveRun
 from aqualog.thesis.evidence.scenes import (
@@ -29,15 +28,22 @@ from aqualog.thesis.evidence.scenes import (
     share,
     spread,
     stretches,
-    words_of,
 )
-from aqualog.thesis.figures.time_panels import feature_lines, panel, speed_panel, tie_rod_panels
+from aqualog.thesis.figures.panels import (
+    FRONT,
+    by_seed,
+    feature_lines,
+    panel,
+    scene_figure,
+    speed_panel,
+    tie_rod_panels,
+)
 from aqualog.thesis.record import Axis, Figure, Panel, Table
 
-__all__ = ["FIGURES", "panels_2_23"]
+__all__ = ["FIGURES", "panels_2_23", "rod_panels"]
 
 _DOWN = -0.05  # [-] slip of a wheel that spins down
-_SERIES = limit("series", "C61.figure")  # spin-downs that figure_2_21 a series
+_SERIES = limit("series", "C61.figure")  # spin-downs that make a series
 _SCATTERS = limit("dry_scatters")  # dry scatters that a rise must exceed: the drift of the tie-rod detector (K)
 _MATCH = limit("match", "C61.figure")  # times the dry scatter that the residual of a matching rod may have, or
 _COARSE = limit("coarse", "C61.figure")  # [N] the scatter of a good model (K)
@@ -86,28 +92,25 @@ def _c61(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
         f"({spread([_left(r) for r in all_runs], 0)} N), right rod only {in_runs(told)}"
     )
     finding = judge("C61.figure", outcome, whole=every >= MANY, part=told >= SOME, value=every)
-    table = Table(
-        "Front right wheel on the lane",
-        ("seed", "spin-downs", "rise of its rod [N]", "left residual, rms [N]"),
-        tuple(
-            (str(r.seed), str(len(_down(r))), "–" if np.isnan(_rise(r)) else f"{_rise(r):.0f}", f"{_left(r):.0f}")
-            for r in all_runs
-        ),
-    )
-    return finding, table
+    columns = {
+        "spin-downs": [str(len(_down(r))) for r in all_runs],
+        "rise of its rod [N]": ["–" if np.isnan(x) else f"{x:.0f}" for x in map(_rise, all_runs)],
+        "left residual, rms [N]": [f"{_left(r):.0f}" for r in all_runs],
+    }
+    return finding, by_seed("Front right wheel on the lane", all_runs, columns)
+
+
+def rod_panels(r: DriveRun) -> tuple[Panel, ...]:
+    """Front wheel speeds, and the forces of both tie rods."""
+    return (speed_panel(r, FRONT), *tie_rod_panels(r))
 
 
 def figure_2_21() -> Figure:
     """Front wheel speeds and both tie rods of one run; C61 over all runs."""
-    all_runs = runs("2.21")
-    finding, table = _c61(all_runs)
-    r = all_runs[0]
-    return figure_of(
-        "2.21", (speed_panel(r, ("fl", "fr")), *tie_rod_panels(r)), (finding,), (table,), **words_of(all_runs)
-    )
+    finding, table = _c61(runs("2.21"))
+    return scene_figure("2.21", rod_panels, (finding,), (table,))
 
 
-_FRONT = ("fl", "fr")
 _SPUN = limit("spun", "C62.figure")  # [-] slip beyond which a wheel spins down or up
 _SLIGHT = limit("slight")  # [-] of the slight ones
 _BEFORE = limit("before", "C60.figure")  # [s] in which the wheel must have spun before its rod is reported
@@ -141,10 +144,8 @@ def _extreme(r: SceneRun, c: Course) -> float:
 
 def _rise_in_scatters(r: SceneRun, sign: float) -> float:
     """Median residual of the rods of wheels that spin, in dry scatters; NaN if none does. [-]"""
-    x = [
-        residual(r, w)[(sign * r.signal(f"true_slip_{w}") > _SPUN) & r.on_lane()] / scatter(r, w) for w in _FRONT
-    ]  # fmt: skip
-    values = np.concatenate(x)
+    spins = {w: (sign * r.signal(f"true_slip_{w}") > _SPUN) & r.on_lane() for w in FRONT}
+    values = np.concatenate([residual(r, w)[bits] / scatter(r, w) for w, bits in spins.items()])
     return float(np.nanmedian(values)) if values.size else float("nan")
 
 
@@ -153,9 +154,8 @@ def _c62_force(all_runs: tuple[SceneRun, ...]) -> Check:
     has_down, has_up = (float(np.mean([x > _SCATTERS for x in v])) for v in (down, up))
     both = float(np.mean([a > _SCATTERS and b > _SCATTERS for a, b in zip(down, up, strict=True)]))
     outcome = f"both in {in_runs(both)} runs; in spin-downs {spread(down, 1)} scatters, in spin-ups {spread(up, 1)}"
-    return judge(
-        "C62.figure", outcome, whole=both >= MANY, part=both >= SOME or max(has_down, has_up) >= MANY, value=both
-    )
+    part = both >= SOME or max(has_down, has_up) >= MANY
+    return judge("C62.figure", outcome, whole=both >= MANY, part=part, value=both)
 
 
 def _is_course(r: SceneRun) -> bool:
@@ -186,8 +186,8 @@ def _calm(r: SceneRun, wheel: str) -> tuple[FloatArray, BoolArray]:
 
 
 def _c60(all_runs: tuple[SceneRun, ...]) -> Check:
-    begun = [_before(r, t, w) for r in all_runs for w in _FRONT for t in r.events("tie_rod", w)]
-    calm = [_calm(r, w) for r in all_runs for w in _FRONT]
+    begun = [_before(r, t, w) for r in all_runs for w in FRONT for t in r.events("tie_rod", w)]
+    calm = [_calm(r, w) for r in all_runs for w in FRONT]
     contact, bits = np.concatenate([c for c, _ in calm]), np.concatenate([b for _, b in calm])
     rate = float(np.mean(bits)) if bits.size else 0.0
     reported = share(all_runs, lambda r: bool(r.events("tie_rod")))
@@ -210,7 +210,7 @@ def _early() -> tuple[SceneRun, ...]:
 
 def _c60_early(early: tuple[SceneRun, ...]) -> Check:
     hit = share(early, lambda r: bool(r.events("tie_rod")))
-    calm = share(early, lambda r: all(np.nanmax(np.abs(r.signal(f"true_slip_{w}"))) < _SLIGHT for w in _FRONT))
+    calm = share(early, lambda r: all(np.nanmax(np.abs(r.signal(f"true_slip_{w}"))) < _SLIGHT for w in FRONT))
     contact = [float(np.nanmedian(r.signal("true_contact_fl")[r.on_lane()])) for r in early]
     peak = [float(np.nanmax(np.abs(residual(r, "fl")[r.on_lane()]))) for r in early]
     outcome = (
@@ -223,19 +223,10 @@ def _c60_early(early: tuple[SceneRun, ...]) -> Check:
 def figure_2_22() -> Figure:
     """Front wheel speeds and both tie rods of one run; C62 and C60 over all runs."""
     all_runs = runs("2.22")
-    r = all_runs[0]
-    table = Table(
-        "Largest slip of the front left wheel [%]",
-        ("seed", *(c.name for c in _COURSE)),
-        tuple((str(x.seed), *(f"{100 * c.sign * _extreme(x, c):.1f}" for c in _COURSE)) for x in all_runs),
-    )
-    return figure_of(
-        "2.22",
-        (speed_panel(r, _FRONT), *tie_rod_panels(r)),
-        (_c62_force(all_runs), _c62_course(all_runs), _c60(all_runs), _c60_early(_early())),
-        (table,),
-        **words_of(all_runs),
-    )
+    columns = {c.name: [f"{100 * c.sign * _extreme(x, c):.1f}" for x in all_runs] for c in _COURSE}
+    table = by_seed("Largest slip of the front left wheel [%]", all_runs, columns)
+    checks = (_c62_force(all_runs), _c62_course(all_runs), _c60(all_runs), _c60_early(_early()))
+    return scene_figure("2.22", rod_panels, checks, (table,))
 
 
 _DRY = (8.0, 22.5)  # [s] slalom before the water
@@ -262,30 +253,21 @@ def _peak(r: SceneRun, wheel: str, span: tuple[float, float]) -> float:
     return float(np.nanmax(residual(r, wheel)[r.within(*span)])) / scatter(r, wheel)
 
 
-def _went(r: SceneRun, wheel: str, span: tuple[float, float]) -> bool:
-    return bool((r.signal(f"true_slip_{wheel}")[r.within(*span)] < _LIGHT_DOWN).any())
-
-
-def _stops(r: SceneRun) -> bool:
-    """Whether the spin-downs of the left wheel are not light ones."""
-    return bool((r.signal("true_slip_fl")[r.within(*_LEFT)] < _STOP).any())
+def _went(r: SceneRun, wheel: str, span: tuple[float, float], slip: float = _LIGHT_DOWN) -> bool:
+    return bool((r.signal(f"true_slip_{wheel}")[r.within(*span)] < slip).any())
 
 
 def _amplitude(r: SceneRun, span: tuple[float, float]) -> float:
     return float(np.nanmax(np.abs(r.feature("a_y_slow")[r.within(*span)])))
 
 
-def _is_steady(r: SceneRun) -> bool:
-    """Whether the speed is almost constant until control is lost."""
-    v = r.velocity[r.within(_DRY[0], _BOTH[0])]
-    return float(np.ptp(v)) < _STEADY * float(np.mean(v))
-
-
 def _parts(r: SceneRun) -> dict[str, bool]:
     left, right = (_peak(r, w, _SHORT) for w in ("fl", "fr"))
+    v = r.velocity[r.within(_DRY[0], _BOTH[0])]  # until control is lost
+    is_steady = float(np.ptp(v)) < _STEADY * float(np.mean(v))
     fall = _amplitude(r, (_BOTH[0] + 0.3, _BOTH[1])) / _amplitude(r, _DRY)
     return {
-        "match in the dry slalom": _explained(r) >= _EXPLAINED and _amplitude(r, _DRY) <= _A_Y and _is_steady(r),
+        "match in the dry slalom": _explained(r) >= _EXPLAINED and _amplitude(r, _DRY) <= _A_Y and is_steady,
         "both at 23 s": min(left, right) > _SCATTERS and all(_went(r, w, _SHORT) for w in ("fl", "fr")),
         "right more": right > left,
         "left from 26 s": _peak(r, "fl", _LEFT) > _SCATTERS and _went(r, "fl", _LEFT),
@@ -299,30 +281,26 @@ def _c63(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
     each = {name: float(np.mean([f[name] for f in found])) for name in found[0]}
     every = float(np.mean([all(f.values()) for f in found]))
     rest = float(np.mean([all(v for n, v in f.items() if n != "right more") for f in found]))
+    stops = share(all_runs, lambda r: _went(r, "fl", _LEFT, _STOP))
     outcome = (
         f"all in {in_runs(every)} runs, all but the right one more in {in_runs(rest)}; "
         + ", ".join(f"{n} {in_runs(x)}" for n, x in each.items())
-        + f"; the left wheel stops altogether in {in_runs(share(all_runs, _stops))}"
+        + f"; the left wheel stops altogether in {in_runs(stops)}"
     )
     finding = judge("C63.figure", outcome, whole=every >= MANY, part=rest >= SOME, value=rest)
     spans = (("at 23 s", _SHORT), ("from 26 s on", _LEFT), ("after 27 s", _BOTH))
-    columns = [(f"{w} {n}", w, s) for n, s in spans for w in ("left", "right")]
-    table = Table(
-        "Largest residual [dry scatters]",
-        ("seed", *(n for n, _, _ in columns)),
-        tuple((str(r.seed), *(f"{_peak(r, f'f{w[0]}', s):.1f}" for _, w, s in columns)) for r in all_runs),
-    )
-    return finding, table
+    columns = {
+        f"{w} {n}": [f"{_peak(r, f'f{w[0]}', s):.1f}" for r in all_runs] for n, s in spans for w in ("left", "right")
+    }
+    return finding, by_seed("Largest residual [dry scatters]", all_runs, columns)
 
 
 def _c59(all_runs: tuple[SceneRun, ...]) -> Check:
     found = known("2.23").explained
     other = [_explained(r) for r in all_runs]
     whole = found >= _EXPLAINED and min(other) >= _EXPLAINED
-    outcome = (
-        f"explained {found:.1%} in its own slalom, {spread([100.0 * x for x in other], 1)} % in the dry part of "
-        "the others"
-    )
+    others = spread([100.0 * x for x in other], 1)
+    outcome = f"explained {found:.1%} in its own slalom, {others} % in the dry part of the others"
     return judge("C59.figure", outcome, whole=whole, part=found >= _EXPLAINED, value=min(other))
 
 
@@ -334,8 +312,7 @@ def panels_2_23(r: DriveRun) -> tuple[Panel, ...]:
     }
     return (
         panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)),
-        speed_panel(r, ("fl", "fr")),
-        *tie_rod_panels(r),
+        *rod_panels(r),
     )
 
 
@@ -343,8 +320,7 @@ def figure_2_23() -> Figure:
     """Steering, front wheel speeds and both tie rods of one run; C63 and C59 over all runs."""
     all_runs = runs("2.23")
     c63, table = _c63(all_runs)
-    r = all_runs[0]
-    return figure_of("2.23", panels_2_23(r), (c63, _c59(all_runs)), (table,), **words_of(all_runs))
+    return scene_figure("2.23", panels_2_23, (c63, _c59(all_runs)), (table,))
 
 
 FIGURES = {"2.21": figure_2_21, "2.22": figure_2_22, "2.23": figure_2_23}

@@ -21,11 +21,11 @@ from aqualog.thesis.evidence.half_car import (
     is_used,
     slope_at,
 )
-from aqualog.thesis.record import Axis, Line, Table, seconds
+from aqualog.thesis.record import Axis, Line, Panel, Table, seconds
 
 __all__ = [
-    "COLOURS", "SLOPE", "TIME", "detection_time", "estimate_lines", "false_alarms_of", "is_falling", "listed",
-    "settled_slopes", "slope_after", "tangent_table", "told", "true_slope",
+    "COLOURS", "TIME", "detection_time", "estimate_lines", "false_alarms_of", "is_falling", "listed",
+    "settled_slopes", "slope_after", "slope_panel", "tangent_table", "told",
 ]  # fmt: skip
 
 COLOURS = (*WHEEL_COLOURS.values(), "#E69F00", "#56B4E9")
@@ -36,28 +36,28 @@ SLOPE = Axis("slip slope", "-", limits=(0.0, 36.0))
 _FROM = -2.0  # [s] of the dry road that is drawn
 
 
-def true_slope(t_end: float) -> Line:
-    """The road's slope: a step at t = 0."""
-    return Line(
-        "true", np.array([_FROM, 0.0, 0.0, t_end]), np.array([HIGH_SLOPE, HIGH_SLOPE, LOW_SLOPE, LOW_SLOPE]),
-        colour=MUTED, dash="dot", width=1.5,
-    )  # fmt: skip
+def slope_panel(
+    title: str, cases: Mapping[str, tuple[Case, str, str]], *, t_end: float, is_split: bool = False
+) -> Panel:
+    """Estimated slopes of cases by name, each with its colour and dash, beside that of the road, a step at t = 0.
+
+    `t_end` [s] and `is_split` as in `estimate_lines`.
+    """
+    lines = [
+        line for name, (case, colour, dash) in cases.items()
+        for line in estimate_lines(name, case, colour=colour, dash=dash, t_end=t_end, is_split=is_split)
+    ]  # fmt: skip
+    high, low = [HIGH_SLOPE] * 2, [LOW_SLOPE] * 2
+    road = Line("true", np.array([_FROM, 0.0, 0.0, t_end]), np.array(high + low), colour=MUTED, dash="dot", width=1.5)
+    return Panel(title, TIME, SLOPE, (*lines, road))
 
 
 def estimate_lines(
     name: str, case: Case, *, colour: str = INK, dash: str = "solid", t_end: float = 12.0, is_split: bool = False
 ) -> list[Line]:
-    """Estimated slope of a case, with a dot where the drop is found.
+    """Estimated slope of a case until `t_end` [s], with a dot where the drop is found.
 
-    Parameters
-    ----------
-    name : str
-    case : Case
-    colour, dash : str
-    t_end : float
-        End of the drawn time. [s]
-    is_split : bool
-        Thin and light where the estimator does not work, as in the thesis' figures 3.7 and on.
+    `is_split`: thin and light where the estimator does not work, as in the thesis' figures 3.7 and on.
     """
     d, e = drive(case), estimate(case)
     span = (d.t >= _FROM - 1e-9) & (d.t <= t_end + 1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,19 +11,16 @@ from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.excitation import force_rate, waveform
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit, limits
-from aqualog.thesis.evidence.half_car import GATE_OFF, RATE_HZ, SUV, Case, drive, estimate, inputs, is_used
-from aqualog.thesis.figures.splits import TRACTION
+from aqualog.thesis.evidence.half_car import GATE_OFF, RATE_HZ, SUV, Case, drive, estimate, inputs, is_used, slope_at
+from aqualog.thesis.figures.brush_curves import TRACTION
 from aqualog.thesis.figures.timeline import (
     COLOURS,
-    SLOPE,
     TIME,
     detection_time,
-    estimate_lines,
     false_alarms_of,
     settled_slopes,
-    slope_after,
+    slope_panel,
     tangent_table,
-    true_slope,
 )
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table, seconds
 
@@ -31,6 +28,7 @@ __all__ = ["FIGURES"]
 
 WAVES = ("triangle", "sine", "ramp", "step")
 PHASES = int(limit("phases", "C104.figure_phase"))
+_STYLES = {w: (c, "solid") for w, c in zip(WAVES, COLOURS, strict=False)}
 _END = 12.0  # [s] of what is drawn
 _STEP_RANGE = limits("step_range")  # [s] "approximately 1 s"
 _OTHERS = limit("others")  # [s] "above 2 s"
@@ -40,13 +38,8 @@ def _case(wave: str, a_x: float) -> Case:
     return Case(wave, 250.0, "force", 8.0, a_x=a_x, tuning=GATE_OFF)
 
 
-def phase_times(wave: str) -> list[float]:
-    """Detection times at 1 m/s² with the change at eight phases of the excitation. [s]"""
-    return [detection_time(replace(_case(wave, 1.0), phase=k / PHASES)) for k in range(PHASES)]
-
-
 def _c104_phase() -> tuple[Check, Table]:
-    times = {w: phase_times(w) for w in WAVES}
+    times = {w: [detection_time(replace(_case(w, 1.0), phase=k / PHASES)) for k in range(PHASES)] for w in WAVES}
     mean = {w: float(np.mean(t)) for w, t in times.items()}  # NaN if a drop was not found
     in_order = mean["step"] < mean["ramp"] < min(mean["triangle"], mean["sine"])
     outcome = "mean (shortest to longest) at 1 m/s²: " + ", ".join(
@@ -71,8 +64,10 @@ def figure_3_06() -> Figure:
     step, ramp, others = times["step"], times["ramp"], [times["triangle"], times["sine"]]
     in_order = step < ramp < min(others)
     mu, slope, estimated = settled_slopes(_case("sine", 1.0))
-    swing = _swing(0.0)
-    late = slope_after(_case("sine", 0.0), _END)
+    constant = _case("sine", 0.0)
+    d, e = drive(constant), estimate(constant)
+    # largest prediction error of the sine that a slope of 30 would show in the first half period
+    swing = float(np.nanmax(np.abs(e.innovation[(d.t > 0.0) & (d.t <= 0.5 * constant.period)])))
     outcome = (
         "at 1 m/s^2 "
         + ", ".join(f"{w} {seconds(times[w])} s" for w in ("step", "ramp", "sine", "triangle"))
@@ -81,49 +76,17 @@ def figure_3_06() -> Figure:
         + f"; false alarms before the change: {false}"
     )
     whole = in_order and _STEP_RANGE[0] <= step <= _STEP_RANGE[1] and ramp > _OTHERS
-    fields = {
-        "swing": 1e3 * swing,
-        "drift": 1e3 * TUNING.zeta,
-        "late": late,
-        "end": _END,
-        "slope": slope,
-        "mu": mu,
-        "estimated": estimated,
-    }
-    c104 = judge(
-        "C104.figure", outcome, whole=whole, part=in_order, value=None if np.isnan(step) else step, fields=fields
-    )
+    fields = {"swing": 1e3 * swing, "drift": 1e3 * TUNING.zeta, "late": slope_at(d, e, _END), "end": _END,
+              "slope": slope, "mu": mu, "estimated": estimated}  # fmt: skip
+    value = None if np.isnan(step) else step
+    c104 = judge("C104.figure", outcome, whole=whole, part=in_order, value=value, fields=fields)
     by_phase, phases = _c104_phase()
-    panels = []
-    for a_x, title in ((1.0, "1 m/s²"), (0.0, "constant speed, 20 m/s")):
-        lines: list[Line] = []
-        for w, c in zip(WAVES, COLOURS, strict=False):
-            lines += estimate_lines(w, _case(w, a_x), colour=c, t_end=_END)
-        panels.append(Panel(f"Estimated slope, {title}", TIME, SLOPE, (*lines, true_slope(_END))))
-    return figure_of(
-        "3.6",
-        tuple(panels),
-        (c104, by_phase),
-        (
-            phases,
-            tangent_table(
-                {
-                    f"{w}, {a:g} m/s^2": _case(w, a)
-                    for a, t in ((1.0, times), (0.0, still))
-                    for w in WAVES
-                    if not np.isnan(t[w])
-                }
-            ),
-        ),
-    )
-
-
-def _swing(a_x: float) -> float:
-    """Largest prediction error of the sine that a slope of 30 would show in the first half period. [-]"""
-    case = _case("sine", a_x)
-    d, e = drive(case), estimate(case)
-    first = (d.t > 0.0) & (d.t <= 0.5 * case.period)
-    return float(np.nanmax(np.abs(e.innovation[first])))
+    panels = [
+        slope_panel(f"Estimated slope, {title}", {w: (_case(w, a), *s) for w, s in _STYLES.items()}, t_end=_END)
+        for a, title in ((1.0, "1 m/s²"), (0.0, "constant speed, 20 m/s"))
+    ]
+    found = {f"{w}, {a:g} m/s^2": _case(w, a) for a, t in ((1.0, times), (0.0, still)) for w in WAVES if t[w] == t[w]}
+    return figure_of("3.6", panels, (c104, by_phase), (phases, tangent_table(found)))
 
 
 _SMOOTH = WAVES[:3]
@@ -144,36 +107,38 @@ def used_share(case: Case) -> tuple[float, float]:
     return float(np.mean(is_used(e))), float(np.mean(e.status == 0.0))
 
 
-def _rate(wave: str) -> float:
-    return force_rate(wave, amplitude=_AMPLITUDE, period=_GATED_PERIOD)
+@dataclass(frozen=True, slots=True)
+class _Felt:
+    """What passengers may feel of a waveform, against the run without excitation.
+
+    `rate` of the force [N/s], infinite at a jump; `jump` its largest change in one sample [N]; `dry` and `after` the
+    largest change of the acceleration before and after the surface's [m/s²]; `v` [km/h] and `a` [m/s²] the largest
+    change of the velocity and of its mean slope on the dry road; `mu` the largest traction coefficient [-].
+    """
+
+    rate: float
+    jump: float
+    dry: float
+    after: float
+    v: float
+    a: float
+    mu: float
 
 
-def _jump(wave: str) -> float:
-    """Largest change of the force from one sample to the next. [N]"""
+def felt_of(wave: str) -> _Felt:
+    """What passengers may feel of a waveform."""
     t = np.arange(0.0, 2.0 * _GATED_PERIOD, 1.0 / RATE_HZ)
-    return float(_AMPLITUDE * np.abs(np.diff(waveform(wave, t, period=_GATED_PERIOD))).max())
-
-
-def _left_over(wave: str) -> tuple[float, float]:
-    """Remaining influence of the excitation on the acceleration, against the run without: before and after the change.
-    [m/s²]"""
     d, plain = drive(_gated(wave)), drive(_gated(""))
-    difference = np.abs(d.a_x - plain.a_x)
-    before = (d.t >= _SETTLED) & (d.t < 0.0)
-    return float(difference[before].max()), float(difference[d.t > 0.0].max())
-
-
-def _drift(wave: str) -> tuple[float, float]:
-    """Largest change of the velocity [km/h] and of its mean slope [m/s²] against the run without, on the dry road."""
-    d, plain = drive(_gated(wave)), drive(_gated(""))
-    dry = d.t < 0.0
-    return 3.6 * float(np.abs(d.v_x - plain.v_x)[dry].max()), abs(float((d.a_x - plain.a_x)[dry].mean()))
-
-
-def _most_traction(wave: str) -> float:
-    d = drive(_gated(wave))
-    past = d.t >= _SETTLED
-    return float(max(np.abs(d.mu_f[past]).max(), np.abs(d.mu_r[past]).max()))
+    change, past, dry = d.a_x - plain.a_x, d.t >= _SETTLED, d.t < 0.0
+    return _Felt(
+        force_rate(wave, amplitude=_AMPLITUDE, period=_GATED_PERIOD),
+        float(_AMPLITUDE * np.abs(np.diff(waveform(wave, t, period=_GATED_PERIOD))).max()),
+        float(np.abs(change)[past & dry].max()),
+        float(np.abs(change)[d.t > 0.0].max()),
+        3.6 * float(np.abs(d.v_x - plain.v_x)[dry].max()),
+        abs(float(change[dry].mean())),
+        float(max(np.abs(d.mu_f[past]).max(), np.abs(d.mu_r[past]).max())),
+    )
 
 
 _SITUATIONS = {
@@ -214,42 +179,38 @@ def _c96() -> tuple[Check, Table]:
 
 def _comfort() -> tuple[list[Check], Table]:
     """C97, C99 and C107, with what passengers may feel of each waveform."""
-    left = {w: _left_over(w) for w in WAVES}
-    most = {w: _most_traction(w) for w in WAVES}
-    jumps = {w: _jump(w) for w in WAVES}
-    smooth_left = max(left[w][0] for w in _SMOOTH)
-    largest = max(most.values())
-    ratio, blip = jumps["step"] / max(jumps[w] for w in _SMOOTH), left["step"][0] / max(smooth_left, 1e-9)
-    dry, after = (", ".join(f"{n}{1e3 * left[w][k]:.1f}" for w, n in zip(WAVES, names, strict=True))
-                  for k, names in ((0, [f"{w} " for w in WAVES]), (1, [""] * len(WAVES))))  # fmt: skip
-    used = ", ".join(f"{w} {x:.3f}" for w, x in most.items())
+    felt = {w: felt_of(w) for w in WAVES}
+    step, smooth = felt["step"], [felt[w] for w in _SMOOTH]
+    largest = max(f.mu for f in felt.values())
+    ratio, blip = step.jump / max(f.jump for f in smooth), step.dry / max(*(f.dry for f in smooth), 1e-9)
+    used = ", ".join(f"{w} {f.mu:.3f}" for w, f in felt.items())
     used += f"; on the low surface {largest / 0.4:.0%} of its friction"
-    others = ", ".join(f"{w} {_rate(w):.0f} N/s" for w in _SMOOTH)
-    felt = (
-        f"step: jump of 2 A = {jumps['step']:.0f} N ({jumps['step'] * SUV.r_l_f:.0f} N m per axle) in one sample; "
-        f"others {others}; acceleration left over {blip:.0f} times as large"
+    jumped = (
+        f"step: jump of 2 A = {step.jump:.0f} N ({step.jump * SUV.r_l_f:.0f} N m per axle) in one sample; others "
+        + ", ".join(f"{w} {felt[w].rate:.0f} N/s" for w in _SMOOTH)
+        + f"; acceleration left over {blip:.0f} times as large"
     )
-    drift = {w: _drift(w) for w in WAVES}
-    holds = {w: v < _LIMIT_V and a < _LIMIT_A for w, (v, a) in drift.items()}
+    holds = {w: f.v < _LIMIT_V and f.a < _LIMIT_A for w, f in felt.items()}
     kept = (
-        f"velocity within {', '.join(f'{w} {v:.3f}' for w, (v, _) in drift.items())} km/h, mean acceleration within "
-        f"{max(a for _, a in drift.values()):.4f} m/s²; at one moment at "
-        f"most {dry}e-3 m/s², after the change {after}e-3"
+        f"velocity within {', '.join(f'{w} {f.v:.3f}' for w, f in felt.items())} km/h, mean acceleration within "
+        f"{max(f.a for f in felt.values()):.4f} m/s²; at one moment at most "
+        + ", ".join(f"{w} {1e3 * f.dry:.1f}" for w, f in felt.items())
+        + f"e-3 m/s², after the change {', '.join(f'{1e3 * f.after:.1f}' for f in felt.values())}e-3"
     )
-    smooth = all(holds[w] for w in _SMOOTH)
+    most = max(f.v for f in felt.values())
     checks = [
-        judge("C97.figure", kept, whole=all(holds.values()), part=smooth, value=max(v for v, _ in drift.values())),
+        judge("C97.figure", kept, whole=all(holds.values()), part=all(holds[w] for w in _SMOOTH), value=most),
         # the first half of the claim is out of reach here, so that the second alone cannot reproduce it
         judge("C99.figure", used, part=largest <= _LIMIT_MU, value=largest),
-        judge("C107.figure", felt, whole=ratio > 10.0 and blip > 1.0, part=ratio > 10.0, value=ratio),
+        judge("C107.figure", jumped, whole=ratio > 10.0 and blip > 1.0, part=ratio > 10.0, value=ratio),
     ]
     table = Table(
         "Comfort",
         ("waveform", "largest rate [N/s]", "change in 10 ms [N]", "left in a_x, dry [1e-3 m/s^2]",
          "largest traction [-]"),
         tuple(
-            (w, "jump" if np.isinf(r := _rate(w)) else f"{r:.0f}", f"{jumps[w]:.1f}", f"{1e3 * left[w][0]:.2f}",
-             f"{most[w]:.3f}") for w in WAVES
+            (w, "jump" if np.isinf(f.rate) else f"{f.rate:.0f}", f"{f.jump:.1f}", f"{1e3 * f.dry:.2f}", f"{f.mu:.3f}")
+            for w, f in felt.items()
         ),
     )  # fmt: skip
     return checks, table
@@ -259,15 +220,14 @@ def figure_3_07() -> Figure:
     """Estimates with their idle spans; availability, comfort and the friction that is used."""
     c96, availability = _c96()
     felt, comfort = _comfort()
-    lines: list[Line] = []
-    forces: list[Line] = []
-    for w, c in zip(WAVES, COLOURS, strict=False):
-        lines += estimate_lines(w, _gated(w), colour=c, t_end=_GATED_END, is_split=True)
-        d = drive(_gated(w))
-        span = (d.t >= -2.0) & (d.t <= _GATED_END)
-        forces.append(Line(w, d.t[span], _AMPLITUDE * waveform(w, d.t[span], period=_GATED_PERIOD), colour=c))
+    forces = []
+    for w, (colour, _) in _STYLES.items():
+        t = drive(_gated(w)).t
+        t = t[(t >= -2.0) & (t <= _GATED_END)]
+        forces.append(Line(w, t, _AMPLITUDE * waveform(w, t, period=_GATED_PERIOD), colour=colour))
+    cases = {w: (_gated(w), *s) for w, s in _STYLES.items()}
     panels = (
-        Panel("Estimated slope", TIME, SLOPE, (*lines, true_slope(_GATED_END))),
+        slope_panel("Estimated slope", cases, t_end=_GATED_END, is_split=True),
         Panel("Excitation force of the front axle", TIME, Axis("F_exc", "N"), tuple(forces)),
     )
     return figure_of("3.7", panels, (_c105(), c96, *felt), (availability, comfort))
@@ -276,6 +236,7 @@ def figure_3_07() -> Figure:
 _PERIOD = 8.0
 _BINS = 24  # per axis
 _EXTREME = limit("extreme", "C106.figure")  # of the largest deviation from the mean
+_STARTS = {"slope 30": -_PERIOD, "slope 10": _PERIOD}  # [s]; on the low surface the second period: wheels have settled
 
 
 def _points(wave: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -286,13 +247,8 @@ def _points(wave: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     return d.t, d.s_f, s_delta, mu_i - rho_mu_j
 
 
-def _dry(t: FloatArray) -> BoolArray:
-    return (t >= -_PERIOD - 1e-9) & (t < -1e-9)
-
-
-def _low(t: FloatArray) -> BoolArray:
-    # the second period on the low surface: the wheels have settled
-    return (t >= _PERIOD - 1e-9) & (t < 2.0 * _PERIOD - 1e-9)
+def _period_from(t: FloatArray, start: float) -> BoolArray:
+    return (t >= start - 1e-9) & (t < start + _PERIOD - 1e-9)
 
 
 def extreme_share(mu_delta: FloatArray) -> float:
@@ -318,69 +274,51 @@ _LIMITS = ((0.2, 2.0), (-0.5, 0.8), (-0.04, 0.06))  # front slip [%], differenti
 def _cloud(wave: str) -> Panel:
     t, s_f, s_delta, mu_delta = _points(wave)
     lines = []
-    for name, where, colour in (("slope 30", _dry(t), COLOURS[0]), ("slope 10", _low(t), COLOURS[1])):
+    for (name, start), colour in zip(_STARTS.items(), COLOURS, strict=False):
+        where = _period_from(t, start)
         x, y, z, count = _binned(100.0 * s_f[where], 100.0 * s_delta[where], mu_delta[where])
         lines.append(Line(name, x, y, z=z, count=count, colour=colour, mode="markers", group=name))
-        for k, (shadow, wall) in enumerate(
-            (("projected on s_F", _LIMITS[0][1]), ("projected on s_delta", _LIMITS[1][1]),
-             ("projected on mu_delta", _LIMITS[2][0]))
-        ):  # fmt: skip
+        walls = (_LIMITS[0][1], _LIMITS[1][1], _LIMITS[2][0])
+        for k, (axis, wall) in enumerate(zip(("s_F", "s_delta", TRACTION.label), walls, strict=True)):
             flat = [x, y, z]
             flat[k] = np.full_like(x, wall)
             lines.append(
-                Line(f"{name}, {shadow}", flat[0], flat[1], z=flat[2], count=count, colour=colour, mode="markers",
-                     opacity=0.25, group=name, in_legend=False)
+                Line(f"{name}, projected on {axis}", flat[0], flat[1], z=flat[2], count=count, colour=colour,
+                     mode="markers", opacity=0.25, group=name, in_legend=False)
             )  # fmt: skip
-    return Panel(
-        wave,
-        Axis("s_F", "%", limits=_LIMITS[0]),
-        Axis("s_delta", "%", limits=_LIMITS[1]),
-        tuple(lines),
-        Axis(TRACTION.label, limits=_LIMITS[2]),
-    )
+    slip, differential = (Axis(n, "%", limits=r) for n, r in zip(("s_F", "s_delta"), _LIMITS, strict=False))
+    return Panel(wave, slip, differential, tuple(lines), Axis(TRACTION.label, limits=_LIMITS[2]))
 
 
 def figure_3_08() -> Figure:
     """Clouds of four waveforms, with the distribution over the differential traction."""
-    dry, low = {}, {}
+    shares: dict[str, dict[str, float]] = {name: {} for name in _STARTS}
     lines = []
     edges = np.linspace(0.0, 1.0, 21)
     for wave, colour in zip(WAVES, COLOURS, strict=False):
         t, _, _, mu_delta = _points(wave)
-        dry[wave], low[wave] = extreme_share(mu_delta[_dry(t)]), extreme_share(mu_delta[_low(t)])
-        away = np.abs(mu_delta[_dry(t)] - mu_delta[_dry(t)].mean())
-        share, _ = np.histogram(away / away.max(), bins=edges)
-        lines.append(Line(wave, 0.5 * (edges[1:] + edges[:-1]), 100.0 * share / away.size, colour=colour,
+        for name, start in _STARTS.items():
+            shares[name][wave] = extreme_share(mu_delta[_period_from(t, start)])
+        dry = mu_delta[_period_from(t, -_PERIOD)]
+        away = np.abs(dry - dry.mean())
+        count, _ = np.histogram(away / away.max(), bins=edges)
+        lines.append(Line(wave, 0.5 * (edges[1:] + edges[:-1]), 100.0 * count / away.size, colour=colour,
                           mode="lines+markers"))  # fmt: skip
-    in_order = [s["triangle"] < min(s["sine"], s["ramp"]) and max(s["sine"], s["ramp"]) < s["step"] for s in (dry, low)]
-    outcome = "; ".join(
-        f"{name}: " + ", ".join(f"{w} {100 * s[w]:.0f} %" for w in WAVES)
-        for name, s in (("slope 30", dry), ("slope 10", low))
+    in_order = [
+        s["triangle"] < min(s["sine"], s["ramp"]) and max(s["sine"], s["ramp"]) < s["step"] for s in shares.values()
+    ]
+    outcome = "; ".join(f"{n}: " + ", ".join(f"{w} {100 * x:.0f} %" for w, x in s.items()) for n, s in shares.items())
+    high, low = shares.values()
+    c106 = judge("C106.figure", outcome, whole=all(in_order), part=any(in_order), value=high["sine"] / high["triangle"])
+    away_axis, share_axis = Axis("|mu_delta - mean| over its maximum"), Axis("share of the samples", "%")
+    spread = Panel("Distribution over the differential traction, dry", away_axis, share_axis, tuple(lines))
+    ideal = dict(zip(WAVES, (0.1, 1.0 - 2.0 / np.pi * np.arcsin(0.9), 0.4, 1.0), strict=True))
+    table = Table(
+        "Share of the samples at the extremes [%]",
+        ("waveform", *shares, "by hand, without the wheels' response"),
+        tuple((w, *(f"{100 * x[w]:.1f}" for x in (high, low, ideal))) for w in WAVES),
     )
-    c106 = judge("C106.figure", outcome, whole=all(in_order), part=any(in_order), value=dry["sine"] / dry["triangle"])
-    return figure_of(
-        "3.8",
-        (
-            *(_cloud(w) for w in WAVES),
-            Panel(
-                "Distribution over the differential traction, dry",
-                Axis("|mu_delta - mean| over its maximum"),
-                Axis("share of the samples", "%"),
-                tuple(lines),
-            ),
-        ),
-        (c106,),
-        (
-            Table(
-                "Share of the samples at the extremes [%]",
-                ("waveform", "slope 30", "slope 10", "by hand, without the wheels' response"),
-                tuple(
-                    (w, f"{100 * dry[w]:.1f}", f"{100 * low[w]:.1f}", f"{100 * ideal:.1f}")
-                    for w, ideal in zip(WAVES, (0.1, 1.0 - 2.0 / np.pi * np.arcsin(0.9), 0.4, 1.0), strict=True)
-                ),
-            ),
-        ),
-    )
+    return figure_of("3.8", (*(_cloud(w) for w in WAVES), spread), (c106,), (table,))
 
 
 FIGURES = {"3.6": figure_3_06, "3.7": figure_3_07, "3.8": figure_3_08}

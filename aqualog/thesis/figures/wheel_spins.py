@@ -12,7 +12,6 @@ from aqualog.detect.minor_spin_down import MinorParams
 from aqualog.model.programme import scene
 from aqualog.model.scenario import SURFACES, Lane
 from aqualog.report.theme import MUTED, THRESHOLD, wheel_colour
-from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence.campaign import DriveRun
 from aqualog.thesis.evidence.scenes import (
@@ -20,6 +19,7 @@ from aqualog.thesis.evidence.scenes import (
     SEEDS,
     SOME,
     SceneRun,
+    dry_and_wet,
     in_runs,
     known,
     run_of,
@@ -27,9 +27,16 @@ from aqualog.thesis.evidence.scenes import (
     share,
     spread,
     stretches,
-    words_of,
 )
-from aqualog.thesis.figures.time_panels import WHEEL_WORDS, bit_panel, feature_lines, panel, speed_panel
+from aqualog.thesis.figures.panels import (
+    WHEEL_WORDS,
+    bit_panel,
+    by_seed,
+    feature_lines,
+    panel,
+    scene_figure,
+    speed_panel,
+)
 from aqualog.thesis.record import Axis, Figure, Panel, Table, seconds
 
 __all__ = ["FIGURES", "panels_2_08", "panels_2_09"]
@@ -59,15 +66,10 @@ def _c28(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
         f"both in {in_runs(both)} runs (spin-down front right {in_runs(has_down)}, after {spread(down)} s; spin-up "
         f"rear right {in_runs(has_up)}, after {spread(up)} s); alarms before the entry in {in_runs(early)}"
     )
-    finding = judge(
-        "C28.figure", outcome, whole=both >= MANY and early == 0.0, part=both >= SOME or has_down >= MANY, value=both
-    )
-    table = Table(
-        "First detection after the entry [s]",
-        ("seed", "spin-down front right", "spin-up rear right"),
-        tuple((str(r.seed), seconds(a), seconds(b)) for r, a, b in zip(all_runs, down, up, strict=True)),
-    )
-    return finding, table
+    whole, part = both >= MANY and early == 0.0, both >= SOME or has_down >= MANY
+    finding = judge("C28.figure", outcome, whole=whole, part=part, value=both)
+    columns = {"spin-down front right": [*map(seconds, down)], "spin-up rear right": [*map(seconds, up)]}
+    return finding, by_seed("First detection after the entry [s]", all_runs, columns)
 
 
 def panels_2_08(r: DriveRun, front: str = "fr", rear: str = "rr") -> tuple[Panel, ...]:
@@ -87,10 +89,8 @@ def panels_2_08(r: DriveRun, front: str = "fr", rear: str = "rr") -> tuple[Panel
 
 def figure_2_08() -> Figure:
     """Speeds, acceleration differences front and rear right, detection bits of one run; C28 over all runs."""
-    all_runs = runs("2.8")
-    finding, table = _c28(all_runs)
-    r = all_runs[0]
-    return figure_of("2.8", panels_2_08(r), (finding,), (table,), **words_of(all_runs))
+    finding, table = _c28(runs("2.8"))
+    return scene_figure("2.8", panels_2_08, (finding,), (table,))
 
 
 _DIP, _LARGE = -0.015, -0.10  # [-] slip of a minor spin-down: beyond the first, not beyond the second
@@ -114,16 +114,10 @@ def _ratio(r: SceneRun) -> float:
     return float(np.median(_difference(r)[high] / var[high])) if high.any() else float("nan")
 
 
-def _rear_slip(r: SceneRun) -> tuple[float, float]:
-    """Median slip of the rear right wheel before and on the lane. [-]"""
-    slip = r.signal("true_slip_rr")
-    return float(np.nanmedian(slip[r.within(10.0, r.entry)])), float(np.nanmedian(slip[r.on_lane()]))
-
-
 def _c33(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
     rises = [r.after_entry(r.feature("variance_fr") > _LIMITS.var_min) for r in all_runs]
     ratios = [_ratio(r) for r in all_runs]
-    rear = [_rear_slip(r) for r in all_runs]
+    rear = [dry_and_wet(r, "true_slip_rr") for r in all_runs]
     soon = [t <= _SOON for t in rises]
     follows = [x > _RATIO for x in ratios]
     slight = [dry < wet < _REAR for dry, wet in rear]
@@ -134,12 +128,11 @@ def _c33(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
         f"{spread([100.0 * a for a, _ in rear])} % before and {spread([100.0 * b for _, b in rear])} % on the lane"
     )
     finding = judge("C33.figure", outcome, whole=every >= MANY, part=float(np.mean(follows)) >= MANY, value=every)
-    table = Table(
-        "Front right wheel on the lane",
-        ("seed", "variance beyond its limit after [s]", "difference over variance [-]"),
-        tuple((str(r.seed), seconds(a), seconds(b)) for r, a, b in zip(all_runs, rises, ratios, strict=True)),
-    )
-    return finding, table
+    columns = {
+        "variance beyond its limit after [s]": [*map(seconds, rises)],
+        "difference over variance [-]": [*map(seconds, ratios)],
+    }
+    return finding, by_seed("Front right wheel on the lane", all_runs, columns)
 
 
 def dips(r: SceneRun) -> list[slice]:
@@ -214,8 +207,7 @@ def figure_2_09() -> Figure:
     """Speeds of the right wheels, variances front and rear and their difference of one run; claims over all runs."""
     all_runs = runs("2.9")
     c33, table = _c33(all_runs)
-    r = all_runs[0]
-    return figure_of("2.9", panels_2_09(r), (c33, _c29(all_runs), _c32(all_runs)), (table,), **words_of(all_runs))
+    return scene_figure("2.9", panels_2_09, (c33, _c29(all_runs), _c32(all_runs)), (table,))
 
 
 FIGURES = {"2.8": figure_2_08, "2.9": figure_2_09}

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from aqualog.thesis.checks import contact, differential, estimator, excitation, joint, resistance_rules, wheels
+from aqualog.thesis.checks import contact, differential, estimator, excitation, joint, resistance, wheels
 from aqualog.thesis.claims import DIFFERENCE, NEEDS_DATA, NOT_REPRODUCED, REPRODUCED, combined
 from aqualog.thesis.evidence.seeds import Maker, Plan
 
@@ -59,7 +59,7 @@ def broken(function, factor=1.001):
         (estimator.cusum, "scan", estimator._change_detection, "C89"),
         (excitation, "axle_forces", excitation._sums, "C97"),
         (excitation, "f_step", excitation._waveforms, "C103"),
-        (resistance_rules, "nominal_acceleration", resistance_rules._balance, "C35"),
+        (resistance, "nominal_acceleration", resistance._balance, "C35"),
         (wheels.ewvar, "scan", wheels._moving_variance, "C30"),
     ],
     ids=lambda x: x if isinstance(x, str) and x.startswith("C") else "",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.evaluate.labels import Label, Labels
-from aqualog.thesis.checks import joint_rules, resistance_rules, slope_rules, wheels
+from aqualog.thesis.checks import joint, resistance, slip_slope, wheels
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
 from aqualog.thesis.evidence.drives import NUISANCE, WATER, Score, bits_of, detected, score, taken, threshold_for
 from aqualog.thesis.evidence.seeds import Plan
@@ -17,8 +17,8 @@ FEW = Plan(range(1, 3))
 @pytest.fixture
 def few(monkeypatch):
     """The rules' checks with two drives on water and one other of each situation."""
-    monkeypatch.setattr(joint_rules, "_PER_WATER", 2)
-    monkeypatch.setattr(joint_rules, "_PER_OTHER", 1)
+    monkeypatch.setattr(joint, "_PER_WATER", 2)
+    monkeypatch.setattr(joint, "_PER_OTHER", 1)
     return FEW
 
 
@@ -90,34 +90,30 @@ def test_sign_of_the_speed_difference(monkeypatch):
 
 
 def test_the_gate(few, monkeypatch):
-    found = joint_rules._gate(few)
+    found = joint._gate(few)
     assert found.verdict == REPRODUCED
     assert found.value < 0.5
-    without = joint_rules.variants
-    monkeypatch.setattr(
-        joint_rules, "variants", lambda n, s: {**without(n, s), "joint_criteria": without(n, s)["ungated"]}
-    )
-    assert joint_rules._gate(few).verdict == NOT_REPRODUCED
+    without = joint.variants
+    monkeypatch.setattr(joint, "variants", lambda n, s: {**without(n, s), "joint_criteria": without(n, s)["ungated"]})
+    assert joint._gate(few).verdict == NOT_REPRODUCED
 
 
 def test_braking_forces(few, monkeypatch):
-    assert joint_rules._spin_down(few).verdict in (REPRODUCED, DIFFERENCE)
-    without = joint_rules.variants
-    monkeypatch.setattr(
-        joint_rules, "variants", lambda n, s: {**without(n, s), "criterion_1": without(n, s)["spin_down"]}
-    )
-    assert joint_rules._spin_down(few).verdict == NOT_REPRODUCED
+    assert joint._spin_down(few).verdict in (REPRODUCED, DIFFERENCE)
+    without = joint.variants
+    monkeypatch.setattr(joint, "variants", lambda n, s: {**without(n, s), "criterion_1": without(n, s)["spin_down"]})
+    assert joint._spin_down(few).verdict == NOT_REPRODUCED
 
 
 def test_resistance_is_its_own_indicator(few):
-    assert joint_rules._resistance(few).verdict in (REPRODUCED, DIFFERENCE)
+    assert joint._resistance(few).verdict in (REPRODUCED, DIFFERENCE)
 
 
 def test_detections_by_rule_and_by_truth():
     """C66 and C68: none begins against its rule, and four of five are true."""
 
     def verdict(lawful, true):
-        return joint_rules._by_rule("C66.drives", "minor spin-down", lawful, true).verdict
+        return joint._by_rule("C66.drives", "minor spin-down", lawful, true).verdict
 
     assert verdict([True] * 10, [True] * 8 + [False] * 2) == REPRODUCED
     assert verdict([True] * 9 + [False], [True] * 10) == DIFFERENCE
@@ -126,24 +122,24 @@ def test_detections_by_rule_and_by_truth():
 
 
 def test_minor_spin_downs_begin_by_their_rule(monkeypatch):
-    monkeypatch.setattr(joint_rules, "_all", lambda plan: [taken("lane_deep", 1), taken("puddle", 1)])
-    assert joint_rules._minor(FEW).value > 0.8
+    monkeypatch.setattr(joint, "_all", lambda plan: [taken("lane_deep", 1), taken("puddle", 1)])
+    assert joint._minor(FEW).value > 0.8
     # a detector that begins far below its limits begins against the rule
-    strict = joint_rules.MinorParams.make(0.01, 1e9)
-    monkeypatch.setattr(joint_rules, "MinorParams", SimpleNamespace(make=lambda dt: strict))
-    assert joint_rules._minor(FEW).found.startswith("0 of ")
+    strict = joint.MinorParams.make(0.01, 1e9)
+    monkeypatch.setattr(joint, "MinorParams", SimpleNamespace(make=lambda dt: strict))
+    assert joint._minor(FEW).found.startswith("0 of ")
 
 
 def test_sign_and_balance_of_the_resistance(monkeypatch):
-    assert resistance_rules._sign(Plan(range(1, 7))).verdict == REPRODUCED
-    assert resistance_rules._balance(FEW).verdict == DIFFERENCE
-    measure = resistance_rules._measure
-    monkeypatch.setattr(resistance_rules, "_measure", lambda *a: -measure(*a))
-    assert resistance_rules._sign(Plan(range(1, 7))).verdict == NOT_REPRODUCED
+    assert resistance._sign(Plan(range(1, 7))).verdict == REPRODUCED
+    assert resistance._balance(FEW).verdict == DIFFERENCE
+    measure = resistance._measure
+    monkeypatch.setattr(resistance, "_measure", lambda *a: -measure(*a))
+    assert resistance._sign(Plan(range(1, 7))).verdict == NOT_REPRODUCED
 
 
 def test_mass_and_rolling_resistance_matter_most():
-    effect = resistance_rules._parameters()
+    effect = resistance._parameters()
     # a car that is heavier than its file says seems to be held back, the more the harder it accelerates
     assert 0.0 < effect["mass"]["80 km/h"] < 0.2 * effect["mass"]["80 km/h, 1 m/s^2"]
     assert effect["rolling_resistance"]["80 km/h"] == pytest.approx(0.3 * 0.0105 * 9.80665, rel=0.02)
@@ -152,14 +148,14 @@ def test_mass_and_rolling_resistance_matter_most():
 
 
 def test_high_pressure_and_winter_tyres():
-    assert slope_rules._pressure_and_tread(FEW).verdict == REPRODUCED
+    assert slip_slope._pressure_and_tread(FEW).verdict == REPRODUCED
 
 
 def test_slopes_of_other_roads(monkeypatch):
     few = Plan((1,))
-    found = {c.part: c.verdict for c in slope_rules._unchanged(few)}
+    found = {c.part: c.verdict for c in slip_slope._unchanged(few)}
     assert found["detection"] == REPRODUCED
     everywhere = {"slope": np.ones(1, dtype=bool), "joint_criteria": np.ones(1, dtype=bool)}
-    monkeypatch.setattr(slope_rules, "variants", lambda n, s: everywhere)
-    assert {c.part: c.verdict for c in slope_rules._unchanged(few)}["detection"] == NOT_REPRODUCED
-    assert slope_rules._not_unique(few).verdict == NOT_REPRODUCED
+    monkeypatch.setattr(slip_slope, "variants", lambda n, s: everywhere)
+    assert {c.part: c.verdict for c in slip_slope._unchanged(few)}["detection"] == NOT_REPRODUCED
+    assert slip_slope._not_unique(few).verdict == NOT_REPRODUCED

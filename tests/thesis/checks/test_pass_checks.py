@@ -23,9 +23,21 @@ from aqualog.thesis.evidence.passes import (
     figures_of,
     slope_of,
 )
-from aqualog.thesis.evidence.seeds import Cell, Plan, estimate, first_speed, mean, scatter, spread_over, table_of, told
+from aqualog.thesis.evidence.seeds import (
+    PASS_SEEDS,
+    Cell,
+    Plan,
+    estimate,
+    first_speed,
+    mean,
+    scatter,
+    spread_over,
+    table_of,
+    told,
+)
 
-MAKERS = {m.claims[0]: m.checks for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS}
+PASSES = [m for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS if m.seeds == PASS_SEEDS]
+MAKERS = {m.claims[0]: m.checks for m in PASSES}
 SEEDS = (1, 2, 3, 4)
 
 # --- passes -----------------------------------------------------------------------------------------------------------
@@ -395,7 +407,7 @@ def test_c47_on_one_drive():
 
 
 def test_every_claim_of_chapter_2_by_passes_has_a_maker():
-    wanted = {3, 4, 5, 6, *range(12, 24), *range(37, 46), *range(47, 56), 70, 71, 78}
+    wanted = {3, 4, 5, 6, *range(12, 24), *range(37, 46), *range(47, 56), 70, 78}
     assert {int(c[1:]) for c in MAKERS} == wanted
 
 

@@ -223,7 +223,7 @@ def test_c42_by_hand(monkeypatch, a, b, share, verdicts):
     levels = [level("old", ("w", "worn", 1.6), (1.3, None)), level("deep", ("n", "new", 8.0), (1.3, None))]
     found = Found(levels, wish, {("old", "deep"): (effect(a, 0.02), effect(b, 0.02))})
     made = [SimpleNamespace(columns={"y": np.array([v])}) for v in (1.0, share)]
-    monkeypatch.setattr(resistance, "common", lambda x, y: made)
+    monkeypatch.setattr(measures, "common", lambda x, y: made)
     assert (resistance.treads_differ("C40", found).verdict, resistance._c42(found).verdict) == verdicts
 
 

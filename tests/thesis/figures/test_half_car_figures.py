@@ -17,8 +17,8 @@ from aqualog.thesis.catalogue import rows
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, VERDICTS
 from aqualog.thesis.evidence import brush, half_car
 from aqualog.thesis.evidence.half_car import GATE_OFF, SUV, Case
-from aqualog.thesis.figures import amplitudes, change_input, periods, splits, timeline, waveforms
-from aqualog.thesis.figures.splits import DRY
+from aqualog.thesis.figures import amplitudes, brush_curves, change_input, periods, timeline, waveforms
+from aqualog.thesis.figures.brush_curves import DRY
 from aqualog.thesis.record import seconds, stem_of
 from aqualog.thesis.run import make
 from tests.thesis.made import all_made, check, made
@@ -126,10 +126,10 @@ def test_lines_of_a_split_lie_on_the_surface():
 
 def test_blind_split_by_hand():
     """Slips are alike where (1 - nu) / 0.4 = nu / 0.6; small forces show [(1 - nu) / 0.4 - nu / 0.6] / 30."""
-    assert splits.blind_split(0.1) == pytest.approx(0.6, abs=1e-8)
+    assert brush_curves.blind_split(0.1) == pytest.approx(0.6, abs=1e-8)
     nu = np.array([0.0, 0.3, 0.6, 1.0])
     expected = ((1 - nu) / 0.4 - nu / 0.6) / 30.0
-    assert splits.slip_per_force(nu, 1e-6) == pytest.approx(expected, abs=1e-6)
+    assert brush_curves.slip_per_force(nu, 1e-6) == pytest.approx(expected, abs=1e-6)
     assert check("3.5", "C95").value == pytest.approx(0.6, abs=1e-6)
 
 
@@ -238,9 +238,9 @@ def test_density_at_the_extremes_by_hand():
 
 
 def test_rates_and_availability():
-    assert waveforms._rate("triangle") == pytest.approx(100.0)
-    assert waveforms._rate("sine") == pytest.approx(50.0 * np.pi)
-    assert waveforms._rate("ramp") == pytest.approx(150.0)
+    assert waveforms.felt_of("triangle").rate == pytest.approx(100.0)
+    assert waveforms.felt_of("sine").rate == pytest.approx(50.0 * np.pi)
+    assert waveforms.felt_of("ramp").rate == pytest.approx(150.0)
     table = next(t for t in made("3.7").tables if t.title == "Comfort")
     assert {r[0]: float(r[2]) for r in table.rows} == pytest.approx(
         {"triangle": 1.0, "sine": 1.57, "ramp": 1.5, "step": 500.0}, abs=0.1

@@ -1,4 +1,4 @@
-"""Pages and tables of figures as text: nothing from outside, the same every time, units in every header."""
+"""Pages and tables of figures and of a reproduction as text: nothing from outside, the same every time, units in every header."""
 
 import base64
 import csv
@@ -9,14 +9,18 @@ import re
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from aqualog.cli.main import app
+from aqualog.core.errors import ConfigError
 from aqualog.thesis.catalogue import WITHOUT
-from aqualog.thesis.claims import DIFFERENCE, Check
+from aqualog.thesis.claims import DIFFERENCE, NEEDS_DATA, NOT_REPRODUCED, REPRODUCED, VERDICTS, Check, claims
 from aqualog.thesis.draw import panel_figure, rounded
-from aqualog.thesis.export import figure_csv, figures_document
-from aqualog.thesis.page import panel_ids, render_figures
+from aqualog.thesis.export import claims_csv, claims_document, counts_of, figure_csv, figures_document
+from aqualog.thesis.page import panel_ids, render_figures, render_reproduction
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
-from aqualog.thesis.run import make
+from aqualog.thesis.run import Made, conclude, make
+from tests.headless import severe, wait_for
 from tests.thesis.made import all_made, made
 
 
@@ -125,3 +129,98 @@ def test_colours_are_left_to_the_page_and_solid_panels_are_solid():
             assert figure["layout"]["font"]["color"] == "@ink"
             kinds = {t["type"] for t in figure["data"]}
             assert kinds <= ({"scatter3d", "surface"} if p.z else {"scatter"})
+
+
+# --- the reproduction
+
+HOSTILE_FOUND = "</script><img src=x onerror=\"document.body.dataset.hit='1'\">"
+
+
+def small_figure(number, verdict, claim):
+    x = np.linspace(0.0, 1.0, 20)
+    panel = Panel("panel", Axis("v", "km/h"), Axis("slip"), (Line("line", x, x * x),))
+    check = Check(claim, "crit", f"found {HOSTILE_FOUND}", verdict, reason="" if verdict == REPRODUCED else "why")
+    return Figure(number, "title", "caption", (panel,), (check,))
+
+
+def made_up():
+    checks = [
+        Check(name, "criterion", "found", VERDICTS[i % 4], reason="because", value=1.5, ci95=(1.0, 2.0), unit="m/s^2")
+        for i, name in enumerate(claims())
+    ]
+    figures = (small_figure("2.3", REPRODUCED, "C1"), small_figure("3.5", NOT_REPRODUCED, "C2"))
+    return Made(figures, tuple(checks), {"2.4": f"no runs {HOSTILE_FOUND}"})
+
+
+@pytest.fixture(scope="module")
+def reproduction():
+    m = made_up()
+    return render_reproduction(conclude(m), m.figures, m.missing, ["a fact"])
+
+
+def test_every_claim_has_one_verdict_from_its_checks_and_figures():
+    found = conclude(made_up())
+    of = {c.claim.id: c.verdict for c in found}
+    assert list(of) == list(claims())
+    assert (of["C1"], of["C2"], of["C3"], of["C4"]) == (REPRODUCED, DIFFERENCE, NOT_REPRODUCED, NEEDS_DATA)
+    assert sum(counts_of(found).values()) == 118
+    spoilt = Made((small_figure("2.3", NOT_REPRODUCED, "C1"),), made_up().checks, {})
+    assert conclude(spoilt)[0].verdict == DIFFERENCE
+
+
+def test_a_claim_that_nothing_judges_is_an_error():
+    m = made_up()
+    with pytest.raises(ConfigError, match="C118"):
+        conclude(Made(m.figures, m.checks[:-1], m.missing))
+
+
+def test_page_has_all_claims_numbers_and_missing_figures(reproduction):
+    for name in claims():
+        assert f'id="{name}"' in reproduction
+    assert "1.5 [1, 2] m/s²" in reproduction
+    assert 'href="#figure_2_03"' in reproduction
+    assert reproduction.count("<script>") == 2
+    assert "no runs &lt;/script&gt;" in reproduction
+
+
+def test_reproduction_is_the_same_for_the_same_results(reproduction):
+    m = made_up()
+    assert render_reproduction(conclude(m), m.figures, m.missing, ["a fact"]) == reproduction
+
+
+def test_documents_of_claims():
+    m = made_up()
+    found = conclude(m)
+    whole = json.loads(json.dumps(claims_document(found, m.figures, m.missing, {"conditions": ["a"]}), allow_nan=False))
+    assert len(whole["claims"]) == 118
+    assert whole["figures_missing"].keys() == {"2.4"}
+    rows = list(csv.DictReader(io.StringIO(claims_csv(found))))
+    assert len(rows) == 120  # two of the figures
+    assert {r["claim"] for r in rows} == set(claims())
+
+
+@pytest.mark.browser
+def test_page_in_the_browser(reproduction, tmp_path, browser):
+    path = tmp_path / "index.html"
+    path.write_text(reproduction, encoding="utf-8")
+    browser.get(path.as_uri())
+    wait_for(lambda: browser.execute_script("return document.body.dataset.ready === 'true'"))
+    assert browser.execute_script("return document.body.dataset.hit") is None
+    assert len(browser.find_elements("css selector", ".plot .main-svg")) >= 2
+    shown = "return document.querySelectorAll('#claims tbody:not([hidden])').length"
+    assert browser.execute_script(shown) == 118
+    browser.find_element("css selector", ".chip.reproduced").click()
+    without = browser.execute_script(shown)
+    assert without == 118 - counts_of(conclude(made_up()))[REPRODUCED]
+    browser.find_element("id", "search").send_keys("C118")
+    assert browser.execute_script(shown) == 1
+    assert "1 of 118" in browser.find_element("id", "shown").text
+    assert severe(browser) == []
+
+
+def test_results_are_not_overwritten(tmp_path):
+    (tmp_path / "index.html").write_text("mine")
+    result = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "exists already" in result.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["index.html"]
