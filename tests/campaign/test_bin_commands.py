@@ -75,7 +75,7 @@ def test_slopes_as_the_contract_says(campaign):
 def test_tables_and_files(campaign, tmp_path):
     done = invoke("bin-slipslope", campaign, "--road", "both", "--robust", "-o", tmp_path / "s.csv", "--jobs", 1)
     assert done.exit_code == 0, done.stderr
-    assert "Speed of full aquaplaning" in done.stdout
+    assert "speed of full aquaplaning" in done.stdout
     assert "v_x is late by" in done.stdout
     rows = list(csv.DictReader((tmp_path / "s.csv").open()))
     assert {r["road"] for r in rows} == {"wet", "dry"}
