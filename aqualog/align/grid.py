@@ -254,7 +254,7 @@ def onto_grid(
     dt_ns: int,
     at: Placed | None,
 ) -> tuple[FloatArray, bool]:
-    """Put samples (n,) of a signal, at least those around the points (m,) [ns], on the grid; and whether one is missing.
+    """Put samples (n,) of a signal, at least those around the points (m,) [ns], on the grid; whether one is missing.
 
     `span` is that of the whole signal: its sample time decides what is bridged. `at`: where the points lie among these
     stamps; None without samples.
