@@ -13,7 +13,7 @@ SCENARIO = 'vehicle = "vehicle.toml"\nspeed_kmh = 80.0\nduration_s = 1.0\n'
 CAR = ("--vehicle", "vehicle.toml")
 # command: arguments, exit code, and a part of what it prints; in this order, as some go on with what others left
 CALLS = {
-    "detect": (("lane_drive.mf4", *CAR, "--fail-on-event"), 5, "minor_spin_down"),
+    "detect": (("lane_drive.mf4", *CAR, "--fail-on-event", "--json"), 5, "minor_spin_down"),
     "inspect": (("lane_drive.mf4",), 0, "omega_fl"),
     "doctor": (("cut.mcap", *CAR), 3, "cut.mcap"),
     "convert": (("lane_drive.mf4", *CAR, "-o", "again.parquet"), 0, ""),
