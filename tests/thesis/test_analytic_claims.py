@@ -131,6 +131,18 @@ def test_C34_resistance_measure_is_positive_for_more_resistance():
     assert f["delta_a_x"][1:] == pytest.approx(0.3, abs=2e-3)
 
 
+def test_C35_nominal_acceleration_by_hand():
+    """2.10: a_nom = (sum(T_i / r_l,i - r_w,i F_z,i) - c_x v^2) / m with c_x = 1/2 c_w A rho."""
+    torque = np.array([[10.0], [20.0], [300.0], [310.0]])
+    F_z = np.array([[4100.0], [4200.0], [3900.0], [3800.0]])
+    a = nominal_acceleration(
+        torque, F_z, one(30.0), np.zeros((4, 1)), r_l=np.array([0.30, 0.30, 0.31, 0.31]), inertia=np.ones(4), mass=1600.0,
+        r_w=0.01, drag_area=0.7, air_density=1.2,
+    )[0]  # fmt: skip
+    # 30/0.3 + 610/0.31 = 2067.742; 160 N of rolling; 378 N of drag
+    assert a == pytest.approx((2067.7419 - 160.0 - 378.0) / 1600.0, rel=1e-7)
+
+
 @pytest.mark.parametrize("a_x", [0.0, 1.0])
 def test_C35_nothing_is_missing_on_a_dry_drive(a_x):
     """2.10 on the half-car of 3.3: the wheels' inertia apart (E5), the torques explain the acceleration."""
