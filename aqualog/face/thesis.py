@@ -234,7 +234,7 @@ def figures(
 
 
 def check_formats(formats: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats in their order; an unknown one is a ConfigError, as is none at all."""
+    """Return the formats in their order; an unknown one, or no format at all, is a ConfigError."""
     asked = [f.strip().lower() for f in formats if f.strip()]
     if not asked or set(asked) - set(FORMATS):
         raise ConfigError(

@@ -96,7 +96,7 @@ def interval(name: str, unit: str, meaning: str, *, null: bool = False) -> Field
 
 
 def with_ci(name: str, unit: str, meaning: str) -> tuple[Field, Field]:
-    """A number, null where there is none, and its interval `NAME_ci95`."""
+    """A number, null where it is not available, and its interval `NAME_ci95`."""
     return number(name, unit, meaning, null=True), interval(f"{name}_ci95", unit, "95 % interval")
 
 

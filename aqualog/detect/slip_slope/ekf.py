@@ -1,4 +1,4 @@
-"""Extended Kalman filter [kalman1960] of inverse slope, slope ratio and slip offset; what the last seconds tell."""
+"""Extended Kalman filter [kalman1960] of inverse slope, slope ratio and slip offset; what the last seconds show."""
 
 from __future__ import annotations
 
