@@ -77,7 +77,7 @@ def test_libraries_whose_private_parts_are_used_have_a_ceiling(name):
 
 def steps(path):
     """Scripts of `.ci` that a file runs, with what they are given."""
-    return re.findall(r"^(?:RUN )?(\.ci/\w+) ", (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE)
+    return re.findall(r"^(?:RUN |beside \w+ )?(\.ci/\w+) ", (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def test_container_is_built_by_the_steps_of_the_checks():
