@@ -18,7 +18,7 @@ from aqualog.align.propose_map import LogFile
 from aqualog.campaign.definition import GROUP_NAMES
 from aqualog.campaign.store import MARK
 from aqualog.core.errors import AqualogError
-from aqualog.io.open_log import open_log, sniff
+from aqualog.io.open_log import LOG_SUFFIXES, open_log, sniff
 from aqualog.io.reader import ReadOptions
 
 __all__ = [
@@ -26,7 +26,6 @@ __all__ = [
     "without_twins",
 ]  # fmt: skip
 
-SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
 _RUN_COLUMNS = {k for keys in GROUP_NAMES.values() for k in keys} | {
     "", "log", "labels", "lane_start_s", "lane_end_s", "water_depth_left_mm",
 }  # fmt: skip
@@ -104,7 +103,7 @@ def _walk(folder: Path) -> list[Path]:
         bags = [f for f in folders if (here / f / "metadata.yaml").exists() and sniff(here / f) == "ros"]
         found += [here / f for f in bags]
         folders[:] = [f for f in folders if f not in bags]
-        found += [here / n for n in sorted(names) if not n.startswith(".") and Path(n).suffix.lower() in SUFFIXES]
+        found += [here / n for n in sorted(names) if not n.startswith(".") and Path(n).suffix.lower() in LOG_SUFFIXES]
     return sorted(found)
 
 
@@ -226,7 +225,7 @@ def _share_a_word(names: Iterable[Sequence[str]]) -> bool:
 
 def _rank(path: Path) -> int:
     """Formats with units and groups first; a bag's folder has no suffix."""
-    return SUFFIXES.index(path.suffix.lower()) if path.suffix.lower() in SUFFIXES else 0
+    return LOG_SUFFIXES.index(path.suffix.lower()) if path.suffix.lower() in LOG_SUFFIXES else 0
 
 
 def _are_partners(

@@ -21,13 +21,10 @@ from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
 from aqualog.doctor.findings import Examination, FileState, Finding
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.fingerprint import changed_files, state_of
-from aqualog.io.open_log import open_log, read_readable
+from aqualog.io.open_log import open_log, read_readable, stored_in
 from aqualog.io.reader import ReadOptions
 
 __all__ = ["examine"]
-
-
-_STORED = {"mdf": "records", "csv": "rows or cells", "parquet": "rows or values"}  # messages elsewhere
 
 
 def examine(
@@ -132,7 +129,7 @@ def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
         advice = "record again if the end matters; a logger that loses power needs a buffered supply"
         yield Finding("lost", "truncated", name, "", "is cut off: its end is missing", advice)
     if faults.lost_samples:
-        what = f"{faults.lost_samples} {_STORED.get(kind, 'messages')} could not be read"
+        what = f"{faults.lost_samples} {stored_in(kind)} could not be read"
         yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",
                       faults.lost_samples)  # fmt: skip
     for drift in faults.drifts:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.io import atomic_write
-from aqualog.io.open_log import sniff
+from aqualog.io.open_log import LOG_SUFFIXES, sniff
 
 __all__ = [
     "check_name",
@@ -169,15 +169,14 @@ def _text_of_list(path: Path) -> str:
 def _from_folder(path: Path) -> list[Path]:
     if _is_log(path):
         return [path]
-    hits = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix.lower() in _LOG_SUFFIXES and _is_log(p)]
+    hits = [p for p in sorted(path.iterdir()) if p.is_file() and p.suffix.lower() in LOG_SUFFIXES and _is_log(p)]
     if not hits:
-        raise ConfigError("no log in this folder", where=str(path), expected=" ".join(_LOG_SUFFIXES))
+        raise ConfigError("no log in this folder", where=str(path), expected=" ".join(LOG_SUFFIXES))
     return hits
 
 
 _LARGEST_LIST = 100_000_000  # [byte] a million names
 # In a folder, text files that are no logs (README, notes, maps) stand beside them, so there the suffix is asked too.
-_LOG_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
 
 
 def _is_log(path: Path) -> bool:

@@ -13,7 +13,7 @@ from aqualog.core.records import Channel, ChannelInfo, FileFaults
 from aqualog.guard.reading import reading
 from aqualog.io.reader import Closing, Part, Reader, ReadOptions, csv_hint, format_of
 
-__all__ = ["DriveLog", "open_log", "read_readable", "sniff"]
+__all__ = ["LOG_SUFFIXES", "DriveLog", "open_log", "read_readable", "sniff", "stored_in"]
 
 
 _HEAD = 4096
@@ -21,14 +21,23 @@ _MCAP = b"\x89MCAP0\r\n"
 _NAMED = 3  # channels of a lost group that are named
 
 
+# Format by content: module and class of its reader, and what a log of it stores.
 # Each reader's libraries are imported when a file of its format is opened, not before.
 _READERS = {
-    "mdf": ("aqualog.io.mdf.reader", "MdfReader"),
-    "mcap": ("aqualog.io.messages.reader", "McapReader"),
-    "ros": ("aqualog.io.messages.reader", "RosReader"),
-    "csv": ("aqualog.io.tables.csv", "CsvReader"),
-    "parquet": ("aqualog.io.tables.parquet", "ParquetReader"),
+    "mdf": ("aqualog.io.mdf.reader", "MdfReader", "records"),
+    "mcap": ("aqualog.io.messages.reader", "McapReader", "messages"),
+    "ros": ("aqualog.io.messages.reader", "RosReader", "messages"),
+    "csv": ("aqualog.io.tables.csv", "CsvReader", "rows or cells"),
+    "parquet": ("aqualog.io.tables.parquet", "ParquetReader", "rows or values"),
 }
+
+LOG_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
+"""Of files that are looked for in a folder, the richest format first. A file that is named needs none of them."""
+
+
+def stored_in(kind: str) -> str:
+    """Return what a log of a format stores, for messages about loss."""
+    return _READERS[kind][2] if kind in _READERS else "messages"
 
 
 def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
@@ -42,7 +51,7 @@ def open_log(path: Path, options: ReadOptions | None = None) -> Reader:
     options = options or ReadOptions()
     has_encoding = bool(format_of(options.csv, path.name).encoding)
     with reading(path):
-        module, name = _READERS[sniff(path, any_text=has_encoding)]
+        module, name, _ = _READERS[sniff(path, any_text=has_encoding)]
         reader: Reader = getattr(import_module(module), name)(path, options)
     return _Watched(path, reader)
 
@@ -239,7 +248,7 @@ def _is_recording(folder: Path) -> bool:
     """Whether a folder without metadata holds one ROS 2 recording and no other log: one file, or parts counted from 0,
     as ROS names them. A folder of drives, each in a file of its own, would otherwise be read as one.
     """
-    logs = [p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES]
+    logs = [p for p in folder.iterdir() if p.suffix.lower() in LOG_SUFFIXES]
     if len(logs) == 1:
         return logs[0].suffix.lower() in (".db3", ".mcap")
     parts = [_PART.fullmatch(p.name) for p in logs]
@@ -252,7 +261,6 @@ def _is_recording(folder: Path) -> bool:
     )
 
 
-_SUFFIXES = (".mf4", ".mdf", ".dat", ".mcap", ".bag", ".db3", ".csv", ".tsv", ".parquet")
 _PART = re.compile(r"(.*)_(\d{1,6})\.(db3|mcap)", re.DOTALL)
 
 _MAGIC = (
