@@ -48,16 +48,20 @@ ACTS = {
 
 
 def mistreat(opening):
-    real, names = opening.import_module, dict(opening._READERS.values())
+    real = opening.import_module
 
     def import_module(module):
-        def reads(path, options):
-            kind = path.stem.partition("poison_")[2].partition(".")[0]
-            if kind in ACTS:
-                ACTS[kind](path)
-            return getattr(real(module), names[module])(path, options)
+        def misbehaving(name):
+            def reads(path, options):
+                kind = path.stem.partition("poison_")[2].partition(".")[0]
+                if kind in ACTS:
+                    ACTS[kind](path)
+                return getattr(real(module), name)(path, options)
 
-        return types.SimpleNamespace(**{names[module]: reads})
+            return reads
+
+        names = [name for where, name, _ in opening._READERS.values() if where == module]
+        return types.SimpleNamespace(**{name: misbehaving(name) for name in names})
 
     opening.import_module = import_module
 

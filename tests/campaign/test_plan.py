@@ -152,7 +152,7 @@ def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, mon
     runs = configured.campaign.runs
     run_batch(replace(configured, campaign=replace(configured.campaign, runs=runs[:1])), store)
     (tmp_path / "runs.csv").open("a").write("logs/none.mf4,a,,,,,\n")
-    monkeypatch.setattr(Contents, "of", lambda *_: pytest.fail("a log is hashed"))
+    monkeypatch.setattr(Contents, "_unknown", lambda *_: pytest.fail("a log is hashed"))
     work = work_of(configure(path), store)
     assert [j.logs for j, _, _ in work.new] == [runs[1].logs]
     assert (work.kept, work.failed, len(work.missing)) == (1, 0, 1)

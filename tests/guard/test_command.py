@@ -18,7 +18,7 @@ import collections, ctypes, importlib, itertools, os, sys, tempfile, time
 from pathlib import Path
 import aqualog.io.open_log as opening
 from aqualog.guard.reading import unfinished
-module, name = opening._READERS["csv"]
+module, name, _ = opening._READERS["csv"]
 
 def write(path):
     with tempfile.NamedTemporaryFile() as file:
@@ -60,7 +60,7 @@ def bad(path, options):
         act(path)
     return getattr(importlib.import_module(module), name)(path, options)
 
-opening._READERS["csv"] = ("__main__", "bad")
+opening._READERS["csv"] = ("__main__", "bad", "rows")
 '''
 LOOK = """
 import json
