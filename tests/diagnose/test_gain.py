@@ -89,10 +89,10 @@ def test_gain_is_deterministic():
 
 @pytest.mark.parametrize(("drives", "blocks"), [(1, 15), (3, 15), (8, 15), (3, 1)])
 @pytest.mark.parametrize(
-    ("n", "least", "most"), [(60, 0.87, 1.0), pytest.param(500, 0.90, 0.98, marks=pytest.mark.nightly)]
+    ("n", "least", "most"), [(120, 0.88, 0.995), pytest.param(500, 0.90, 0.98, marks=pytest.mark.nightly)]
 )
 def test_interval_covers(drives, blocks, n, least, most):
-    """Many sets of drives; where drives are the units, their own gains vary too."""
+    """Many sets of drives; where drives are the units, their own gains vary too. All of 120 sets within: too wide."""
     rng = np.random.default_rng(5)
     covered = 0
     for seed in range(n):

@@ -96,7 +96,6 @@ def wind():
     return drive, case([drive], WIND)
 
 
-@pytest.mark.nightly
 @pytest.mark.xfail(
     strict=True,
     reason="the trial forecasts little from hard acceleration since the curve of a tyre is allowed for so widely",
