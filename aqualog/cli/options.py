@@ -127,7 +127,8 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     # one drive
     "out:results": _file("Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
     "write": _file(
-        "Signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.", "--write"
+        "Signals, statistics and detection bits as channels of a log: .mf4, .mcap (with the events), .csv or .parquet.",
+        "--write",
     ),
     "history": _file(
         "Dry slip slopes of this car from earlier drives (JSON); read, and written back with this drive's.",

@@ -160,7 +160,10 @@ class Detection(Result):
         return files if self.has_samples else {"events.json": files["events.json"]}
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet."""
+        """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
+
+        The first two hold the events, too: as event blocks of MDF and as messages `foxglove.Event`.
+        """
         from aqualog.io.write_log import check_suffix
 
         suffix = check_suffix(file_of(path, "path"))
@@ -343,11 +346,11 @@ def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 
     import numpy as np
 
     from aqualog.io.write_log import write_log
-    from aqualog.report.drive.document import result_groups
+    from aqualog.report.drive.document import result_events, result_groups
 
     signals = found.signals
     t_ns = (first_row + np.arange(signals.frame.height, dtype=np.int64)) * signals.dt_ns
-    write_log(path, t_ns, result_groups(found), suffix=suffix, start_ns=signals.start_ns)
+    write_log(path, t_ns, result_groups(found), suffix=suffix, start_ns=signals.start_ns, events=result_events(found))
 
 
 def model_of(model: PathLike | Model | None) -> Model | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray, TimeArray
+from aqualog.io.log_event import LogEvent
 
 __all__ = ["LogGroup", "check_suffix", "write_log"]
 
@@ -52,6 +53,7 @@ def write_log(
     decimal_comma: bool = False,
     comment: str = "written by aqualog",
     written_ns: int | None = None,
+    events: Sequence[LogEvent] = (),
 ) -> None:
     """Write groups of channels, on one time base where the format is a table.
 
@@ -73,19 +75,21 @@ def write_log(
         About the log, for formats that have a place for it (MDF, MCAP).
     written_ns : int, optional
         Time of writing for formats that keep it (MDF), since 1970 UTC; default now.
+    events : sequence of LogEvent
+        For formats that have a place for them (MDF, MCAP).
     """
     if suffix == ".mf4":
         from aqualog.io.write_mdf import MdfGroup, write_mf4
 
         seconds = [(t_ns if g.t_ns is None else g.t_ns).astype(np.float64) * 1e-9 for g in groups]
         mdf_groups = [MdfGroup(g.name, t, g.columns) for g, t in zip(groups, seconds, strict=True)]
-        write_mf4(path, mdf_groups, start_ns, comment, written_ns=written_ns)
+        write_mf4(path, mdf_groups, start_ns, comment, written_ns=written_ns, events=events)
         return
     if suffix == ".mcap":
         from aqualog.io.write_mcap import McapTopic, write_mcap
 
         topics = [McapTopic(f"/{g.name}", t_ns if g.t_ns is None else g.t_ns, g.columns) for g in groups]
-        write_mcap(path, topics, start_ns, comment)
+        write_mcap(path, topics, start_ns, comment, events=events)
         return
     if any(g.t_ns is not None for g in groups):
         raise ValueError(f"{suffix} is one table: bring the groups onto one time base first")

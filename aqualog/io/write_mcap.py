@@ -15,10 +15,28 @@ from mcap.writer import CompressionType, Writer
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import FloatArray, TimeArray
+from aqualog.io.log_event import LogEvent
 
-__all__ = ["McapTopic", "write_mcap"]
+__all__ = ["EVENT_TOPIC", "McapTopic", "write_mcap"]
 
+EVENT_TOPIC = "/aqualog/events"
 _BLOCK = 4096
+_TIME = {
+    "type": "object", "title": "time",
+    "properties": {
+        "sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999_999_999},
+    },
+}  # fmt: skip
+_PAIR = {
+    "type": "object", "title": "foxglove.KeyValuePair",
+    "properties": {"key": {"type": "string"}, "value": {"type": "string"}}, "required": ["key", "value"],
+}  # fmt: skip
+_EVENT = {
+    "title": "foxglove.Event", "description": "A discrete event that occurred over a time range", "type": "object",
+    "properties": {"start_time": _TIME, "end_time": _TIME, "metadata": {"type": "array", "items": _PAIR}},
+    "required": ["start_time", "end_time"],
+}  # fmt: skip
+"""The JSON schema that a timeline knows by its name. [foxglove_event2026]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +52,9 @@ class McapTopic:
 
 
 def write_mcap(
-    path: Path, topics: Sequence[McapTopic], start_ns: int | None, comment: str = "written by aqualog"
-) -> None:
+    path: Path, topics: Sequence[McapTopic], start_ns: int | None, comment: str = "written by aqualog",
+    *, events: Sequence[LogEvent] = (),
+) -> None:  # fmt: skip
     """Write topics into one file, message by message in the order of time.
 
     Parameters
@@ -48,6 +67,8 @@ def write_mcap(
         Added to all times; None leaves them as they are, counted from 0 or from 1970. [ns]
     comment : str
         Kept as metadata of the file.
+    events : sequence of LogEvent
+        Messages `foxglove.Event` at their start, on a topic of their own; without events there is no such topic.
 
     Raises
     ------
@@ -63,7 +84,7 @@ def write_mcap(
             writer.start(profile="", library="aqualog")
             writer.add_metadata("aqualog", {"comment": comment})
             channels = [_register(writer, topic) for topic in topics]
-            rows = heapq.merge(*starmap(_rows, zip(channels, topics, strict=True)))
+            rows = heapq.merge(*starmap(_rows, zip(channels, topics, strict=True)), _event_rows(writer, events, offset))
             for sequence, (t, channel, _, data) in enumerate(rows):
                 writer.add_message(channel, t + offset, data, t + offset, sequence & 0xFFFFFFFF)
             writer.finish()
@@ -107,3 +128,22 @@ def _nullable(values: FloatArray) -> list[float | None]:
     finite = np.isfinite(values)
     plain: list[float | None] = values.tolist()
     return plain if finite.all() else [v if ok else None for v, ok in zip(plain, finite, strict=True)]
+
+
+def _event_rows(writer: Writer, events: Sequence[LogEvent], offset: int) -> Iterator[tuple[int, int, int, bytes]]:
+    """Time, channel, number and JSON of each event, in the order of their start."""
+    if not events:
+        return iter(())
+    schema_id = writer.register_schema(name=_EVENT["title"], encoding="jsonschema", data=json.dumps(_EVENT).encode())
+    channel = writer.register_channel(topic=EVENT_TOPIC, message_encoding="json", schema_id=schema_id)
+    ordered = sorted(events, key=lambda e: e.start_ns)
+    return iter([(e.start_ns, channel, i, _event_json(e, offset)) for i, e in enumerate(ordered)])
+
+
+def _event_json(event: LogEvent, offset: int) -> bytes:
+    start, end = (
+        dict(zip(("sec", "nsec"), divmod(t + offset, 10**9), strict=True)) for t in (event.start_ns, event.end_ns)
+    )
+    about = {"name": event.name, "text": event.text, **event.properties}
+    pairs = [{"key": k, "value": v} for k, v in about.items()]
+    return json.dumps({"start_time": start, "end_time": end, "metadata": pairs}).encode()

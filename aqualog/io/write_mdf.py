@@ -11,12 +11,15 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
+from xml.sax.saxutils import escape, quoteattr
 
 import asammdf
 import numpy as np
-from asammdf.blocks.v4_blocks import FileHistory
+from asammdf.blocks import v4_constants
+from asammdf.blocks.v4_blocks import EventBlock, FileHistory
 
 from aqualog.core.records import FloatArray
+from aqualog.io.log_event import LogEvent
 
 __all__ = ["MdfGroup", "write_mf4", "writing"]
 
@@ -38,7 +41,7 @@ class MdfGroup:
 
 def write_mf4(
     path: Path, groups: Sequence[MdfGroup], start_ns: int | None, comment: str,
-    *, compression: Compression = 2, written_ns: int | None = None,
+    *, compression: Compression = 2, written_ns: int | None = None, events: Sequence[LogEvent] = (),
 ) -> None:  # fmt: skip
     """Write measured channels.
 
@@ -57,9 +60,11 @@ def write_mf4(
     written_ns : int, optional
         Time of writing for the file's history, since 1970 UTC; default now. With one the same channels give the same
         bytes.
+    events : sequence of LogEvent
+        Each becomes two EV blocks, the beginning and the end of a range. [asam_mdf_2019]
     """
-    with writing(path, groups, start_ns, comment, compression=compression, written_ns=written_ns):
-        pass
+    with writing(path, groups, start_ns, comment, compression=compression, written_ns=written_ns) as mdf:
+        mdf.events.extend(b for i, e in enumerate(events) for b in _event_blocks(e, first=2 * i))
 
 
 @contextmanager
@@ -91,3 +96,34 @@ def writing(
             mdf.save(file, compression=compression, add_history_block=written_ns is None)
     finally:
         mdf.close()
+
+
+def _event_blocks(event: LogEvent, *, first: int) -> tuple[EventBlock, EventBlock]:
+    """The beginning and the end of a range; `first` is the place of the beginning among all blocks of events."""
+    begin = _event_block(event.name, event.start_ns, v4_constants.EVENT_RANGE_TYPE_BEGINNING)
+    end = _event_block(event.name, event.end_ns, v4_constants.EVENT_RANGE_TYPE_END)
+    begin.comment, end.range_start = _event_comment(event), first
+    return begin, end
+
+
+def _event_block(name: str, t_ns: int, kind: int) -> EventBlock:
+    block = EventBlock(
+        event_type=v4_constants.EVENT_TYPE_MARKER, sync_type=v4_constants.EVENT_SYNC_TYPE_S, range_type=kind,
+        cause=v4_constants.EVENT_CAUSE_TOOL, flags=v4_constants.FLAG_EV_POST_PROCESSING, sync_base=t_ns,
+        sync_factor=1e-9,
+    )  # fmt: skip
+    block.name = name
+    return block
+
+
+def _event_comment(event: LogEvent) -> str:
+    """The text and properties as MDF 4 has them in XML; without what XML cannot hold."""
+    values = "".join(f"<e name={quoteattr(_clean(k))}>{escape(_clean(v))}</e>" for k, v in event.properties.items())
+    properties = f"<common_properties>{values}</common_properties>" if values else ""
+    return (
+        f'<EVcomment xmlns="http://www.asam.net/mdf/v4"><TX>{escape(_clean(event.text))}</TX>{properties}</EVcomment>'
+    )
+
+
+def _clean(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -1,7 +1,8 @@
-"""A drive's result as the JSON document of the contract, and as channels of a log."""
+"""A drive's result as the JSON document of the contract, and as channels and events of a log."""
 
 from __future__ import annotations
 
+import json
 from datetime import UTC, datetime
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from aqualog import __version__
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import DriveResult, Signals, Track
+from aqualog.core.records import DriveResult, Event, Signals, Track
+from aqualog.io.log_event import LogEvent
 from aqualog.io.write_log import LogGroup
 from aqualog.report.values import fields_of, plain
+from aqualog.report.wording import detector_name, evidence_parts
 
-__all__ = ["SCHEMA_VERSION", "document", "result_groups", "signal_groups", "track_name"]
+__all__ = ["SCHEMA_VERSION", "document", "result_events", "result_groups", "signal_groups", "track_name"]
 
 SCHEMA_VERSION = 1
 _EVENT = ("detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence")
@@ -94,6 +97,25 @@ def result_groups(result: DriveResult) -> list[LogGroup]:
     }
     groups = [*signal_groups(result.signals), LogGroup("statistics", statistics), LogGroup("detections", bits)]
     return [g for g in groups if g.columns]
+
+
+def result_events(result: DriveResult) -> list[LogEvent]:
+    """The events as spans of a log, in the order of the document."""
+    return [_log_event(e) for e in result.events]
+
+
+def _log_event(event: Event) -> LogEvent:
+    place = event.wheel.upper() if event.wheel else event.side
+    fields = fields_of(event, *_EVENT)
+    evidence = fields.pop("evidence")
+    properties = {"kind": "event", **fields, **evidence}
+    return LogEvent(
+        " ".join(filter(None, (detector_name(event.detector), place))),
+        round(event.start_s * 1e9),
+        round(event.end_s * 1e9),
+        "; ".join((event.severity, *evidence_parts(event.evidence))),
+        {k: v if isinstance(v, str) else json.dumps(v) for k, v in properties.items() if v is not None},
+    )
 
 
 def track_name(track: Track) -> str:
