@@ -28,7 +28,7 @@ def _campaign() -> None:
 
 
 @campaign_app.command(no_args_is_help=True)
-@command("folder out:campaign vehicle:proposed dbc json force")
+@command("folder out:campaign vehicle:proposed dbc data force")
 def init(run: Run, folder: Path, out: Path) -> Output:
     """Propose a campaign file for a folder of logs.
 
@@ -52,7 +52,7 @@ def init(run: Run, folder: Path, out: Path) -> Output:
 
 
 @command(
-    "logs:campaign store:out vehicle:of_logs signals dbc thresholds jobs limit_s limit_mb shard cluster json force"
+    "logs:campaign store:out vehicle:of_logs signals dbc thresholds jobs limit_s limit_mb shard cluster data force"
 )
 def batch(run: Run, limit_s: float | None, limit_mb: int | None, shard: str | None, cluster: str | None) -> Output:
     """Run every log of a campaign through the detectors and keep the results.
@@ -80,7 +80,7 @@ def batch(run: Run, limit_s: float | None, limit_mb: int | None, shard: str | No
     return run.of_runs(runs, result=runs, notes=runs.notes)
 
 
-@command("logs:campaign store jobs sample within vehicle:of_logs signals dbc thresholds json")
+@command("logs:campaign store jobs sample within vehicle:of_logs signals dbc thresholds data force")
 def plan(run: Run, sample: int | None, within: str | None) -> Output:
     """Estimate what `aqualog batch` on a campaign will cost: time, memory, room in the store, shards.
 
@@ -105,7 +105,7 @@ def plan(run: Run, sample: int | None, within: str | None) -> Output:
     return Output(found, found.notes, details)
 
 
-@command("logs:campaign by width road robust store vehicle:of_logs signals dbc table jobs json force")
+@command("logs:campaign by width road robust store vehicle:of_logs signals dbc table jobs data force")
 def bin_slipslope(run: Run, by: str, width: float, road: str, robust: bool, table: Path | None) -> Output:
     """Slip slope over speed for each configuration, and the speed of full aquaplaning.
 
@@ -132,7 +132,7 @@ def bin_slipslope(run: Run, by: str, width: float, road: str, robust: bool, tabl
     return _binned(run, find, by, width, road, table)
 
 
-@command("logs:campaign by width road robust as_measured store vehicle:of_logs signals dbc table jobs json force")
+@command("logs:campaign by width road robust as_measured store vehicle:of_logs signals dbc table jobs data force")
 def bin_resistance(
     run: Run, by: str, width: float, road: str, robust: bool, table: Path | None, as_measured: bool
 ) -> Output:

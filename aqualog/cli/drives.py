@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["calibrate", "diagnose", "evaluate"]
 
 
-@command("logs:drives vehicle:needed signals dbc out:vehicle fix page:calibration rate cache json force")
+@command("logs:drives vehicle:needed signals dbc out:vehicle fix page:calibration rate cache data force")
 def calibrate(run: Run, out: Path | None, fix: list[str] | None, page: Path | None) -> Output:
     """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
@@ -68,7 +68,7 @@ def _fixed(texts: list[str]) -> dict[str, float]:
 
 @command(
     "logs:diagnosed vehicle:believed model:known signals dbc holdout out:model page:diagnosis level seed:drawn "
-    "surrogates bootstrap rate cache json force"
+    "surrogates bootstrap rate cache data force"
 )
 def diagnose(
     run: Run,
@@ -170,7 +170,7 @@ def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[
     return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]
 
 
-@command("logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune out:page json force")
+@command("logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune out:page data force")
 def evaluate(
     run: Run, labels: Path | None, by: str, rivals: bool, roc: bool, tune: Path | None, out: Path | None
 ) -> Output:

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["BATCH_BROKEN_OFF", "Output", "Run", "command"]
 
+_GROUPS = {"data": ("csv", "decimal_comma:tables", "json")}
+"""Options that stand together: in which forms a command gives its result."""
+
 BATCH_BROKEN_OFF = "the logs that are done are kept, the same command goes on with the rest"
 
 
@@ -57,6 +60,8 @@ class Run:
     thresholds: Path | None = None
     jobs: int | None = None
     model: Path | None = None
+    csv: Path | None = None
+    decimal_comma: bool = False
     json: bool = False
     force: bool = False
 
@@ -160,14 +165,37 @@ class Run:
         has_some, lost = bool(runs.outcome.done), ExitCode.PARTIAL if runs.has_loss else ExitCode.DONE
         return Output(**output, code=int(lost if has_some else ExitCode.NOTHING_USABLE))
 
+    def check_csv(self, others: Iterable[Any]) -> None:
+        """Refuse a --csv that could not be written, before any work; `others` are the values of all other options.
+
+        Raises
+        ------
+        ConfigError
+        """
+        from aqualog.core.errors import ConfigError
+        from aqualog.face.arguments import refuse_existing
+        from aqualog.face.result import check_csv
+
+        if self.csv is not None:
+            check_csv(self.csv)
+            named = [
+                p for o in others for p in (o if isinstance(o, list | tuple) else (o,)) if isinstance(p, str | Path)
+            ]
+            refuse_existing([self.csv], force=self.force, sources=[Path(p) for p in named if p])
+        elif self.decimal_comma:
+            raise ConfigError("--decimal-comma without --csv", expected="--csv FILE.csv, the tables that it is for")
+
     def finish(self, output: Output) -> int:
-        """Print what a command leaves, and return its exit code."""
+        """Write the tables that were asked for, print what a command leaves, and return its exit code."""
         from aqualog.core.errors import ExitCode
 
         result = output.result
+        tables: Sequence[Path] = ()
         if result is not None:
+            if self.csv is not None:
+                tables = result.write_csv(self.csv, decimal_comma=self.decimal_comma, force=self.force)
             self.console.data(result, as_json=self.json, text=output.text)
-        for text in output.notes:
+        for text in (*output.notes, *([f"tables: {', '.join(map(str, tables))}"] if tables else [])):
             self.console.note(text)
         for text in output.details:
             self.console.detail(text)
@@ -196,7 +224,8 @@ def command(
 
     def made(body: Callable[..., Output]) -> Callable[..., None]:
         own = inspect.signature(body).parameters
-        names = [*takes.split(), *(("quiet", "verbose", "progress") if has_steps else ()), "debug"]
+        taken = [n for name in takes.split() for n in _GROUPS.get(name, (name,))]
+        names = [*taken, *(("quiet", "verbose", "progress") if has_steps else ()), "debug"]
         options = [_parameter(name) for name in names]
 
         def work(**given: Any) -> None:
@@ -207,6 +236,8 @@ def command(
                 unsupervised()
             with guarded(debug=given["debug"]):
                 run = _run(given)
+                if "csv" in given:
+                    run.check_csv(v for n, v in given.items() if n != "csv")
                 code = run.finish(body(run, **{n: given[n] for n in own if n != "run"}))
             if code:
                 raise typer.Exit(code)

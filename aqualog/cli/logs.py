@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["align", "cache", "convert", "doctor", "inspect"]
 
 
-@command("logs signals dbc write_map:proposed json force")
+@command("logs signals dbc write_map:proposed data force")
 def inspect(run: Run, write_map: Path | None) -> Output:
     """List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix.
 
@@ -61,7 +61,7 @@ def _campaign(run: Run, *, has_log_options: bool) -> Output:
     return Output(found, code=None if found.logs_there else int(ExitCode.NOTHING_USABLE))
 
 
-@command("logs vehicle signals dbc json")
+@command("logs vehicle signals dbc data force")
 def doctor(run: Run) -> Output:
     """Report what is wrong with a log, what was lost of it, and what to do.
 
@@ -130,7 +130,7 @@ def _of_default_car(signals: Signals, vehicle: Vehicle) -> list[str]:
     return [f"no --vehicle: wheel speeds in km/h or m/s became rad/s with a default car's radius of {radii}"]
 
 
-@command("logs:sources quantity channel signals dbc vehicle max_offset start_offset write_map:clocks json force")
+@command("logs:sources quantity channel signals dbc vehicle max_offset start_offset write_map:clocks data force")
 def align(
     run: Run,
     quantity: str,
@@ -169,7 +169,7 @@ def align(
     return Output(result, [*notes, *result.notes], code=None if result.fits else int(ExitCode.NOTHING_USABLE))
 
 
-@command("clean json verbose", has_steps=False)
+@command("clean data force verbose", has_steps=False)
 def cache(run: Run, clean: bool) -> Output:
     """Show or empty the folder in which aligned signals are kept.
 

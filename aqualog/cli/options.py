@@ -104,6 +104,8 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "robust": _flag("Weigh outliers down (Huber [huber1981]).", "--robust"),
     "as_measured": _flag("Do not take off each run's own level on dry road.", "--as-measured"),
     "table": _file("Table of the rows: FILE.csv or FILE.parquet."),
+    "csv": _file("Each printed table as CSV: the first as FILE.csv, others as FILE_TABLE.csv.", "--csv"),
+    "decimal_comma:tables": _flag("With --csv: decimal commas and semicolons.", "--decimal-comma"),
     "json": _flag("Print one JSON document.", "--json"),
     "force": _flag("Overwrite existing results.", "--force"),
     "quiet": _option(bool, False, "-q", "--quiet", help="Errors only on stderr."),

@@ -82,7 +82,7 @@ def _drive(run: Run, names: list[str], out: Path, seed: int | None) -> Output:
     return Output(result, [*result.notes, where])
 
 
-@command("numbers out:figures campaign store dbc formats jobs json force")
+@command("numbers out:figures campaign store dbc formats jobs data force")
 def figures(run: Run, numbers: list[str], out: Path, campaign: Path | None, formats: str) -> Output:
     """Make figures of the thesis again, from runs, with what they say about its claims.
 
@@ -124,7 +124,7 @@ def figures(run: Run, numbers: list[str], out: Path, campaign: Path | None, form
     return run.of_runs(found.runs, result=found, notes=notes, text=text)
 
 
-@command("out:reproduction jobs json force")
+@command("out:reproduction jobs data force")
 def reproduce(run: Run, out: Path) -> Output:
     """Reproduce the thesis: simulate its campaign, run everything, and judge each of its claims.
 

@@ -73,6 +73,11 @@ class Calibration(Result):
             "residuals": pl.concat(residuals),
         }
 
+    @property
+    def printed(self) -> Mapping[str, pl.DataFrame]:
+        """The tables without `residuals`."""
+        return {n: t for n, t in self.tables.items() if n != "residuals"}
+
     def _report(self) -> Report:
         from aqualog.report.calibration import calibration_report
 

@@ -144,14 +144,12 @@ def _frame(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
 
 def _write(rows: Sequence[Mapping[str, Any]], suffix: str, path: Path) -> None:
     """Write rows of a document as CSV or Parquet; a text that a spreadsheet would run is made harmless in CSV."""
-    from aqualog.report.campaign.bins import flat_rows
-    from aqualog.report.campaign.folder import safe_cell
+    from aqualog.report.spreadsheet import csv_bytes
 
     if suffix == ".parquet":
         _frame(rows).write_parquet(path)
-        return
-    plain = [{k: safe_cell(v) if isinstance(v, str) else v for k, v in row.items()} for row in flat_rows(rows)]
-    rows_table(plain).write_csv(path)
+    else:
+        path.write_bytes(csv_bytes(_frame(rows)))
 
 
 def _curves(curves: Sequence[Curve], unit: str, title: str) -> go.Figure:

@@ -16,7 +16,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, text_of, write_whole
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_of
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, page_file, table
+from aqualog.face.result import PathLike, Result, Writers, flat, page_file, rows_table, table
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -114,6 +114,26 @@ class Detection(Result):
         """`events`, `signals`, and where the samples were kept `features` and `tracks`."""
         found = {"events": self.events, "signals": self.signals}
         return {**found, "features": self.features, "tracks": self.tracks} if self.has_samples else found
+
+    @property
+    def printed(self) -> Mapping[str, pl.DataFrame]:
+        """`events` with speed and evidence in words, `slip_slope`, and `not_judged`: what detectors miss."""
+        import polars as pl
+
+        from aqualog.report.values import ordinary
+        from aqualog.report.wording import evidence_parts, speed_kmh
+
+        found = self.drive_result.events
+        words = [ordinary("; ".join(evidence_parts(e.evidence))) for e in found]
+        speeds = pl.Series("v_x_kmh", [speed_kmh(e) for e in found], pl.Float64)
+        lacking = [*self.document["unavailable"], *self.document["limited"]]
+        return {
+            "events": self.events.drop("evidence").with_columns(speeds, pl.Series("evidence", words, pl.String)),
+            "slip_slope": rows_table(
+                {k.replace(" ", "_"): v for k, v in flat(s).items()} for s in self.document["slip_slope"]
+            ),
+            "not_judged": rows_table(lacking),
+        }
 
     def _report(self) -> Report:
         from aqualog.report.drive.report import drive_report

@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of, refuse_existing, write_whole, writing
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from aqualog.report.sections import Report
 
 __all__ = [
-    "PathLike", "Result", "Writers", "bars", "document_head", "flat", "page_file", "printable", "rows_table", "table",
-    "text_file",
+    "PathLike", "Result", "Writers", "bars", "check_csv", "document_head", "flat", "page_file", "printable",
+    "rows_table", "table", "text_file",
 ]  # fmt: skip
 
 PathLike = str | Path
@@ -53,6 +54,11 @@ class Result(ABC):
     @abstractmethod
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """The result as polars tables, by name; the first is the one that a notebook shows."""
+
+    @property
+    def printed(self) -> Mapping[str, pl.DataFrame]:
+        """The tables that the command shows: those of `tables` without samples."""
+        return self.tables
 
     def text(self) -> str:
         """Return what the command prints for a reader."""
@@ -102,6 +108,40 @@ class Result(ABC):
             write_whole(out / name, write)
         return tuple(out / name for name in files)
 
+    def write_csv(self, path: PathLike, *, decimal_comma: bool = False, force: bool = False) -> tuple[Path, ...]:
+        """Write the tables that the command shows as CSV, each whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            `NAME.csv`, for the first table. Each other table becomes `NAME_TABLE.csv` beside it, but one without
+            columns.
+        decimal_comma : bool
+            For a spreadsheet that expects it: decimal commas, and semicolons between cells.
+        force : bool
+            Overwrite files that exist. Sources are never overwritten.
+
+        Raises
+        ------
+        ConfigError
+            If the name does not end in .csv, a file exists already, or is a source of this result.
+        AqualogError
+            If a file cannot be written.
+        """
+        from aqualog.report.spreadsheet import csv_bytes
+
+        first = check_csv(file_of(path, "path"))
+        printed = self.printed
+        frames = {first: next(iter(printed.values()))} | {
+            first.with_name(f"{first.stem}_{name}{first.suffix}"): frame
+            for name, frame in [*printed.items()][1:]
+            if frame.columns
+        }
+        refuse_existing(frames, force=force, sources=self.sources)
+        for target, frame in frames.items():
+            write_whole(target, _bytes_file(csv_bytes(frame, decimal_comma=decimal_comma)))
+        return tuple(frames)
+
     def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
         """Write the file that `save` calls `name` to a path of the user's choice."""
         return self._write_to(path, self.files()[name], force=force)
@@ -148,6 +188,13 @@ class Result(ABC):
         return page_file(page)
 
 
+def check_csv(path: Path) -> Path:
+    """Return the name of a table to be written; a ConfigError if it is no .csv."""
+    if path.suffix.lower() != ".csv":
+        raise ConfigError(f'"{path.suffix}" is no CSV', where=str(path), expected="a name that ends in .csv")
+    return path
+
+
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
@@ -156,6 +203,13 @@ def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
 
     def write(path: Path) -> None:
         path.write_text(text(), encoding="utf-8")
+
+    return write
+
+
+def _bytes_file(data: bytes) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        path.write_bytes(data)
 
     return write
 

@@ -74,6 +74,11 @@ class SlipSlope(Result):
             "samples": pl.concat(samples) if samples else table([], "place t mu slip", text=("place",)),
         }
 
+    @property
+    def printed(self) -> Mapping[str, pl.DataFrame]:
+        """The tables without `samples`."""
+        return {n: t for n, t in self.tables.items() if n != "samples"}
+
     def _report(self) -> Report:
         from aqualog.report.slope import slope_report
 

@@ -79,6 +79,11 @@ class Figures(Result):
         drawn = {f.number: pl.read_csv(StringIO(figure_csv(f)), infer_schema_length=None) for f in self.made}
         return {"findings": rows_table(rows), **drawn}
 
+    @property
+    def printed(self) -> Mapping[str, pl.DataFrame]:
+        """`findings`; a table behind a figure is a file of its own."""
+        return {"findings": self.tables["findings"]}
+
     def text(self, *, width: int = _WHOLE) -> str:
         """Return claim, figure, verdict and finding; `width` cuts the findings."""
         from textwrap import shorten

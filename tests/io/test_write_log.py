@@ -66,7 +66,8 @@ def test_signals_are_as_without_events(written, suffix):
     with open_log(written / f"a{suffix}") as with_events, open_log(written / f"none{suffix}") as without:
         plain = without.read(without.channels())
         same = with_events.read([c for c in with_events.channels() if "events" not in c.path])
-    assert [c.info.path for c in same] == [c.info.path for c in plain] and len(plain) == 1
+    assert [c.info.path for c in same] == [c.info.path for c in plain]
+    assert len(plain) == 1
     np.testing.assert_array_equal(same[0].values, plain[0].values)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import re
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,9 +21,10 @@ from aqualog.report.campaign.labels import file_name
 from aqualog.report.campaign.page import campaign_page
 from aqualog.report.campaign.run_page import RunFacts, facts_of, run_page
 from aqualog.report.page import plotly_js
+from aqualog.report.spreadsheet import safe_cell
 from aqualog.report.values import KMH
 
-__all__ = ["MARK", "check_folder", "page_names", "safe_cell", "tables_of", "targets_of", "write_report"]
+__all__ = ["MARK", "check_folder", "page_names", "tables_of", "targets_of", "write_report"]
 
 MARK = "aqualog_report.json"
 _OWN = re.compile(r"runs/[a-z0-9-]{1,120}\.html|data/[a-z_]{1,60}\.csv|plotly\.min\.js|index\.html")
@@ -32,7 +32,6 @@ _TABLES = ("runs.csv", "slip_slope.csv", "resistance.csv", "full_aquaplaning.csv
 _WRITERS, _WAITING = 8, 64  # threads, and pages that wait for them
 Report = Callable[[int, int], None]
 _Row = Sequence[object]
-_DIGITS = 6
 
 
 def page_names(names: Sequence[str]) -> list[str]:
@@ -175,16 +174,3 @@ def _csv(heading: _Row, rows: Iterable[_Row]) -> str:
     writer.writerow([safe_cell(c) for c in heading])
     writer.writerows([safe_cell(c) for c in row] for row in rows)
     return out.getvalue()
-
-
-# a spreadsheet takes a cell that begins so for a formula; one that splits at semicolons or tabs makes cells of its own
-_FORMULA = re.compile(r"(?:^|(?<=[;,|\t\r\n]))(?=\s*[=+\-@＝＋－＠])|^(?=[\t\r\n])")
-
-
-def safe_cell(value: object) -> str:
-    """A cell that no spreadsheet takes for a formula; empty for NaN and infinities."""
-    if isinstance(value, float):
-        return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
-    text = str(value)
-    is_number = text.removeprefix("-").replace(".", "", 1).isdigit()
-    return text if is_number else _FORMULA.sub("'", text)
