@@ -170,9 +170,20 @@ def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[
     return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]
 
 
-@command("logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune out:page data force")
+@command(
+    "logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune gate junit out:page "
+    "data force"
+)
 def evaluate(
-    run: Run, labels: Path | None, by: str, rivals: bool, roc: bool, tune: Path | None, out: Path | None
+    run: Run,
+    labels: Path | None,
+    by: str,
+    rivals: bool,
+    roc: bool,
+    tune: Path | None,
+    gate: list[str] | None,
+    junit: Path | None,
+    out: Path | None,
 ) -> Output:
     """Compare what the detectors find with what was there: recall, latency, false alarms, confusion.
 
@@ -186,25 +197,33 @@ def evaluate(
       aqualog evaluate campaign.toml --tune thresholds.toml
       aqualog evaluate drive.mf4 --vehicle car.toml --labels labels.csv --json
       aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
+      aqualog evaluate campaign.toml --gate 'joint_cusum.recall>=0.9' --junit g.xml
     """
-    from aqualog.core.errors import ExitCode
+    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.evaluate.gates import parse_gates
     from aqualog.evaluate.judge import ODD_LABELS
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.evaluate import evaluate, inputs_of
 
+    parse_gates(gate or (), with_rivals=rivals)
+    if junit is not None and not gate:
+        raise ConfigError("--junit without --gate", expected="--gate 'joint_cusum.recall>=0.9'")
     given = inputs_of(run.logs, run.vehicle, map=run.signals, dbc=run.dbc, labels=labels)
     own = [*given.files, *(p for p in (run.thresholds,) if p)]
-    refuse_existing([p for p in (tune, out) if p], force=run.force, sources=own)
+    refuse_existing([p for p in (tune, out, junit) if p], force=run.force, sources=own)
     with run.hearing("nothing was written") as hear:
         found = evaluate(
             run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals, roc=roc,
             thresholds=run.thresholds, tune=tune is not None, progress=hear,
         )  # fmt: skip
+    found = found.gated(gate or ())
     has_records = bool(found.evaluation.records)
     if tune is not None and has_records and found.evaluation.tuning is not None:
         found.write_thresholds(tune, force=True)
     if out is not None and has_records:
         found.write_page(out, force=True)
+    if junit is not None:  # also without a drive: the build server then shows why
+        found.write_junit(junit, force=True)
     for name, reason in found.evaluation.failed.items():
         run.console.error(reason if name in reason else f"{name}: {reason}")
     if not has_records:
@@ -214,5 +233,7 @@ def evaluate(
     odd = [n for n in found.notes if ODD_LABELS in n]
     written = [f"the page is {out}"] if out is not None else []
     written += [f"the thresholds are in {tune}"] if tune is not None else []
+    written += [f"the gates are in {junit}"] if junit is not None else []
+    has_tripped = any(not g.is_kept for g in found.gates)
     details = [f"note: {n}" for n in (*found.notes, *found.cut) if n not in odd]
-    return Output(found, [*odd, *written], details)
+    return Output(found, [*odd, *written], details, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)

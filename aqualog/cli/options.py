@@ -194,6 +194,11 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "tune": _file(
         "Propose thresholds on some drives, report them on the others, and write them here.", "--tune"
     ),
+    "gate": _option(
+        list[str] | None, None, "--gate", metavar="DETECTOR.MEASURE>=X",
+        help="Exit with 5 if this is not kept, such as 'joint_cusum.recall>=0.9'; may be repeated.",
+    ),
+    "junit": _file("Gates and drives as JUnit XML, for a build server.", "--junit"),
     "out:page": _file("Page (HTML)."),
     # campaigns
     "folder": _argument(Path, "Folder with logs, in it or below it.", "FOLDER", shows_default=True),

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import expand, file_of, list_files, names_of
+from aqualog.face.arguments import expand, file_of, list_files, names_of, text_of
 from aqualog.face.campaign import Campaign
 from aqualog.face.campaign_inputs import is_campaign, split
 from aqualog.face.drive import sources_of
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, rows_table, text_file
+from aqualog.face.result import PathLike, Result, Writers, flat, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from aqualog.campaign.jobs import Configured
     from aqualog.detect.joint_cusum import JointCusumParams
     from aqualog.evaluate.drives import LogSource
+    from aqualog.evaluate.gates import GateResult
     from aqualog.evaluate.labels import Label
     from aqualog.evaluate.run import Evaluation
     from aqualog.report.sections import Report
@@ -36,7 +37,7 @@ class Comparison(Result):
     """Detections held against what was there.
 
     `evaluation` holds the records; `keys` are those of the configuration by which tables are repeated; `late` names
-    drives whose labels begin after the log has ended, with what is left out of them.
+    drives whose labels begin after the log has ended, with what is left out of them. `gates` are those of `gated`.
     """
 
     evaluation: Evaluation
@@ -45,26 +46,53 @@ class Comparison(Result):
     joint: JointCusumParams
     late: Mapping[str, str]
     cut: tuple[str, ...] = ()
+    gates: tuple[GateResult, ...] = ()
 
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.evaluation import evaluation_document
 
-        return evaluation_document(self.evaluation, by=self.keys)
+        return evaluation_document(self.evaluation, by=self.keys, gates=self.gates)
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
-        """The lists of the document, each as a table."""
-        lists = {k: v for k, v in self.document.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
-        return {
-            k: rows_table({n: x if isinstance(x, _CELL) else str(x) for n, x in row.items()} for row in rows)
-            for k, rows in lists.items()
+        """`detectors` and `by`: a row for each score; `confusion`; the lists of the document, each as a table."""
+        d = self.document
+        scores = {
+            "detectors": [{"detector": n, **flat(s)} for n, s in d["detectors"].items()],
+            "by": [{**b["groups"], "detector": n, **flat(s)} for b in d["by"] for n, s in b["detectors"].items()],
+            "confusion": [
+                {"label": row, "detector": n, **c} for row, of in d["confusion"].items() for n, c in of.items()
+            ],
         }
+        lists = {
+            k: [{n: x if isinstance(x, _CELL) else str(x) for n, x in row.items()} for row in v]
+            for k, v in d.items()
+            if k not in scores and isinstance(v, list) and v and isinstance(v[0], Mapping)
+        }
+        return {k: rows_table(rows) for k, rows in {**scores, **lists}.items() if rows or k == "detectors"}
+
+    def gated(self, gates: Sequence[str]) -> Comparison:
+        """Return the same, held against gates such as `joint_cusum.recall>=0.9`.
+
+        Each is `DETECTOR.MEASURE` with `>=`, `<=`, `>` or `<` and a number; measures bear the names of the document. A
+        gate on what was not measured is not kept.
+
+        Raises
+        ------
+        ConfigError
+            With the nearest known name where one is wrong.
+        """
+        from aqualog.evaluate.gates import judge_gates, parse_gates
+        from aqualog.evaluate.score import score_all
+
+        given = parse_gates([text_of(g, "gates") for g in gates], with_rivals=self.evaluation.rivals is not None)
+        return replace(self, gates=judge_gates(given, score_all(self.evaluation.records)))
 
     def _report(self) -> Report:
         from aqualog.report.evaluation import evaluation_report
 
-        return evaluation_report(self.evaluation, by=self.keys)
+        return evaluation_report(self.evaluation, by=self.keys, gates=self.gates)
 
     def headline(self) -> str:
         from aqualog.report.evaluation_words import headline
@@ -97,6 +125,26 @@ class Comparison(Result):
     def write_thresholds(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the tuned thresholds, which `aq.detect` takes."""
         return self._write_to(path, text_file(self._thresholds), force=force)
+
+    def write_junit(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write gates and drives as JUnit XML, which build servers show: a drive that cannot be read is an error."""
+        from aqualog.report.junit import Case, Suite, junit_xml
+
+        gates = [
+            Case(
+                f"gates.{g.gate.detector}",
+                g.gate.text,
+                "" if g.is_kept else f"{g.gate.text}: {g.found}",
+                output=g.found,
+            )
+            for g in self.gates
+        ]
+        drives = [
+            *(Case("drives", r.name) for r in self.evaluation.records),
+            *(Case("drives", name, error=reason) for name, reason in self.evaluation.failed.items()),
+        ]
+        text = junit_xml([Suite("gates", gates), Suite("drives", drives)])
+        return self._write_to(path, text_file(lambda: text), force=force)
 
     def _thresholds(self) -> str:
         from aqualog.config.thresholds import joint_text, thresholds_text

@@ -8,6 +8,7 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.detect.registry import RIVALS
+from aqualog.evaluate.gates import GateResult
 from aqualog.evaluate.records import Cell as Counts
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
@@ -64,7 +65,7 @@ _FOOTER = (
 # --- sections --------------------------------------------------------------------------------------------------------
 
 
-def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Report:
+def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: Sequence[GateResult] = ()) -> Report:
     """Verdicts, tables of detectors and configurations, confusion, situations, thresholds, rivals.
 
     Parameters
@@ -72,6 +73,8 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Repo
     evaluation : Evaluation
     by : sequence of str
         Keys of the configuration by which the table is repeated.
+    gates : sequence of GateResult
+        Limits that were to be kept.
     """
     records, tuning = evaluation.records, evaluation.tuning
     scores, situations = score_all(records), situation_scores(records)
@@ -87,6 +90,9 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = ()) -> Repo
             Lines(answers or [headline(evaluation)]),
         ], where="text"),
         Section("", [Headline(headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
+        Section("Gates", [Table(("Gate", "Found", "Kept"), [
+            (g.gate.text, g.found, "yes" if g.is_kept else "no") for g in gates
+        ], "gates")]),
         Section("Not evaluated", [Lines(list(evaluation.failed.items()), most=1000)], "failed", look="problems",
                 where="page"),
         Section("All drives", [Table(_SCORES, _score_rows(scores), "detectors"), Para(_LEGEND, where="text")]),
@@ -180,7 +186,9 @@ def _situation_sections(records: Sequence[RunRecord], situations: Mapping[str, M
 # --- JSON ------------------------------------------------------------------------------------------------------------
 
 
-def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> dict[str, Any]:
+def evaluation_document(
+    evaluation: Evaluation, *, by: Sequence[str] = (), gates: Sequence[GateResult] = ()
+) -> dict[str, Any]:
     """The JSON document of `evaluate`. NaN and infinities become null.
 
     Returns
@@ -200,7 +208,8 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
         `better_rivals`: measures in which a rival is better; `sentences`: the same in words;
         `tuning`: null, or `rule`, `tuned_on`, `reported_on`, `unused`, `choices`, `before` (detectors with the
         thresholds as they were);
-        `runs`: per drive `name`, `groups`, `seconds`, `false_alarms_s` {detector: times}, `unavailable`.
+        `runs`: per drive `name`, `groups`, `seconds`, `false_alarms_s` {detector: times}, `unavailable`;
+        `gates`: each `gate`, `value`, `kept`, `found` in words.
     """
     records, tuning = evaluation.records, evaluation.tuning
     return {
@@ -240,6 +249,7 @@ def evaluation_document(evaluation: Evaluation, *, by: Sequence[str] = ()) -> di
              "false_alarms_s": {n: list(d.false_alarms) for n, d in r.detectors.items() if d.false_alarms},
              "unavailable": list(r.unavailable)} for r in records
         ],
+        "gates": [{"gate": g.gate.text, "value": plain(g.value), "kept": g.is_kept, "found": g.found} for g in gates],
         "notes": notes_of(records),
     }  # fmt: skip
 

@@ -1,7 +1,9 @@
 """`aqualog evaluate` as a user calls it."""
 
 import json
+import xml.etree.ElementTree as ET
 
+import polars as pl
 import pytest
 
 from tests import commands
@@ -160,3 +162,32 @@ def test_what_cannot_be_done_is_one_line(folder, args, code, text):
     assert len(lines) == 1
     assert text in lines[0]
     assert result.stdout == ""
+
+
+def test_gates_decide_the_exit_code_and_go_to_the_build_server(folder, tmp_path):
+    xml, given = tmp_path / "gates.xml", (folder / "campaign.toml", "--json", "--csv", tmp_path / "scores.csv")
+    done = run(*given, "--gate", "joint_criteria.full.recall>=1", "--gate", "joint_criteria.drives>=5", "--junit", xml)
+    assert done.exit_code == 5, done.stderr
+    document = json.loads(done.stdout)
+    assert [(g["value"], g["kept"]) for g in document["gates"]] == [(1.0, True), (4.0, False)]
+    gates, drives = ET.parse(xml).getroot()
+    assert [len(case.findall("failure")) for case in gates] == [0, 1]
+    assert [c.get("name") for c in drives if c.find("error") is not None] == ["broken.mf4"]
+    scores = pl.read_csv(tmp_path / "scores.csv")
+    assert dict(scores.select("detector", "full_recall").rows())["joint_criteria"] == 1.0
+    kept = run(folder / "campaign.toml", "--gate", "joint_criteria.drives>=4")
+    assert kept.exit_code == 3
+    assert "joint_criteria.drives>=4" in kept.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (("--gate", "joint_criterion.recall>=1"), 'did you mean "joint_criteria"'),
+        (("--junit", "j.xml"), "without --gate"),
+    ],
+)
+def test_a_wrong_gate_is_refused_before_any_work(folder, options, text):
+    done = run(folder / "gone.toml", *options)
+    assert done.exit_code == 2
+    assert text in error_lines(done)[0]

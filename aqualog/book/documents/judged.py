@@ -284,6 +284,13 @@ EVALUATE = Document(
             mapping("false_alarms_s", "begins of false alarms, by detector [s]", several("", "", number("", "s", ""))),
             several("unavailable", "detectors that could not run"),
         )),
+        rows("gates", "limits of `--gate`", (
+            text("gate", "the gate as it was given"),
+            number("value", "unit of the measure", "what came out; null where it was not measured, or is infinite",
+                   null=True),
+            flag("kept", "whether the gate was kept"),
+            text("found", "the same in words"),
+        )),
         several("notes", "sentences on the evaluation"),
     ),
     files=("evaluation.json",),
