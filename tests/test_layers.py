@@ -13,7 +13,7 @@ import aqualog
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
-    "core", "physics", "guard", "io", "align", "features", "calibrate",
+    "core", "physics", "guard", "io", "align", "features", "checks", "calibrate",
     "detect", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "thesis", "config", "face", "book", "cli",
 )  # fmt: skip
 # align/propose and align/load read a map, which is a record of align; config turns TOML into these records

@@ -6,7 +6,7 @@ A signal arrives in any pieces, a whole drive in one. The result does not depend
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -270,8 +270,16 @@ class Cleaner:
             invalid_code=self._code,
             frozen=self._frozen,
             faults=taken.faults,
+            mapped=mapped_as(self._entry),
         )
         return Clean(self._symbol, origin, taken.used), notes
+
+
+def mapped_as(entry: Entry) -> dict[str, Any]:
+    """Return the line of a map by key, in plain values; without those that do nothing."""
+    idle = Entry(entry.symbol, entry.channel)
+    said = {k: getattr(entry, k) for k in ("unit", "scale", "offset") if getattr(entry, k) != getattr(idle, k)}
+    return {"channel": list(entry.channel), **said, **({"invalid": list(entry.invalid)} if entry.invalid else {})}
 
 
 def _where(keep: BoolArray, t: TimeArray, x: FloatArray) -> Samples:

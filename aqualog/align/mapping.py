@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -13,7 +14,10 @@ from aqualog.core.records import ChannelInfo
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.reader import CsvFormat
 
-__all__ = ["Entry", "SignalMap", "SourceClock", "channel_id", "map_text", "matching", "resolve", "values_read"]
+__all__ = [
+    "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text", "matching", "quoted", "resolve",
+    "values_read",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,13 @@ class SignalMap:
         """Return the clock correction of a file, by name or glob pattern."""
         return next((c for pattern, c in self.clocks.items() if _names(pattern, file)), SourceClock())
 
+    def unmatched(self, files: Iterable[str]) -> list[tuple[str, str]]:
+        """Return table and name of all that the map says of files, as `("sources", "gps.csv")`, and fits none."""
+        names = list(files)
+        clocks = [("sources", n) for n in self.clocks if not any(_names(n, f) for f in names)]
+        forms = [("csv", n) for n in self.csv if n != "*" and not any(fnmatchcase(f, n) for f in names)]
+        return [*forms, *clocks]
+
     def joins(self, file: str) -> bool:
         """Return whether the map gives the offset of this file's clock."""
         return any(_names(pattern, file) for pattern in self.clocks)
@@ -67,6 +78,26 @@ class SignalMap:
 
 def _names(pattern: str, file: str) -> bool:
     return fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern
+
+
+def entry_line(entry: Entry) -> str:
+    """Return an entry as a line of a signal map (TOML): `a_y = { channel = "LatAcc", scale = -1.0 }`."""
+    names = [quoted(c) for c in entry.channel]
+    parts = [f"channel = {names[0]}" if len(names) == 1 else f"channel = [{', '.join(names)}]"]
+    if entry.unit is not None:
+        parts.append(f"unit = {quoted(entry.unit)}")
+    if entry.scale != 1.0:
+        parts.append(f"scale = {entry.scale!r}")
+    if entry.offset != 0.0:
+        parts.append(f"offset = {entry.offset!r}")
+    if entry.invalid:
+        parts.append(f"invalid = [{', '.join(repr(i) for i in entry.invalid)}]")
+    return f"{entry.symbol} = {{ {', '.join(parts)} }}"
+
+
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # a JSON string is a TOML basic string
 
 
 def channel_id(info: ChannelInfo) -> str:

@@ -85,17 +85,18 @@ class Run:
         with self.console.hearing() as hear, told_if_interrupted(interrupted):
             yield hear
 
-    def drive(self, targets: Iterable[Path] = (), *, others: Sequence[Path] = ()) -> Drive:
+    def drive(self, targets: Iterable[Path] = (), *, others: Sequence[Path] = (), all_files: bool = True) -> Drive:
         """Return the drive of all logs, after all checks that need no log to be opened.
 
-        Neither logs, settings nor `others` may be among the files to be written, the `targets`.
+        Neither logs, settings nor `others` may be among the files to be written, the `targets`. Unless `all_files` is
+        False, the map may say nothing of a file that is not among the logs and `others`.
 
         Raises
         ------
         ConfigError, LogError
         """
         from aqualog.align.mapping import SignalMap
-        from aqualog.config.signal_map import load_signal_map
+        from aqualog.config.signal_map import check_files, load_signal_map
         from aqualog.core.vehicle import Vehicle
         from aqualog.face.arguments import expand, list_files, refuse_existing
         from aqualog.face.drive import Drive
@@ -105,9 +106,12 @@ class Run:
         before = state_of(paths)
         own = (*paths, *list_files(self.logs), *self.dbc, *(p for p in (self.signals, self.vehicle) if p))
         refuse_existing(targets, force=self.force, sources=(*own, *others))
+        signal_map = load_signal_map(self.signals) if self.signals else SignalMap()
+        if all_files:
+            check_files(signal_map, (*paths, *others))
         return Drive(
             tuple(paths),
-            load_signal_map(self.signals) if self.signals else SignalMap(),
+            signal_map,
             self.dbc,
             self.rate,
             Vehicle.read(self.vehicle) if self.vehicle else Vehicle(),

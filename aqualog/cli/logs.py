@@ -154,7 +154,7 @@ def align(
     from aqualog.face.align import align, check_quantity
 
     check_quantity(quantity)
-    drive = run.drive([write_map] if write_map else [])
+    drive = run.drive([write_map] if write_map else [], all_files=False)
     with run.hearing() as hear:
         result = align(
             drive, quantity=quantity, channels=dict(pair.partition("=")[::2] for pair in channel or ()),

@@ -11,7 +11,7 @@ from aqualog.campaign.jobs import Configured
 from aqualog.config.campaign import load_campaign
 from aqualog.config.labels import load_labels
 from aqualog.config.reader import tried
-from aqualog.config.signal_map import load_signal_map
+from aqualog.config.signal_map import check_files, load_signal_map
 from aqualog.config.thresholds import load_settings
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
@@ -51,6 +51,11 @@ def _configured(
     map_path = map_file or (campaign.signals if campaign else None)
     signal_map = tried(load_signal_map, map_path, faults) if map_path else SignalMap()
     settings = tried(load_settings, thresholds, faults) if thresholds else Settings()
+    if signal_map is not None and runs:
+        try:
+            check_files(signal_map, [p for r in runs for p in r.logs])
+        except ConfigError as error:
+            faults.append(error.line())
     faults += [f"{p}: {'is no file' if p.exists() else 'there is no such file'}" for p in dbc if not p.is_file()]
     if faults or campaign is None or signal_map is None or settings is None:
         raise ConfigError("; ".join(dict.fromkeys(faults)))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 
-from aqualog.align.mapping import Entry, SignalMap, SourceClock
-from aqualog.config.reader import Key, Table, is_number, read
+from aqualog.align.mapping import Entry, SignalMap, SourceClock, entry_line, quoted
+from aqualog.config.reader import Faults, Key, Table, is_number, read
+from aqualog.core.errors import listed
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.reader import CsvFormat, format_fault
 
-__all__ = ["MAP_KEYS", "load_signal_map", "map_text"]
+__all__ = ["MAP_KEYS", "check_files", "load_signal_map", "map_text"]
 
 _CLOCK = 'sources."FILE"'
 MAP_KEYS = (
@@ -36,6 +38,7 @@ MAP_KEYS = (
 )  # fmt: skip
 """Every key of a signal map."""
 
+_LONGEST = 60  # characters of a name that are shown
 _TABLES = ("signals", "time", "csv", "sources")
 _ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")
 _NUMBERS = {n: k for n, k in zip(_ENTRY_KEYS, MAP_KEYS, strict=False) if k.kind == "number"}
@@ -77,6 +80,34 @@ def load_signal_map(path: Path) -> SignalMap:
     csv = _csv(file.table("csv"))
     file.faults.raise_if_any()
     return SignalMap(entries, clocks, channel, unit, str(path), csv)
+
+
+def check_files(signal_map: SignalMap, files: Iterable[Path]) -> None:
+    """Refuse a map with a table `[sources."NAME"]` or `[csv."NAME"]` that fits none of the files: it would do nothing.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        All logs that are read with this map.
+
+    Raises
+    ------
+    ConfigError
+        With line and nearest name of each such table.
+    """
+    names = sorted({f.name for f in files})
+    idle = signal_map.unmatched(names)
+    if not idle or not names:
+        return
+    path = Path(signal_map.path or "signal map")
+    file = read(path, "signal map") if path.is_file() else Table({}, Faults(path), lines=[])
+    for table, name in idle:
+        shown = f"{name[:_LONGEST]} ..." if len(name) > _LONGEST else name
+        near = get_close_matches(name, names, n=1, cutoff=0.5)
+        told = f' (did you mean "{near[0]}"?)' if near else f"; the files are {listed(names, 4)}"
+        at = file.line_of(f"{table}.{name}") or file.table(table).line_of(name)
+        file.faults.add(f'[{table}."{shown}"] fits no file{told}', partial(int, at) if at else lambda: None)
+    file.faults.raise_if_any()
 
 
 def _csv(table: Table) -> dict[str, CsvFormat]:
@@ -129,20 +160,20 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
     if signal_map.time_channel or signal_map.time_unit:
         lines.append("[time]")
         if signal_map.time_channel:
-            lines.append(f"channel = {_quote(signal_map.time_channel)}")
+            lines.append(f"channel = {quoted(signal_map.time_channel)}")
         if signal_map.time_unit:
-            lines.append(f"unit = {_quote(signal_map.time_unit)}")
+            lines.append(f"unit = {quoted(signal_map.time_unit)}")
         lines.append("")
     for name, form in signal_map.csv.items():
-        lines.append("[csv]" if name == "*" else f"[csv.{_quote(name)}]")
-        lines += [f"{key} = {_quote(value)}" for key in _CSV_KEYS if (value := getattr(form, key))]
+        lines.append("[csv]" if name == "*" else f"[csv.{quoted(name)}]")
+        lines += [f"{key} = {quoted(value)}" for key in _CSV_KEYS if (value := getattr(form, key))]
         lines.append("")
     lines.append("[signals]")
     for symbol, entry in signal_map.entries.items():
         remark = f"  # {_one_line(remarks[symbol])}" if symbol in remarks else ""
-        lines.append(f"{symbol} = {_entry_text(entry)}{remark}")
+        lines.append(f"{entry_line(entry)}{remark}")
     for name, clock in signal_map.clocks.items():
-        lines += ["", f"[sources.{_quote(name)}]", f"offset_s = {clock.offset_s!r}"]
+        lines += ["", f"[sources.{quoted(name)}]", f"offset_s = {clock.offset_s!r}"]
         if clock.drift_ppm or clock.at_s:
             lines += [f"drift_ppm = {clock.drift_ppm!r}", f"at_s = {clock.at_s!r}"]
     return "\n".join(lines) + "\n"
@@ -150,21 +181,3 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
 
 def _one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
-
-
-def _quote(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # a JSON string is a TOML basic string
-
-
-def _entry_text(entry: Entry) -> str:
-    names = [_quote(c) for c in entry.channel]
-    parts = [f"channel = {names[0]}" if len(names) == 1 else f"channel = [{', '.join(names)}]"]
-    if entry.unit is not None:
-        parts.append(f"unit = {_quote(entry.unit)}")
-    if entry.scale != 1.0:
-        parts.append(f"scale = {entry.scale!r}")
-    if entry.offset != 0.0:
-        parts.append(f"offset = {entry.offset!r}")
-    if entry.invalid:
-        parts.append(f"invalid = [{', '.join(repr(i) for i in entry.invalid)}]")
-    return "{ " + ", ".join(parts) + " }"

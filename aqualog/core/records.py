@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BoolArray", "Channel", "ChannelInfo", "Drift", "DriveResult", "Event", "FileFaults", "FloatArray", "Origin",
-    "Quality", "Signals", "SlopeSummary", "TimeArray", "TimeFaults", "Track", "Unavailable",
+    "Quality", "Remark", "Signals", "SlopeSummary", "TimeArray", "TimeFaults", "Track", "Unavailable",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -118,7 +119,10 @@ class TimeFaults:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a signal on the grid comes from and what was wrong with it."""
+    """Where a signal on the grid comes from and what was wrong with it.
+
+    `mapped`: its line in the signal map, by key: channel, unit, scale, offset, invalid.
+    """
 
     symbol: str
     channel: str
@@ -132,6 +136,7 @@ class Origin:
     missing_fraction: float = 0.0
     faults: TimeFaults = field(default_factory=TimeFaults)
     frozen: int = 0
+    mapped: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,12 +284,36 @@ class SlopeSummary:
 
 
 @dataclass(frozen=True, slots=True)
+class Remark:
+    """What does not fit among the signals of a drive, and what to change.
+
+    `kind`: `sign`, `offset`, `scale`, `torque`, `drivetrain` or `resistance`; `signals`: the symbols in question, or
+    the keys of the vehicle file; `lines`: what to put under [signals] of the map. `value` with `ci95`: what was
+    measured, SI (NaN without).
+    """
+
+    kind: str
+    signals: tuple[str, ...]
+    what: str
+    advice: str
+    lines: tuple[str, ...] = ()
+    value: float = math.nan
+    ci95: tuple[float, float] = (math.nan, math.nan)
+
+    @property
+    def sentence(self) -> str:
+        """What and advice in one."""
+        return f"{self.what}: {self.advice}" if self.advice else self.what
+
+
+@dataclass(frozen=True, slots=True)
 class DriveResult:
     """All results of `detect` for one drive.
 
     `features` has the rows of `signals.frame` and no `t`; `features.names.FEATURES` holds names, units and meanings. A
     column is present only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
+    `checks`: what does not fit among the signals; the notes hold their sentences.
     """
 
     signals: Signals
@@ -296,3 +325,4 @@ class DriveResult:
     vehicle_name: str
     notes: tuple[str, ...] = ()
     slopes: tuple[SlopeSummary, ...] = ()
+    checks: tuple[Remark, ...] = ()

@@ -8,13 +8,13 @@ from difflib import get_close_matches
 
 import numpy as np
 
+from aqualog.checks.look import Checks
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import DriveResult, Event, FloatArray, Signals, SlopeSummary, Track, Unavailable
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.detector import Detector, Scene, Settings, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.plausibility import Plausibility
 from aqualog.detect.registry import RIVALS, all_of, check_needs, running_order
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.watch import DropWatch, remarks
@@ -122,14 +122,14 @@ class Through:
         self, vehicle: Vehicle, dt_ns: int, present: Sequence[str], settings: Settings | None, memory: Memory | None
     ) -> None:
         self._stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
-        self._plausibility = Plausibility(present, vehicle, self._stream.dt)
+        self._checks = Checks(present, vehicle, self._stream.dt)
         self._vehicle = vehicle
         self._events: list[Event] = []
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples; as `DriveStream.push`."""
         piece = self._stream.push(columns)
-        self._plausibility.push(columns, piece.features)
+        self._checks.push(columns, piece.features)
         self._events += piece.events
         return piece
 
@@ -139,6 +139,7 @@ class Through:
 
         stream = self._stream
         slopes = stream.slopes
+        checks = self._checks.remarks(signals.origins)
         return DriveResult(
             signals=signals,
             features=pl.DataFrame(features),
@@ -147,8 +148,9 @@ class Through:
             unavailable=stream.unavailable,
             limited=stream.limited,
             vehicle_name=self._vehicle.name,
-            notes=(*self._plausibility.notes(), *remarks(slopes)),
+            notes=(*(r.sentence for r in checks), *remarks(slopes)),
             slopes=slopes,
+            checks=checks,
         )
 
 

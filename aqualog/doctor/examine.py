@@ -12,7 +12,7 @@ from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
 from aqualog.align.propose import Quantity
 from aqualog.core.errors import AqualogError
-from aqualog.core.records import FileFaults
+from aqualog.core.records import FileFaults, Remark, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.registry import DETECTORS
 from aqualog.detect.stream import detect_drive
@@ -84,7 +84,9 @@ def _examined(
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
     # what the drive leaves out as frozen need not be looked at
     findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]
-    findings += _of_signals(findings, [*signals.quality.notes, *result.notes], frozen)
+    said = {r.sentence for r in result.checks}
+    notes = [n for n in (*signals.quality.notes, *result.notes) if n not in said]
+    findings += [*_of_signals(findings, notes, frozen), *(_of_check(r, signals) for r in result.checks)]
     missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
     lacking = {u.detector for u in result.unavailable}
     return Examination(tuple(files), tuple(findings), tuple(d for d in DETECTORS if d not in lacking), missing)
@@ -144,6 +146,13 @@ def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
         if note.removeprefix(f"{name}: ") in told or (faults.unfinalised and "was not finalised" in note):
             continue
         yield Finding("lost" if is_lossy else "doubt", "note", name, "", note.removeprefix(f"{name}: "))
+
+
+def _of_check(remark: Remark, signals: Signals) -> Finding:
+    """Return what does not fit among the signals, with its file and channel where it is one signal."""
+    origin = signals.origins.get(remark.signals[0]) if len(remark.signals) == 1 else None
+    file, channel = ("", "") if origin is None else (origin.file, origin.channel)
+    return Finding("doubt", remark.kind, file, channel, remark.what, remark.advice)
 
 
 def _of_signals(

@@ -237,6 +237,10 @@ def read(
         signal_map = load_signal_map(file_of(map, "map", "SignalMap"))
     else:
         signal_map = map or SignalMap()
+    if signal_map.clocks or signal_map.csv:
+        from aqualog.config.signal_map import check_files
+
+        check_files(signal_map, paths)
     return Drive(
         paths, signal_map, databases, rate_hz, None if vehicle is None else vehicle_of(vehicle),
         cache_of_user() if cache else None, sources_of((*paths, *list_files(names), *databases), map, vehicle),

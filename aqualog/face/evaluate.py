@@ -309,7 +309,7 @@ def _of_logs(
 ) -> Inputs:
     """Logs, each a drive of its own."""
     from aqualog.align.mapping import SignalMap
-    from aqualog.config.signal_map import load_signal_map
+    from aqualog.config.signal_map import check_files, load_signal_map
     from aqualog.config.vehicle import load_vehicle
     from aqualog.evaluate.drives import LogSource
 
@@ -320,6 +320,7 @@ def _of_logs(
         raise ConfigError("no log is named", expected="a campaign file, or at least one log")
     car = load_vehicle(vehicle)
     signal_map = load_signal_map(map_file) if map_file else SignalMap()
+    check_files(signal_map, paths)
     given = _labels(labels, paths)
     sources = tuple(
         LogSource(str(p), (p,), car, signal_map, tuple(dbc), given.get(p), groups={"vehicle": car.name}) for p in paths

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.core.records import Remark
     from aqualog.detect.slip_slope.direct_records import DirectResult
     from aqualog.detect.slip_slope.regression import Line
     from aqualog.report.sections import Report
@@ -31,19 +32,22 @@ SLIP_SLOPE_FILES = ("slip_slope.json", "slip_slope.csv", "slip_slope.html")
 class SlipSlope(Result):
     """Slip slope C_s/F_z [-] of each driven wheel, its interval, and whether it stayed the same.
 
-    `slopes` holds the records, `file_notes` the sentences on the files.
+    `slopes` holds the records, `file_notes` the sentences on files and signals, `checks` what does not fit among these.
     """
 
     drive: Drive
     vehicle: Vehicle
     slopes: DirectResult
     file_notes: tuple[str, ...] = ()
+    checks: tuple[Remark, ...] = ()
 
     @cached_property
     def document(self) -> dict[str, Any]:
+        from aqualog.report.drive.document import remark_rows
         from aqualog.report.slope import slope_document
 
-        return slope_document(self.slopes, log=self.drive.name, notes=self.file_notes)
+        document = slope_document(self.slopes, log=self.drive.name, notes=self.file_notes)
+        return {**document, "checks": remark_rows(self.checks)}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -173,15 +177,17 @@ def slip_slope(
         delay = number_of(delay, "delay", -1.0, 1.0, "s")
     method, traction = text_of(method, "method"), text_of(traction, "traction")
     with one.reading():
+        from aqualog.checks.look import look
         from aqualog.detect.slip_slope.direct import slip_slopes
 
         loaded = one.load(car, report=hear)
         hear.detail(f"{len(loaded.symbols)} signals, {loaded.frame.height} samples at {1e9 / loaded.dt_ns:g} Hz")
         changes = one.changes()
         hear("estimating")
+        checks = look(loaded, car)
         found = slip_slopes(loaded, car, method=method, traction=traction, mu_max=mu_max, delay=delay)
-    notes = (*loaded.quality.notes, *changes)
+    notes = (*loaded.quality.notes, *changes, *(r.sentence for r in checks))
     return SlipSlope(
-        one, car, found, notes, notes=(*notes, *found.notes), has_loss=loaded.quality.has_loss or bool(changes),
+        one, car, found, notes, checks, notes=(*notes, *found.notes), has_loss=loaded.quality.has_loss or bool(changes),
         sources=sources_of(one.sources, vehicle),
     )  # fmt: skip

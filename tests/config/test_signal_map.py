@@ -1,3 +1,6 @@
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -5,7 +8,7 @@ from hypothesis import strategies as st
 from aqualog.align.load import read_options
 from aqualog.align.mapping import Entry, SignalMap, SourceClock
 from aqualog.align.mapping import map_text as map_key
-from aqualog.config.signal_map import load_signal_map, map_text
+from aqualog.config.signal_map import check_files, load_signal_map, map_text
 from aqualog.core.errors import ConfigError
 from aqualog.io.reader import CsvFormat, format_of
 
@@ -79,3 +82,24 @@ def test_written_maps_read_back(tmp_path_factory, names, scale, offset, remark, 
     assert after.clocks == before.clocks
     assert (after.time_channel, after.time_unit) == ("t_ms", "ms")
     assert after.csv == csv
+
+
+IDLE = '[signals]\nv_x = "v"\n\n[sources."gps_20Hz.csv"]\noffset_s = 0.2\n\n[csv."imu*.csv"]\ndecimal = ","\n'
+
+
+def test_what_is_said_of_a_file_that_is_not_there_is_refused(tmp_path):
+    found = load_signal_map(write(tmp_path, IDLE, "map.toml"))
+    with pytest.raises(ConfigError) as error:
+        check_files(found, [Path("a/gps_10Hz.csv"), Path("a/wheels.csv")])
+    assert error.value.where.endswith("map.toml")
+    assert 'line 4: [sources."gps_20Hz.csv"] fits no file (did you mean "gps_10Hz.csv"?)' in error.value.what
+    assert 'line 7: [csv."imu*.csv"] fits no file; the files are gps_10Hz.csv, wheels.csv' in error.value.what
+    with pytest.raises(ConfigError, match="fits no file"):
+        check_files(replace(found, path=""), [Path("a.csv")])
+
+
+@pytest.mark.parametrize("name", ["gps_20Hz.csv", "gps_20Hz", "gps*"])
+def test_what_is_said_of_one_of_the_files_is_not(tmp_path, name):
+    found = load_signal_map(write(tmp_path, f'[csv]\nseparator = ";"\n[sources."{name}"]\noffset_s = 0.2\n'))
+    check_files(found, [Path("gps_20Hz.csv"), Path("b.mf4")])
+    check_files(SignalMap(), [])

@@ -11,7 +11,6 @@ from aqualog.align import load
 from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
-from aqualog.detect import plausibility
 from aqualog.detect.long import Extremes, detect_long
 from aqualog.detect.stream import detect_drive
 from aqualog.io.mdf import reader as mdf
@@ -108,18 +107,6 @@ def test_table_and_page_of_the_command(tmp_path, monkeypatch):
     assert (tmp_path / "long" / "report.html").stat().st_size / (
         tmp_path / "whole" / "report.html"
     ).stat().st_size > 0.5
-
-
-@pytest.mark.parametrize("size", [1, 7, 64, 1000])
-def test_samples_for_a_median_are_the_same_for_pieces_and_bounded(size, monkeypatch):
-    monkeypatch.setattr(plausibility, "MOST", 100)
-    x = np.arange(1037.0)
-    whole, pieces = plausibility._Sampled(), plausibility._Sampled()
-    whole.push(x)
-    for a in range(0, x.size, size):
-        pieces.push(x[a : a + size])
-    np.testing.assert_array_equal(whole.finite(), pieces.finite())
-    np.testing.assert_array_equal(whole.finite(), x[::16])
 
 
 @pytest.mark.parametrize("step", [1, 17, 999, 250_000])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from aqualog.book.documents.fields import (
+    CHECKS,
     EVENT,
     EVIDENCE,
     FAULTS,
@@ -90,6 +91,7 @@ DETECT = Document(
             *FAULTS,
             several("notes", "sentences on the log and on the judgement"),
         )),
+        CHECKS,
         rows("model", "effects that the detectors allowed for, with `--model`; null without", TERMS, null=True),
     ),
     files=("events.json",),
@@ -159,6 +161,7 @@ SLIP_SLOPE = Document(
         )),
         rows("recursive", "the recursive filter, by place, where there is no regression", _RECURSIVE),
         several("notes", "sentences on the log and on the estimate"),
+        CHECKS,
     ),
     files=("slip_slope.json",),
 )  # fmt: skip

@@ -10,9 +10,9 @@ from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import DETECTORS
 
 __all__ = [
-    "BIN", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "LACKING", "PLACE_KEYS", "TERMS", "Document", "Field",
-    "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number", "obj", "open_ci",
-    "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
+    "BIN", "CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "LACKING", "PLACE_KEYS", "TERMS",
+    "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number",
+    "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
 ]  # fmt: skip
 
 Kind = Literal["number", "whole number", "text", "true or false", "interval", "object", "list", "by name", "any"]
@@ -255,6 +255,15 @@ _EVIDENCE = (
     flag("full", "whether a wheel went as far as full aquaplaning"),
     several("decided_by", "detectors that decided when the warning began"),
 )
+
+CHECKS = rows("checks", "what does not fit among the signals, and what to change; the notes say the same", (
+    text("kind", "what is in doubt", ("sign", "offset", "scale", "torque", "drivetrain", "resistance")),
+    several("signals", "signals, or keys of the vehicle file"),
+    text("what", "what does not fit"),
+    text("advice", "what to do"),
+    several("lines", "lines for [signals] of the map; empty where no line helps"),
+    *with_ci("value", "SI unit of the signal", "what was measured"),
+))  # fmt: skip
 
 EVENT = (
     text("detector", "which detector", DETECTORS),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -10,13 +11,15 @@ import numpy as np
 
 from aqualog import __version__
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import DriveResult, Event, Signals, Track
+from aqualog.core.records import DriveResult, Event, Remark, Signals, Track
 from aqualog.io.log_event import LogEvent
 from aqualog.io.write_log import LogGroup
 from aqualog.report.values import fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
-__all__ = ["SCHEMA_VERSION", "document", "result_events", "result_groups", "signal_groups", "track_name"]
+__all__ = [
+    "SCHEMA_VERSION", "document", "remark_rows", "result_events", "result_groups", "signal_groups", "track_name",
+]  # fmt: skip
 
 SCHEMA_VERSION = 1
 _EVENT = ("detector", "wheel", "side", "start_s", "end_s", "severity", "peak", "threshold", "evidence")
@@ -53,7 +56,14 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
             **fields_of(quality.faults, *quality.faults.KINDS, "first_s"),
             "notes": [*quality.notes, *result.notes],
         },
+        "checks": remark_rows(result.checks),
     }
+
+
+def remark_rows(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
+    """What does not fit among the signals, for JSON."""
+    fields = ("kind", "signals", "what", "advice", "lines", "value")
+    return [fields_of(r, *fields, value_ci95="ci95") for r in remarks]
 
 
 def _start(start_ns: int | None) -> str | None:

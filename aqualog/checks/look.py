@@ -1,0 +1,65 @@
+"""The checks of one drive, all alike for every command: piece by piece, or of signals as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from aqualog.checks.doubts import Doubt, remarks_of
+from aqualog.checks.drive import drive_doubts
+from aqualog.checks.signs import sign_doubts
+from aqualog.checks.speeds import scale_doubts
+from aqualog.checks.standstill import offset_doubts
+from aqualog.checks.windows import EXTRA, Gather, Windows
+from aqualog.core.records import FloatArray, Origin, Remark, Signals
+from aqualog.core.vehicle import Vehicle
+
+__all__ = ["Checks", "look"]
+
+_JUDGED = (14.0, -1.0)  # [m/s], [m/s^2] above which the measure of the resistance means something
+
+
+class Checks:
+    """Gather a drive piece by piece, and say at its end what does not fit.
+
+    Parameters
+    ----------
+    available : collection of str
+        Symbols of the drive.
+    dt : float
+        [s]
+    """
+
+    def __init__(self, available: Collection[str], vehicle: Vehicle, dt: float) -> None:
+        self._gather = Gather([*available, EXTRA], vehicle, dt)
+
+    def push(self, columns: Mapping[str, FloatArray], features: Mapping[str, FloatArray] | None = None) -> None:
+        """Take the signals of the next piece, arrays (n,), and where there are some its features."""
+        f = features or {}
+        if EXTRA in f:
+            with np.errstate(invalid="ignore"):
+                judged = (f["v_x_hat"] > _JUDGED[0]) & (f["a_kin_slow"] > _JUDGED[1])
+            extra = np.where(judged, f[EXTRA], np.nan)
+        else:
+            extra = np.full(next(iter(columns.values())).size, np.nan)
+        self._gather.push({**columns, EXTRA: extra})
+
+    def remarks(self, origins: Mapping[str, Origin]) -> tuple[Remark, ...]:
+        """Return what does not fit; empty if all fits or too little moved. `origins` name the lines of the map."""
+        return remarks_of(_doubts(self._gather.windows()), origins)
+
+
+def look(signals: Signals, vehicle: Vehicle) -> tuple[Remark, ...]:
+    """Return what does not fit among the signals of a drive, as `Checks` does."""
+    present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
+    if not present:
+        return ()
+    checks = Checks(present, vehicle, signals.dt)
+    checks.push({s: signals.array(s) for s in present})
+    return checks.remarks(signals.origins)
+
+
+def _doubts(windows: Windows) -> list[Doubt]:
+    found = (sign_doubts(windows), offset_doubts(windows), scale_doubts(windows), drive_doubts(windows))
+    return [d for part in found for d in part]

@@ -1,0 +1,185 @@
+"""Signs: which of the signals that must move together moves the wrong way.
+
+Speed decides on a_x. Turning has several witnesses; each is brought to the lateral acceleration that it stands for.
+Forward and left are positive [iso8855_2011].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from itertools import combinations
+
+import numpy as np
+
+from aqualog.checks.doubts import Change, Doubt
+from aqualog.checks.relations import Relation, changes, relate
+from aqualog.checks.windows import Windows
+from aqualog.core.records import FloatArray
+
+__all__ = ["sign_doubts"]
+
+AGAINST = 0.4  # correlation from which a signal is called turned: noise and delays weaken it, nothing turns it
+TOGETHER = 0.3  # from which a signal is a witness: wheel speeds in steps of 0.1 km/h show no more
+LONGITUDINAL = 0.10  # [m/s^2] changes of less are no driving
+LATERAL = 0.06  # [m/s^2] changes of less are no steering, but wind and the crown of the road
+MOVING = 3.0  # [m/s] below, wheels stand or go backwards without a sign
+BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what is no bend the other way
+OVAL_SHARE = 0.05  # of the drive
+UNDERSTEER = 0.003  # [rad s^2/m] of a car; it only weighs fast driving against slow
+TURN = Change(-1.0)
+
+_NAMES = {"front": "the front wheels (right minus left)", "rear": "the rear wheels (right minus left)"}
+_ONE_FAULT = (
+    ({"a_y", "yaw_rate"}, 1),  # an IMU with y to the right and z down
+    ({"a_y", "yaw_rate", "steer_angle"}, 1),  # a log whose axes are those: right turns are positive
+    ({"a_y"}, 1), ({"yaw_rate"}, 1), ({"steer_angle"}, 1),
+    ({"front"}, 2), ({"rear"}, 2), ({"front", "rear"}, 2),  # names of wheels are rarely wrong
+)  # fmt: skip
+"""Sets of signals that one mistake turns, and how much it takes to believe it."""
+
+
+def sign_doubts(windows: Windows) -> Iterator[Doubt]:
+    """Yield what has the wrong sign; a signal without enough driving is not judged."""
+    speed = windows.speed
+    if not speed.size:
+        return
+    yield from _forward(windows, speed)
+    yield from _turning(windows, speed)
+
+
+def _forward(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
+    if "a_x" not in windows or speed.size < 3:
+        return
+    step = windows.step_s
+    gained = np.gradient(speed, step)
+    found = relate(changes(windows["a_x"], step), changes(gained, step), step, least=LONGITUDINAL)
+    if found.is_sure and found.r < -AGAINST:
+        by = "the wheels' acceleration" if windows.wheels else "the change of v_x"
+        what = f"a_x has the opposite sign of {by} (correlation {found.r:.2f})"
+        yield Doubt("sign", ("a_x",), what, ways=({"a_x": TURN},), value=found.r)
+
+
+def _turning(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
+    step = windows.step_s
+    seen = {n: changes(x, step) for n, x in _witnesses(windows, speed).items()}
+    relations = {(a, b): relate(seen[a], seen[b], step, least=LATERAL) for a, b in combinations(seen, 2)}
+    for one, other in _camps(relations):
+        turned = _turned(one, other)
+        if turned is None:
+            yield _undecided(one, other, relations)
+            continue
+        right = other if turned is one else one
+        if not turned <= {"a_y", "yaw_rate", "steer_angle"}:
+            yield _swapped(turned, right, relations)
+        for name in sorted(turned & {"a_y", "yaw_rate", "steer_angle"}):
+            yield _opposite(name, right, relations)
+
+
+def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
+    """Return the lateral acceleration (n,) that each witness of turning stands for, where the car moves. [m/s²]"""
+    car = windows.vehicle
+    v = np.where(speed > MOVING, speed, np.nan)
+    found = {}
+    if "yaw_rate" in windows:
+        found["yaw_rate"] = v * windows["yaw_rate"]
+    if "a_y" in windows:
+        found["a_y"] = np.where(np.isfinite(v), windows["a_y"], np.nan)
+    if "steer_angle" in windows:
+        found["steer_angle"] = v**2 * windows["steer_angle"] / (car.wheelbase + UNDERSTEER * v**2)
+    wheels = windows.wheels
+    for axle in ("front", "rear"):
+        left, right = f"{axle[0]}l", f"{axle[0]}r"
+        if left in wheels and right in wheels:
+            found[axle] = v * (wheels[right] - wheels[left]) / car.track
+    if any(_is_oval(x) for n, x in found.items() if n != "a_y"):
+        found.pop("a_y", None)
+    return found
+
+
+def _is_oval(turning: FloatArray) -> bool:
+    """Whether the car turns one way only: on a bank that is too steep for its speed a_y then points the other way."""
+    known = turning[np.isfinite(turning)]
+    if not known.size:
+        return False
+    low, high = np.quantile(known, OVAL_SHARE), np.quantile(known, 1.0 - OVAL_SHARE)
+    return bool(max(high, -low) > BANKED and min(high, -low) < LITTLE)
+
+
+def _camps(relations: Mapping[tuple[str, str], Relation]) -> Iterator[tuple[set[str], set[str]]]:
+    """Yield pairs of camps: within each all go the same way, and against the other one.
+
+    The surest relations come first; one that contradicts them is left out.
+    """
+    camp: dict[str, tuple[int, int]] = {}  # number of the group, and side
+    said = [(r.weight, pair, r.r) for pair, r in relations.items() if r.weight and (r.r > TOGETHER or r.r < -AGAINST)]
+    for i, (_, (a, b), r) in enumerate(sorted(said, reverse=True)):
+        sign = 1 if r > 0.0 else -1
+        (group_a, side_a), (group_b, side_b) = camp.setdefault(a, (2 * i, 1)), camp.setdefault(b, (2 * i + 1, 1))
+        if group_a != group_b:
+            flip = sign * side_a * side_b
+            for name, (group, side) in camp.items():
+                if group == group_b:
+                    camp[name] = (group_a, side * flip)
+    for number in dict.fromkeys(group for group, _ in camp.values()):
+        sides = [{n for n, own in camp.items() if own == (number, side)} for side in (1, -1)]
+        if all(sides):
+            yield sides[0], sides[1]
+
+
+def _turned(one: set[str], other: set[str]) -> set[str] | None:
+    """Return the camp that takes fewer mistakes to be the wrong one; None where both take the same."""
+    a, b = _mistakes(one), _mistakes(other)
+    return None if a == b else one if a < b else other
+
+
+def _mistakes(names: set[str]) -> int:
+    """Return the least sum of mistakes that turns exactly these signals."""
+    fitting = [(own, cost) for own, cost in _ONE_FAULT if own <= names]
+    best = {frozenset[str](): 0}
+    for own, cost in fitting:
+        for done, total in list(best.items()):
+            both = done | own
+            best[both] = min(best.get(both, 99), total + cost)
+    return best[frozenset(names)]
+
+
+def _opposite(name: str, right: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
+    told, r = _against(name, right, relations)
+    return Doubt("sign", (name,), f"{name} has the opposite sign of {told}", ways=({name: TURN},), value=r)
+
+
+def _undecided(one: set[str], other: set[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
+    told = " and ".join(_named(n) for n in sorted(one))
+    first = min(one, key=lambda n: _against(n, other, relations)[1])
+    against, r = _against(first, other, relations)
+    ways = tuple(dict.fromkeys(sorted(camp), TURN) for camp in (one, other) if camp.isdisjoint(_NAMES))
+    verb = "has" if len(one) == 1 else "have"
+    what = f"{told} {verb} the opposite sign of {against}; this log does not show which of them is turned"
+    advice = "in a left turn each must be positive"
+    return Doubt("sign", tuple(sorted(one | other)), what, advice, ways, r)
+
+
+def _swapped(wheels: set[str], right: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
+    axles = sorted(wheels & _NAMES.keys())
+    told, r = _against(axles[0], right, relations)
+    names = [f"omega_{a[0]}{side}" for a in axles for side in "lr"]
+    what = f"{' and '.join(_named(a) for a in axles)} have the opposite sign of {told}"
+    pairs = ", ".join(f"omega_{a[0]}l and omega_{a[0]}r" for a in axles)
+    return Doubt("sign", tuple(names), what, f"in the signal map, swap the channels of {pairs}", value=r)
+
+
+def _against(name: str, others: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> tuple[str, float]:
+    """Name the others, with the strongest correlation, and return that."""
+    pairs = {o: relations.get((name, o)) or relations.get((o, name)) for o in sorted(others)}
+    found = {o: r.r for o, r in pairs.items() if r is not None and r.r < 0.0}
+    if not found:
+        return " and of ".join(_named(o) for o in pairs), math.nan
+    first = min(found, key=lambda o: found[o])
+    rest = [_named(o) for o in pairs if o != first]
+    told = f"{_named(first)} (correlation {found[first]:.2f})" + (f" and of {', '.join(rest)}" if rest else "")
+    return told, found[first]
+
+
+def _named(witness: str) -> str:
+    return _NAMES.get(witness, witness)
