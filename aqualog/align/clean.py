@@ -43,6 +43,11 @@ class Span(NamedTuple):
     period_ns: int
     mean_period_ns: int
 
+    @property
+    def rate_hz(self) -> float:
+        """Samples per second outside gaps [Hz]; 0 for fewer than two samples."""
+        return 1e9 / self.mean_period_ns if self.mean_period_ns else 0.0
+
 
 class SpanWatch:
     """Find the span of strictly increasing stamps, in any pieces."""
@@ -263,7 +268,7 @@ class Cleaner:
             channel=self.info.path,
             file=self.info.file,
             unit=self._unit or self._symbol.unit,
-            rate_hz=1e9 / taken.every.period_ns if taken.every.period_ns else 0.0,
+            rate_hz=taken.every.rate_hz,
             samples=taken.samples,
             not_finite=self._bad,
             out_of_range=self._out + self._glitches,

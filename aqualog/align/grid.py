@@ -242,7 +242,8 @@ def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:
     for rate in _NICE_HZ:
         if abs(period * rate / 1e9 - 1.0) < 0.02:
             return round(1e9 / rate)
-    return max(1_000_000, round(period / 1e5) * 100_000)
+    # four digits of the rate: what the signals' own rates are shown with
+    return max(1_000_000, round(1e9 / float(f"{1e9 / period:.4g}")))
 
 
 def onto_grid(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.align.grid import median_period_ns
+from aqualog.align.clean import span_of
 from aqualog.align.timebase import ClockRepair
 from aqualog.core.records import Channel, FloatArray, TimeFaults
 from aqualog.core.units import is_unit, parse_unit
@@ -43,16 +43,15 @@ def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
     """Summarise one channel. Times count from `origin_ns`; a gap is more than five median sample times."""
     t_ns, _, faults = ClockRepair().repair(channel.t_ns)
     finite = channel.values[np.isfinite(channel.values)]
-    steps = np.diff(t_ns)
-    period = median_period_ns(t_ns)
-    gaps = steps[steps > 5 * max(period, 1)]
+    steps, span = np.diff(t_ns), span_of(t_ns)
+    gaps = steps[steps > 5 * max(span.period_ns, 1)]
     return ChannelOverview(
         file=channel.info.file,
         path=channel.info.path,
         name=channel.info.name,
         unit=channel.info.unit,
         samples=channel.values.size,
-        rate_hz=1e9 / float(steps[steps <= 5 * period].mean()) if period and (steps <= 5 * period).any() else 0.0,
+        rate_hz=span.rate_hz,
         start_s=float(t_ns[0] - origin_ns) * 1e-9 if t_ns.size else np.nan,
         end_s=float(t_ns[-1] - origin_ns) * 1e-9 if t_ns.size else np.nan,
         low=float(finite.min()) if finite.size else np.nan,

@@ -32,7 +32,7 @@ __all__ = ["ALIGN", "CACHE", "CALIBRATE", "DETECT", "DOCTOR", "INSPECT", "SIMULA
 _SIGNAL = (
     text("channel", "channel of the log"),
     text("unit", "unit of the signal inside aqualog"),
-    number("rate_hz", "Hz", "rate of the channel", null=True),
+    number("rate_hz", "Hz", "samples per second outside gaps", null=True),
     *maybe(
         text("file", "file that holds it"),
         text("source_unit", "unit in the file", null=True),
@@ -180,7 +180,7 @@ INSPECT = Document(
             text("unit", "unit as the file gives it"),
             count("samples", "samples"),
             *or_null(
-                number("rate_hz", "Hz", "rate, from the median step"),
+                number("rate_hz", "Hz", "samples per second outside gaps"),
                 number("start_s", "s", "first sample, from the first of all channels"),
                 number("end_s", "s", "last sample"),
                 number("low", "unit of the channel", "least value"),
