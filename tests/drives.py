@@ -6,9 +6,9 @@ from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
 from tests.small_model import Drive, Lane, simulate
 
-CAR = Vehicle(name="test car", given=frozenset({"mass"}))
-FWD = Vehicle(name="fwd car", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
-AWD = Vehicle(name="awd car", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"mass"}))
+CAR = Vehicle(name="test car", given=frozenset({"drivetrain", "mass"}))
+FWD = Vehicle(name="fwd car", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"drivetrain", "mass"}))
+AWD = Vehicle(name="awd car", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", "mass"}))
 
 
 def as_signals(columns, rate_hz=100.0, drop=()):

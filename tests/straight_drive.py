@@ -7,7 +7,7 @@ from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
 
 G = 9.80665
-GIVEN = frozenset({"mass", "l_f", "l_r"})
+GIVEN = frozenset({"drivetrain", "mass", "l_f", "l_r"})
 RWD = Vehicle(name="rwd", given=GIVEN, l_f=1.35, l_r=1.46)
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=GIVEN)
 AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=GIVEN)

@@ -112,6 +112,7 @@ def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning) -> Meas
         "v_min": _plain(moving.min()),
         "v_max": _plain(moving.max()),
         "distance_m": _plain(float(np.sum(moving.to_numpy(), dtype=np.float64)) * thinning.step_s),
+        **result.judgement.document(),
         "events": [_event(e) for e in result.events],
         "unavailable": {u.detector: list(u.missing) for u in result.unavailable},
         "limited": {u.detector: list(u.missing) for u in result.limited},

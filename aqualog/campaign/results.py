@@ -14,6 +14,7 @@ from aqualog.campaign.definition import Run
 from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
 from aqualog.campaign.store import Store
 from aqualog.core.errors import AqualogError
+from aqualog.core.judgement import Judgement
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import AQUAPLANING, Label, Span
@@ -47,6 +48,11 @@ class RunInfo:
     def is_done(self) -> bool:
         """Whether there are results."""
         return self.state == "done"
+
+    @property
+    def judgement(self) -> Judgement:
+        """Verdict and episodes; of a run without results that it cannot be judged."""
+        return Judgement.of_document(self.about) if self.about else Judgement()
 
     @property
     def events(self) -> Sequence[Mapping[str, Any]]:

@@ -4,6 +4,7 @@ STORE/samples/KEY.parquet   samples of one log; findings as JSON under "aqualog"
 STORE/failed/KEY.json       reason for no result; tried again when the log or its configuration changes
 STORE/runs.parquet          a row per run        (made again by every batch)
 STORE/events.parquet        a row per event      (as above)
+STORE/episodes.parquet      a row per episode    (as above)
 STORE/manifest.json         state of every log   (as above)
 STORE/contents.json         hashes of the logs by size and time of change
 STORE/lock                  held by the batch that writes here; readers do not need it
@@ -35,7 +36,7 @@ _SCHEMA = 1
 _LOCK = "lock"
 _FOLDERS = ("samples", "failed", "parts")
 _CONTENTS = "contents.json"
-_FILES = ("runs.parquet", "events.parquet", "manifest.json", "contents.json", MARK, _LOCK)
+_FILES = ("runs.parquet", "events.parquet", "episodes.parquet", "manifest.json", "contents.json", MARK, _LOCK)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
 # names that readers of the store rely on

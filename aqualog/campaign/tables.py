@@ -1,4 +1,4 @@
-"""Tables of a store that open by themselves in polars or DuckDB, runs and events; the manifest; and what they hold."""
+"""Tables of a store that open by themselves in polars or DuckDB; the manifest; and what they hold."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
 
-__all__ = ["NUMBERS", "TEXTS", "StoredRun", "events_table", "lane_faults", "runs_table", "stored_runs", "write_tables"]
+__all__ = [
+    "NUMBERS", "TEXTS", "StoredRun", "episodes_table", "events_table", "lane_faults", "runs_table", "stored_runs",
+    "write_tables",
+]  # fmt: skip
 
 TEXTS = ("tyre", "wear", "manoeuvre")
 NUMBERS = (
@@ -32,13 +35,20 @@ _EVENT = {
     "start_s": pl.Float64, "end_s": pl.Float64, "severity": pl.String, "peak": pl.Float64, "threshold": pl.Float64,
     "v_x": pl.Float64, "slip_min": pl.Float64, "decided_by": pl.String,
 }  # fmt: skip
+_EPISODE = {
+    "run": pl.Int64, "name": pl.String, "key": pl.String, "kind": pl.String, "start_s": pl.Float64, "end_s": pl.Float64,
+    "wheels": pl.String, "axle": pl.String, "side": pl.String, "severity": pl.String, "v_x_kmh": pl.Float64,
+    "decided_by": pl.String, "delta_a_x_max": pl.Float64, "slip_min": pl.Float64, "distance_m": pl.Float64,
+    "events": pl.Int64,
+}  # fmt: skip
 
 
 def write_tables(data: CampaignData) -> None:
-    """Write runs.parquet, events.parquet and manifest.json of a campaign into its store."""
+    """Write runs.parquet, events.parquet, episodes.parquet and manifest.json of a campaign into its store."""
     store, infos = data.store, data.runs
     store.write_table("runs.parquet", runs_table(infos))
     store.write_table("events.parquet", events_table(infos))
+    store.write_table("episodes.parquet", episodes_table(infos))
     states = [i.state for i in infos]
     store.write_json(
         "manifest.json",
@@ -54,14 +64,15 @@ def write_tables(data: CampaignData) -> None:
 
 
 def runs_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
-    """A row for each run: state, configuration, range, events of each detector, quality. [s, m, km/h, Hz]"""
+    """A row for each run: state, configuration, range, verdict, events of each detector, quality. [s, m, km/h, Hz]"""
     extra = sorted({k for i in infos for k in i.run.values if k.startswith("x_")})
     schema: dict[str, Any] = {
         "run": pl.Int64, "name": pl.String, "key": pl.String, "state": pl.String, "reason": pl.String,
         "vehicle": pl.String, **dict.fromkeys(TEXTS, pl.String), **dict.fromkeys(NUMBERS, pl.Float64),
         **dict.fromkeys(extra, pl.String), "start_ns": pl.Int64, "duration_s": pl.Float64, "distance_m": pl.Float64,
         "v_min_kmh": pl.Float64, "v_max_kmh": pl.Float64, "sample_rate_hz": pl.Float64, "slip_against": pl.String,
-        "traction": pl.String, **{f"events_{d}": pl.Int64 for d in DETECTORS}, "unavailable": pl.String,
+        "traction": pl.String, "verdict": pl.String, "missing": pl.String, "episodes": pl.Int64,
+        "full_episodes": pl.Int64, **{f"events_{d}": pl.Int64 for d in DETECTORS}, "unavailable": pl.String,
         "truncated": pl.Boolean, **dict.fromkeys(_QUALITY, pl.Int64), "notes": pl.String,
     }  # fmt: skip
     return pl.DataFrame([_run_row(i) for i in infos], schema=schema, strict=False)
@@ -70,6 +81,16 @@ def runs_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
 def events_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
     """A row for each event of each run. [s, m/s]"""
     return pl.DataFrame([_event_row(i, e) for i in infos for e in i.events], schema=_EVENT, strict=False)
+
+
+def episodes_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
+    """A row for each episode of each run. [s, km/h, m/s², m]"""
+    rows = [
+        {**e.document(), "run": i.index, "name": i.name, "key": i.key, "wheels": ", ".join(e.wheels),
+         "decided_by": ", ".join(e.decided_by), "events": len(e.events)}
+        for i in infos for e in i.judgement.episodes
+    ]  # fmt: skip
+    return pl.DataFrame(rows, schema=_EPISODE, strict=False)
 
 
 def _run_row(info: RunInfo) -> dict[str, Any]:
@@ -84,6 +105,11 @@ def _run_row(info: RunInfo) -> dict[str, Any]:
         return row
     row |= {n: about[n] for n in ("start_ns", "duration_s", "distance_m", "sample_rate_hz", "slip_against", "traction")}
     row |= {f"{n}_kmh": None if about[n] is None else 3.6 * about[n] for n in ("v_min", "v_max")}
+    judgement = info.judgement
+    wet = judgement.of("aquaplaning")
+    row |= {"verdict": judgement.verdict, "missing": ", ".join(judgement.missing)}
+    if judgement.verdict != "cannot_be_judged":
+        row |= {"episodes": len(wet), "full_episodes": sum(e.severity == "full" for e in wet)}
     found = [e["detector"] for e in about["events"]]
     row |= {f"events_{d}": None if d in about["unavailable"] else found.count(d) for d in DETECTORS}
     row["unavailable"] = ", ".join(about["unavailable"])

@@ -68,7 +68,11 @@ def detect(
             result.write(write, force=True)
         if history is not None:
             result.remember(history)
-    notes = [] if run.vehicle else ["no --vehicle: a default RWD car is taken, and what needs its mass is not judged"]
+    notes = (
+        []
+        if run.vehicle
+        else ["no --vehicle: radii of a default car are taken, and what needs mass or drivetrain is not judged"]
+    )
     if result.model is not None:
         effects = ", ".join(t.effect.name for t in result.model.terms) or "no effect"
         notes.append(f"model {run.model}: the detectors allow for {effects}; signals and features are corrected for it")
@@ -77,7 +81,7 @@ def detect(
         *result.notes,
         *([f"results are in {out}: {', '.join(DETECT_FILES)}"] if out is not None else []),
     ]
-    has_tripped = fail_on_event and bool(result.drive_result.events)
+    has_tripped = fail_on_event and result.verdict == "aquaplaning"
     return Output(result, notes, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)
 
 

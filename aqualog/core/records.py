@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.judgement import Judgement
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -216,7 +218,11 @@ class Signals:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One detection. `peak` and `threshold` are in the unit of the detector's statistic."""
+    """One detection. `peak` and `threshold` are in the unit of the detector's statistic.
+
+    `cause_s` estimates when the cause began and ended: without the detector's delay, decay and hold. None: as the
+    detection. [s]
+    """
 
     detector: str
     wheel: str | None
@@ -227,6 +233,7 @@ class Event:
     peak: float
     threshold: float
     evidence: Mapping[str, Any]
+    cause_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,6 +321,7 @@ class DriveResult:
     column is present only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
     `checks`: what does not fit among the signals; the notes hold their sentences.
+    `judgement` has the verdict and the episodes.
     """
 
     signals: Signals
@@ -326,3 +334,4 @@ class DriveResult:
     notes: tuple[str, ...] = ()
     slopes: tuple[SlopeSummary, ...] = ()
     checks: tuple[Remark, ...] = ()
+    judgement: Judgement = field(default_factory=Judgement)

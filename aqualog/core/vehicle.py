@@ -160,6 +160,11 @@ class Vehicle:
         return self.l_f + self.l_r
 
     @property
+    def knows_drivetrain(self) -> bool:
+        """Whether the user's file says which axle is driven; without it nothing that depends on it is judged."""
+        return "drivetrain" in self.given
+
+    @property
     def driven(self) -> tuple[str, ...]:
         """Driven wheels."""
         return {"rwd": WHEELS[2:], "fwd": WHEELS[:2], "awd": WHEELS}[self.drivetrain]

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 
-__all__ = ["CusumParams", "CusumState", "initial_state", "scan", "step"]
+__all__ = ["Ages", "CusumParams", "CusumState", "ages", "initial_state", "new_ages", "scan", "step"]
 
 
 class CusumParams(NamedTuple):
@@ -86,3 +86,58 @@ def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, 
     """
     g, bits, last, active = _scan(p, state.g, state.active, np.ascontiguousarray(x, dtype=np.float64))
     return g, bits, CusumState(last, active=bool(active))
+
+
+class Ages(NamedTuple):
+    """Largest sum since it left zero, seconds since it left zero, seconds since an alarm's sum was the largest."""
+
+    peak: float
+    since: float
+    after: float
+
+
+def new_ages() -> Ages:
+    """Return the state of a sum that is zero."""
+    return Ages(0.0, 0.0, 0.0)
+
+
+@compiled
+def _ages(dt, peak, since, after, g, active):  # type: ignore[no-untyped-def]
+    left = np.empty_like(g)
+    back = np.empty_like(g)
+    for i in range(g.size):
+        after += dt
+        since += dt
+        if g[i] <= 0.0:
+            peak, since = 0.0, 0.0
+        elif g[i] >= peak:
+            peak = g[i]
+            if active[i]:
+                after = 0.0
+        left[i], back[i] = since, after
+    return left, back, peak, since, after
+
+
+def ages(dt: float, state: Ages, g: FloatArray, active: BoolArray) -> tuple[FloatArray, FloatArray, Ages]:
+    """Tell when a change began and ended from its sum, which is late at both ends.
+
+    Parameters
+    ----------
+    dt : float
+        [s]
+    state : Ages
+        From `new_ages` or the piece before.
+    g, active : array (n,)
+        Statistic and alarm of `scan`. NaN: time goes on.
+
+    Returns
+    -------
+    since : array (n,)
+        Seconds since the sum left zero: the estimate of when a change began (Page [page1954]).
+    after : array (n,)
+        Seconds since the sum of an alarm was at its largest, which with a clamp is as long as the change lasts. What
+        follows is decay.
+    state : Ages
+    """
+    since, after, *last = _ages(dt, *state, np.ascontiguousarray(g, dtype=np.float64), np.ascontiguousarray(active))
+    return since, after, Ages(*(float(x) for x in last))

@@ -18,7 +18,8 @@ from aqualog.features.stream import Features
 
 __all__ = [
     "Detector", "Found", "JointCusumParams", "Kind", "Needs", "Output", "Scene", "Settings", "Setup", "Watch",
-    "always_partial", "any_wheel", "missing_balance", "missing_torques", "missing_wheels", "too_slow", "traction",
+    "always_partial", "any_wheel", "missing_balance", "missing_drivetrain", "missing_torques", "missing_wheels",
+    "too_slow", "traction",
 ]  # fmt: skip
 
 
@@ -243,8 +244,16 @@ def missing_wheels(have: Collection[str], wheels: Collection[str] = WHEELS) -> l
     return [f"omega_{w}" for w in wheels if f"omega_{w}" not in have]
 
 
+def missing_drivetrain(vehicle: Vehicle) -> list[str]:
+    """The vehicle's key of the driven axle, if its file does not have it: no detector assumes one."""
+    return [] if vehicle.knows_drivetrain else ["vehicle.drivetrain"]
+
+
 def missing_torques(vehicle: Vehicle, have: Collection[str]) -> list[str]:
-    """Torques of driven wheels that the drive does not have."""
+    """Torques of driven wheels that the drive does not have, and the drivetrain where it is not known."""
+    if not vehicle.knows_drivetrain:
+        torque = () if any(f"torque_{w}" in have for w in WHEELS) else ("torque of the driven wheels",)
+        return [*torque, *missing_drivetrain(vehicle)]
     return [f"torque_{w}" for w in vehicle.driven if f"torque_{w}" not in have]
 
 

@@ -10,10 +10,13 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, Event, FloatArray, Track
 
-__all__ = ["EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
+__all__ = ["AFTER", "SINCE", "EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
-"""Name -> (how, values): `first`, `min`, `max`; of a bit, `any` or `at_start`."""
+"""Name -> (how, values): `first`, `last`, `min`, `max`; of a bit, `any` or `at_start`."""
+
+SINCE, AFTER = "since_s", "after_s"
+"""Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`)."""
 
 Severity = Callable[[Mapping[str, Any]], str]
 Explain = Callable[[dict[str, Any]], dict[str, Any]]
@@ -49,6 +52,9 @@ class _Open:
                 continue
             if how == "first":
                 self.evidence.setdefault(name, float(piece[0]))
+                continue
+            if how == "last":
+                self.evidence[name] = float(piece[-1])
                 continue
             new, least = float(piece.min() if how == "min" else piece.max()), min if how == "min" else max
             self.evidence[name] = least(self.evidence[name], new) if name in self.evidence else new
@@ -94,11 +100,13 @@ class _Builder:
         if self._open is None:
             return []
         opened, self._open = self._open, None
+        start_s, end_s = opened.start * self._dt_ns / 1e9, end * self._dt_ns / 1e9
+        since, after = (opened.evidence.pop(name, 0.0) for name in (SINCE, AFTER))
         return [
             Event(
-                **self._place, start_s=opened.start * self._dt_ns / 1e9, end_s=end * self._dt_ns / 1e9,
-                severity=self._severity(opened.evidence), peak=opened.peak, threshold=self._threshold,
-                evidence=self._explain(opened.evidence),
+                **self._place, start_s=start_s, end_s=end_s, severity=self._severity(opened.evidence),
+                peak=opened.peak, threshold=self._threshold, evidence=self._explain(opened.evidence),
+                cause_s=(max(start_s - since, 0.0), max(end_s - after, start_s)),
             )
         ]  # fmt: skip
 

@@ -16,6 +16,7 @@ from aqualog.detect import cusum, other_surface
 from aqualog.detect.braking import began_free, hold_on
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_wheels, traction
+from aqualog.detect.events import AFTER
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
@@ -23,8 +24,8 @@ from aqualog.detect.spin import MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "CRITERIA", "FULL", "GATE", "GATED", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER", "SLOPE", "Criteria",
-    "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity", "without_start",
+    "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER", "SLOPE",
+    "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity", "without_start",
 ]  # fmt: skip
 
 THRESHOLD = 0.03  # [m/s]
@@ -35,7 +36,8 @@ CRITERIA = {d.name: number for number, d in _NUMBERED.items()}
 SLOPE = 4
 GATED = (1, 2, 3, 4)  # one of these must be met while the gate is open; 5 needs no gate
 _OF_WHEELS = (SPIN_DOWN.name, MINOR_SPIN_DOWN.name, SPIN_UP.name)
-GATE, MAY_BE_WATER, FULL = "gate", "may_be_water", "criterion_full"  # as later detectors find them
+# as later detectors find them
+GATE, GATE_AFTER, MAY_BE_WATER, FULL = "gate", "gate_after", "may_be_water", "criterion_full"
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +114,7 @@ class JointCriteriaWatch:
         self._setup = setup
         self._dt = setup.dt
         self._params = gate_params(setup.dt, setup.threshold)
-        self._sum = cusum.initial_state()
+        self._sum, self._ages = cusum.initial_state(), cusum.new_ages()
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
@@ -121,7 +123,8 @@ class JointCriteriaWatch:
     def push(self, scene: Scene) -> Output:
         """Take the next piece: one track, the number of criteria that count. [-]"""
         f, x = scene.f, scene.shared[MEASURE]
-        _, gate, self._sum = cusum.scan(self._params, self._sum, x)
+        g, gate, self._sum = cusum.scan(self._params, self._sum, x)
+        _, after, self._ages = cusum.ages(self._dt, self._ages, g, gate)
         gate, self._open = hold_on(gate, self._open, seconds=GATE_HOLD, dt=self._dt)
         slope = self._may_be_water(scene, x)
         found = criteria(
@@ -143,11 +146,12 @@ class JointCriteriaWatch:
             **{f"criterion_{k}": ("any", b) for k, b in bits.items()},
             **{f"at_start_{k}": ("at_start", b) for k, b in bits.items()},
             "full": ("any", found.is_full),
+            AFTER: ("last", after),
         }
         features = {f"criterion_{k}": b.astype(np.float64) for k, b in found.met.items()}
         features["joint_gate"] = gate.astype(np.float64)
         features[FULL] = found.is_full.astype(np.float64)
-        return Output((Found(track, evidence),), features, {GATE: gate, MAY_BE_WATER: slope})
+        return Output((Found(track, evidence),), features, {GATE: gate, GATE_AFTER: after, MAY_BE_WATER: slope})
 
     def _may_be_water(self, scene: Scene, x: FloatArray) -> BoolArray:
         slopes = scene.of(SLIP_SLOPE_DROP)

@@ -11,9 +11,11 @@ from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
 from aqualog.detect.detector import Detector, Found, JointCusumParams, Output, Scene, Setup
+from aqualog.detect.events import AFTER
 from aqualog.detect.joint_criteria import (
     FULL,
     GATE,
+    GATE_AFTER,
     HOLD,
     JOINT_CRITERIA,
     MAY_BE_WATER,
@@ -102,6 +104,7 @@ class JointCusumWatch:
             **{f"term_{name}": ("max", part) for name, part in parts.items()},
             **{f"at_start_{name}": ("first", part) for name, part in parts.items()},
             "full": ("any", f[FULL] > 0.0),
+            AFTER: ("last", scene.shared[GATE_AFTER]),
         }
         track = self._setup.track(np.where(known, total, np.nan), active)
         return Output((Found(track, evidence),), {f"joint_term_{name}": part for name, part in parts.items()})

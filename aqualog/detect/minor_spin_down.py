@@ -12,7 +12,17 @@ from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_wheels, too_slow
+from aqualog.detect.detector import (
+    Detector,
+    Found,
+    Needs,
+    Output,
+    Scene,
+    Setup,
+    missing_drivetrain,
+    missing_wheels,
+    too_slow,
+)
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
 from aqualog.detect.spin import wheel_evidence
@@ -196,7 +206,8 @@ class MinorWatch:
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     omega = missing_wheels(have)
     has_side = any(not missing_wheels(have, wheels) for wheels in SIDES.values())
-    return Needs((*(() if has_side else omega), *too_slow(rate_hz, MIN_RATE)), tuple(omega))
+    wheels = () if has_side else omega
+    return Needs((*wheels, *missing_drivetrain(vehicle), *too_slow(rate_hz, MIN_RATE)), tuple(omega))
 
 
 MINOR_SPIN_DOWN = Detector(

@@ -14,6 +14,7 @@ from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_balance, too_slow
+from aqualog.detect.events import AFTER, SINCE
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
@@ -25,6 +26,7 @@ __all__ = [
 
 THRESHOLD = 0.2  # [m/s]
 LEVEL = 0.2  # [m/s^2] thesis 2.2: partial aquaplaning (C44)
+LATEST = 2.0  # [s] at most so long after it begins a resistance of 0.2 m/s^2 is reported
 MIN_RATE = 2.0  # [Hz]
 MEASURE = "trusted_measure"  # as later detectors find it
 FREEZE = 2.0  # [s] after a wheel has left the road's speed nothing is learnt as dry
@@ -106,7 +108,7 @@ class ResistanceWatch:
         self._params = alarm_params(setup.dt, setup.threshold)
         self._online = online.OnlineParams.make(setup.dt) if setup.settings.learns_offset else None
         self._offset = online.initial_state()
-        self._sum = cusum.initial_state()
+        self._sum, self._ages = cusum.initial_state(), cusum.new_ages()
         self._frozen = 0
 
     def push(self, scene: Scene) -> Output:
@@ -123,11 +125,14 @@ class ResistanceWatch:
             measure = measure - offset
         x = trusted_measure(measure, f["v_x_hat"], f["a_y_slow"], scene.is_braking)
         g, bits, self._sum = cusum.scan(self._params, self._sum, x)
+        since, after, self._ages = cusum.ages(self._dt, self._ages, g, bits)
         evidence: dict[str, Any] = {
             "v_x": ("first", f["v_x_hat"]),
             "v_x_min": ("min", f["v_x_hat"]),
             "v_x_max": ("max", f["v_x_hat"]),
             "delta_a_x_max": ("max", np.where(scene.is_braking, np.nan, measure)),
+            SINCE: ("first", np.minimum(since, LATEST)),
+            AFTER: ("last", after),
         }
         return Output((Found(self._setup.track(g, bits), evidence),), features, {MEASURE: x})
 

@@ -24,6 +24,7 @@ from aqualog.detect.detector import (
     Output,
     Scene,
     Setup,
+    missing_drivetrain,
     missing_torques,
     missing_wheels,
     too_slow,
@@ -206,7 +207,8 @@ def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     omega = missing_wheels(have, vehicle.driven)
     is_blind = len(omega) == len(vehicle.driven)
     return Needs(
-        (*(omega if is_blind else ()), *too_slow(rate_hz, MIN_RATE)), (*omega, *missing_torques(vehicle, have))
+        (*(omega if is_blind else ()), *missing_drivetrain(vehicle), *too_slow(rate_hz, MIN_RATE)),
+        (*omega, *missing_torques(vehicle, have)),
     )
 
 

@@ -14,10 +14,12 @@ from aqualog.core.records import DriveResult, Event, FloatArray, Signals, SlopeS
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.detector import Detector, Scene, Settings, Setup
+from aqualog.detect.episodes import Way
 from aqualog.detect.events import EventBook
 from aqualog.detect.registry import RIVALS, all_of, check_needs, running_order
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.watch import DropWatch, remarks
+from aqualog.detect.verdict import JOINT, judge
 from aqualog.features.stream import INPUTS, Features, FeatureStream
 
 __all__ = [
@@ -125,12 +127,17 @@ class Through:
         self._checks = Checks(present, vehicle, self._stream.dt)
         self._vehicle = vehicle
         self._events: list[Event] = []
+        self._way = Way(self._stream.dt)
+        self._judged = 0
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples; as `DriveStream.push`."""
         piece = self._stream.push(columns)
         self._checks.push(columns, piece.features)
         self._events += piece.events
+        self._way.push(piece.features["v_x_hat"])
+        joint = (t for t in piece.tracks if t.detector in JOINT)
+        self._judged += max((int(np.count_nonzero(~np.isnan(t.statistic))) for t in joint), default=0)
         return piece
 
     def result(self, signals: Signals, features: Mapping[str, FloatArray], tracks: tuple[Track, ...]) -> DriveResult:
@@ -140,17 +147,23 @@ class Through:
         stream = self._stream
         slopes = stream.slopes
         checks = self._checks.remarks(signals.origins)
+        events = in_order((*self._events, *stream.finish()))
+        judgement = judge(
+            events, stream.unavailable, [d.name for d in stream.watches], judged_s=self._judged * stream.dt,
+            way=self._way.between,
+        )  # fmt: skip
         return DriveResult(
             signals=signals,
             features=pl.DataFrame(features),
             tracks=tracks,
-            events=in_order((*self._events, *stream.finish())),
+            events=events,
             unavailable=stream.unavailable,
             limited=stream.limited,
             vehicle_name=self._vehicle.name,
             notes=(*(r.sentence for r in checks), *remarks(slopes)),
             slopes=slopes,
             checks=checks,
+            judgement=judgement,
         )
 
 

@@ -12,7 +12,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum
 from aqualog.detect.cusum import CusumParams
-from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup
+from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_drivetrain
 
 __all__ = ["SIGMA", "TIE_ROD", "TieRodWatch", "params", "scaled_residual"]
 
@@ -107,7 +107,7 @@ def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     """Name what is missing to compare tie-rod forces, or else the steering torque, with their model."""
     rods = [f"tie_rod_{w}" for w in AXLES["f"]]
     front = [f"torque_{w}" for w in AXLES["f"] if w in vehicle.driven and f"torque_{w}" not in have]
-    motion = [*(s for s in ("a_y", "yaw_rate") if s not in have), *front]
+    motion = [*(s for s in ("a_y", "yaw_rate") if s not in have), *front, *missing_drivetrain(vehicle)]
     if any(r in have for r in rods):
         model = [] if vehicle.tie_rod else ["vehicle.tie_rod (aqualog calibrate)"]
     elif "steering_torque" in have:

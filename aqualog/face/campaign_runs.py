@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from aqualog.core.errors import ConfigError
+from aqualog.core.judgement import VERDICTS
 from aqualog.face.arguments import file_of
 from aqualog.face.campaign_inputs import CampaignInputs, split
 from aqualog.face.listener import Counted, Progress, listener
@@ -196,6 +197,8 @@ class CampaignRuns(Result):
             "made": self.outcome.made,
             "kept": self.outcome.kept,
             "failed": [{"log": name, "reason": reason} for name, reason in self.outcome.failed.items()],
+            "verdicts": self._verdicts(),
+            "episodes": sum(len(r.judgement.of("aquaplaning")) for r in self.data.done),
             "events": {d: n for d, (n, _) in self._counts().items()},
         }
 
@@ -214,15 +217,31 @@ class CampaignRuns(Result):
         return events_table(self.data.runs)
 
     @property
+    def episodes(self) -> pl.DataFrame:
+        """A row for each episode of each run, as `episodes.parquet` of the store."""
+        from aqualog.campaign.tables import episodes_table
+
+        return episodes_table(self.data.runs)
+
+    @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
-        """`runs` and `events`."""
-        return {"runs": self.runs, "events": self.events}
+        """`runs`, `events` and `episodes`."""
+        return {"runs": self.runs, "events": self.events, "episodes": self.episodes}
 
     def text(self) -> str:
         from aqualog.report.text import table
+        from aqualog.report.values import counted
 
         rows = [(d, str(n), f"{k} of {len(self.data.done)}") for d, (n, k) in self._counts().items()]
-        return f"{self._head()}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
+        found = self._verdicts()
+        wet = sum(len(r.judgement.of("aquaplaning")) for r in self.data.done)
+        told = [
+            (found["aquaplaning"], f"aquaplaning in {counted(found['aquaplaning'], 'run')}, {counted(wet, 'episode')}"),
+            (found["none"], f"none in {counted(found['none'], 'run')}"),
+            (found["cannot_be_judged"], f"{counted(found['cannot_be_judged'], 'run')} cannot be judged"),
+        ]
+        head = "; ".join(x for n, x in told if n)
+        return f"{self._head()}\n{head}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
 
     def headline(self) -> str:
         failed = [f"  failed: {name}: {reason}" for name, reason in self.outcome.failed.items()]
@@ -231,6 +250,11 @@ class CampaignRuns(Result):
     def _head(self) -> str:
         o = self.outcome
         return f"{o.done} logs done ({o.made} now, {o.kept} before), {len(o.failed)} failed"
+
+    def _verdicts(self) -> dict[str, int]:
+        """Runs with results, by verdict."""
+        found = [r.judgement.verdict for r in self.data.done]
+        return {v: found.count(v) for v in VERDICTS}
 
     def _counts(self) -> dict[str, tuple[int, int]]:
         """Per detector: its events, and the runs that have one."""
@@ -252,11 +276,12 @@ class CampaignRuns(Result):
         return made
 
     def files(self) -> Writers:
-        """Return `campaign.json`, `runs.parquet` and `events.parquet`; the store itself stays where it is."""
+        """Return `campaign.json`, `runs.parquet`, `events.parquet` and `episodes.parquet`; the store stays."""
         return {
             "campaign.json": self._json_file(),
             "runs.parquet": self.runs.write_parquet,
             "events.parquet": self.events.write_parquet,
+            "episodes.parquet": self.episodes.write_parquet,
         }
 
     def slip_slope(

@@ -70,6 +70,23 @@ class Detection(Result):
         )  # fmt: skip
 
     @property
+    def verdict(self) -> str:
+        """`aquaplaning`, `none`, or `cannot_be_judged`: then `drive_result.judgement.missing` names what is missing."""
+        return self.drive_result.judgement.verdict
+
+    @property
+    def episodes(self) -> pl.DataFrame:
+        """A row for each episode, detections that belong together; `events` are rows of the table of events."""
+        rows = [
+            {**e, **{n: ", ".join(map(str, e[n])) for n in ("wheels", "decided_by", "events")}}
+            for e in self.document["episodes"]
+        ]
+        return table(
+            rows, "kind start_s end_s wheels axle side severity v_x_kmh decided_by delta_a_x_max slip_min distance_m "
+            "events", text=("kind", "wheels", "axle", "side", "severity", "decided_by", "events"),
+        )  # fmt: skip
+
+    @property
     def signals(self) -> pl.DataFrame:
         """The signals on one time base: `t` [s] and a column for each, SI."""
         return self.drive_result.signals.frame
@@ -111,8 +128,8 @@ class Detection(Result):
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
-        """`events`, `signals`, and where the samples were kept `features` and `tracks`."""
-        found = {"events": self.events, "signals": self.signals}
+        """`events`, `episodes`, `signals`, and where the samples were kept `features` and `tracks`."""
+        found = {"events": self.events, "episodes": self.episodes, "signals": self.signals}
         return {**found, "features": self.features, "tracks": self.tracks} if self.has_samples else found
 
     @property
@@ -141,18 +158,17 @@ class Detection(Result):
         return drive_report(self.drive_result)
 
     def headline(self) -> str:
-        from aqualog.report.drive.report import verdict
+        from aqualog.report.drive.judged import headline, lines_of
+        from aqualog.report.drive.report import lacking
 
-        found, signals = verdict(self.drive_result), self.drive_result.signals
-        rate = 1e9 / signals.step_ns
-        lines = [
-            f"{self.drive.title}, {self.drive_result.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz",
-            found.headline,
-            *(f"  {d}" for d in found.details[:4]),
-        ]
-        if found.not_judged:
-            lines.append(f"  Not judged: {'; '.join(found.not_judged)}")
-        return "\n".join(lines)
+        found, signals = self.drive_result, self.drive_result.signals
+        rate, lacks = 1e9 / signals.step_ns, lacking(found)
+        return "\n".join([
+            f"{self.drive.title}, {found.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz",
+            headline(found.judgement),
+            *(f"  {line}" for line in lines_of(found.judgement, 4)),
+            *([f"  Not judged: {'; '.join(lacks)}"] if lacks else []),
+        ])  # fmt: skip
 
     def plot(self) -> go.Figure:
         """Return the panels of the page: speeds, detectors, differences, accelerations, statistics, slopes."""
@@ -226,7 +242,7 @@ def detect(
     drive : Drive, Signals, str, Path or several
         From `aq.read`, or files of ONE drive that need no signal map.
     vehicle : Vehicle, str or Path, optional
-        Without it that of the drive, else a default car; detectors that need its mass are then not judged.
+        Without it that of the drive, else radii of a default car; what needs mass or drivetrain is then not judged.
     thresholds : str or Path, optional
         Thresholds of the detectors, as `aq.evaluate(..., tune=True)` proposes them.
     model : Model, str or Path, optional
@@ -408,7 +424,7 @@ def check_something_to_do(
     unavailable, _ = check_needs(vehicle, symbols, rate_hz=rate_hz)
     if len(unavailable) < len(DETECTORS):
         return
-    asked = ("omega_", "torque_", "a_x", "wheel speeds", "signals at")
+    asked = ("omega_", "torque", "a_x", "wheel speeds", "signals at")
     missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(asked))
     raise SignalError(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),

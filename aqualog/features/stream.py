@@ -62,7 +62,8 @@ class FeatureStream:
         self._velocity_params = params_from_seconds(dt, has_accelerometer="a_x" in self.available)
         self._velocity = initial_state()
         self._memory: dict[str, float] = {}
-        trust = 1.0 if vehicle.drivetrain == "awd" else 0.25
+        # of an axle that may or may not be driven nothing is assumed
+        trust = 1.0 if vehicle.drivetrain == "awd" or not vehicle.knows_drivetrain else 0.25
         self._weights = np.array([trust if w in vehicle.driven else 1.0 for w in WHEELS])
         self._r_e = np.array([vehicle.r_e(w) for w in WHEELS])
         self._r_l = np.array([vehicle.r_l(w) for w in WHEELS])

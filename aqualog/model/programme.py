@@ -26,12 +26,12 @@ LEFT_IRREGULARITY, RIGHT_IRREGULARITY = 0.5, 0.05
 
 SEDAN = Vehicle(
     name="sedan RWD", drivetrain="rwd", torque_split_rear=1.0, mass=1680.0, l_f=1.32, l_r=1.48, h_cg=0.54, track=1.55,
-    drag_area=0.66, rolling_resistance=0.0105,
+    drag_area=0.66, rolling_resistance=0.0105, given=frozenset({"drivetrain"}),
 )  # fmt: skip
 SUV = Vehicle(
     name="SUV AWD", drivetrain="awd", torque_split_rear=0.6, mass=1950.0, l_f=1.40, l_r=1.41, h_cg=0.62, track=1.62,
     drag_area=0.91, rolling_resistance=0.0105, r_e_f=0.355, r_e_r=0.355, r_l_f=0.346, r_l_r=0.346, inertia_f=1.8,
-    inertia_r=1.8,
+    inertia_r=1.8, given=frozenset({"drivetrain"}),
 )  # fmt: skip
 SUV_REAR = replace(SUV, name="SUV AWD, drive to the rear", torque_split_rear=0.98)
 

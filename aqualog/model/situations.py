@@ -86,5 +86,5 @@ def believed_vehicle(scenario: Scenario, rng: np.random.Generator) -> Vehicle:
         slip_slope_f=float(plant.slip_slope[0]) * (1.0 + SLOPE_ERROR * slope_f),
         slip_slope_r=float(plant.slip_slope[2]) * (1.0 + SLOPE_ERROR * slope_r),
         mu_max=float(plant.mu[0]),
-        given=frozenset({"name", *KEYS}),
+        given=frozenset({"name", "drivetrain", *KEYS}),
     )

@@ -144,7 +144,10 @@ Part = Code | Table | Lines | Para | Headline | Bars | Figures | Beside | Residu
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Parts under a title. `look` is a class of the page's style; empty parts and sections are not shown."""
+    """Parts under a title. `look` is a class of the page's style; empty parts and sections are not shown.
+
+    `fold`: a page shows this line instead, and the parts when the reader opens it.
+    """
 
     title: str
     parts: Sequence[Part]
@@ -152,6 +155,7 @@ class Section:
     hint: str = ""
     look: str = ""
     where: Where = "everywhere"
+    fold: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ def car(rng):
         mass=rng.uniform(1200.0, 2100.0), l_f=rng.uniform(1.25, 1.45), l_r=rng.uniform(1.35, 1.5),
         drag_area=rng.uniform(0.5, 0.9), rolling_resistance=rng.uniform(0.008, 0.014),
         r_e_f=0.317 * (1.0 + 0.003 * rng.normal()), r_e_r=0.317 * (1.0 + 0.003 * rng.normal()),
-        given=frozenset({"mass", "l_f", "l_r"}),
+        given=frozenset({"drivetrain", "mass", "l_f", "l_r"}),
     )  # fmt: skip
     return true, 1.0 + GAIN_SD * rng.normal()
 

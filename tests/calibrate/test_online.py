@@ -17,7 +17,7 @@ from aqualog.model.simulate import simulate
 
 DT = 0.01
 P = online.OnlineParams.make(DT)
-CAR = Vehicle(name="sedan", mass=1680.0, l_f=1.32, l_r=1.48, given=frozenset({"mass"}))
+CAR = Vehicle(name="sedan", mass=1680.0, l_f=1.32, l_r=1.48, given=frozenset({"drivetrain", "mass"}))
 
 
 def offset(x, v=25.0, frozen=False, p=P):

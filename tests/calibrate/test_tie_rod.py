@@ -69,7 +69,7 @@ def test_refused_without_steering_or_time():
 
 def test_braking_is_left_out_of_a_drive():
     """Brakes pull at the rods on another lever than the drive: one coefficient for both would be neither."""
-    car = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
+    car = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"drivetrain", "mass"}))
     found = {}
     for braked in (False, True):
         brakes = tuple(

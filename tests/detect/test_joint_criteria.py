@@ -11,7 +11,7 @@ from aqualog.core.records import Track
 from aqualog.detect import joint_criteria, joint_cusum, other_surface
 from aqualog.detect.detector import JointCusumParams, Scene, Settings, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.joint_criteria import GATE, JOINT_CRITERIA, MAY_BE_WATER
+from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
 from tests.drives import CAR
@@ -24,7 +24,12 @@ NOTHING = np.zeros(N, dtype=bool)
 def scene(tracks=(), x=0.3, v_x=27.0, **shared):
     features = {"v_x_hat": np.full(N, v_x), "delta_a_x": np.full(N, 0.3), "criterion_full": np.zeros(N)}
     features |= {f"v_w_{w}": np.full(N, v_x) for w in WHEELS}
-    shared = {MEASURE: np.broadcast_to(x, (N,)).astype(float), GATE: ~NOTHING, MAY_BE_WATER: ~NOTHING} | shared
+    shared = {
+        MEASURE: np.broadcast_to(x, (N,)).astype(float),
+        GATE: ~NOTHING,
+        GATE_AFTER: np.zeros(N),
+        MAY_BE_WATER: ~NOTHING,
+    } | shared
     return Scene(features, dict.fromkeys(WHEELS, NOTHING), tracks=tuple(tracks), shared=shared)
 
 

@@ -11,7 +11,7 @@ from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
-CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset(KEYS))
+CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", *KEYS}))
 SPEED = ((0.0, 8.0), (8.0, 8.0), (16.0, 32.0), (24.0, 32.0), (34.0, 12.0), (36.0, 12.0), (43.0, 32.0), (48.0, 32.0))
 
 

@@ -21,7 +21,7 @@ from aqualog.model.sensors import IDEAL, Channel
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
-CAR = Vehicle(name="test car", given=frozenset({"mass"}))
+CAR = Vehicle(name="test car", given=frozenset({"drivetrain", "mass"}))
 # no braking: the car of the log rolls out
 SPEED = ((0.0, 15.0), (8.0, 15.0), (16.0, 24.0), (28.0, 24.0), (40.0, 20.0), (46.0, 24.0), (58.0, 24.0), (66.0, 30.0), (78.0, 30.0), (90.0, 25.0))  # fmt: skip
 NOISY = replace(

@@ -18,7 +18,7 @@ from aqualog.model.sensors import ESC, IDEAL, Sensors
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
-CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset(KEYS))
+CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", *KEYS}))
 SPEED = ((0.0, 18.0), (5.0, 18.0), (12.0, 34.0), (20.0, 34.0), (28.0, 20.0), (35.0, 20.0))
 
 

@@ -27,7 +27,7 @@ from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
 # radii that a file does not give are hardly known, and then no run tells them from the velocity's scale
-CAR = Vehicle(name="test car", given=frozenset({"mass", "wheels.r_e_f", "wheels.r_e_r"}))
+CAR = Vehicle(name="test car", given=frozenset({"drivetrain", "mass", "wheels.r_e_f", "wheels.r_e_r"}))
 NOISE = {"a_x": 0.05, "a_y": 0.05, "v_x": 0.02, "yaw_rate": 2e-3, "omega": 0.01, "torque": 2.0}
 SENSORS = replace(PERFECT, channels={
     n: Channel(noise=x)

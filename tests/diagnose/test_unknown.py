@@ -238,7 +238,7 @@ def test_a_force_over_speed_becomes_a_term():
     x = np.linspace(10.0, 35.0, 60)
     f = np.where(x > 30.0, np.nan, hump(x))
     term = as_term(remainder(x, f, half=0.1), mass=1600.0)
-    car = Vehicle(name="car", given=frozenset({"mass"}))
+    car = Vehicle(name="car", given=frozenset({"drivetrain", "mass"}))
     plant = Model((term,)).apply(assemble(Scenario(car, duration_s=2.0))).plant
     v, ok = np.linspace(10.0, 29.5, 100), x <= 30.0
     np.testing.assert_allclose(

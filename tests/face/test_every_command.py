@@ -40,6 +40,9 @@ def test_detect(tmp_path):
     for name in DETECTED:
         assert (tmp_path / "face" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
     assert result.events.height == len(result.document["events"]) == 12
+    assert result.verdict == result.document["verdict"] == "aquaplaning"
+    (episode,) = result.episodes.filter(pl.col("kind") == "aquaplaning").rows(named=True)
+    assert (episode["start_s"], episode["wheels"]) == (pytest.approx(8.0, abs=0.1), "fr, fl")
     assert result.features.columns[0] == result.tracks.columns[0] == "t"
     assert result.features.height == result.signals.height == result.tracks.height
     written = result.write(tmp_path / "by_face.mf4")
@@ -50,7 +53,8 @@ def test_detect(tmp_path):
 def test_detect_says_what_it_found_in_a_few_lines():
     shown = repr(aq.detect(LOG, CAR)).splitlines()
     assert "lane_drive.mf4" in shown[0]
-    assert shown[1] == "12 events"
+    assert shown[1].startswith("Aquaplaning: 8.0–16.")
+    assert ", 101 km/h, front right, front left, partial" in shown[1]
     assert any("Not judged: Tie-rod force" in line for line in shown)
 
 
@@ -131,9 +135,11 @@ def test_batch(campaign, runs, tmp_path):
     assert runs.outcome.made == 6
     again = aq.Campaign(campaign).run(jobs=1)
     agree(again, "batch", campaign, "--jobs", 1)
-    check_saved(again, tmp_path, ("campaign.json", "runs.parquet", "events.parquet"))
+    check_saved(again, tmp_path, ("campaign.json", "runs.parquet", "events.parquet", "episodes.parquet"))
     assert again.runs["state"].to_list() == ["done"] * 6
     assert again.events.height == sum(again.document["events"].values())
+    assert (again.episodes["kind"] == "aquaplaning").sum() == again.document["episodes"] == again.runs["episodes"].sum()
+    assert sum(again.document["verdicts"].values()) == 6
 
 
 def test_batch_of_a_log_that_fails(tmp_path):

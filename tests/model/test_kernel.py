@@ -19,8 +19,8 @@ from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G, wheel_loads
 from tests.thesis.passes import SEDAN, resistance, slip_and_traction
 
-FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"mass"}))
-AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"mass"}))
+FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"drivetrain", "mass"}))
+AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", "mass"}))
 CARS = {"rwd": SEDAN, "fwd": FWD, "awd": AWD}
 RAMP = ((0.0, 60 / 3.6), (20.0, 130 / 3.6))
 

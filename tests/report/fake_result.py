@@ -7,6 +7,7 @@ import polars as pl
 
 from aqualog.core.notation import WHEELS, side_of
 from aqualog.core.records import DriveResult, Event, Origin, Quality, Signals, TimeFaults, Track, Unavailable
+from aqualog.detect.verdict import judge
 
 SPIKE = 0.371  # [m/s] an outlier of one sample
 
@@ -62,11 +63,28 @@ def make_result(duration_s=30.0, rate_hz=100.0, *, every_s=300.0, seed=1):
         dropped_samples=5, time_jumps=1, faults=TimeFaults(2, 0, 0, 0, 1), notes=("a_x: 3 samples out of range",)
     )
     signals = Signals(frame, round(1e9 / rate_hz), 1_700_000_000 * 10**9, origins, quality, ("drive.mf4",))
-    return DriveResult(
+    result = DriveResult(
         signals, pl.DataFrame(features), tuple(tracks), tuple(_events(tracks, t, features)),
         (Unavailable("slip_slope_drop", ("torque_rl",)), Unavailable("tie_rod", ("tie_rod_fl", "tie_rod_fr"))),
         (Unavailable("spin_up", ("torque_rl", "torque_rr")),), "sedan RWD",
     )  # fmt: skip
+    return judged(result)
+
+
+def judged(result, *, can_judge=True):
+    """The same result with the verdict that follows from its events."""
+    ran = dict.fromkeys(t.detector for t in result.tracks) if can_judge else {"spin_down": 0}
+    lacks = () if can_judge else (Unavailable("joint_cusum", ("torque_rl", "vehicle.mass")),)
+    judgement = judge(
+        result.events, (*result.unavailable, *lacks), list(ran), judged_s=result.signals.duration_s if can_judge else 0.0,
+        way=lambda a, b: (26.0 * (b - a), b - a),
+    )  # fmt: skip
+    return replace(result, judgement=judgement)
+
+
+def with_events(result, events, **how):
+    """The same drive with other events."""
+    return judged(replace(result, events=tuple(events)), **how)
 
 
 def _tracks(t, features, on_water, n):

@@ -54,10 +54,10 @@ def drive(name):
     tracks = tuple(replace(t, detector=name, unit=name) if t.detector == "resistance" else t for t in result.tracks)
     events = tuple(replace(e, evidence={**e.evidence, name: name}, detector=name) for e in result.events)
     missing = (Unavailable(name, (name, name)),)
-    return replace(
+    return fake.judged(replace(
         result, signals=replace(result.signals, origins=origins, files=(name, name), quality=quality), tracks=tracks,
         events=events, unavailable=missing, limited=missing, vehicle_name=name, notes=(name,),
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def eventful(name):

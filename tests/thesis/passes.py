@@ -7,4 +7,4 @@ from aqualog.thesis.evidence.passes import resistance, slip_and_traction
 
 __all__ = ["SEDAN", "resistance", "slip_and_traction"]
 
-SEDAN = replace(DRIVEN, given=frozenset({"mass"}))
+SEDAN = replace(DRIVEN, given=frozenset({"drivetrain", "mass"}))

@@ -24,7 +24,7 @@ __all__ = ["CAR", "SPLITS", "Outcome", "drive", "outcome", "study"]
 CAR = Vehicle(
     name="AWD SUV", drivetrain="awd", mass=2714.0, l_f=1.686, l_r=1.124, h_cg=0.62, drag_area=0.91,
     torque_split_rear=0.5, r_e_f=0.4, r_e_r=0.4, r_l_f=0.39, r_l_r=0.39, inertia_f=2.55, inertia_r=2.55,
-    slip_slope_f=30.0, slip_slope_r=30.0, mu_max=1.0, given=frozenset({"mass", "tyre.slip_slope_f"}),
+    slip_slope_f=30.0, slip_slope_r=30.0, mu_max=1.0, given=frozenset({"drivetrain", "mass", "tyre.slip_slope_f"}),
 )  # fmt: skip
 SPLITS = (0.0, 0.2, 0.4, 0.5, 0.6, 0.8, 1.0)
 EXCITATION = Excitation("sine", 0.05, "mu", 8.0)

@@ -16,7 +16,7 @@ from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
 from aqualog.physics.resistance import nominal_acceleration
 
 DT = 0.01
-CAR = Vehicle(name="test", given=frozenset({"mass"}))
+CAR = Vehicle(name="test", given=frozenset({"drivetrain", "mass"}))
 
 
 def one(x):

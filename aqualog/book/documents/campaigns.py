@@ -118,6 +118,8 @@ BATCH = Document(
         count("made", "logs measured now"),
         count("kept", "logs whose results were there"),
         rows("failed", "logs that failed", (text("log", "log"), text("reason", "why"))),
+        mapping("verdicts", "runs with results by verdict", _COUNT),
+        count("episodes", "episodes of aquaplaning in all runs"),
         mapping("events", "events by detector, of all runs with results", _COUNT),
     ),
     files=("campaign.json",),

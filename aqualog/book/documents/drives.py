@@ -8,6 +8,7 @@ from aqualog.book.documents.fields import (
     EVIDENCE,
     FAULTS,
     HEAD,
+    JUDGEMENT,
     LACKING,
     TERMS,
     Document,
@@ -67,7 +68,7 @@ _FILTER_STATE = (
 DETECT = Document(
     "detect",
     "aqualog detect --json",
-    "What the detectors found in one drive: events, what could not be judged, and the quality of the log.",
+    "What the detectors found in one drive: verdict, episodes, events, what could not be judged, quality of the log.",
     (
         *HEAD,
         text("log", "the files as they were named"),
@@ -77,6 +78,7 @@ DETECT = Document(
         number("sample_rate_hz", "Hz", "rate of the common time grid"),
         text("vehicle", "name of the car"),
         by_name("signals", "every signal that the drive has", _SIGNAL),
+        *JUDGEMENT,
         rows("events", "every event, by begin", (*EVENT, obj("evidence", "what was measured in the event; the fields "
              "depend on the detector", EVIDENCE))),
         rows("unavailable", "detectors that cannot run", LACKING),

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from aqualog.core.judgement import EPISODE_KINDS, VERDICTS
 from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import DETECTORS
 
 __all__ = [
-    "BIN", "CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "LACKING", "PLACE_KEYS", "TERMS",
-    "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number",
+    "BIN", "CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "JUDGEMENT", "LACKING", "PLACE_KEYS",
+    "TERMS", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number",
     "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
 ]  # fmt: skip
 
@@ -264,6 +265,29 @@ CHECKS = rows("checks", "what does not fit among the signals, and what to change
     several("lines", "lines for [signals] of the map; empty where no line helps"),
     *with_ci("value", "SI unit of the signal", "what was measured"),
 ))  # fmt: skip
+
+JUDGEMENT = (
+    text("verdict", "whether there was aquaplaning; only the joint detectors decide", tuple(VERDICTS)),
+    several("missing", "what the joint detectors lack where the verdict is `cannot_be_judged`, else empty"),
+    several("ran", "detectors that ran"),
+    number("judged_s", "s", "time in which the joint detectors had all of their signals"),
+    rows("episodes", "detections that belong together, by begin", (
+        text("kind", "; ".join(f"{kind}: {means}" for kind, means in EPISODE_KINDS.items()), tuple(EPISODE_KINDS)),
+        number("start_s", "s", "estimate of the begin, from the log's first sample"),
+        number("end_s", "s", "estimate of the end"),
+        several("wheels", "wheels that lost speed or grip, the worst first", text("", "", WHEELS)),
+        text("axle", "axle of all of these wheels; null where both", ("f", "r"), null=True),
+        text("side", "side of all of these wheels; null where both", ("left", "right"), null=True),
+        text("severity", "partial or full", ("partial", "full")),
+        number("v_x_kmh", "km/h", "mean speed", null=True),
+        several("decided_by", "detectors that decided"),
+        number("delta_a_x_max", "m/s^2", "greatest resistance measure (2.9)", null=True),
+        number("slip_min", "-", "least slip", null=True),
+        number("distance_m", "m", "way", null=True),
+        several("events", "places of its detections in `events`, from 0", count("", "")),
+    )),
+)  # fmt: skip
+"""Fields of the verdict on a drive."""
 
 EVENT = (
     text("detector", "which detector", DETECTORS),

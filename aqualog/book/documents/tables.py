@@ -42,6 +42,10 @@ _RUNS = Table(
         number("sample_rate_hz", "Hz", "rate of the common time grid"),
         text("slip_against", "what the slip is measured against"),
         text("traction", "source of the traction"),
+        text("verdict", "aquaplaning, none or cannot_be_judged"),
+        text("missing", "what the joint detectors lack"),
+        count("episodes", "episodes of aquaplaning; null where they cannot be judged"),
+        count("full_episodes", "those of them with full aquaplaning"),
         count("events_DETECTOR", "events of each detector; null where it could not run"),
         text("unavailable", "detectors that could not run"),
         flag("truncated", "whether a file ends before its end"),
@@ -71,6 +75,29 @@ _EVENTS = Table(
         number("v_x", "m/s", "speed at the begin"),
         number("slip_min", "-", "least slip"),
         text("decided_by", "detectors that decided, of a joint one"),
+    ),
+)
+_EPISODES = Table(
+    "episodes.parquet",
+    "`aqualog batch` into the store",
+    "A row per episode of all runs: detections that belong together.",
+    (
+        count("run", "index of the run"),
+        text("name", "log"),
+        text("key", "name of its files in the store"),
+        text("kind", "aquaplaning, suspected, other_surface, wheel_lock or single_detector"),
+        number("start_s", "s", "estimate of the begin, from the log's first sample"),
+        number("end_s", "s", "estimate of the end"),
+        text("wheels", "wheels that lost speed or grip, the worst first"),
+        text("axle", "axle of all of these wheels; null where both"),
+        text("side", "side of all of these wheels; null where both"),
+        text("severity", "partial or full"),
+        number("v_x_kmh", "km/h", "mean speed"),
+        text("decided_by", "detectors that decided"),
+        number("delta_a_x_max", "m/s^2", "greatest resistance measure (2.9)"),
+        number("slip_min", "-", "least slip"),
+        number("distance_m", "m", "way"),
+        count("events", "detections"),
     ),
 )
 _SAMPLES = Table(
@@ -208,11 +235,14 @@ _REPORT_RUNS = Table(
         number("lane_v_kmh", "km/h", "mean speed on the water"),
         number("lane_s", "s", "time on the water"),
         number("dry_km", "km", "way off the water"),
+        text("verdict", "aquaplaning, none or cannot_be_judged"),
+        text("missing", "what the joint detectors lack"),
+        count("episodes", "episodes of aquaplaning"),
         count("events_DETECTOR", "events of each detector"),
     ),
 )
 
 TABLES = (
-    _SIGNALS, _SLOPES, _RUNS, _EVENTS, _SAMPLES, _REPORT_RUNS, _REPORT_SLOPE, _REPORT_RESISTANCE, _REPORT_SPEED,
-    _CLAIMS,
+    _SIGNALS, _SLOPES, _RUNS, _EVENTS, _EPISODES, _SAMPLES, _REPORT_RUNS, _REPORT_SLOPE, _REPORT_RESISTANCE,
+    _REPORT_SPEED, _CLAIMS,
 )  # fmt: skip

@@ -20,7 +20,8 @@ MEANINGS = {
     ExitCode.PARTIAL: ("done, but not with all data", "the result is there; data of a log was lost, or some logs could "
                        "not be read"),
     ExitCode.NOTHING_USABLE: ("nothing usable", "signals are missing, or the data do not carry the estimate"),
-    ExitCode.GATE_TRIPPED: ("a gate has tripped", "`--fail-on-event` found an event, or a `--gate` was not kept; it wins over 3"),
+    ExitCode.GATE_TRIPPED: ("a gate has tripped", "`--fail-on-event` found an episode of aquaplaning, or a `--gate` "
+                            "was not kept; it wins over 3"),
     ExitCode.INTERRUPTED: ("interrupted", "Ctrl-C or a request to end; files that were finished are whole"),
 }  # fmt: skip
 _ERRORS = (ConfigError, LogError, SignalError, FitError)

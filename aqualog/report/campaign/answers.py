@@ -9,12 +9,24 @@ from typing import NamedTuple
 from aqualog.campaign.bins import Group
 from aqualog.campaign.full_speed import FullSpeed
 from aqualog.campaign.results import CampaignData
+from aqualog.core.judgement import VERDICTS
 from aqualog.report.campaign.findings import Curve, Findings, crossing
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.campaign.run_page import RunFacts
+from aqualog.report.drive.judged import missing_words
 from aqualog.report.values import KMH, counted, number, place
 
-__all__ = ["RESISTANCE_LEVEL", "WAYS", "Answer", "Number", "answers_of", "headline", "off_water", "summaries"]
+__all__ = [
+    "RESISTANCE_LEVEL",
+    "WAYS",
+    "Answer",
+    "Number",
+    "answers_of",
+    "headline",
+    "off_water",
+    "summaries",
+    "verdicts",
+]
 
 RESISTANCE_LEVEL = 0.2  # [m/s^2] resistance from which a driver feels it, after the thesis (C46)
 HALF = 0.5  # of the dry slip slope
@@ -91,6 +103,20 @@ def headline(data: CampaignData, findings: Findings) -> str:
     bad = f"{failed} without results" if failed else "all with results"
     groups = counted(len(findings.groups), "configuration")
     return f"{counted(len(data.runs), 'run')} of {counted(logs, 'log')}, {bad}, {groups}"
+
+
+def verdicts(data: CampaignData) -> list[str]:
+    """How many runs aquaplaned, how many did not, and how many cannot be judged, with what they lack."""
+    of = {v: [r for r in data.done if r.judgement.verdict == v] for v in VERDICTS}
+    wet, dry, blind = of["aquaplaning"], of["none"], of["cannot_be_judged"]
+    lacks = sorted({missing_words(r.judgement.missing) for r in blind})
+    episodes = counted(sum(len(r.judgement.of("aquaplaning")) for r in wet), "episode")
+    told = [
+        (wet, f"Aquaplaning in {counted(len(wet), 'run')}: {episodes}"),
+        (dry, f"No aquaplaning in {counted(len(dry), 'run')}"),
+        (blind, f"Aquaplaning cannot be judged in {counted(len(blind), 'run')}: {'; or '.join(lacks[:3])}"),
+    ]
+    return [words for runs, words in told if runs]
 
 
 class Summary(NamedTuple):

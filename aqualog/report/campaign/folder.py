@@ -142,13 +142,17 @@ def tables_of(
 
 def _runs(data: CampaignData, facts: Sequence[RunFacts | None], pages: Sequence[str]) -> str:
     heading = ["run", "log", "page", "state", "reason", *data.keys, "duration_s", "lane_v_kmh", "lane_s", "dry_km",
-               *(f"events_{d}" for d in DETECTORS)]  # fmt: skip
+               "verdict", "missing", "episodes", *(f"events_{d}" for d in DETECTORS)]  # fmt: skip
     rows: list[_Row] = []
     for info, fact, page in zip(data.runs, facts, pages, strict=True):
         groups, found = info.run.groups, [e["detector"] for e in info.events]
         row = [info.index + 1, info.name, page, info.state, info.reason, *(groups.get(k, "") for k in data.keys)]
         if fact is not None:
             row += [info.about["duration_s"], fact.lane_kmh, fact.lane_s, fact.dry_km]
+            judgement = info.judgement
+            is_open = judgement.verdict == "cannot_be_judged"
+            row += [judgement.verdict, ", ".join(judgement.missing),
+                    "" if is_open else len(judgement.of("aquaplaning"))]  # fmt: skip
             row += ["" if d in info.about["unavailable"] else found.count(d) for d in DETECTORS]
         rows.append([*row, *[""] * (len(heading) - len(row))])
     return _csv(heading, rows)

@@ -9,9 +9,18 @@ from aqualog import __version__
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import campaign_matrix
 from aqualog.campaign.results import CampaignData, RunInfo
+from aqualog.core.judgement import VERDICTS
 from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import DETECTORS
-from aqualog.report.campaign.answers import RESISTANCE_LEVEL, Answer, answers_of, headline, off_water, summaries
+from aqualog.report.campaign.answers import (
+    RESISTANCE_LEVEL,
+    Answer,
+    answers_of,
+    headline,
+    off_water,
+    summaries,
+    verdicts,
+)
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import group_text, key_title, value_text
 from aqualog.report.campaign.quality import Problem, problems_of
@@ -29,6 +38,7 @@ _ORDER = (
 )  # fmt: skip
 _DROPPED = ("pressure_front_bar", "water_depth_left_mm", "tread_depth_mm")  # where they repeat another key
 _STATES = ("done", "failed", "to do")
+_VERDICTS = tuple(VERDICTS)
 _DIGITS = 5
 _SCRIPTS = ("loader.js", "campaign_state.js", "campaign_figures.js", "campaign_tables.js")
 
@@ -63,6 +73,7 @@ def campaign_page(
         facts=(),
         level="open",
         headline=headline(data, findings),
+        verdicts=verdicts(data),
         summaries=summaries(answers),
         off_water=off_water(facts),
         has_losses=any(p.weight == "loss" for p in problems),
@@ -228,6 +239,8 @@ def _runs(
         "name": [cut(r.name, 120) for r in data.runs],
         "page": list(pages),
         "state": [_STATES.index(r.state) for r in data.runs],
+        "verdict": [_VERDICTS.index(r.judgement.verdict) if r.is_done else -1 for r in data.runs],
+        "episodes": [len(r.judgement.of("aquaplaning")) for r in data.runs],
         "facets": [f["runs"] for f in facets],
         "group": [index[group_of(r, keys)] for r in data.runs],
         **{name: [row[i] for row in rows] for i, name in enumerate(("v", "s", "km", "dry", "full", "events", "gone"))},

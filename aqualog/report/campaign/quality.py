@@ -92,7 +92,8 @@ _KINDS: tuple[tuple[str, str, str, _Test], ...] = (
     ("limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded from figures over speed",
      lambda r: "" if r.water_from else "no lane"),
     ("limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
-    ("limit", "vehicle file without the drivetrain", "rear-wheel drive is assumed",
+    ("limit", "vehicle file without the drivetrain", "minor spin-downs, spin-ups, resistance and the joint "
+     "detectors are not judged; slip slopes take rear-wheel drive",
      lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
     ("limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope learnt in the "
      "drive; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),

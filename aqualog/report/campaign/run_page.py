@@ -14,14 +14,22 @@ import numpy as np
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Event, FloatArray
-from aqualog.detect.registry import DETECTORS
 from aqualog.report.campaign.labels import key_title, value_text
+from aqualog.report.drive.judged import (
+    EPISODE_HEADS,
+    FOLDED,
+    card_lines,
+    episode_cells,
+    folded_line,
+    headline,
+    level,
+)
 from aqualog.report.drive.report import EVENT_HEADS, event_cells
 from aqualog.report.page import report_page
 from aqualog.report.reduce import spans_of
-from aqualog.report.sections import Cell, Code, Headline, Lines, Para, Report, Section, Stack, Table
+from aqualog.report.sections import Cell, Code, Headline, Line, Lines, Para, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS, detector_colour
-from aqualog.report.values import KMH, cut, number, place
+from aqualog.report.values import KMH, counted, cut, number, place
 from aqualog.report.wording import detector_name
 
 __all__ = ["BEHIND_S", "EventCount", "RunFacts", "command_of", "facts_of", "run_page"]
@@ -49,17 +57,23 @@ def run_page(
     has_load = any(info.run.values.get(f"load_{a}_kg", 0.0) for a in ("front", "rear"))
     more = f"and {len(info.events) - MOST_EVENTS} more events" if len(info.events) > MOST_EVENTS else ""
     rows = [_event(e) for e in info.events[:MOST_EVENTS]]
-    look = "open" if not info.is_done else "partial" if info.events else "none"
+    judgement = info.judgement
+    main = [e for e in judgement.episodes if e.kind not in FOLDED]
+    fold = "; ".join([*(folded_line(k, judgement.of(k)) for k in FOLDED if judgement.of(k)),
+                      f"{counted(len(info.events), 'detection')}, one by one"])  # fmt: skip
     over_time = (
         "blue: on the lane; drag to zoom, double click to reset; rim speeds and slips: extremes of every 0.1 s, "
         "relative to the vehicle's speed"
     )
     sections = [
-        Section("", [Headline(_headline(info), [(f"{info.state}:", cut(info.reason, 600))] if info.reason else [])],
-                "verdict", look=f"verdict {look}"),
+        Section("", [Headline(headline(judgement) if info.is_done else "No results", _answers(info))], "verdict",
+                look=f"verdict events {level(judgement)}"),
         Section("Notes", [Lines(_problems(info), most=1000)], "quality", look="problems"),
         *([Section("Over time", [Stack()], "plot-section", over_time)] if info.is_done else []),
-        Section("Events", [Table(EVENT_HEADS, rows, "events", (0, 1, 5, 8), wide=(8,)), Para(more)], "events-section"),
+        Section("Episodes", [Table(EPISODE_HEADS, [episode_cells(e) for e in main], "episodes", (0, 3, 4, 10))],
+                "episode-section"),
+        Section("Events", [Table(EVENT_HEADS, rows, "events", (0, 1, 5, 8), wide=(8,)), Para(more)], "events-section",
+                fold=fold),
         Section("The full page of this run", [
             Code(command_of(data, info)),
             Para("The vehicle file does not have this run's load; the campaign adds it to mass and centre of mass."
@@ -93,13 +107,11 @@ def _from(base: Path, path: Path) -> str:
     return f"./{name}" if name.startswith("-") else name
 
 
-def _headline(info: RunInfo) -> str:
+def _answers(info: RunInfo) -> list[Line]:
+    """What stands under the headline."""
     if not info.is_done:
-        return "No results"
-    found = [e["detector"] for e in info.events]
-    told = [f"{detector_name(d)} {found.count(d)}×" for d in DETECTORS if d in found]
-    full = sum(e["severity"] == "full" for e in info.events)
-    return (", ".join(told) + (f" ({full} full)" if full else "")) or "No event"
+        return [(f"{info.state}:", cut(info.reason, 600))] if info.reason else []
+    return card_lines(info.judgement, float(info.about["duration_s"]))
 
 
 def _facts(info: RunInfo, facts: RunFacts | None) -> list[tuple[str, str]]:

@@ -45,6 +45,7 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
         "sample_rate_hz": plain(1e9 / signals.step_ns),
         "vehicle": result.vehicle_name,
         "signals": {name: _signal(signals, name) for name in signals.symbols},
+        **result.judgement.document(),
         "events": [fields_of(e, *_EVENT) for e in result.events],
         "unavailable": [fields_of(u, "detector", "missing") for u in result.unavailable],
         "limited": [fields_of(u, "detector", "missing") for u in result.limited],

@@ -1,4 +1,4 @@
-"""A drive's result as sections: the verdict first, then events, signals over time, detectors, and where data came from.
+"""A drive's result as sections: the verdict first, then episodes, events, signals over time, detectors, sources.
 
 The order of `drive_report` is that of the page. A new kind of finding is a section there.
 """
@@ -7,11 +7,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import Any
 
+from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import DriveResult, Event, SlopeSummary, TimeFaults
+from aqualog.report.drive.judged import (
+    EPISODE_HEADS,
+    FOLDED,
+    card_lines,
+    episode_cells,
+    folded_line,
+    headline,
+    level,
+)
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.stack import VEHICLE, groups, stack
 from aqualog.report.page import report_page
@@ -21,15 +32,17 @@ from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import counted, number, place, pretty_unit
 from aqualog.report.wording import detector_name, evidence_parts, not_judged, speed_kmh
 
-__all__ = ["EVENT_HEADS", "Verdict", "by_importance", "drive_page", "drive_report", "event_cells", "verdict"]
+__all__ = ["EVENT_HEADS", "by_importance", "drive_page", "drive_report", "event_cells", "lacking"]
 
 MOST_ROWS = 500  # of events in the page's text: a browser lays a longer table out slowly, so the script fills it
 FIRST_EVENTS = 200  # in the text of a page with more, for a reader without scripts
-MOST_NAMED = 4
+MOST_TEXT = 20  # events that a terminal shows with those of folded episodes among them
 EVENT_HEADS: Sequence[str | tuple[str, str]] = (
     "Detector", "Where", ("Start [s]", "from s"), ("End [s]", "to s"), ("Duration [s]", ""), "Severity",
     ("Peak / threshold", "peak / limit"), ("v_x [km/h]", "v km/h"), "Evidence",
 )  # fmt: skip
+_EPISODE_WORDS = (0, 3, 4, 10)
+_HINT = "click a row (or Enter) to zoom all plots to it; click a head to sort"
 _SLOPES = (
     "Where", "At the end", "Dry", "Dry from", ("Compared [s]", ""), ("Estimated [s]", "estimated s"),
     ("Traction too even [s]", "too even s"), ("Blind [s]", "blind s"), ("Not active [s]", "not active s"),
@@ -57,7 +70,7 @@ def drive_page(result: DriveResult, *, title: str) -> str:
 
 def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     """The sections of a drive; with its signals over time if `is_drawn`."""
-    found = verdict(result)
+    judgement = result.judgement
     units = {t.detector: pretty_unit(t.unit) for t in result.tracks}
     events = [event_cells(e, units.get(e.detector, "")) for e in result.events]
     first = len(events) if len(events) <= MOST_ROWS else FIRST_EVENTS
@@ -66,21 +79,27 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         more=events[first:],
     )  # fmt: skip
     drawn, island = _drawn(result, table) if is_drawn else ([], {})
-    answers: list[Line] = [
-        *found.details,
-        *([("Not judged:", "; ".join(found.not_judged))] if found.not_judged else []),
-    ]
+    lacks = lacking(result)
     signals = result.signals
+    answers: list[Line] = [
+        *card_lines(judgement, signals.duration_s),
+        *([("Not judged:", "; ".join(lacks))] if lacks else []),
+    ]
+    folded = {i for e in judgement.of(*FOLDED) for i in e.events} if len(events) > MOST_TEXT else set()
     sections = [
         Section("", [
+            Headline(headline(judgement), answers),
             Para(f"{result.vehicle_name}: {signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, "
-                 f"{len(signals.symbols)} signals{'' if events else chr(10) + 'no event'}", where="text"),
-        ], where="text"),
-        Section("", [Headline(found.headline, answers)], "verdict", look=f"verdict events {found.level}", where="page"),
+                 f"{len(signals.symbols)} signals", where="text"),
+        ], "verdict", look=f"verdict events {level(judgement)}"),
         Section("Problems of the data", [Lines(_problems(result), most=1000)], "problems", look="problems",
                 where="page"),
-        Section("Events", [table], "event-section", "click a row (or Enter) to zoom all plots to it; click a head to "
-                "sort"),
+        *_episodes(result, folded=bool(folded)),
+        Section("Events", [
+            replace(table, where="page"),
+            Table(EVENT_HEADS, [c for i, c in enumerate(events) if i not in folded], "events", (0, 1, 5, 8), wide=(8,),
+                  where="text"),
+        ], "event-section", _HINT, fold=f"{counted(len(events), 'detection')}, one by one"),
         *drawn,
         *not_judged(*([(u.detector, u.missing) for u in some] for some in (result.unavailable, result.limited))),
         Section("Detectors", [_detectors(result)], "detector-section", where="page"),
@@ -97,19 +116,44 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     )
 
 
-# --- the verdict -----------------------------------------------------------------------------------------------------
+# --- episodes --------------------------------------------------------------------------------------------------------
 
 
-class Verdict(NamedTuple):
-    """`level` is `full`, `partial`, `none`, or `open` where nothing could be judged.
+def _episodes(result: DriveResult, *, folded: bool) -> list[Section]:
+    """The table of episodes; a terminal counts those of folded kinds where there are many."""
+    of = result.judgement
+    main, rest = _parted(of)
+    few = main if folded else of.episodes
+    counts = [folded_line(k, of.of(k)) for k in FOLDED if folded and of.of(k)]
+    return [
+        Section("Episodes", [
+            _choice("episodes", main),
+            Table(EPISODE_HEADS, [episode_cells(e) for e in few], "episodes", _EPISODE_WORDS, where="text"),
+            Lines([f"{line}; --json lists them" for line in counts], where="text"),
+        ], "episode-section", _HINT),
+        Section("Lock-ups and single detectors", [_choice("more-episodes", rest)], "more-section", _HINT, where="page",
+                fold="; ".join(folded_line(k, of.of(k)) for k in FOLDED if of.of(k))),
+    ]  # fmt: skip
 
-    `details` name the events, or summarise many of them; `not_judged` lists detectors that could not judge.
-    """
 
-    level: str
-    headline: str
-    details: Sequence[str]
-    not_judged: Sequence[str]
+def _choice(id: str, found: Sequence[Episode]) -> Table:
+    """Episodes as a table in which a row is picked."""
+    rows = [episode_cells(e) for e in found]
+    return Table(EPISODE_HEADS, rows, id, _EPISODE_WORDS, is_sortable=True, is_choice=True, where="page")
+
+
+def _parted(judgement: Judgement) -> tuple[Sequence[Episode], Sequence[Episode]]:
+    """Episodes that may be an answer to the question for water, and those that are none."""
+    rest = judgement.of(*FOLDED)
+    return [e for e in judgement.episodes if e not in rest], rest
+
+
+def lacking(result: DriveResult) -> list[str]:
+    """Detectors that could not judge, with what each needs."""
+    return [f"{detector_name(u.detector)} (needs {', '.join(u.missing)})" for u in result.unavailable]
+
+
+# --- which events come first -----------------------------------------------------------------------------------------
 
 
 def by_importance(events: Sequence[Event]) -> list[Event]:
@@ -124,47 +168,6 @@ def by_importance(events: Sequence[Event]) -> list[Event]:
 
 def _is_braking(event: Event) -> bool:
     return bool(event.evidence.get("braking_at_start"))
-
-
-def verdict(result: DriveResult) -> Verdict:
-    """Events, and detectors that could not judge."""
-    events = by_importance(result.events)
-    lacks = [f"{detector_name(u.detector)} (needs {', '.join(u.missing)})" for u in result.unavailable]
-    if not events:
-        judged = dict.fromkeys(detector_name(t.detector) for t in result.tracks)
-        if not judged:
-            return Verdict("open", "Nothing could be judged", (), lacks)
-        return Verdict("none", "No event", [f"Judged: {', '.join(judged)}"], lacks)
-    full = sum(e.severity == "full" and not _is_braking(e) for e in events)
-    braking = sum(map(_is_braking, events))
-    notes = [f"{n} {what}" for n, what in ((full, "full"), (braking, "while braking")) if n]
-    headline = counted(len(events), "event") + (f" ({', '.join(notes)})" if notes else "")
-    if len(events) <= MOST_NAMED:
-        details = [_sentence(e) for e in events]
-    else:
-        names = dict.fromkeys(e.detector for e in events)
-        details = [_phrase(d, [e for e in events if e.detector == d]) for d in names]
-    return Verdict("full" if full else "partial", headline, details, lacks)
-
-
-def _sentence(event: Event) -> str:
-    speed = speed_kmh(event)
-    words = [
-        detector_name(event.detector), place(event.wheel, event.side), f"{event.start_s:.1f}–{event.end_s:.1f} s",
-        f"at {number(speed, 0)} km/h" if math.isfinite(speed) else "", "(full)" if event.severity == "full" else "",
-        "(while braking)" if _is_braking(event) else "",
-    ]  # fmt: skip
-    return " ".join(w for w in words if w)
-
-
-def _phrase(detector: str, events: Sequence[Event]) -> str:
-    """Wheels, how often, from when to when, and how often full."""
-    # front left, front right, rear left, rear right also sort so by name
-    places = ", ".join(sorted({place(e.wheel, e.side) for e in events} - {""}))
-    full = sum(e.severity == "full" for e in events)
-    words = [detector_name(detector), places, f"{len(events)}×" if len(events) > 1 else ""]
-    begin, end = min(e.start_s for e in events), max(e.end_s for e in events)
-    return f"{' '.join(w for w in words if w)}, {begin:.1f}–{end:.1f} s" + (f" ({full} full)" if full else "")
 
 
 # --- head ------------------------------------------------------------------------------------------------------------
@@ -302,7 +305,9 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
     rows = drive_rows(result)
     plan = make_plan(by_importance(result.events), result.signals.frame.height, result.signals.dt)
     spans = [[round(e.start_s, 6), round(e.end_s, 6), int(e.severity == "full")] for e in result.events]
-    island: dict[str, Any] = {"events": spans}
+    parted = zip(("episodes", "more-episodes"), _parted(result.judgement), strict=True)
+    chosen = {id: [[round(e.start_s, 6), round(e.end_s, 6)] for e in found] for id, found in parted}
+    island: dict[str, Any] = {"events": spans, "episodes": chosen}
     if events.more:
         island["table"] = event_columns([*events.rows, *events.more])
     if not rows or not plan.n:

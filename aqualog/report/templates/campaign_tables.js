@@ -225,9 +225,13 @@ function eventWords(i) {
 function sum(i, column) { return countOf(i, -1, column) + (column === 2 ? countOf(i, -1, 4) : 0); }
 
 const STATES = ["done", "failed", "to do"];
+const VERDICTS = ["yes", "none", "cannot be judged"]; // in the order of the document
 const columns = [
   ["#", "num", function (i) { return i + 1; }],
   ["Run", "", function (i) { return runs.name[i]; }],
+  ["Aquaplaning", "", function (i) { return (runs.verdict[i] + 4) % 4; }, function (i) { return ["", ...VERDICTS][runs.verdict[i] + 1]; }],
+  ["Episodes", "num", function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? runs.episodes[i] : -1; },
+    function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? String(runs.episodes[i]) : "–"; }],
   ["Lane [km/h]", "num", function (i) { return runs.v[i] ?? -1; }, function (i) { return runs.v[i] === null ? "–" : runs.v[i].toFixed(0); }],
   ["On water", "num", function (i) { return sum(i, 2); }],
   ["Off", "num", function (i) { return sum(i, 3); }],

@@ -169,7 +169,7 @@
   const hidden = new Set();
   const held = {}; // y axes that the user has scaled, until "show all"
   let view = whole.slice();
-  let selected = -1;
+  let selected = ["", -1]; // table and row
 
   function isHidden(i) { return hidden.has(data.figure.data[i].legendgroup); }
 
@@ -194,8 +194,8 @@
   }
 
   function selectionShape() {
-    if (selected < 0) return [];
-    const event = data.events[selected];
+    if (selected[1] < 0) return [];
+    const event = choices[selected[0]].spans[selected[1]];
     return [{
       type: "rect", xref: "x", x0: event[0], x1: event[1], yref: "paper", y0: 0, y1: 1, layer: "above",
       fillcolor: "rgba(0,0,0,0)", line: { width: 1.5, color: schemeColours()["@accent"], dash: "dot" },
@@ -243,7 +243,7 @@
 
   function showAll() {
     for (const name of Object.keys(held)) delete held[name];
-    mark(-1);
+    mark("", -1);
     return draw(whole.slice());
   }
 
@@ -262,22 +262,33 @@
 
   // --- events -------------------------------------------------------------------------------------------------
 
+  // Tables whose rows are spans of the drive. The arrows step through the one that the reader used last.
+  const choices = {};
+  for (const [id, spans] of Object.entries({ ...data.episodes, events: data.events })) {
+    const table = document.getElementById(id);
+    if (table) choices[id] = { body: table.tBodies[0], spans: spans };
+  }
+  let stepped = Object.keys(choices)[0];
   const eventTable = document.getElementById("events");
   const eventBody = eventTable ? eventTable.tBodies[0] : null;
   const PAGE = 200; // rows of a long table of events at a time
   // A long table is filled by its pages; `order` has the events that the search leaves, as they are sorted.
   const long = data.table ? { order: data.events.map(function (_, i) { return i; }), first: 0, words: null } : null;
 
-  function mark(index) {
-    selected = index;
-    if (!eventBody) return;
-    for (const row of eventBody.rows) row.setAttribute("aria-selected", String(Number(row.dataset.row) === index));
+  function mark(id, index) {
+    selected = [id, index];
+    for (const [name, choice] of Object.entries(choices)) {
+      for (const row of choice.body.rows) {
+        row.setAttribute("aria-selected", String(name === id && Number(row.dataset.row) === index));
+      }
+    }
   }
 
-  function zoomTo(index, scroll) {
-    const event = data.events[index];
+  function zoomTo(id, index, scroll) {
+    const event = choices[id].spans[index];
     const margin = Math.max(1, 0.35 * (event[1] - event[0]));
-    mark(index);
+    stepped = id;
+    mark(id, index);
     for (const name of Object.keys(held)) delete held[name];
     if (plot) {
       draw([Math.max(whole[0], event[0] - margin), Math.min(whole[1], event[1] + margin)]);
@@ -287,22 +298,24 @@
   }
 
   function step(by) {
-    const order = long ? long.order : Array.from(eventBody.rows, function (r) { return Number(r.dataset.row); });
+    const isLong = long && stepped === "events";
+    const rows = choices[stepped].body.rows;
+    const order = isLong ? long.order : Array.from(rows, function (r) { return Number(r.dataset.row); });
     if (!order.length) return;
-    const at = order.indexOf(selected);
+    const at = selected[0] === stepped ? order.indexOf(selected[1]) : -1;
     const next = at < 0 ? (by > 0 ? 0 : order.length - 1) : (at + by + order.length) % order.length;
-    if (long && (next < long.first || next >= long.first + PAGE)) fillEvents(next - next % PAGE);
-    zoomTo(order[next], false);
+    if (isLong && (next < long.first || next >= long.first + PAGE)) fillEvents(next - next % PAGE);
+    zoomTo(stepped, order[next], false);
   }
 
-  if (eventBody) {
-    eventBody.addEventListener("click", function (e) {
+  for (const [id, choice] of Object.entries(choices)) {
+    choice.body.addEventListener("click", function (e) {
       const row = e.target.closest("tr");
-      if (row) zoomTo(Number(row.dataset.row), true);
+      if (row) zoomTo(id, Number(row.dataset.row), true);
     });
-    eventBody.addEventListener("keydown", function (e) {
+    choice.body.addEventListener("keydown", function (e) {
       const row = e.target.closest("tr");
-      if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(Number(row.dataset.row), true); }
+      if (e.key === "Enter" || e.key === " ") { e.preventDefault(); zoomTo(id, Number(row.dataset.row), true); }
       const other = e.key === "ArrowDown" ? row.nextElementSibling : e.key === "ArrowUp" ? row.previousElementSibling : null;
       if (other) { e.preventDefault(); other.focus(); }
     });
@@ -334,7 +347,7 @@
   function eventRow(i) {
     const line = make("tr", { tabIndex: 0 });
     line.dataset.row = i;
-    line.setAttribute("aria-selected", String(i === selected));
+    line.setAttribute("aria-selected", String(selected[0] === "events" && i === selected[1]));
     columns.forEach(function (column, c) {
       const text = column(i)[0], colour = c === 1 ? data.table.places[data.table.place[i]][1] : "";
       const isNumber = eventTable.tHead.rows[0].cells[c].classList.contains("num");
@@ -360,6 +373,7 @@
   }
 
   function orderEvents() {
+    stepped = "events";
     const words = document.getElementById("events-search").value.trim().toLowerCase().split(/\s+/);
     long.words = long.words || data.events.map(function (_, i) {
       return columns.map(function (column) { return column(i)[0]; }).join(" ").toLowerCase();
@@ -398,6 +412,7 @@
     for (const other of head.parentNode.cells) other.removeAttribute("aria-sort");
     head.setAttribute("aria-sort", down ? "descending" : "ascending");
     if (long && table === eventTable) { orderEvents(); return; }
+    if (choices[table.id]) stepped = table.id;
     const body = table.tBodies[0];
     const key = function (row) { return row.cells[column].dataset.key; };
     const isNumber = head.classList.contains("num");

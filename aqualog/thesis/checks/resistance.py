@@ -300,7 +300,7 @@ def _sign(plan: Plan) -> Check:
     """C34: a known extra torque against the wheels, and one with them."""
     wanted, found = [], []
     rng = np.random.default_rng(plan.seeds[0])
-    car = Vehicle(name="test", given=frozenset({"mass"}))
+    car = Vehicle(name="test", given=frozenset({"drivetrain", "mass"}))
     for seed in plan.first(20):
         torque = float(rng.uniform(-5.0, 80.0))
         v, a = rng.uniform(18.0, 35.0), rng.uniform(-0.3, 0.8)
@@ -408,7 +408,7 @@ def _nominal(car: Vehicle, torque: float, v: float, a: float) -> float:
 
 def _parameters() -> dict[str, dict[str, float]]:
     """How far the measure is off when one parameter has changed and the vehicle file has not, by driving state."""
-    car = Vehicle(name="test", given=frozenset({"mass"}))
+    car = Vehicle(name="test", given=frozenset({"drivetrain", "mass"}))
     out: dict[str, dict[str, float]] = {}
     for key, change in _CHANGES.items():
         if key == "mass":

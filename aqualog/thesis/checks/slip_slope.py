@@ -326,7 +326,7 @@ def _winter() -> Iterator[Pass]:
         yield from at_speeds(Pass(90, tyre="new_winter", h=h, wiggles=True), WINTER_SPEEDS)
 
 
-_CAR = replace(SCORING_POOL.vehicles[0], given=frozenset({"name", *KEYS}))
+_CAR = replace(SCORING_POOL.vehicles[0], given=frozenset({"name", "drivetrain", *KEYS}))
 _UNKNOWN = replace(_CAR, given=_CAR.given - {"tyre.slip_slope_f", "tyre.slip_slope_r"})
 _GAINS = (0.45, 1.8)  # slope of the tyres on the car over that in the vehicle file: soft winter tyres, stiff worn ones
 _DRY_S, _WET_S, _ENTRY = 45.0, 40.0, 25.0  # [s]

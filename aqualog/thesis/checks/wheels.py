@@ -27,7 +27,7 @@ _SHAKEN = ("rough_asphalt", "gravel", "kerbs_and_holes", "gear_shifts", "dry_cru
 def _acceleration_difference(plan: Plan) -> Check:
     """C24: against straight lines of wheel speed and velocity, whose derivatives are known without a computer."""
     rng = np.random.default_rng(plan.seeds[0])
-    car = Vehicle(name="test", given=frozenset({"mass"}))
+    car = Vehicle(name="test", given=frozenset({"drivetrain", "mass"}))
     worst = 0.0
     n, cases = 400, 200
     t = np.arange(n) * _DT

@@ -80,7 +80,7 @@ def known(number: str) -> Known:
         If the dry slalom gives no polynomial.
     """
     wet = scene(number)
-    car = replace(wet.vehicle, given=wet.vehicle.given | {"mass"})
+    car = replace(wet.vehicle, given=wet.vehicle.given | {"drivetrain", "mass"})
     v = 0.5 * (_FALL + _RISE)
     steering = Steering(slalom_angle(car, wet.tyre_front, v, _A_Y), 4.0)
     # pushes, and rolling out without the brake: they determine the coefficient of the longitudinal force

@@ -14,7 +14,7 @@ from tests.drives import AWD, CAR, FWD, drive, lane
 from tests.straight_drive import RWD
 from tests.straight_drive import drive as straight
 
-KNOWN = frozenset({"mass", "l_f", "l_r", "tyre.slip_slope_f", "tyre.slip_slope_r"})
+KNOWN = frozenset({"drivetrain", "mass", "l_f", "l_r", "tyre.slip_slope_f", "tyre.slip_slope_r"})
 NAMES = tuple(RIVALS)
 SLOPES = ("slope_rls", "slope_kalman", "slope_friction_ekf")
 WHEEL_RIVALS = ("wheel_thresholds", "front_rear_pattern", "wheel_oscillation")
@@ -144,7 +144,7 @@ def test_braking_has_its_own_levels():
         ("front_rear_pattern", CAR, ["omega_fr", "omega_rl"], ("omega_fr", "omega_rl")),
         ("wheel_oscillation", CAR, ["omega_rr"], ("omega_rr",)),
         ("resistance_model", CAR, ["a_x", "torque_rl"], ("torque_rl", "a_x")),
-        ("resistance_model", replace(CAR, given=frozenset()), [], ("vehicle.mass",)),
+        ("resistance_model", replace(CAR, given=frozenset()), [], ("vehicle.drivetrain", "vehicle.mass")),
         *((n, CAR, ["torque_rr"], ("torque_rr",)) for n in SLOPES),
         *((n, AWD, ["v_x"], ("v_x",)) for n in SLOPES),
         *((n, AWD, ["a_x"], ("a_x",)) for n in SLOPES),

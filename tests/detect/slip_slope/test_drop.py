@@ -26,8 +26,8 @@ from aqualog.report.drive.report import drive_report
 from aqualog.report.text import report_text
 
 DT = 0.01
-RWD = Vehicle(name="rwd", given=frozenset({"mass", "tyre.slip_slope_r"}))
-AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.5, given=frozenset({"mass"}))
+RWD = Vehicle(name="rwd", given=frozenset({"drivetrain", "mass", "tyre.slip_slope_r"}))
+AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.5, given=frozenset({"drivetrain", "mass"}))
 
 
 def judge(slope, sd=0.5, valid=True, alarm=0.0, periods=(), rule="robust", fallback=np.nan):

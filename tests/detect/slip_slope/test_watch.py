@@ -16,8 +16,8 @@ N = 6000
 T = np.arange(N) * DT
 TYRES = {"slip_slope_f": 24.0, "slip_slope_r": 36.0}
 AWD = Vehicle(drivetrain="awd", torque_split_rear=0.5, **TYRES)
-RWD = Vehicle(drivetrain="rwd", given=frozenset({"tyre.slip_slope_r"}), **TYRES)
-FWD = Vehicle(drivetrain="fwd", given=frozenset({"tyre.slip_slope_f"}), **TYRES)
+RWD = Vehicle(drivetrain="rwd", given=frozenset({"drivetrain", "tyre.slip_slope_r"}), **TYRES)
+FWD = Vehicle(drivetrain="fwd", given=frozenset({"drivetrain", "tyre.slip_slope_f"}), **TYRES)
 
 
 def features(vehicle, factor=1.0, **changes):

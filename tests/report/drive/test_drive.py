@@ -30,6 +30,7 @@ def show(browser, tmp_path_factory):
         for kind in ("browser", "performance"):
             browser.get_log(kind)
         browser.get(path.as_uri())
+        browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true; })")
         wait_for(lambda: browser.execute_script("return document.getElementById('plots').dataset.ready === 'true'"))
         last[:] = [result, x_range(browser)]
         return browser

@@ -13,10 +13,12 @@ import polars as pl
 import pytest
 
 import aqualog.report
+from aqualog.core.judgement import Judgement
 from aqualog.core.records import Quality, Unavailable
-from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, event_cells
+from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
 from aqualog.report.reduce import POINTS
+from aqualog.report.text import report_text
 from tests.report import fake_result as fake
 
 TEMPLATES = Path(aqualog.report.__file__).parent / "templates"
@@ -88,31 +90,63 @@ def test_templates_switch_no_escaping_off():
     assert "innerHTML" not in (TEMPLATES / "drive.js").read_text(encoding="utf-8")
 
 
-def test_verdict_comes_first_and_names_the_events(page, short):
-    words = Reader(page).words
-    assert f"{len(short.events)} events (2 full)" in words
-    assert words.index("events (2 full)") < 400
+def card(result):
+    """Class and words of the verdict's card."""
+    page = drive_page(result, title="t")
+    text = re.search(r'<section id="verdict" class="(.*?)">(.*?)</section>', page, re.DOTALL)
+    return text[1].split()[-1], Reader(text[2]).words
+
+
+def test_verdict_comes_first_and_names_the_episode(page, short):
+    (wet,) = short.judgement.of("aquaplaning")
+    look, words = card(short)
+    assert look == "partial"
+    assert words.startswith(f"Aquaplaning: {wet.start_s:.1f}–{wet.end_s:.1f} s, 94 km/h, front left, front right, ")
     assert "Not judged: Slip-slope drop (needs torque_rl); Tie-rod force (needs tie_rod_fl, tie_rod_fr)" in words
+    assert Reader(page).words.index("Aquaplaning:") < 400
 
 
-def test_few_events_are_named_one_by_one(short):
+def test_several_episodes_are_counted_and_listed(short):
+    later = [replace(e, start_s=e.start_s + 20.0, end_s=e.end_s + 20.0, severity="full") for e in short.events]
+    look, words = card(fake.with_events(short, [*short.events, *later]))
+    assert look == "full"
+    assert words.startswith("Aquaplaning: 2 episodes, 1 full 8.")
+
+
+def test_without_the_joint_detectors_nothing_is_green_or_orange(short):
+    """D5: one event of a single detector, or none, where nobody could judge."""
     spin = [e for e in short.events if e.detector == "minor_spin_down" and e.wheel == "fr"][:1]
-    words = Reader(drive_page(replace(short, events=tuple(spin)), title="t")).words
-    assert "1 event Minor spin-down FR 8.4–8.9 s at 104 km/h" in words
+    for events in ((), spin, [e for e in short.events if not e.detector.startswith("joint")]):
+        look, words = card(fake.with_events(short, events, can_judge=False))
+        assert look == "open"
+        assert words.startswith("Aquaplaning cannot be judged: no wheel torque, no mass in a vehicle file ")
+        assert "Ran: Spin-down; no single detector decides by itself" in words
+    assert "Single detector: 8.4–8.9 s" in card(fake.with_events(short, spin))[1]
 
 
-def test_no_event_says_what_was_judged_and_what_was_not(short):
-    words = Reader(drive_page(replace(short, events=()), title="t")).words
-    assert "No event Judged: Spin-down, Minor spin-down" in words
+def test_no_episode_says_what_was_judged_and_what_was_not(short):
+    look, words = card(fake.with_events(short, ()))
+    assert look == "none"
+    assert words.startswith("No aquaplaning Judged: 30.0 of 30.0 s, by Spin-down, Minor spin-down")
     assert "Not judged:" in words
-    assert 'id="events"' not in drive_page(replace(short, events=()), title="t")
+    page = drive_page(fake.with_events(short, ()), title="t")
+    assert not any(f'id="{table}"' in page for table in ("events", "episodes", "more-episodes"))
 
 
-def test_braking_is_told(short):
-    event = replace(short.events[0], evidence={"braking": True, "braking_at_start": True, "v_x": 20.0})
-    words = Reader(drive_page(replace(short, events=(event,)), title="t")).words
-    assert "1 event (1 while braking)" in words
-    assert "at 72 km/h (full) (while braking)" in words
+def test_lock_ups_are_folded(short):
+    """D6: a drive with many lock-ups says in one line that none of them is aquaplaning."""
+    lock = replace(short.events[0], evidence={"braking": True, "braking_at_start": True, "v_x": 20.0})
+    drive = fake.with_events(short, [replace(lock, start_s=5.0 * k, end_s=5.0 * k + 1.0) for k in range(40)])
+    look, words = card(drive)
+    assert look == "none"
+    assert "Wheel lock: 40 episodes, 40 detections" in words
+    page = drive_page(drive, title="t")
+    assert '<details class="fold"><summary>Wheel lock: 40 episodes, 40 detections</summary>' in page
+    assert '<details class="fold"><summary>40 detections, one by one</summary>' in page
+    text = report_text(drive_report(drive))
+    assert text.startswith("No aquaplaning\n")
+    assert "Wheel lock: 40 episodes, 40 detections; --json lists them" in text
+    assert "Spin-down" not in text.split("not judged")[0]
 
 
 def test_problems_are_in_a_box(short):
@@ -168,7 +202,6 @@ def test_absent_signals_leave_no_row(short):
     )  # fmt: skip
     text = drive_page(bare, title="t")
     assert len(data_of(text)["rows"]) == 2
-    assert "Nothing could be judged" in text
 
 
 def test_empty_drive_is_still_a_page(short):
@@ -202,7 +235,8 @@ def test_two_thousand_events_go_into_columns_and_stay_small(short):
     events = tuple(sorted((replace(e, start_s=e.start_s + 1e-3 * k) for k in range(140) for e in short.events),
                           key=lambda e: e.start_s))  # fmt: skip
     assert len(events) > 2000
-    many, few = replace(short, events=events), replace(short, events=events[:MOST_ROWS])
+    bare = replace(short, judgement=Judgement())
+    many, few = replace(bare, events=events), replace(bare, events=events[:MOST_ROWS])
     text = drive_page(many, title="t")
     rows = [a["data-row"] for t, a in Reader(text).elements if "data-row" in a]
     assert rows == [str(i) for i in range(FIRST_EVENTS)]

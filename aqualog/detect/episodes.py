@@ -1,0 +1,207 @@
+"""Detections that belong together are one episode: what happened, from when to when, and to which wheels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from aqualog.core.judgement import EPISODE_KINDS, Episode, EpisodeKind
+from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.records import Event, FloatArray
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.registry import all_of
+from aqualog.detect.resistance import RESISTANCE
+from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
+from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
+
+__all__ = ["BRAKING_GAP_S", "GAP_S", "Way", "episodes_of"]
+
+GAP_S = 1.0  # [s] detections nearer than this have one cause: a joint warning outlasts its criteria by that much
+BRAKING_GAP_S = 3.0  # [s] lock-ups nearer than this belong to one braking
+STEP_S = 0.1  # [s] of the way that is kept
+
+_JOINT = tuple(d.name for d in all_of("joint"))
+_WHEELS = (SPIN_DOWN.name, MINOR_SPIN_DOWN.name, SPIN_UP.name)
+_EFFECT = {MINOR_SPIN_DOWN.name: SPIN_DOWN.name}  # both see the same wheel slow down
+
+Stretch = Callable[[float, float], tuple[float, float]]
+"""(start, end) [s] -> the way between them [m], and the seconds of it with a known speed."""
+
+
+class Way:
+    """The way of a drive over time, kept every 0.1 s; any cut into pieces gives the same.
+
+    Parameters
+    ----------
+    dt : float
+        Sample time. [s]
+    """
+
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
+        self._step = max(1, round(STEP_S / dt))
+        self._rows = 0
+        self._last = np.zeros(2)
+        self._kept: list[FloatArray] = [np.zeros((2, 1))]
+
+    def push(self, v_x: FloatArray) -> None:
+        """Take the velocity (n,) of the next samples, NaN where unknown. [m/s]"""
+        known = np.isfinite(v_x)
+        steps = np.array([np.where(known, v_x, 0.0), known]) * self._dt
+        # one sum after the other, so that the cut does not matter
+        sums = np.cumsum(np.concatenate([self._last[:, None], steps], axis=1), axis=1)[:, 1:]
+        first = self._step - 1 - self._rows % self._step
+        self._kept.append(sums[:, first :: self._step].copy())
+        self._rows += v_x.size
+        self._last = sums[:, -1] if v_x.size else self._last
+
+    def between(self, start_s: float, end_s: float) -> tuple[float, float]:
+        """Return the way [m] and the seconds with a known speed."""
+        sums = np.concatenate(self._kept, axis=1)
+        self._kept = [sums]
+        t = np.arange(sums.shape[1]) * self._step * self._dt
+        metres, seconds = (float(np.interp(end_s, t, x) - np.interp(start_s, t, x)) for x in sums)
+        return metres, seconds
+
+
+def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
+    """Group the detections of one drive into episodes.
+
+    Parameters
+    ----------
+    events : sequence of Event
+        Of one drive.
+    way : callable
+        As `Way.between`.
+
+    Returns
+    -------
+    tuple of Episode
+        In order of their beginning; each event is in exactly one of them.
+
+    Detections are one episode where less than 1 s lies between their causes. What began under a braking force is apart:
+    lock-ups less than 3 s from each other are one braking. A lock-up within an episode of aquaplaning belongs to it.
+    """
+    numbered = list(enumerate(events))
+    free = _with_slopes([x for x in numbered if not _is_braking(x[1])])
+    braked = _groups([x for x in numbered if _is_braking(x[1])], BRAKING_GAP_S)
+    made = [_episode(_kind(e for _, e in group), group, way) for group in free]
+    wet = [x for x in made if x.kind == "aquaplaning"]
+    for group in braked:
+        start, end = _span(e for _, e in group)
+        host = next((i for i, x in enumerate(made) if x in wet and start < x.end_s and end > x.start_s), None)
+        if host is None:
+            made.append(_episode("wheel_lock", group, way))
+        else:
+            made[host] = _with(made[host], group)
+    order = list(EPISODE_KINDS)
+    return tuple(sorted(made, key=lambda x: (x.start_s, order.index(x.kind))))
+
+
+_Numbered = tuple[int, Event]
+
+
+def _is_braking(event: Event) -> bool:
+    return event.evidence.get("braking_at_start") is True
+
+
+def _cause(event: Event) -> tuple[float, float]:
+    return event.cause_s or (event.start_s, event.end_s)
+
+
+def _span(events: Iterable[Event]) -> tuple[float, float]:
+    found = list(events)
+    # the estimate of the slip slope recovers seconds after the tyre has
+    prompt = [e for e in found if e.detector != SLIP_SLOPE_DROP.name]
+    starts, ends = zip(*map(_cause, prompt or found), strict=True)
+    return min(starts), max(ends)
+
+
+def _groups(events: Sequence[_Numbered], gap_s: float) -> list[list[_Numbered]]:
+    """Events whose causes are nearer than a gap, also through others."""
+    groups: list[list[_Numbered]] = []
+    end = -math.inf
+    for item in sorted(events, key=lambda x: _cause(x[1])):
+        begin, until = _cause(item[1])
+        if begin - end < gap_s and groups:
+            groups[-1].append(item)
+        else:
+            groups.append([item])
+            end = -math.inf
+        end = max(end, until)
+    return groups
+
+
+def _with_slopes(events: Sequence[_Numbered]) -> list[list[_Numbered]]:
+    """Groups of detections. A lost slip slope belongs to what it goes on with, and joins nothing itself."""
+    slopes = [x for x in events if x[1].detector == SLIP_SLOPE_DROP.name]
+    groups = _groups([x for x in events if x not in slopes], GAP_S)
+    spans = [_span(e for _, e in group) for group in groups]
+    alone = []
+    for item in slopes:
+        begin, end = _cause(item[1])
+        near = (g for g, (a, b) in zip(groups, spans, strict=True) if begin - b < GAP_S and a - end < GAP_S)
+        next(near, alone).append(item)
+    return [*groups, *_groups(alone, GAP_S)]
+
+
+def _kind(events: Iterable[Event]) -> EpisodeKind:
+    """The kind of an episode that no brake has begun.
+
+    Water that takes half of the slip slope costs at least 0.2 m/s² (thesis C3, C44, C57). So a slope that is lost
+    without resistance is lost to another surface.
+    """
+    found = {e.detector for e in events}
+    if found & set(_JOINT):
+        return "aquaplaning"
+    if SLIP_SLOPE_DROP.name in found and RESISTANCE.name not in found:
+        return "other_surface"
+    return "suspected" if len({_EFFECT.get(d, d) for d in found}) > 1 else "single_detector"
+
+
+def _episode(kind: EpisodeKind, group: Sequence[_Numbered], way: Stretch) -> Episode:
+    events = [e for _, e in sorted(group, key=lambda x: (x[1].start_s, x[0]))]
+    joint = [e for e in events if e.detector in _JOINT]
+    start, end = _span(events)
+    metres, seconds = way(start, end)
+    wheels = _wheels(events)
+    decided = [d for e in joint for d in e.evidence.get("decided_by", ())] or [e.detector for e in events]
+    return Episode(
+        kind, start, end, wheels, _shared(wheels, AXLES), _shared(wheels, SIDES),
+        "full" if any(e.severity == "full" for e in joint or events) else "partial",
+        metres / seconds if seconds > 0.0 else math.nan, tuple(dict.fromkeys(decided)),
+        max(_known(events, "delta_a_x_max"), default=math.nan), min(_known(events, "slip_min"), default=math.nan),
+        metres if seconds > 0.0 else math.nan, tuple(sorted(i for i, _ in group)),
+    )  # fmt: skip
+
+
+def _with(episode: Episode, group: Sequence[_Numbered]) -> Episode:
+    """An episode with lock-ups that happened within it, which change nothing else of it."""
+    return replace(episode, events=tuple(sorted((*episode.events, *(i for i, _ in group)))))
+
+
+def _wheels(events: Sequence[Event]) -> tuple[str, ...]:
+    """Wheels that a detector of wheels names, the one with the most slip first; else any that an event names."""
+    depth: dict[str, float] = {}
+    for event in events:
+        if event.wheel is None or event.detector not in _WHEELS:
+            continue
+        slips = [abs(x) for x in (*_known([event], "slip_min"), *_known([event], "slip_max"))]
+        depth[event.wheel] = max(depth.get(event.wheel, 0.0), *slips, 0.0)
+    found = depth or dict.fromkeys((e.wheel for e in events if e.wheel is not None), 0.0)
+    return tuple(sorted(found, key=lambda w: (-found[w], WHEELS.index(w))))
+
+
+def _shared(wheels: Sequence[str], places: Any) -> str | None:
+    """The axle or side that has all of the wheels."""
+    return next((p for p, own in places.items() if wheels and set(wheels) <= set(own)), None)
+
+
+def _known(events: Iterable[Event], name: str) -> list[float]:
+    """Values of the evidence that are numbers."""
+    values = (e.evidence.get(name) for e in events)
+    return [float(x) for x in values if isinstance(x, float | int) and math.isfinite(x)]

@@ -1,0 +1,118 @@
+"""The verdict and the episodes of a drive, in words and as rows of a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from aqualog.core.judgement import Episode, EpisodeKind, Judgement
+from aqualog.report.sections import Cell, Line
+from aqualog.report.theme import WHEEL_COLOURS
+from aqualog.report.values import KMH, counted, number
+from aqualog.report.wording import detector_name
+
+__all__ = [
+    "EPISODE_HEADS", "FOLDED", "KIND_NAMES", "card_lines", "episode_cells", "episode_sentence", "folded_line",
+    "headline", "level", "lines_of", "missing_words",
+]  # fmt: skip
+
+KIND_NAMES: Mapping[EpisodeKind, str] = {
+    "aquaplaning": "aquaplaning", "suspected": "suspected", "other_surface": "other surface",
+    "wheel_lock": "wheel lock", "single_detector": "single detector",
+}  # fmt: skip
+FOLDED: tuple[EpisodeKind, ...] = ("wheel_lock", "single_detector")
+"""Kinds that are no answer to the question for water; a page folds them, a terminal counts them."""
+
+EPISODE_HEADS: Sequence[str | tuple[str, str]] = (
+    "Episode", ("Start [s]", "from s"), ("End [s]", "to s"), "Where", "Severity", ("v_x [km/h]", "km/h"),
+    ("Resistance [m/s²]", "m/s²"), ("Least slip [%]", "slip %"), ("Way [m]", "m"), ("Detections", ""), "Decided by",
+)  # fmt: skip
+_WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+# what the joint detectors lack, in a reader's words: beginning of the name -> words
+_LACKS = (
+    ("omega_", "wheel speeds"), ("wheel speeds", "wheel speeds at a higher rate"), ("torque", "wheel torque"),
+    ("a_x", "longitudinal acceleration a_x"), ("v_x", "speed"), ("vehicle.drivetrain", "drivetrain in a vehicle file"),
+    ("vehicle.mass", "mass in a vehicle file"), ("signals at", "signals at a higher rate"),
+)  # fmt: skip
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+
+
+def missing_words(missing: Sequence[str]) -> str:
+    """What is missing, each thing once: `no wheel torque, no mass in a vehicle file`."""
+    words = [next((w for begin, w in _LACKS if name.startswith(begin)), name) for name in missing]
+    return ", ".join(f"no {w}" for w in dict.fromkeys(words))
+
+
+def level(judgement: Judgement) -> str:
+    """The look of the verdict: `full`, `partial`, `none`, or `open` where it cannot be judged."""
+    if judgement.verdict == "cannot_be_judged":
+        return "open"
+    wet = judgement.of("aquaplaning")
+    return ("full" if any(e.severity == "full" for e in wet) else "partial") if wet else "none"
+
+
+def headline(judgement: Judgement) -> str:
+    """The verdict in one sentence."""
+    wet = judgement.of("aquaplaning")
+    if len(wet) == 1:
+        return f"Aquaplaning: {episode_sentence(wet[0])}"
+    if wet:
+        full = sum(e.severity == "full" for e in wet)
+        return f"Aquaplaning: {counted(len(wet), 'episode')}" + (f", {full} full" if full else "")
+    if judgement.verdict == "none":
+        return "No aquaplaning"
+    return f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
+
+
+def episode_sentence(episode: Episode) -> str:
+    """`8.2–17.7 s, 101 km/h, front right, front left, partial`."""
+    speed = f"{number(KMH * episode.v_x, 0)} km/h" if math.isfinite(episode.v_x) else ""
+    wheels = ", ".join(_WHEELS[w] for w in episode.wheels)
+    severity = episode.severity if episode.kind == "aquaplaning" else ""
+    told = (f"{episode.start_s:.1f}–{episode.end_s:.1f} s", speed, wheels, severity)
+    return ", ".join(x for x in told if x)
+
+
+def lines_of(judgement: Judgement, most: int) -> list[str]:
+    """A line for each of several episodes of aquaplaning, and one that counts each other kind."""
+    wet = judgement.of("aquaplaning")
+    lines = [episode_sentence(e) for e in wet[:most]] if len(wet) > 1 else []
+    lines += [f"and {len(wet) - most} more"] if len(wet) > most else []
+    return [*lines, *(folded_line(k, judgement.of(k)) for k in KIND_NAMES if k != "aquaplaning" and judgement.of(k))]
+
+
+def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
+    """`Wheel lock: 41 episodes, 112 detections`; one alone is told whole."""
+    name = KIND_NAMES[kind].capitalize()
+    if len(episodes) == 1:
+        return f"{name}: {episode_sentence(episodes[0])}"
+    return f"{name}: {len(episodes)} episodes, {counted(sum(len(e.events) for e in episodes), 'detection')}"
+
+
+def card_lines(judgement: Judgement, duration_s: float, most: int = 4) -> list[Line]:
+    """What stands under the headline of a page: episodes, and which detectors have judged."""
+    ran = ", ".join(detector_name(d) for d in judgement.ran) or "no detector"
+    if judgement.verdict == "cannot_be_judged":
+        judged = f"{ran}; no single detector decides by itself"
+    else:
+        judged = f"{number(min(judgement.judged_s, duration_s), 1)} of {number(duration_s, 1)} s, by {ran}"
+    return [*lines_of(judgement, most), ("Ran:" if judgement.verdict == "cannot_be_judged" else "Judged:", judged)]
+
+
+def episode_cells(episode: Episode) -> list[str | Cell]:
+    """Row of an episode, under `EPISODE_HEADS`."""
+    first = episode.wheels[0] if episode.wheels else ""
+    return [
+        KIND_NAMES[episode.kind], _number(episode.start_s, 2), _number(episode.end_s, 2),
+        Cell(", ".join(w.upper() for w in episode.wheels) or "vehicle", dot=WHEEL_COLOURS.get(first, "")),
+        Cell(episode.severity, tag=episode.severity if episode.kind == "aquaplaning" else ""),
+        _number(KMH * episode.v_x, 0), _number(episode.delta_a_x_max, 2), _number(100.0 * episode.slip_min, 1),
+        _number(episode.distance_m, 0), str(len(episode.events)),
+        " + ".join(detector_name(d).lower() for d in episode.decided_by),
+    ]  # fmt: skip
+
+
+def _number(x: float, decimals: int) -> Cell:
+    return Cell(number(x, decimals), key=x if math.isfinite(x) else -math.inf)

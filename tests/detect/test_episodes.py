@@ -1,0 +1,152 @@
+"""Detections that belong together, and the verdict: scripted events."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aqualog.core.records import Event, Unavailable
+from aqualog.detect.episodes import Way, episodes_of
+from aqualog.detect.verdict import NEVER_TOGETHER, judge
+
+
+def event(detector, start, end, wheel=None, severity="partial", **evidence):
+    return Event(detector, wheel, None, start, end, severity, 1.0, 0.5, evidence)
+
+
+def way(a, b):
+    return 28.0 * (b - a), b - a
+
+
+def kinds(*events):
+    return [(e.kind, e.start_s, e.end_s) for e in episodes_of(events, way)]
+
+
+LANE = (
+    event("minor_spin_down", 8.2, 16.7, "fr", slip_min=-0.2),
+    event("joint_criteria", 8.3, 17.7, decided_by=["minor_spin_down"], delta_a_x_max=1.1, slip_min=-0.2),
+    event("joint_cusum", 8.4, 17.6, decided_by=["minor_spin_down", "resistance"], delta_a_x_max=1.1),
+    event("spin_down", 8.6, 8.9, "fr", slip_min=-0.2),
+    event("minor_spin_down", 9.0, 9.4, "fl", slip_min=-0.02),
+)
+
+
+def test_one_pass_is_one_episode_with_all_that_is_known_of_it():
+    (e,) = episodes_of(LANE, way)
+    assert (e.kind, e.start_s, e.end_s, e.severity) == ("aquaplaning", 8.2, 17.7, "partial")
+    assert (e.wheels, e.axle, e.side) == (("fr", "fl"), "f", None)
+    assert e.decided_by == ("minor_spin_down", "resistance")
+    assert (e.delta_a_x_max, e.slip_min) == (1.1, -0.2)
+    assert e.v_x == pytest.approx(28.0)
+    assert e.distance_m == pytest.approx(28.0 * 9.5)
+    assert e.events == (0, 1, 2, 3, 4)
+
+
+def test_less_than_a_second_between_detections_joins_them():
+    parts = [event("joint_criteria", 1.0, 3.0), event("joint_criteria", 3.9, 5.0), event("joint_criteria", 6.1, 7.0)]
+    assert kinds(*parts) == [("aquaplaning", 1.0, 5.0), ("aquaplaning", 6.1, 7.0)]
+
+
+@pytest.mark.parametrize(
+    ("detectors", "kind"),
+    [
+        (("spin_down",), "single_detector"),
+        (("resistance",), "single_detector"),
+        (("spin_down", "minor_spin_down"), "single_detector"),  # both see the same wheel slow down
+        (("spin_down", "resistance"), "suspected"),
+        (("spin_up", "tie_rod"), "suspected"),
+        (("slip_slope_drop",), "other_surface"),
+        (("slip_slope_drop", "spin_up"), "other_surface"),
+        (("slip_slope_drop", "resistance"), "suspected"),
+        (("resistance", "joint_cusum"), "aquaplaning"),
+    ],
+)
+def test_kind_is_by_what_decided(detectors, kind):
+    (e,) = episodes_of([event(d, 1.0, 2.0, "rl") for d in detectors], way)
+    assert e.kind == kind
+
+
+def test_a_lost_slope_neither_joins_nor_lengthens():
+    """Its estimate recovers seconds after the tyre has."""
+    wet = [event("joint_criteria", a, a + 2.0) for a in (1.0, 5.0)]
+    drop = event("slip_slope_drop", 2.0, 6.0, "rl")
+    assert kinds(*wet, drop) == [("aquaplaning", 1.0, 3.0), ("aquaplaning", 5.0, 7.0)]
+    assert episodes_of([*wet, drop], way)[0].events == (0, 2)
+    assert kinds(drop, event("slip_slope_drop", 6.5, 8.0, "rr")) == [("other_surface", 2.0, 8.0)]
+
+
+def test_edges_are_those_of_the_cause():
+    held = replace(event("joint_criteria", 2.0, 9.0), cause_s=(1.2, 7.5))
+    later = replace(event("resistance", 8.0, 9.0), cause_s=(7.8, 8.4))
+    assert kinds(held, later) == [("aquaplaning", 1.2, 8.4)]
+    assert len(kinds(held, replace(later, cause_s=(8.6, 8.9)))) == 2
+
+
+def test_lock_ups_of_one_braking_are_one_and_apart_from_water():
+    locks = [
+        event("spin_down", a, a + 0.3, w, "full", braking_at_start=True)
+        for a, w in ((1.0, "fl"), (2.0, "fr"), (4.5, "fl"), (9.0, "fr"))
+    ]
+    assert kinds(*locks) == [("wheel_lock", 1.0, 4.8), ("wheel_lock", 9.0, 9.3)]
+    free = event("spin_down", 2.1, 2.2, "rl", braking_at_start=False)
+    assert [k for k, *_ in kinds(*locks, free)] == ["wheel_lock", "single_detector", "wheel_lock"]
+
+
+def test_a_lock_up_on_water_belongs_to_the_water():
+    lock = event("spin_down", 10.0, 10.5, "rl", "full", braking_at_start=True)
+    (e,) = episodes_of([*LANE, lock], way)
+    assert e.events == (0, 1, 2, 3, 4, 5)
+    assert (e.severity, e.wheels) == ("partial", ("fr", "fl"))
+    assert [k for k, *_ in kinds(*LANE, event("spin_down", 17.8, 18.0, "rl", braking_at_start=True))] == [
+        "aquaplaning", "wheel_lock",
+    ]  # fmt: skip
+
+
+def verdict(events, unavailable=(), ran=("spin_down", "joint_criteria"), judged_s=20.0):
+    return judge(events, unavailable, ran, judged_s=judged_s, way=way)
+
+
+@pytest.mark.parametrize(
+    ("events", "ran", "judged_s", "expected"),
+    [
+        (LANE, ("spin_down", "joint_criteria"), 20.0, "aquaplaning"),
+        ((), ("spin_down", "joint_criteria"), 20.0, "none"),
+        (LANE[3:], ("spin_down", "joint_criteria"), 20.0, "none"),
+        (LANE[3:], ("spin_down",), 0.0, "cannot_be_judged"),
+        ((), ("spin_down", "joint_criteria"), 0.0, "cannot_be_judged"),
+    ],
+)
+def test_only_joint_detectors_that_saw_something_decide(events, ran, judged_s, expected):
+    assert verdict(events, ran=ran, judged_s=judged_s).verdict == expected
+
+
+def test_what_is_missing_is_that_of_the_joint_detectors():
+    lacks = [
+        Unavailable("tie_rod", ("tie_rod_fl",)), Unavailable("joint_criteria", ("torque_rl", "vehicle.mass")),
+        Unavailable("joint_cusum", ("torque_rl", "vehicle.mass")),
+    ]  # fmt: skip
+    assert verdict((), lacks, ran=("spin_down",)).missing == ("torque_rl", "vehicle.mass")
+    assert verdict((), judged_s=0.0).missing == (NEVER_TOGETHER,)
+    assert verdict((), lacks[:1]).missing == ()
+
+
+@pytest.mark.parametrize("cuts", [(), (1,), (7, 8, 500, 501, 777)])
+def test_way_is_the_same_for_any_cut_and_knows_its_gaps(cuts):
+    v = 20.0 + np.sin(np.arange(1000) / 50.0)
+    v[300:400] = np.nan
+    whole, cut = Way(0.01), Way(0.01)
+    whole.push(v)
+    for part in np.split(v, cuts):
+        cut.push(part)
+    assert cut.between(2.5, 6.5) == whole.between(2.5, 6.5)
+    metres, seconds = whole.between(2.5, 6.5)
+    assert seconds == pytest.approx(3.0)
+    assert metres == pytest.approx(np.nansum(v[250:650]) * 0.01, abs=1e-6)
+    assert whole.between(3.2, 3.8) == pytest.approx((0.0, 0.0))
+
+
+def test_without_a_speed_the_mean_is_unknown():
+    (e,) = episodes_of([event("resistance", 1.0, 2.0)], lambda a, b: (0.0, 0.0))
+    assert math.isnan(e.v_x)
+    assert math.isnan(e.distance_m)
