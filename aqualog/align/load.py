@@ -19,11 +19,18 @@ from aqualog.io.reader import Part, ReadOptions
 if TYPE_CHECKING:
     from aqualog.align.cache import SignalCache
 
-__all__ = ["LONG", "LoadedLong", "find_channels", "load_drive", "load_signals", "read_options", "read_signals"]
+__all__ = [
+    "LONG", "LoadedLong", "NothingMappedError", "find_channels", "load_drive", "load_signals", "read_options",
+    "read_signals",
+]  # fmt: skip
 
 _Read = TypeVar("_Read")
 LONG = 15_000_000  # samples of all signals together, from which a drive is long: as a whole it needs about 1 GB
 _NAMED = 3  # files in a note
+
+
+class NothingMappedError(SignalError):
+    """A drive has channels, but none of them is a signal."""
 
 
 class LoadedLong(NamedTuple):
@@ -243,7 +250,7 @@ def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) 
             "holds no channel" + (f" ({told})" if told else ""), where=", ".join(p.name for p in paths),
             expected="measured signals", hint=f"{hint}; `aqualog inspect LOG`",
         )  # fmt: skip
-    return SignalError(
+    return NothingMappedError(
         f"none of {channels} channels is a signal that aqualog knows by name"
         + (f" ({notes[0]})" if notes else "")
         + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",

@@ -15,8 +15,8 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.io.reader import CsvFormat
 
 __all__ = [
-    "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text", "matching", "quoted", "resolve",
-    "values_read",
+    "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text", "matching",
+    "quoted", "resolve", "separate_drives", "values_read",
 ]  # fmt: skip
 
 
@@ -148,14 +148,8 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         elif len(matches) > 1:
             faults.append(f"{symbol}: several channels bear this name: {_listed(matches)}")
             doubled += len({m.file for m in matches}) > 1
-    if doubled >= 3:
-        files = ", ".join(dict.fromkeys(c.file for c in channels))
-        raise SignalError(
-            f"several channels bear the same {doubled} names: these look like separate drives",
-            where=files,
-            expected="the files of ONE drive",
-            hint="run them one by one, or all by `aqualog batch`",
-        )
+    if doubled >= OF_SEPARATE_DRIVES:
+        raise separate_drives(doubled, (c.file for c in channels))
     if faults:
         raise SignalError(
             "; ".join(faults),
@@ -163,6 +157,20 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             hint="name one channel each in a signal map; `aqualog inspect LOG` lists them",
         )
     return found
+
+
+OF_SEPARATE_DRIVES = 3
+"""Signals with one name in several files from which these are of separate drives."""
+
+
+def separate_drives(names: int, files: Iterable[str]) -> SignalError:
+    """Return the error for files whose channels bear the same names."""
+    return SignalError(
+        f"several channels bear the same {names} names: these look like separate drives",
+        where=", ".join(dict.fromkeys(files)),
+        expected="the files of ONE drive",
+        hint="run them one by one, or all by `aqualog batch`",
+    )
 
 
 def matching(channels: Iterable[ChannelInfo], wanted: str) -> list[ChannelInfo]:

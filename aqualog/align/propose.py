@@ -1,7 +1,8 @@
-"""Propose a signal map for a log with names of its own, or the channel that carries one quantity.
+"""Propose a signal map for a log with names of its own.
 
 A name suggests which signal a channel may be, and its unit rules out wrong ones. The data decide among the rest: an
-accelerometer must follow the derivative of the speed, a yaw rate the difference of the wheel speeds.
+accelerometer must follow the derivative of the speed, a yaw rate the course or the difference of the wheel speeds.
+Where a file gives no units, range and motion give them (`guess_units`, `evidence`).
 """
 
 from __future__ import annotations
@@ -15,33 +16,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.grid import linear
-from aqualog.align.mapping import Entry, SignalMap, channel_id, matching
+from aqualog.align.evidence import (
+    CHECKS,
+    Known,
+    Proposal,
+    quantity_of,
+    settle_by_range,
+    speed_unit,
+    to_si,
+    with_unit,
+)  # fmt: skip
+from aqualog.align.guess_units import CHOICES, by_range
+from aqualog.align.mapping import Entry, channel_id
+from aqualog.align.motion import Motion, derivative, even_times, fit, on_grid, smooth, track, wheel_turn
 from aqualog.align.overview import ChannelOverview, overview, rotated_channels
-from aqualog.align.timebase import ClockRepair
-from aqualog.core.errors import SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
-from aqualog.core.units import convert, is_unit, parse_unit
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.units import is_unit, parse_unit
 
-__all__ = [
-    "CANONICAL", "QUANTITIES", "Look", "Proposal", "Quantity", "find_quantity", "look_at", "propose_map", "words_of",
-]  # fmt: skip
+__all__ = ["CANONICAL", "Look", "Proposal", "look_at", "propose_map", "words_of"]
 
 
 CANONICAL = "its canonical name"
 """Reason of a proposal that needs no map."""
-
-
-@dataclass(frozen=True, slots=True)
-class Proposal:
-    """A channel proposed for a symbol, and why."""
-
-    entry: Entry
-    reason: str
-    score: float
-
 
 _POSITIONS = {
     "fl": ("fl", "vl", "lf", "front left", "left front", "vorne links", "frontleft", "leftfront"),
@@ -87,31 +84,43 @@ _OF_WHEELS = (
     _OfWheels("tie_rod", ("spurstange", "spurstangenkraft", "tie rod", "tierod"), ("force",),
               {w: (*_POSITIONS[w], *more) for w, more in _SIDES.items()}),
 )  # fmt: skip
+_STATES = 5  # values of a switch or a state, at most
+_SEEN = 5000  # samples that are looked at for their number of values
 _LANE_WORDS = ("nass", "nassbahn", "wet", "on water", "onwater", "lichtschranke", "light barrier")
 _LANE_FLAGS = {"flag", "state", "status", "sensor", "valid"}  # of a state these words may be the name
-_RULES = (
-    _Rule("v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "v", "vx", "spd"), ("speed",),
-          ("gps", "gnss", "optical", "correvit", "reference", "referenz", "vx"),
-          ("wheel", "whl", "wind", "engine", "fan", "limit",
-          "set", "steer", "accuracy", "vertical", "lateral", "east", "north", "up", "down", *_WHEEL_WORDS)),
-    _Rule("a_x", ("ax", "accel", "acceleration", "acc", "inline", "laengs", "longitudinal", "gvc", "beschl"),
-          ("acceleration",), ("longitudinal", "inline", "laengs", "long", "x", "ax", "esc", "esp"),
-          ("lateral", "vertical", "querb", "quer", "y", "z", "ay", "az", "angular")),
-    _Rule("a_y", ("ay", "accel", "acceleration", "acc", "quer", "lateral", "beschl"), ("acceleration",),
-          ("lateral", "quer", "y", "ay"), ("longitudinal", "inline", "vertical", "x", "z", "ax", "az", "laengs")),
-    _Rule("yaw_rate", ("yaw", "gier", "yawrate", "gierrate"), ("angular_speed",), ("rate",), ("acceleration",)),
-    _Rule("steering_wheel_angle", ("steer", "steering", "lenk", "lenkrad", "lenkradwinkel", "lwi", "swa"),
-          ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
-    _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",), ("pressure", "druck"),
-          may_rest=True),
-    _Rule("torque_f", _TORQUE_WORDS, ("torque",), ("axle",), ("rear", "hinten", "steer", "motor")),
-    _Rule("torque_r", _TORQUE_WORDS, ("torque",), ("axle",), ("front", "vorne", "steer", "motor")),
-    _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
+_PLACES = (
     _Rule("latitude", ("latitude", "lat"), ("", "angle"), (), ("lateral", "acc"), "deg"),
     _Rule("longitude", ("longitude", "lon", "lng"), ("", "angle"), (), ("longitudinal", "acc"), "deg"),
-    _Rule("altitude", ("altitude", "elevation", "height", "alt"), ("length",)),
-    _Rule("ambient_temperature", ("ambient", "outside", "aussen", "outdoor"), ("temperature",)),
+    _Rule("altitude", ("altitude", "elevation", "height", "alt"), ("length", ""), (), ("cam", "ride"), "m"),
 )  # fmt: skip
+_SPEED = _Rule(
+    "v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "v", "vx", "spd"), ("speed",),
+    ("gps", "gnss", "optical", "correvit", "reference", "referenz", "vx"),
+    ("wheel", "whl", "wind", "engine", "fan", "limit", "set", "steer", "accuracy", "vertical", "lateral", "east",
+     "north", "up", "down", "motor", "rotor", "pump", "turbine", "shaft", "idle", "cruise", *_WHEEL_WORDS),
+)  # fmt: skip
+_FORWARD = _Rule(
+    "a_x", ("ax", "accel", "acceleration", "acc", "inline", "laengs", "longitudinal", "gvc", "beschl"),
+    ("acceleration",), ("longitudinal", "inline", "laengs", "long", "x", "ax", "esc", "esp"),
+    ("lateral", "vertical", "querb", "quer", "y", "z", "ay", "az", "angular", "pedal"),
+)  # fmt: skip
+_RULES = (
+    _FORWARD,
+    _Rule("yaw_rate", ("yaw", "gier", "yawrate", "gierrate"), ("angular_speed",), ("rate",), ("acceleration",)),
+    _Rule("a_y", ("ay", "accel", "acceleration", "acc", "quer", "lateral", "beschl"), ("acceleration",),
+          ("lateral", "quer", "y", "ay"),
+          ("longitudinal", "inline", "vertical", "x", "z", "ax", "az", "laengs", "pedal")),
+    _Rule("steering_wheel_angle", ("steer", "steering", "lenk", "lenkrad", "lenkradwinkel", "lwi", "swa"),
+          ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
+    _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",),
+          ("pressure", "press", "druck"), ("pressed", "pedal", "switch", "sw"), may_rest=True),
+    _Rule("torque_f", _TORQUE_WORDS, ("torque",), ("axle", "achsmoment"), ("rear", "hinten", "steer", "motor")),
+    _Rule("torque_r", _TORQUE_WORDS, ("torque",), ("axle", "achsmoment"), ("front", "vorne", "steer", "motor")),
+    _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
+    _Rule("ambient_temperature", ("ambient", "outside", "aussen", "outdoor"), ("temperature",),
+          ("temp", "temperature", "temperatur")),
+)  # fmt: skip
+"""In the order in which they are looked for: what is found is what later ones are held against."""
 
 
 class Look(NamedTuple):
@@ -148,25 +157,31 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
             candidates = [
                 p for c in usable if (p := _wheel_candidate(several, wheel, positions, c, usable)) is not None
             ]
+            if several.quantity != "omega":
+                candidates = [settle_by_range(p, usable.of(p)) for p in candidates]
             _keep_best(found, f"{several.quantity}_{wheel}", candidates)
     _keep_best(found, "on_water", [p for c in usable if (p := _lane_candidate(c, usable)) is not None])
-    speed = _speed(found, usable)
+    for rule in (*_PLACES, _SPEED):
+        candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
+        if rule is _SPEED and all(f"omega_{w}" in found for w in WHEELS):
+            # beside four wheel speeds, a "vehicle speed" is made from them: only a sensor of its own is a reference
+            named = [(p, channel_id(usable.of(p).info)) for p in candidates]
+            candidates = [p for p, name in named if set(words_of(name)) & set(rule.bonus)]
+        _keep_best(found, rule.symbol, candidates)
+    motion = _motion(found, usable)
     for rule in _RULES:
         candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
         if rule.symbol in ("torque_f", "torque_r"):
             want = {"torque_f": ("front", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
             candidates = [p for p in candidates if set(words_of(p.entry.channel[0])) & set(want)]
-        if rule.symbol == "v_x" and all(f"omega_{w}" in found for w in WHEELS):
-            # beside four wheel speeds, a "vehicle speed" is made from them: only a sensor of its own is a reference
-            named = [(p, channel_id(usable.by_address[p.entry.channel[0]].info)) for p in candidates]
-            candidates = [p for p, name in named if set(words_of(name)) & set(rule.bonus)]
-        if rule.symbol == "a_x" and speed is not None:
-            candidates = [_check_acceleration(p, usable, speed) for p in candidates]
-        if rule.symbol == "yaw_rate":
-            candidates = [_check_yaw(p, usable, found) for p in candidates]
-        _keep_best(found, rule.symbol, candidates)
-        if rule.symbol == "v_x" and speed is None:
-            speed = _speed(found, usable)
+        check = CHECKS.get(rule.symbol)
+        if motion is not None and check is not None:
+            candidates = [check(p, usable.of(p), motion) for p in candidates]
+        _keep_best(found, rule.symbol, [settle_by_range(p, usable.of(p)) if p.score > 0 else p for p in candidates])
+        if rule.symbol == "yaw_rate" and motion is not None and "yaw_rate" in found:
+            channel = usable.of(found["yaw_rate"])
+            turn = smooth(to_si(found["yaw_rate"], channel, on_grid(channel, motion.grid))[0])
+            motion = replace(motion, turns=(("the yaw rate", turn), *motion.turns))
     if "steer_angle" in found:
         found.pop("steering_wheel_angle", None)
     return {s: found[s] for s in (*SYMBOLS, *ACCEPTED) if s in found}
@@ -196,6 +211,10 @@ class _Named(list[Channel]):
             self.by_address.setdefault(channel.info.path, channel)
             self.by_address.setdefault(channel_id(channel.info), channel)
 
+    def of(self, proposal: Proposal) -> Channel:
+        """Return the channel of a proposal."""
+        return self.by_address[proposal.entry.channel[0]]
+
 
 def _has(wanted: Sequence[str], words: Sequence[str]) -> bool:
     """Return whether one of the words stands in a name, by itself or (from four letters on) inside a compound."""
@@ -221,10 +240,8 @@ def _proposal(
     entry = Entry(symbol, (_address(channel, channels),), own if own and is_unit(own) else (unit or None))
     if own:
         reason = "name and unit"
-    elif unit:
-        reason = f"name; the file gives no unit: {unit} by its kind, check it"
     else:
-        reason = "name; THE FILE GIVES NO UNIT, add it"
+        reason = f"name; the file gives no unit: {unit} by its kind, check it" if unit else "name"
     finite = channel.values[np.isfinite(channel.values)]
     if finite.size > 10 and finite.min() == finite.max():
         return Proposal(entry, f"{reason}, but it is constant", score - (1.0 if may_rest else 5.0))
@@ -253,12 +270,21 @@ def _candidate(rule: _Rule, channel: Channel, channels: _Named) -> Proposal | No
     never = set(rule.never) & set(words) or _has([w for w in rule.never if len(w) > 4], words)
     if not named or never or set(words) & _NOT_A_VALUE:
         return None
-    # a channel without a unit is proposed only where the name leaves no doubt what the unit is
-    is_clear = dimension == "" and (rule.fallback_unit or rule.symbol == "gear")
+    # a channel without a unit is proposed only where its name says which quantity it is
+    is_clear = dimension == "" and (rule.fallback_unit or rule.symbol == "gear" or _is_measured(rule, channel, words))
     if dimension not in rule.dimensions and not is_clear:
         return None
-    score = 2.0 + len(set(rule.bonus) & path_words) + _has(rule.bonus, words)
+    score = 2.0 + len(set(rule.bonus) & path_words) + _has(rule.bonus, words) - 1.5 * (dimension == "")
     return _proposal(rule.symbol, channel, channels, score, rule.fallback_unit, may_rest=rule.may_rest)
+
+
+def _is_measured(rule: _Rule, channel: Channel, words: Sequence[str]) -> bool:
+    """Whether a channel without a unit bears a name that is clear enough, and more values than a switch or a state."""
+    is_clear = rule is _SPEED or _has(rule.bonus, words)
+    seen = channel.values[:: max(1, channel.values.size // _SEEN)]
+    values = np.unique(seen[np.isfinite(seen)])
+    is_measured = values.size > _STATES or (rule.may_rest and values.size == 1 and values[0] == 0.0)
+    return bool(quantity_of(rule.symbol) and is_clear and is_measured)
 
 
 def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
@@ -280,169 +306,92 @@ def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
 # --- the data's word ---------------------------------------------------------------------------------------------
 
 
-def _clean(channel: Channel, values: FloatArray | None = None) -> tuple[TimeArray, FloatArray]:
-    """Stamps in order, and the finite values there: the channel's own, or these in place of them."""
-    t, order, _ = ClockRepair().repair(channel.t_ns)
-    x = (channel.values if values is None else values)[order]
-    good = np.isfinite(x)
-    return t[good], x[good]
-
-
-def _on_grid(channel: Channel, grid: TimeArray) -> FloatArray:
-    t, x = _clean(channel)
-    return linear(t, x, grid, gap_ns=2_000_000_000)[0]
-
-
-_GRID_NS = 100_000_000
-_LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
-
-
-def _even_times(channel: Channel, least: int) -> TimeArray | None:
-    """Stamps every 0.1 s over a channel; None if it has no more samples than `least`, or its stamps jump."""
-    t, _ = _clean(channel)
-    is_drive = t.size > least and int(t[-1]) - int(t[0]) < _LONGEST_NS
-    return np.arange(t[0], t[-1], _GRID_NS, dtype=np.int64) if is_drive else None
-
-
-def _speed(found: dict[str, Proposal], channels: _Named) -> tuple[TimeArray, FloatArray] | None:
-    """Return the speed on a 0.1 s grid from a wheel or the reference, in its own unit."""
-    for symbol in ("omega_rl", "omega_fl", "v_x"):
-        if symbol in found:
-            channel = channels.by_address[found[symbol].entry.channel[0]]
-            grid = _even_times(channel, 20)
-            if grid is not None:
-                return grid, _on_grid(channel, grid)
-    return None
-
-
-def _correlation(a: FloatArray, b: FloatArray) -> float:
-    good = np.isfinite(a) & np.isfinite(b)
-    if good.sum() < 50 or a[good].std() == 0.0 or b[good].std() == 0.0:
-        return np.nan
-    return float(np.corrcoef(a[good], b[good])[0, 1])
-
-
-def _smooth(x: FloatArray) -> FloatArray:
-    return np.convolve(x, np.ones(11) / 11, mode="same")
-
-
-def _check_acceleration(p: Proposal, channels: _Named, speed: tuple[TimeArray, FloatArray]) -> Proposal:
-    grid, v = speed
-    a = _on_grid(channels.by_address[p.entry.channel[0]], grid)
-    r = _correlation(_smooth(np.gradient(v)), _smooth(a))
-    if np.isnan(r):
-        return p
-    reason = f"{p.reason}; correlation {r:+.2f} with the derivative of the speed"
-    if abs(r) < 0.5:
-        return replace(p, reason=f"{reason}: not the car's a_x", score=-1.0)
-    if r < 0:
-        # a wrong sign is a guess too far for the map: said, and ranked behind any channel that needs none
-        return replace(p, reason=f"{reason}: sign turned", score=p.score - 1.0 - r, entry=replace(p.entry, scale=-1.0))
-    return replace(p, reason=reason, score=p.score + 2.0 * r)
-
-
-def _check_yaw(p: Proposal, channels: _Named, found: dict[str, Proposal]) -> Proposal:
-    if "omega_rl" not in found or "omega_rr" not in found:
-        return p
-    left, right = (channels.by_address[found[f"omega_{w}"].entry.channel[0]] for w in ("rl", "rr"))
-    grid = _even_times(left, 1)
+def _motion(found: dict[str, Proposal], channels: _Named) -> Motion | None:
+    """Return the motion by the speeds and positions that are found, and give units to speeds that have none."""
+    speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in found]
+    bases = [s for s in ("omega_rl", "omega_fl", *speeds, "latitude") if s in found]
+    grid = next((g for s in bases if (g := even_times(channels.of(found[s]), 20)) is not None), None)
     if grid is None:
-        return p
-    turn = _on_grid(right, grid) - _on_grid(left, grid)
-    r = _correlation(_smooth(turn), _smooth(_on_grid(channels.by_address[p.entry.channel[0]], grid)))
-    if np.isnan(r) or abs(r) < 0.5:
-        return replace(p, reason=f"{p.reason}; the wheels turn too little to check its sign")
-    reason = f"{p.reason}; correlation {r:+.2f} with the rear wheels' difference"
-    if r < 0:
-        return replace(p, reason=f"{reason}: sign turned", entry=replace(p.entry, scale=-1.0))
-    return replace(p, reason=reason, score=p.score + r)
-
-
-QUANTITIES = {"speed": "m/s", "yaw_rate": "rad/s"}
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """Samples of a quantity in one file. `t_ns` strictly increasing, `x` in m/s or rad/s."""
-
-    file: str
-    label: str
-    t_ns: TimeArray
-    x: FloatArray
-    absolute: bool
-    note: str = ""
-
-
-def find_quantity(
-    channels: Sequence[Channel], *, quantity: str, signal_map: SignalMap, vehicle: Vehicle, named: str | None = None
-) -> Quantity:
-    """Find the quantity in the channels of ONE file.
-
-    Order of preference: the channel that is named; the signal map; names and units. A reference speed is preferred to
-    the mean of the wheel speeds.
-
-    Raises
-    ------
-    SignalError
-        If the file carries no such quantity.
-    """
-    infos = [c.info for c in channels]
-    if named is not None:
-        hits = [c for c in channels if c.info in matching(infos, named)]
-        if len(hits) != 1:
-            raise SignalError(
-                f'{"no" if not hits else "more than one"} channel "{named}"',
-                where=channels[0].info.file if channels else "",
-                hint="`aqualog inspect` lists the channels",
-            )
-        return _single(hits[0], Entry("v_x", (named,)), quantity)
-    known = {s: e for s, e in signal_map.entries.items() if any(len(matching(infos, c)) == 1 for c in e.channel)}
-    proposed = {s: p.entry for s, p in propose_map(channels).items()}
-    for entries in (known, proposed):
-        found = _from_entries(channels, entries, quantity, vehicle)
-        if found is not None:
-            return found
-    if quantity == "speed":
-        bare = [c for c in channels if not c.info.unit and {"speed", "velocity"} & set(words_of(c.info.name))]
-        if bare:
-            return _single(bare[0], Entry("v_x", (bare[0].info.path,)), quantity)
-    raise SignalError(
-        f"no {quantity.replace('_', ' ')} found",
-        where=channels[0].info.file if channels else "",
-        expected="a channel that both sources carry",
-        hint="name it with --channel FILE=CHANNEL",
-    )
-
-
-def _channel(channels: Sequence[Channel], entry: Entry) -> Channel:
-    infos = [c.info for c in channels]
-    hit = next(m for c in entry.channel if (m := matching(infos, c)))[0]
-    return next(c for c in channels if c.info is hit)
-
-
-def _from_entries(
-    channels: Sequence[Channel], entries: dict[str, Entry], quantity: str, vehicle: Vehicle
-) -> Quantity | None:
-    symbol = "yaw_rate" if quantity == "yaw_rate" else "v_x"
-    if symbol in entries:
-        return _single(_channel(channels, entries[symbol]), entries[symbol], quantity)
-    wheels = [(w, entries[f"omega_{w}"]) for w in WHEELS if f"omega_{w}" in entries]
-    if quantity == "yaw_rate" or len(wheels) < 2:
+        for s in speeds:
+            found[s] = settle_by_range(found[s], channels.of(found[s]))
         return None
-    parts = [_single(_channel(channels, e), e, quantity, r_e=vehicle.r_e(w)) for w, e in wheels]
-    t = parts[0].t_ns
-    mean = np.mean([p.x if p.t_ns is t else linear(p.t_ns, p.x, t, gap_ns=10**9)[0] for p in parts], axis=0)
-    return replace(parts[0], label=f"mean of {len(wheels)} wheels", x=mean)
+    raw = {s: on_grid(channels.of(found[s]), grid) for s in speeds}
+    course = _course(found, channels, grid)
+    _settle_speeds(found, channels, raw, grid, None if course is None else course[0])
+    si = {s: np.abs(to_si(found[s], channels.of(found[s]), x)[0]) for s, x in raw.items() if s in found}
+    wheels = [si[f"omega_{w}"] for w in WHEELS if f"omega_{w}" in si]
+    if not si and course is None:
+        return None
+    v = si["v_x"] if "v_x" in si else np.mean(wheels, axis=0) if wheels or course is None else course[0]
+    turns = [] if course is None else [("the course of the positions", course[1])]
+    for name, left, right in (("rear", "omega_rl", "omega_rr"), ("front", "omega_fl", "omega_fr")):
+        if left in si and right in si:
+            turns.append((f"the {name} wheels' difference", wheel_turn(si[left], si[right])))
+    return Motion(grid, v, derivative(si.get("omega_rl", si.get("omega_fl", v))), tuple(turns))
 
 
-def _single(channel: Channel, entry: Entry, quantity: str, *, r_e: float | None = None) -> Quantity:
-    """One channel in SI; a turning wheel becomes a speed by its effective radius [m]."""
-    unit, target = entry.unit or channel.info.unit, QUANTITIES[quantity]
-    note = ""
-    if r_e is not None and unit and parse_unit(unit).dimension == "angular_speed":
-        values, note = convert(channel.values, unit, "rad/s") * entry.scale * r_e, f"r_e = {r_e:g} m"
-    elif not unit or not is_unit(unit):
-        values, note = channel.values, f"no unit: taken as {target}"
-    else:
-        values = convert(channel.values, unit, target, where=channel_id(channel.info)) * entry.scale + entry.offset
-    return Quantity(channel.info.file, channel.info.path, *_clean(channel, values), channel.absolute, note)
+def _course(found: Mapping[str, Proposal], channels: _Named, grid: TimeArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return speed [m/s] and yaw rate [rad/s] by the positions; None without any or where they hardly move."""
+    if "latitude" not in found or "longitude" not in found:
+        return None
+    degrees = []
+    for symbol in ("latitude", "longitude"):
+        channel = channels.of(found[symbol])
+        x, dimension = to_si(found[symbol], channel, on_grid(channel, grid))
+        degrees.append(np.degrees(x) if dimension == "angle" else x)
+    v, turn = track(degrees[0], degrees[1])
+    return (v, turn) if (v > _MOVING).sum() >= _LEAST else None
+
+
+def _settle_speeds(
+    found: dict[str, Proposal],
+    channels: _Named,
+    raw: Mapping[str, FloatArray],
+    grid: TimeArray,
+    course: FloatArray | None,
+) -> None:
+    """Give a unit to each speed that has none: by one that is known, else by an accelerometer or by its range."""
+
+    def is_bare(symbol: str) -> bool:
+        p = found[symbol]
+        return not (p.entry.unit or channels.of(p).info.unit or p.reason == CANONICAL)
+
+    def as_known(symbol: str) -> Known:
+        x, dimension = to_si(found[symbol], channels.of(found[symbol]), raw[symbol])
+        return Known(symbol, np.abs(x), _TURNING if dimension == "angular_speed" else _SPREAD)
+
+    bare = [s for s in raw if is_bare(s)]
+    if not bare:
+        return
+    sure = [as_known(s) for s in raw if not is_bare(s)]
+    if course is not None:
+        sure.append(Known("the positions", course, 1.5 * _SPREAD))
+    sure.sort(key=lambda k: k.spread)
+    accelerometer = None if sure else _accelerometer(channels, raw[bare[0]], grid)
+    doubt: tuple[str, ...] = ()
+    for symbol in bare:
+        p, is_wheel = found[symbol], symbol != "v_x"
+        known: list[Known | None] = [*sure] or [None]
+        asked = (speed_unit(raw[symbol], is_wheel=is_wheel, known=k, accelerometer=accelerometer) for k in known)
+        guess = next((g for g in asked if g is not None), None)
+        if guess is None and is_wheel:  # whatever another speed says, it is a wheel's
+            guess = by_range(raw[symbol], CHOICES["wheel"])
+        if guess is None:
+            del found[symbol]
+            continue
+        found[symbol] = replace(with_unit(p, guess), doubt=doubt or guess.doubt)
+        if not sure:
+            sure, doubt = [as_known(symbol)], guess.doubt
+
+
+_SPREAD = 0.04  # of two speeds of one car: radius that a control unit assumes, slip
+_TURNING = 0.3  # of a speed from a wheel whose radius is not known
+_MOVING = 5.0  # speed from which positions show it [m/s]
+_LEAST = 100  # points of the grid that must show it: 10 s
+
+
+def _accelerometer(channels: _Named, speed: FloatArray, grid: TimeArray) -> tuple[FloatArray, str] | None:
+    """Return the accelerometer that follows the derivative of a raw speed (n,) best, raw on its grid, and its unit."""
+    own = [channels.of(p) for c in channels if (p := _candidate(_FORWARD, c, channels)) is not None]
+    found = [(on_grid(c, grid), c.info.unit) for c in own]
+    return max(found, key=lambda f: np.nan_to_num(abs(fit(derivative(speed), smooth(f[0])).r)), default=None)

@@ -7,7 +7,7 @@ other names in other drives become a list in order of preference. What one map c
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from aqualog.core.units import is_unit
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions
 
-__all__ = ["LogFile", "MapProposal", "measures_wheels", "propose_signals"]
+__all__ = ["LogFile", "MapProposal", "measures_wheels", "propose_signals", "unmapped_names"]
 
 MOST_MISSING = 0.1  # share of drives that may lack a signal that the map names: those drives cannot be used then
 
@@ -163,7 +163,7 @@ def _joined(
         found.append(symbol)
         if not _is_canonical(symbol, entry):
             entries[symbol] = entry
-            remarks[symbol] = own[0].reason
+            remarks[symbol] = own[0].remark
     notes += [f"{', '.join(symbols)}: {told}" for told, symbols in absent.items()]
     missing = [f"omega_{w}" for w in WHEELS if f"omega_{w}" not in found]
     if missing:
@@ -190,20 +190,30 @@ _NO_ROAD_SPEED = {"wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", 
 
 
 def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """Channels of any drive that no name of the map means; by their path where the name alone would be doubtful."""
-    told: dict[str, None] = {}
-    for members in kinds.values():
-        infos = [c for f in members[0] for c in f.channels]
-        used: set[tuple[str, str]] = set()
-        for wanted in mapped:  # of several names the first that hits is the one that is read
-            hits = next(filter(None, (matching(infos, name) for name in wanted)), [])
-            used |= {(c.file, c.path) for c in hits}
-        names = Counter(c.name for c in infos)
-        for info in infos:
-            if (info.file, info.path) not in used:
-                name = info.name if names[info.name] == 1 else info.path
-                told[f"{name} [{info.unit}]" if info.unit else name] = None
-    return tuple(told)
+    """Channels of any drive that no name of the map means."""
+    return tuple(dict.fromkeys(n for members in kinds.values() for n in unmapped_names(
+        [c for f in members[0] for c in f.channels], mapped
+    )))  # fmt: skip
+
+
+def unmapped_names(infos: Sequence[ChannelInfo], mapped: Iterable[Sequence[str]]) -> list[str]:
+    """Return `name [unit]` of the channels that no name of a map means; the path where the name alone is doubtful.
+
+    Parameters
+    ----------
+    infos : sequence of ChannelInfo
+        All channels of one drive.
+    mapped : iterable of sequences of str
+        Names of each signal's channel; of several the first that hits is the one that is read.
+    """
+    used: set[tuple[str, str]] = set()
+    for wanted in mapped:
+        hits = next(filter(None, (matching(infos, name) for name in wanted)), [])
+        used |= {(c.file, c.path) for c in hits}
+    names = Counter(c.name for c in infos)
+    rest = [i for i in infos if (i.file, i.path) not in used]
+    shown = [i.name if names[i.name] == 1 else i.path for i in rest]
+    return [f"{name} [{i.unit}]" if i.unit else name for name, i in zip(shown, rest, strict=True)]
 
 
 def _is_canonical(symbol: str, entry: Entry) -> bool:

@@ -13,12 +13,10 @@ from aqualog.campaign.propose_drives import Drive, tokens
 from aqualog.campaign.propose_names import NameTable
 from aqualog.core.vehicle import KEYS, POLYNOMIALS
 
-__all__ = ["NEEDED", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "unmapped_text", "vehicle_text"]
+__all__ = ["NEEDED", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
 
 NEEDED = ("drivetrain", "mass", "l_f", "l_r", "wheels.r_e_f", "wheels.r_e_r")
 """Keys without which forces, loads or slip would be those of another car."""
-
-MOST_UNMAPPED = 60
 
 _COLUMNS = (
     "log", "tyre", "wear", "tread_depth_mm", "pressure_front_bar", "pressure_rear_bar", "water_depth_mm",
@@ -57,16 +55,6 @@ def blanks(table: NameTable, count: int) -> dict[str, int]:
     keys += [c for c in table.columns if c not in keys and not c.startswith("x_part")]
     empty = {c: sum(not v for v in table.columns[c]) if c in table.columns else count for c in keys}
     return {c: n for c, n in empty.items() if n}
-
-
-def unmapped_text(unmapped: Sequence[str]) -> str:
-    """Comments for the end of a signal map: channels that no line names, `MOST_UNMAPPED` of them at most."""
-    if not unmapped:
-        return ""
-    lines = ["", f"not mapped, {len(unmapped)} channels:", *(f"  {name}" for name in unmapped[:MOST_UNMAPPED])]
-    lines += [f"  and {len(unmapped) - MOST_UNMAPPED} more"] if len(unmapped) > MOST_UNMAPPED else []
-    shown = ("".join(c if c.isprintable() else " " for c in line) for line in lines)
-    return "".join(f"# {line}\n" if line else "\n" for line in shown)
 
 
 def relative(path: Path, base: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,9 @@ MAP_KEYS = (
 """Every key of a signal map."""
 
 _LONGEST = 60  # characters of a name that are shown
+MOST_UNMAPPED = 60
+"""Channels without a signal that a map names at its end, at most."""
+
 _TABLES = ("signals", "time", "csv", "sources")
 _ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")
 _NUMBERS = {n: k for n, k in zip(_ENTRY_KEYS, MAP_KEYS, strict=False) if k.kind == "number"}
@@ -153,8 +156,17 @@ def _entry(signals: Table, symbol: str) -> Entry | None:
     return Entry(symbol, names, unit, **numbers, invalid=tuple(float(i) for i in invalid))
 
 
-def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None) -> str:
-    """Return the TOML text of a signal map, with remarks behind its lines; reading it again gives the same map."""
+def map_text(
+    signal_map: SignalMap,
+    *,
+    comments: Iterable[str] = (),
+    remarks: Mapping[str, str] | None = None,
+    unmapped: Sequence[str] = (),
+) -> str:
+    """Return the TOML text of a signal map; reading it again gives the same map.
+
+    `comments` stand at its head, `remarks` behind the lines of their signals, `unmapped` channels at its end.
+    """
     remarks = remarks or {}
     lines = [f"# {_one_line(c)}" for c in comments]
     if signal_map.time_channel or signal_map.time_unit:
@@ -176,6 +188,10 @@ def map_text(signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Ma
         lines += ["", f"[sources.{quoted(name)}]", f"offset_s = {clock.offset_s!r}"]
         if clock.drift_ppm or clock.at_s:
             lines += [f"drift_ppm = {clock.drift_ppm!r}", f"at_s = {clock.at_s!r}"]
+    if unmapped:
+        lines += ["", f"# not mapped, {len(unmapped)} channels:"]
+        lines += [f"#   {_one_line(name)}" for name in unmapped[:MOST_UNMAPPED]]
+        lines += [f"#   and {len(unmapped) - MOST_UNMAPPED} more"] if len(unmapped) > MOST_UNMAPPED else []
     return "\n".join(lines) + "\n"
 
 

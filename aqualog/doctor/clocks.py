@@ -8,7 +8,7 @@ from dataclasses import replace
 from aqualog.align.clean import corrected
 from aqualog.align.clock import estimate_clock
 from aqualog.align.mapping import SignalMap
-from aqualog.align.propose import Quantity, find_quantity
+from aqualog.align.quantity import Quantity, find_quantity
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Channel
 from aqualog.core.vehicle import Vehicle

@@ -10,7 +10,7 @@ from aqualog.align.freezes import StandWatch
 from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
-from aqualog.align.propose import Quantity
+from aqualog.align.quantity import Quantity
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FileFaults, Remark, Signals
 from aqualog.core.vehicle import Vehicle

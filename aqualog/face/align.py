@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.align.clock import ClockFit
-    from aqualog.align.propose import Quantity
+    from aqualog.align.quantity import Quantity
     from aqualog.report.sections import Report
 
 __all__ = ["Alignment", "align", "check_quantity"]
@@ -201,7 +201,7 @@ def align(
 
 def check_quantity(quantity: str) -> None:
     """Refuse a quantity that is not known."""
-    from aqualog.align.propose import QUANTITIES
+    from aqualog.align.quantity import QUANTITIES
 
     if text_of(quantity, "quantity") not in QUANTITIES:
         raise ConfigError(f'quantity "{quantity[:60]}"', expected=" or ".join(QUANTITIES))
@@ -211,7 +211,7 @@ def _compared(
     drive: Drive, vehicle: Vehicle, quantity: str, channels: Mapping[str, str], hear: Listener
 ) -> list[Quantity]:  # fmt: skip
     from aqualog.align.load import read_options
-    from aqualog.align.propose import find_quantity
+    from aqualog.align.quantity import find_quantity
     from aqualog.io.open_log import DriveLog
 
     with DriveLog(list(drive.paths), read_options(drive.signal_map, list(drive.dbc))) as log:

@@ -15,6 +15,7 @@ from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import file_of, text_of, write_whole
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_of
+from aqualog.face.guess import load_or_guess
 from aqualog.face.listener import Listener, Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, flat, page_file, rows_table, table
 
@@ -240,7 +241,8 @@ def detect(
     Parameters
     ----------
     drive : Drive, Signals, str, Path or several
-        From `aq.read`, or files of ONE drive that need no signal map.
+        From `aq.read`, or files of ONE drive. Without a signal map and without wheel speeds of canonical names,
+        signals are guessed as `aq.inspect` proposes them, and a note says so.
     vehicle : Vehicle, str or Path, optional
         Without it that of the drive, else radii of a default car; what needs mass or drivetrain is then not judged.
     thresholds : str or Path, optional
@@ -286,7 +288,7 @@ def detect(
     needs = ", ".join(n for n, is_asked in asked if is_asked)
     key = ""
     with one.reading():
-        loaded = one.load_or_open(car, report=hear, note=hear.note, whole_for=needs)
+        one, loaded, guessed = load_or_guess(one, car, hear, whole_for=needs)
         if isinstance(loaded, Signals):
             check_something_to_do(loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name)
             hear("detecting")
@@ -305,7 +307,7 @@ def detect(
             out = None if windows is None else file_of(windows, "windows")
             result = _in_windows(loaded, car, settings, memory, out, hear)
         changes = one.changes()
-    result = replace(result, notes=(*result.notes, *changes))
+    result = replace(result, notes=(*guessed, *result.notes, *changes))
     quality = result.signals.quality
     return Detection(
         one, car, result, known, memory, key, notes=(*quality.notes, *result.notes),

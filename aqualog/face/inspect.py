@@ -31,18 +31,23 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "Health", "Matrix", "doctor", "exit_code", "inspect", "matrix"]
 
 
+_MOST_SHOWN = 12  # channels without a signal that are named in the text
 _HEADER = ("channel", "unit", "samples", "Hz", "from s", "to s", "min", "max", "gaps", "faults", "signal?")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contents(Result):
-    """The channels of one drive's files, and the signals that they look like."""
+    """The channels of one drive's files, and the signals that they look like.
+
+    `unmapped` are the channels, `name [unit]`, that look like no signal.
+    """
 
     drive: Drive
     formats: tuple[str, ...]
     overviews: tuple[ChannelOverview, ...]
     proposals: Mapping[str, Proposal]
     absolute: frozenset[str]
+    unmapped: tuple[str, ...] = ()
 
     @property
     def exit_code(self) -> ExitCode:
@@ -63,9 +68,16 @@ class Contents(Result):
             "files": [{"file": str(p), "format": f} for p, f in zip(self.drive.paths, self.formats, strict=True)],
             "channels": [_plain(dataclasses.asdict(o)) for o in self.overviews],
             "proposed": {
-                s: {"channel": p.entry.channel[0], "unit": p.entry.unit, "scale": p.entry.scale, "reason": p.reason}
+                s: {
+                    "channel": p.entry.channel[0],
+                    "unit": p.entry.unit,
+                    "scale": p.entry.scale,
+                    "reason": p.reason,
+                    "doubt": list(p.doubt),
+                }
                 for s, p in self.proposals.items()
             },
+            "unmapped": list(self.unmapped),
             "notes": list(self.notes),
         }
 
@@ -73,7 +85,8 @@ class Contents(Result):
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """`channels` and `proposed`."""
         channels = [{k: v for k, v in c.items() if not isinstance(v, dict)} for c in self.document["channels"]]
-        proposed = [{"signal": s, **p} for s, p in self.document["proposed"].items()]
+        own = self.document["proposed"].items()
+        proposed = [{"signal": s, **p, "doubt": ", ".join(p["doubt"])} for s, p in own]
         return {"channels": rows_table(channels), "proposed": rows_table(proposed)}
 
     def text(self) -> str:
@@ -100,9 +113,12 @@ class Contents(Result):
         if not self.proposals:
             return ["no channel looks like a signal that aqualog knows"]
         own = self.proposals.items()
+        shown = ", ".join(cut(n, CELL) for n in self.unmapped[:_MOST_SHOWN])
+        more = ", ..." if len(self.unmapped) > _MOST_SHOWN else ""
         return [
             "proposed signals:",
-            *(f"  {s} = {cut(p.entry.channel[0], CELL)}  ({cut(p.reason, CELL)})" for s, p in own),
+            *(f"  {s} = {proposal_words(p)}" for s, p in own),
+            *([f"not mapped, {len(self.unmapped)} channels: {shown}{more}"] if self.unmapped else []),
         ]
 
     def headline(self) -> str:
@@ -131,7 +147,8 @@ class Contents(Result):
             from aqualog.config.signal_map import map_text
 
             comment = f"proposed for {', '.join(p.name for p in self.drive.paths)}: check every line"
-            return map_text(self.map, comments=[comment], remarks={s: p.reason for s, p in self.proposals.items()})
+            remarks = {s: p.remark for s, p in self.proposals.items()}
+            return map_text(self.map, comments=[comment], remarks=remarks, unmapped=self.unmapped)
 
         return {"inspect.json": self._json_file(), "map.toml": text_file(map_file)}
 
@@ -163,6 +180,7 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
     from aqualog.align.load import read_options
     from aqualog.align.overview import find_mounting
     from aqualog.align.propose import look_at
+    from aqualog.align.propose_map import unmapped_names
     from aqualog.io.open_log import DriveLog
 
     one, hear = drive_of(drive), listener(progress)
@@ -182,10 +200,20 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
         tuple(found),
         proposals,
         frozenset(c.info.file for c in channels if c.absolute),
+        tuple(unmapped_names([c.info for c in channels], [p.entry.channel for p in proposals.values()])),
         notes=(*notes, *changes),
         has_loss=bool(damaged),
         sources=one.sources,
     )
+
+
+def proposal_words(p: Proposal) -> str:
+    """Return channel, unit, factor and reason of a proposal in one line."""
+    from aqualog.report.values import CELL, NOTE, cut
+
+    unit = f" [{p.entry.unit}]" if p.entry.unit else ""
+    scale = f" * {p.entry.scale:g}" if p.entry.scale != 1.0 else ""
+    return f"{cut(p.entry.channel[0], CELL)}{unit}{scale}  ({cut(p.remark, NOTE)})"
 
 
 def _plain(value: Any) -> Any:

@@ -271,7 +271,7 @@ def _texts(
     signals: MapProposal,
 ) -> dict[Path, str]:
     """What is to be written; the campaign file last, so that it never names a file that is not there."""
-    from aqualog.campaign.propose_files import campaign_text, relative, runs_text, unmapped_text, vehicle_text
+    from aqualog.campaign.propose_files import campaign_text, relative, runs_text, vehicle_text
     from aqualog.config.signal_map import map_text
 
     base = out.parent
@@ -280,8 +280,9 @@ def _texts(
     if signals.needed:
         comments = [f"proposed for {len(drives)} drives in {name}: check every line"]
         comments += [f"not in all drives, so left out: {s} = {why}" for s, why in signals.left_out.items()]
-        texts[base / "map.toml"] = map_text(signals.signal_map, comments=comments, remarks=signals.remarks)
-        texts[base / "map.toml"] += unmapped_text(signals.unmapped)
+        texts[base / "map.toml"] = map_text(
+            signals.signal_map, comments=comments, remarks=signals.remarks, unmapped=signals.unmapped
+        )
     if vehicle is None:
         texts[base / "vehicle.toml"] = vehicle_text(name)
         car = "vehicle.toml"

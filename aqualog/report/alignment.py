@@ -11,7 +11,7 @@ import numpy as np
 
 from aqualog import __version__
 from aqualog.align.clock import ClockFit
-from aqualog.align.propose import QUANTITIES, Quantity
+from aqualog.align.quantity import QUANTITIES, Quantity
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FloatArray, TimeArray
 from aqualog.report.figures import axis, figure, line

@@ -1,0 +1,106 @@
+"""A signal map for a drive that comes without one: what `inspect` proposes, used at once and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from aqualog.core.errors import AqualogError
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import Signals
+from aqualog.face.listener import Listener
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from aqualog.align.load import LoadedLong
+    from aqualog.align.propose import Proposal
+    from aqualog.core.vehicle import Vehicle
+    from aqualog.face.drive import Drive
+
+__all__ = ["load_or_guess"]
+
+_NAMED = 3  # signals in the note
+
+
+def load_or_guess(
+    drive: Drive, vehicle: Vehicle, hear: Listener, *, whole_for: str = ""
+) -> tuple[Drive, Signals | LoadedLong, tuple[str, ...]]:
+    """Load a drive as `Drive.load_or_open` does; without a map and wheel speeds by guessed signals, with a note on it.
+
+    A drive that is too long for memory is not guessed at.
+
+    Raises
+    ------
+    LogError, SignalError, ConfigError
+        As without a guess, where nothing more is found.
+    """
+    from aqualog.align.load import NothingMappedError
+
+    def load(one: Drive) -> Signals | LoadedLong:
+        return one.load_or_open(vehicle, report=hear, note=hear.note, whole_for=whole_for)
+
+    if drive.given is not None or drive.signal_map.entries:
+        return drive, load(drive), ()
+    loaded: Signals | LoadedLong | None = None
+    try:
+        loaded = load(drive)
+    except NothingMappedError:
+        hear("guessing which channel is which signal")
+        found = _guesses(drive)
+        if not found:
+            raise
+    else:
+        if not isinstance(loaded, Signals) or all(f"omega_{w}" in loaded.symbols for w in WHEELS):
+            return drive, loaded, ()
+        hear("guessing which channel is which signal")
+        found = _guesses(drive)
+        if not any(s.startswith("omega_") for s in found):
+            return drive, loaded, ()
+    entries = {s: p.entry for s, p in found.items()}
+    own = replace(drive, signal_map=replace(drive.signal_map, entries=entries), _loaded={})
+    try:
+        return own, load(own), (_note(found),)
+    except AqualogError:
+        if loaded is None:
+            raise
+        return drive, loaded, ()  # what is guessed does not go together: what is known does
+
+
+def _guesses(drive: Drive) -> Mapping[str, Proposal]:
+    """Return the proposals that need a map; none if the log cannot be read or is too long for memory.
+
+    Raises
+    ------
+    SignalError
+        If the files are those of several drives.
+    """
+    from aqualog.align.load import LONG, read_options
+    from aqualog.align.mapping import OF_SEPARATE_DRIVES, separate_drives
+    from aqualog.align.propose import CANONICAL, look_at
+    from aqualog.io.open_log import DriveLog
+
+    try:
+        with drive.reading(), DriveLog(drive.paths, read_options(drive.signal_map, drive.dbc)) as log:
+            if sum(c.count for c in log.channels()) >= LONG:
+                return {}
+            channels, _ = log.read_readable()
+    except AqualogError:
+        return {}
+    found = {s: p for s, p in look_at(channels).proposals.items() if p.reason != CANONICAL}
+    files = {name: {c.info.file for c in channels if c.info.path == name} for name in {c.info.path for c in channels}}
+    doubled = [p for p in found.values() if len(files.get(p.entry.channel[0].partition(":")[2], ())) > 1]
+    if len(doubled) >= OF_SEPARATE_DRIVES:
+        raise separate_drives(len(doubled), (c.info.file for c in channels))
+    return found
+
+
+def _note(found: Mapping[str, Proposal]) -> str:
+    some = [f"{s} = {p.entry.channel[0]}" for s, p in list(found.items())[:_NAMED]]
+    more = ", ..." if len(found) > _NAMED else ""
+    doubt = [s for s, p in found.items() if p.doubt]
+    unsure = f"; the units of {', '.join(doubt)} are in doubt" if doubt else ""
+    return (
+        f"no signal map: {len(found)} signals are guessed from names, units and data "
+        f"({', '.join(some)}{more}){unsure}. `aqualog inspect LOG --write-map map.toml` writes them down to check"
+    )
