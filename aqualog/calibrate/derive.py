@@ -14,8 +14,8 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = [
-    "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "derived", "estimates",
-    "identified_values",
+    "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
+    "identified_values", "keeping",
 ]  # fmt: skip
 
 FIXABLE: Mapping[str, tuple[float, float]] = {
@@ -115,18 +115,46 @@ _KEYS = {
 }  # fmt: skip
 
 
+def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Parameter]:
+    """Return the estimates whose interval excludes what the vehicle file gives.
+
+    The torque gain does not count: it belongs to the torques as they are read. What `--fix` gives is no estimate.
+    """
+    radii = {"wheels.r_e_f", "wheels.r_e_r"}
+    needs = {**{n: {key} for n, key in _KEYS.items() if n != "torque_gain"}, "r_e_ratio": radii}
+    return [
+        p
+        for p in parameters
+        if p.identified and needs.get(p.name, {""}) <= vehicle.given and p.ci95[0] < p.ci95[1]
+        and not p.ci95[0] <= p.file_value <= p.ci95[1]
+    ]  # fmt: skip
+
+
+def keeping(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Parameter, ...]:
+    """Return the parameters, with those marked as kept that contradict the vehicle file."""
+    kept = {p.name for p in contradicted(parameters, vehicle)}
+    return tuple(replace(p, kept=True, remark=words.kept(p)) if p.name in kept else p for p in parameters)
+
+
 def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
     """Return the identified values by key of the vehicle file (`wheels.r_e_f`), each with the parameter it comes from.
 
-    A ratio of radii without their size keeps the file's mean radius. The torque gain applies to the torques as they
-    were read, which the file's own gain has already multiplied.
+    A value of the file that is kept is not among them. With a mass that is kept the drag area is that of this mass, for
+    the drives show their ratio. A ratio of radii without their size keeps the file's mean radius. The torque gain
+    applies to the torques as they were read, which the file's own gain has already multiplied.
     """
-    found = {_KEYS[p.name]: (p.value, p) for p in parameters if p.identified and p.name in _KEYS}
+    own = [p for p in parameters if p.identified and not p.kept]
+    found = {_KEYS[p.name]: (p.value, p) for p in own if p.name in _KEYS}
+    mass = next((p for p in parameters if p.name == "mass" and p.kept), None)
+    if mass is not None and "drag_area" in found:
+        area, p = found["drag_area"]
+        found["drag_area"] = (area * vehicle.mass / mass.value, p)
     if "torque_gain" in found:
         gain, p = found["torque_gain"]
         found["torque_gain"] = (gain * vehicle.torque_gain, p)
-    ratio = next((p for p in parameters if p.name == "r_e_ratio" and p.identified), None)
-    if ratio is not None and not {"wheels.r_e_f", "wheels.r_e_r"} & set(found):
+    ratio = next((p for p in own if p.name == "r_e_ratio"), None)
+    sizes = [p for p in parameters if p.name in ("r_e_f", "r_e_r") and p.identified]
+    if ratio is not None and not sizes:
         mean = 0.5 * (vehicle.r_e_f + vehicle.r_e_r)
         found["wheels.r_e_f"] = (2.0 * mean * ratio.value / (1.0 + ratio.value), ratio)
         found["wheels.r_e_r"] = (2.0 * mean / (1.0 + ratio.value), ratio)

@@ -10,7 +10,15 @@ import numpy as np
 
 from aqualog.calibrate import words
 from aqualog.calibrate.balance import Sample, energy_offset, fit_balance, residual
-from aqualog.calibrate.derive import balance_parameters, calibrated, check_fixed, derived, estimates
+from aqualog.calibrate.derive import (
+    balance_parameters,
+    calibrated,
+    check_fixed,
+    contradicted,
+    derived,
+    estimates,
+    keeping,
+)
 from aqualog.calibrate.design import Drive, prepare
 from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
@@ -98,7 +106,12 @@ OFFSET_WIDE = 0.1  # [m/s^2] half of the resistance threshold: an offset known w
 
 
 def calibrate(
-    drives: Sequence[Signals], names: Sequence[str], vehicle: Vehicle, fixed: Mapping[str, float] | None = None
+    drives: Sequence[Signals],
+    names: Sequence[str],
+    vehicle: Vehicle,
+    fixed: Mapping[str, float] | None = None,
+    *,
+    accept: bool = False,
 ) -> Calibration:
     """Estimate the parameters of a car from dry drives.
 
@@ -112,6 +125,8 @@ def calibrate(
         Radii, inertias, axle distances, air density; its mass and resistances serve for comparison only.
     fixed : mapping, optional
         Values known from elsewhere, by the names of `derive.FIXABLE`.
+    accept : bool
+        Whether estimates replace values that the vehicle file gives and their intervals exclude.
 
     Returns
     -------
@@ -137,11 +152,12 @@ def calibrate(
     spread = spread_of(partial(estimates, fixed=fixed), samples, drag=best.drag, air_density=vehicle.air_density)
     found = derived(best, fixed)
     fits = drive_fits(usable, samples, found, vehicle)
-    parameters = (
+    estimated = (
         *balance_parameters(found, spread, fixed, vehicle, samples),
         *radius_parameters(usable, vehicle),
         *_offsets(fits, samples, best.levels.tolist(), fixed),
     )
+    parameters = estimated if accept else keeping(estimated, vehicle)
     car = calibrated(vehicle, parameters)
     rods, missing = transfers(all_drives, car, torque_scale=car.torque_gain / vehicle.torque_gain)
     skipped = [
@@ -149,7 +165,8 @@ def calibrate(
     ]
     shown = {p.name for p in parameters if p.name in SPREAD and p.identified and p.name not in fixed}
     differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0}
-    notes = (*words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
+    odd = words.contradictions(contradicted(estimated, vehicle), found["torque_gain"], accepted=accept)
+    notes = (*odd, *words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
     )

@@ -12,8 +12,8 @@ from aqualog.calibrate.records import DriveFit, Parameter
 from aqualog.core.vehicle import Key
 
 __all__ = [
-    "GAIN_UNKNOWN", "NO_SLOPE", "RADIUS_SHORT", "cannot_tell", "left_out", "notes", "outside", "radius_unknown",
-    "remark", "why_not",
+    "GAIN_UNKNOWN", "NO_SLOPE", "RADIUS_SHORT", "cannot_tell", "contradictions", "kept", "left_out", "notes", "outside",
+    "radius_unknown", "remark", "why_not",
 ]  # fmt: skip
 
 GAIN_NOTED = 0.005  # [-]
@@ -54,6 +54,44 @@ def why_not(name: str, value: float, half: float, limit: float, samples: Sequenc
 def outside(key: Key) -> str:
     """Say that no car has such a value."""
     return f"the estimate is outside {key.low:g} to {key.high:g} {key.unit}: check units and signs of torque and a_x"
+
+
+def kept(p: Parameter) -> str:
+    """Say that the vehicle file's value stays, and what the interval rests on."""
+    return "; ".join(x for x in ("the vehicle file's value is kept", p.remark) if x)
+
+
+def contradictions(found: Sequence[Parameter], gain: float, *, accepted: bool) -> list[str]:
+    """Say which values of the vehicle file the drives contradict, and what to do.
+
+    Parameters
+    ----------
+    found : sequence of Parameter
+        Whose interval excludes the file's value.
+    gain : float
+        Torque gain by which the mass was found. [-]
+    accepted : bool
+        Whether the estimates are written in place of the file's values.
+    """
+    said = []
+    for p in found:
+        low, high = p.ci95
+        unit = f" {p.unit}" if p.unit != "-" else ""
+        text = (
+            f"the vehicle file says {p.name} = {p.file_value:.5g}{unit}, but the drives show {p.value:.5g} "
+            f"(95 % {low:.5g} to {high:.5g})"
+        )
+        if accepted:
+            said.append(f"{text}: their value is taken")
+        elif p.name == "mass":
+            said.append(
+                f"{text}: the file's value is kept. If the car was weighed, the torques are wrong: --fix "
+                f"mass={p.file_value:.5g} gives a torque gain of {gain * p.file_value / p.value:.3g}. If not, --accept "
+                "takes the drives' values"
+            )
+        else:
+            said.append(f"{text}: the file's value is kept; --accept takes the drives' values")
+    return said
 
 
 def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Sample]) -> str:

@@ -2,26 +2,43 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
+from aqualog.checks.relations import changes, relate
 from aqualog.checks.windows import EXTRA, Windows
+from aqualog.core.intervals import half_width
 from aqualog.core.notation import AXLES
+from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["drive_doubts"]
 
 LEAST_SAMPLES = 50
 LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less shows no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
+GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
+MOVING = 5.0  # [m/s]
+PUSHED = 0.2  # [m/s^2] by the torque: driving, and surely no braking that the torque does not hold
+BLOCK = 20  # windows, 10 s: grade and wind last as long
+LEAST_BLOCKS = 10
+SPREAD = 0.2  # [m/s^2] standard deviation of what the torque gives: less shows no gain
+SLIPPING = 0.5  # correlation from which the slip of an axle shows that it is driven
+COASTING = -0.3  # [m/s^2] slower, brakes may be on, which slow the front wheels more
+ROLLING = 0.03  # [-] more is water or ice
+DRIVEN = 0.1  # [m/s^2] changes of less show no drive
+SLIP = 2e-4  # [-] changes of less are the resolution of wheel speeds
 _AXLE = {"f": "front", "r": "rear"}
+_DRIVETRAIN = {"f": "fwd", "r": "rwd"}
 
 
 def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield what is wrong with the torques or with the vehicle file."""
-    yield from _resistance(windows)
-    yield from _drivetrain(windows)
+    gains = list(_gain(windows))
+    yield from gains or _resistance(windows)
+    yield from list(_drivetrain(windows)) or _slipping(windows)
 
 
 def _resistance(windows: Windows) -> Iterator[Doubt]:
@@ -35,6 +52,67 @@ def _resistance(windows: Windows) -> Iterator[Doubt]:
     cause = "mass, wheel torque (gear ratio, sign, unit) and the offset of a_x"
     advice = f"check {cause} before you believe the resistance detector"
     yield Doubt("resistance", ("a_x",), what, advice, value=float(np.median(x)))
+
+
+def _gain(windows: Windows) -> Iterator[Doubt]:
+    """Compare what accelerates the car with what the torques would: a_x = gain F / m - drag v^2 - level.
+
+    The level holds the rolling resistance and the accelerometer's offset; a_x has no grade in it (E2).
+    """
+    car = windows.vehicle
+    axles = [a for a in AXLES if f"torque_{a}" in windows]
+    if "mass" not in car.given or "a_x" not in windows or not axles or windows.speed.size < 3:
+        return
+    v, a_x = windows.speed, windows["a_x"]
+    inertia = sum(2.0 * car.inertia(f"{a}l") / car.r_e(f"{a}l") for a in AXLES)
+    force = np.sum([windows[f"torque_{a}"] / car.r_l(f"{a}l") for a in axles], axis=0)
+    pushed = (force - inertia / car.r_l("fl") * np.gradient(v, windows.step_s)) / car.mass
+    with np.errstate(invalid="ignore"):
+        good = (v > MOVING) & (pushed > PUSHED) & np.isfinite(a_x)
+    if "yaw_rate" in windows:
+        with np.errstate(invalid="ignore"):
+            good &= np.abs(v * windows["yaw_rate"]) < 1.5
+    found = _slope(pushed, v**2, a_x, good)
+    if found is None:
+        return
+    gain, half = found
+    if abs(gain - 1.0) - half < GAIN_OFF:
+        return
+    low, high = gain - half, gain + half
+    what = (
+        f"the torques explain the acceleration with a gain of {gain:.2f} (95 % {low:.2f} to {high:.2f}), not of 1, "
+        f"with a mass of {car.mass:.0f} kg"
+    )
+    if gain < 0.0:
+        advice = "check the sign of the torques in the signal map"
+    else:
+        advice = (
+            f"in the vehicle file torque_gain = {gain * car.torque_gain:.3g}, or mass = {car.mass / gain:.0f}; "
+            "`aqualog calibrate` estimates them"
+        )
+    yield Doubt("torque", ("torque_gain", "mass"), what, advice, value=gain, ci95=(low, high))
+
+
+def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> tuple[float, float] | None:
+    """Regress y on x, drag and a level; the slope of x and half of its 95 % interval, by blocks left out in turn."""
+    block = np.flatnonzero(good) // BLOCK
+    labels, block = np.unique(block, return_inverse=True)
+    if labels.size < LEAST_BLOCKS or float(x[good].std()) < SPREAD:
+        return None
+    table = np.column_stack([x[good], drag[good] / float(drag[good].max()), np.ones(block.size), y[good]])
+    products = table[:, :, None] * table[:, None, :]
+    sums = np.zeros((labels.size, 4, 4))
+    np.add.at(sums, block, products)
+    whole = sums.sum(axis=0)
+
+    def solved(total: FloatArray) -> float:
+        return float(np.linalg.lstsq(total[:3, :3], total[:3, 3], rcond=1e-10)[0][0])
+
+    slope = solved(whole)
+    without = np.array([solved(whole - s) for s in sums])
+    n = labels.size
+    sd = math.sqrt((n - 1.0) / n * float(((without - without.mean()) ** 2).sum()))
+    return slope, half_width(sd, n - 1.0)
 
 
 def _drivetrain(windows: Windows) -> Iterator[Doubt]:
@@ -56,3 +134,35 @@ def _drivetrain(windows: Windows) -> Iterator[Doubt]:
         what = f"the vehicle file says {vehicle.drivetrain}, but the {_AXLE[axle]} wheels {told}"
         yield Doubt("drivetrain", ("drivetrain",), what, f'drivetrain = "{better}"?')
         return
+
+
+def _slipping(windows: Windows) -> Iterator[Doubt]:
+    """Compare the axle that slips when the car accelerates with the one that the vehicle file drives."""
+    car, wheels = windows.vehicle, windows.wheels
+    if car.drivetrain == "awd" or len(wheels) < 4 or windows.speed.size < 3:
+        return
+    step = windows.step_s
+    gained = np.gradient(windows.speed, step)
+    front, rear = (0.5 * (wheels[f"{a}l"] + wheels[f"{a}r"]) for a in AXLES)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        calm = (windows.speed > MOVING) & (gained > COASTING)
+        slip = (rear - front) / front
+        slip = np.where(calm & (np.abs(slip) < ROLLING), slip, np.nan)
+    if "yaw_rate" in windows:
+        with np.errstate(invalid="ignore"):
+            slip = np.where(np.abs(windows["yaw_rate"]) < 0.05, slip, np.nan)
+    x, y = changes(slip, step), changes(np.where(np.isfinite(slip), gained, np.nan), step)
+    found = relate(x / SLIP, y / DRIVEN, step, least=1.0)
+    driven = car.driven[0][0]
+    other = "r" if driven == "f" else "f"
+    against = found.r if driven == "r" else -found.r
+    if found.is_sure and against < -SLIPPING:
+        what = (
+            f"the vehicle file says {car.drivetrain}, but the {_AXLE[other]} wheels slip when the car accelerates "
+            f"(correlation {abs(found.r):.2f})"
+        )
+        advice = (
+            f'drivetrain = "{_DRIVETRAIN[other]}" or "awd" in the vehicle file with the torques of that axle in the '
+            "signal map, or front and rear wheels are swapped"
+        )
+        yield Doubt("drivetrain", ("drivetrain",), what, advice, value=found.r)

@@ -1,12 +1,13 @@
-"""Scales: speeds, accelerations and torques that are too large or too small for each other."""
+"""Scales: wheels, velocity and accelerometer that are too large or too small for each other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from aqualog.checks.doubts import Doubt
+from aqualog.checks.doubts import Change, Doubt
 from aqualog.checks.relations import changes
 from aqualog.checks.windows import Windows, middle
 from aqualog.core.records import FloatArray
@@ -15,8 +16,13 @@ __all__ = ["scale_doubts"]
 
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
-RATIO = 1.8  # between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
+RATIO = (
+    1.8  # of accelerations: between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
+)
+OFF = 0.05  # of speeds: no wear and no GNSS is so far off; a tyre of another size is
 MOVING = 3.0  # [m/s] from which a ratio of speeds means something
+_UNITS = {3.6: "km/h read as m/s", 2.23694: "mph read as m/s", 1.60934: "mph read as km/h"}
+_NEAR = 0.04  # about such a factor
 
 
 def scale_doubts(windows: Windows) -> Iterator[Doubt]:
@@ -30,17 +36,30 @@ def _speeds(windows: Windows) -> Iterator[Doubt]:
     if not wheels:
         return
     common = middle(list(wheels.values()))
-    ratios: Mapping[str, float] = {w: _ratio(x, common) for w, x in wheels.items()} if len(wheels) > 2 else {}
-    odd = {w: r for w, r in ratios.items() if not 1 / RATIO < r < RATIO}
+    odd = {w: r for w, x in wheels.items() if _is_off(r := _ratio(x, common))} if len(wheels) > 2 else {}
     if odd:
-        told = ", ".join(f"omega_{w} is {r:.2g} times" for w, r in odd.items())
-        advice = "check its unit (km/h, m/s, rad/s) and scale"
-        yield Doubt("scale", tuple(f"omega_{w}" for w in odd), f"{told} the speed of the other wheels", advice)
+        told = ", ".join(f"omega_{w} is {_factor(r)} times" for w, r in odd.items())
+        own = {f"omega_{w}": Change(1.0 / r) for w, r in odd.items()}
+        names = tuple(f"omega_{w}" for w in odd)
+        yield Doubt("scale", names, f"{told} the speed of the other wheels", "check its unit and tyre size", (own,))
         return
     ratio = _ratio(common, windows["v_x"]) if "v_x" in windows else 1.0
-    if not 1 / RATIO < ratio < RATIO:
-        what = f"wheel speeds times radius are {ratio:.2g} times v_x"
-        yield Doubt("scale", ("v_x",), what, "check the units of both (km/h, m/s, rad/s)", value=ratio)
+    if _is_off(ratio):
+        what = f"wheel speeds times radius are {_factor(ratio)} times v_x"
+        ways = ({"v_x": Change(ratio)}, {f"omega_{w}": Change(1.0 / ratio) for w in wheels})
+        advice = "check the units (km/h, mph, m/s, rad/s) and r_e in the vehicle file"
+        yield Doubt("scale", ("v_x", *(f"omega_{w}" for w in wheels)), what, advice, ways, ratio)
+
+
+def _is_off(ratio: float) -> bool:
+    return not 1.0 / (1.0 + OFF) < ratio < 1.0 + OFF
+
+
+def _factor(ratio: float) -> str:
+    """A factor, and the unit that would make it."""
+    size = max(ratio, 1.0 / ratio)
+    unit = next((said for x, said in _UNITS.items() if abs(size / x - 1.0) < _NEAR), "")
+    return f"{ratio:.3g}" + (f" ({unit}?)" if unit else "")
 
 
 def _ratio(x: FloatArray, y: FloatArray) -> float:
@@ -60,6 +79,6 @@ def _acceleration(windows: Windows) -> Iterator[Doubt]:
     if x.size < LEAST_WINDOWS or not x.any() or not y.any() or np.corrcoef(x, y)[0, 1] < LEAST_CORRELATION:
         return
     ratio = float(y.std() / x.std())
-    if not 1 / RATIO < ratio < RATIO:
+    if not 1 / RATIO < ratio < RATIO and math.isfinite(ratio):
         what = f"wheel speeds change {ratio:.1f} times as fast as a_x says"
         yield Doubt("scale", ("a_x",), what, "check the units of both (km/h, g)", value=ratio)

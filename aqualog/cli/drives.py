@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 __all__ = ["calibrate", "diagnose", "evaluate"]
 
 
-@command("logs:drives vehicle:needed signals dbc out:vehicle fix page:calibration rate cache data force")
-def calibrate(run: Run, out: Path | None, fix: list[str] | None, page: Path | None) -> Output:
+@command("logs:drives vehicle:needed signals dbc out:vehicle fix accept page:calibration rate cache data force")
+def calibrate(run: Run, out: Path | None, fix: list[str] | None, accept: bool, page: Path | None) -> Output:
     """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
     Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
     rods and steering. The drives must be dry and with the same load; four or more show how drives differ. The vehicle
-    file must be given: it says which axle is driven.
+    file must be given: it says which axle is driven. A value in it that the drives contradict stays, unless --accept.
 
     \b
     Examples:
@@ -37,7 +37,7 @@ def calibrate(run: Run, out: Path | None, fix: list[str] | None, page: Path | No
     drive = run.drive(targets)
     try:
         with run.hearing("nothing was written") as hear:
-            result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, progress=hear)
+            result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, accept=accept, progress=hear)
     except NothingUsableError:  # each reason was reported
         return Output(code=int(ExitCode.NOTHING_USABLE))
     if out is not None:

@@ -164,6 +164,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         list[str] | None, None, "--fix", metavar="KEY=VALUE",
         help="What is known: mass=KG, torque_gain=X, drag_area=M2 or rolling_resistance=X; may be repeated.",
     ),
+    "accept": _flag("Take the drives' values also where the vehicle file says something else.", "--accept"),
     "page:calibration": _file("Page with tables and residuals (HTML).", "--page"),
     "holdout": _option(
         list[str] | None, None, "--holdout", metavar="LOG",

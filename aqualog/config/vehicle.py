@@ -136,7 +136,10 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
             lines += ["", f"[{section}]"]
         value = getattr(new, key.name)
         line = f"{key.name} = {value!r}  # [{key.unit}] {key.meaning}"
-        if key.path in values:
+        kept = next((p for p in calibration.parameters if p.kept and p.name == key.name), None)
+        if kept is not None:
+            line += f"; kept, the drives show {kept.value:.5g} ({kept.ci95[0]:.5g} ... {kept.ci95[1]:.5g})"
+        elif key.path in values:
             line += "; " + _source(values[key.path][1])
         elif key.path not in new.given:
             line = f"# {line}; not identified, default"

@@ -134,6 +134,7 @@ def calibrate(
     vehicle: PathLike | Vehicle | None = None,
     *,
     fix: Mapping[str, float] | None = None,
+    accept: bool = False,
     progress: Progress = None,
 ) -> Calibration:
     """Estimate what detectors must know of a car from its dry drives.
@@ -150,6 +151,8 @@ def calibrate(
         Without it that of the first drive; one of them must be given, for it says which axle is driven.
     fix : mapping, optional
         Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-].
+    accept : bool
+        Take estimates in place of values that the vehicle file gives and their intervals exclude; else those stay.
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
@@ -179,7 +182,7 @@ def calibrate(
     def work(signals: dict[str, Signals]) -> Found:
         from aqualog.calibrate.run import calibrate as run
 
-        return run(list(signals.values()), list(signals), car, fixed)
+        return run(list(signals.values()), list(signals), car, fixed, accept=accept)
 
     found = loaded.tried(work, hear)
     used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes)

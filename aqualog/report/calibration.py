@@ -35,7 +35,7 @@ _DOTS = (
 
 def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence[str] = ()) -> dict[str, Any]:
     """The JSON document; NaN and infinities become null."""
-    parameters = ("name", "value", "ci95", "unit", "identified", "why_not", "remark", "file_value")
+    parameters = ("name", "value", "ci95", "unit", "identified", "why_not", "remark", "file_value", "kept")
     return {
         "schema_version": 1,
         "tool_version": __version__,

@@ -8,6 +8,7 @@ import pytest
 
 from aqualog.align.load import load_signals
 from aqualog.calibrate.balance import energy_offset
+from aqualog.calibrate.derive import calibrated
 from aqualog.calibrate.design import lag_between, prepare
 from aqualog.calibrate.run import calibrate
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
@@ -29,7 +30,7 @@ def ideal():
 @pytest.fixture(scope="module")
 def series():
     signals, true, gain = campaign(32, 2, seconds=300.0)
-    return signals, true, gain, calibrate(signals, ["a", "b"], believed(true))
+    return signals, true, gain, calibrate(signals, ["a", "b"], believed(true), accept=True)
 
 
 def test_perfect_sensors_give_the_truth(ideal):
@@ -233,3 +234,31 @@ def test_a_gain_that_is_told_goes_into_the_file_and_onto_the_torques(series, tmp
     frame.rename({"t": "t [s]", "a_x": "a_x [m/s^2]", **{n: f"{n} [N*m]" for n in names}}).write_csv(log)
     plain, scaled = (load_signals([log], vehicle=v).array(names[0]) for v in (before, car))
     np.testing.assert_allclose(scaled, car.torque_gain * plain, rtol=1e-12)
+
+
+def test_a_weighed_mass_that_the_drives_contradict_stays_unless_accepted(series):
+    """A file that says 300 kg less than the drives show: the mass or the torques are wrong, and only the user knows."""
+    signals, true, _, plain = series
+    light = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"mass"}))
+    kept, taken = (calibrate(signals, ["a", "b"], light, accept=accept) for accept in (False, True))
+    for result, word in ((kept, "is kept"), (taken, "is taken")):
+        (note,) = (n for n in result.notes if "the vehicle file says mass" in n)
+        assert word in note
+    (note,) = (n for n in kept.notes if "the vehicle file says mass" in n)
+    assert f"--fix mass={light.mass:.5g} gives a torque gain of {light.mass / plain.get('mass').value:.3g}" in note
+    p = kept.get("mass")
+    assert (p.kept, p.file_value, p.value) == (True, light.mass, plain.get("mass").value)
+    car, other = (calibrated(light, r.parameters) for r in (kept, taken))
+    assert car.mass == light.mass
+    assert other.mass == pytest.approx(p.value, rel=1e-6)
+    assert car.drag_area / car.mass == pytest.approx(other.drag_area / other.mass, rel=1e-6)
+    assert f"mass = {light.mass!r}" in calibrated_toml(light, kept)
+    assert "kept, the drives show" in calibrated_toml(light, kept)
+
+
+def test_what_is_not_given_or_fixed_is_no_contradiction(series):
+    signals, true, _, plain = series
+    free = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset())
+    assert not any(p.kept for p in calibrate(signals, ["a", "b"], free).parameters)
+    given = replace(free, given=frozenset({"mass"}))
+    assert not any(p.kept for p in calibrate(signals, ["a", "b"], given, {"mass": true.mass}).parameters)

@@ -328,6 +328,7 @@ CALIBRATE = Document(
             text("why_not", "why not; empty if they do"),
             text("remark", "what to know of it"),
             number("file_value", "unit of the parameter", "value of the vehicle file", null=True),
+            flag("kept", "whether that value stays although the interval excludes it; `--accept` takes the estimate"),
         )),
         rows("drives", "each drive by itself", _CALIBRATED),
         by_name("transfers", "polynomials of tie rods and steering torque", (

@@ -1,0 +1,53 @@
+"""Torques that do not explain the acceleration, and axles that are not the driven ones."""
+
+from dataclasses import replace
+
+import pytest
+
+from aqualog.checks.look import look
+from tests.checks.made import CAR, made, signals
+
+DRIVE = made(seconds=900.0, accelerating=0.8)
+TORQUES = ("torque_rl", "torque_rr")
+
+
+def said(car=CAR, drop=(), **factors):
+    columns = {n: x * factors.get(n, 1.0) for n, x in DRIVE.items()}
+    return [r for r in look(signals(columns, drop=drop), car) if r.kind in ("torque", "drivetrain")]
+
+
+@pytest.mark.parametrize("gain", [0.93, 1.0, 1.06])
+def test_a_gain_within_a_tenth_is_no_fault(gain):
+    assert said(**dict.fromkeys(TORQUES, 1.0 / gain)) == []
+
+
+@pytest.mark.parametrize("gain", [0.5, 0.8, 1.25])
+def test_a_gain_that_is_off(gain):
+    (remark,) = said(**dict.fromkeys(TORQUES, 1.0 / gain))
+    low, high = remark.ci95
+    assert low < remark.value < high
+    assert remark.value == pytest.approx(gain, rel=0.06)
+    assert f"torque_gain = {remark.value:.3g}" in remark.advice
+    assert f"mass = {CAR.mass / remark.value:.0f}" in remark.advice
+
+
+def test_a_gain_of_the_file_is_multiplied():
+    (remark,) = said(replace(CAR, torque_gain=0.5), **dict.fromkeys(TORQUES, 1.25))
+    assert f"torque_gain = {0.5 * remark.value:.3g}" in remark.advice
+
+
+def test_without_a_mass_no_gain_is_judged():
+    assert said(replace(CAR, given=frozenset()), **dict.fromkeys(TORQUES, 0.5)) == []
+
+
+def test_turned_torques():
+    (remark,) = [r for r in said(torque_rl=-1.0, torque_rr=-1.0) if r.kind == "torque"] or [None]
+    assert remark is None or "sign" in remark.advice
+
+
+def test_the_axle_that_slips_is_the_driven_one():
+    assert said(drop=TORQUES) == []
+    (remark,) = said(replace(CAR, drivetrain="fwd"), drop=TORQUES)
+    assert "the rear wheels slip when the car accelerates" in remark.what
+    assert 'drivetrain = "rwd"' in remark.advice
+    assert said(replace(CAR, drivetrain="awd"), drop=TORQUES) == []
