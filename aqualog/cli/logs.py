@@ -61,13 +61,13 @@ def _campaign(run: Run, *, has_log_options: bool) -> Output:
     return Output(found, code=None if found.logs_there else int(ExitCode.NOTHING_USABLE))
 
 
-@command("logs vehicle signals dbc data force")
-def doctor(run: Run) -> Output:
+@command("logs vehicle signals dbc out:page data force")
+def doctor(run: Run, out: Path | None) -> Output:
     """Report what is wrong with a log, what was lost of it, and what to do.
 
     Every file is read to its end: damage, time stamps that jump, samples that are no numbers, codes, signals that stand
     still. Then the drive is judged as `detect` would see it: units, ranges, sensors that contradict each other, and
-    which detectors lack what. Nothing is written. Exit codes: 0 nothing lost, 3 something lost or a file of several
+    which detectors lack what. Only -o writes a file. Exit codes: 0 nothing lost, 3 something lost or a file of several
     cannot be read, 4 nothing lost but no signal that aqualog knows, or no samples at all, 1 nothing can be read.
 
     \b
@@ -75,13 +75,18 @@ def doctor(run: Run) -> Output:
       aqualog doctor drive.mf4
       aqualog doctor wheels.csv imu.csv --signals map.toml --vehicle car.toml
       aqualog doctor broken.mcap --json
+      aqualog doctor drive.mf4 -o doctor.html
     """
     from aqualog.face.inspect import doctor
 
-    drive = run.drive()
+    drive = run.drive([out] if out else [])
     with run.hearing() as hear:
         found = doctor(drive, progress=hear)
-    return Output(found, code=int(found.exit_code))
+    notes = []
+    if out is not None:
+        found.write_page(out, force=True)
+        notes = [f"written: {out}"]
+    return Output(found, notes, code=int(found.exit_code))
 
 
 @command("logs out:log vehicle signals dbc rate decimal_comma force")

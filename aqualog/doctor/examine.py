@@ -18,7 +18,8 @@ from aqualog.detect.registry import DETECTORS
 from aqualog.detect.stream import detect_drive
 from aqualog.doctor.channels import channel_findings
 from aqualog.doctor.clocks import clock_findings, on_clock, speed_of
-from aqualog.doctor.findings import Examination, FileState, Finding
+from aqualog.doctor.findings import Examination, FileState, Finding, Picture
+from aqualog.doctor.pictures import pictures_of
 from aqualog.io.clock_drift import drift_note
 from aqualog.io.fingerprint import changed_files, state_of
 from aqualog.io.open_log import open_log, read_readable, stored_in
@@ -65,11 +66,13 @@ def _examined(
 ) -> Examination:
     files, findings = [], []
     speeds: list[Quantity] = []
+    pictures: list[Picture] = []
     for path in paths:
         report(f"reading {path.name}")
-        state, own, speed = _file(path, read_options(signal_map, dbc), signal_map=signal_map, vehicle=vehicle)
+        state, own, speed, drawn = _file(path, read_options(signal_map, dbc), signal_map=signal_map, vehicle=vehicle)
         files.append(state)
         findings += own
+        pictures += drawn
         speeds += [on_clock(speed, signal_map)] if speed is not None else []
     if any(f.level == "unreadable" for f in findings):
         return Examination(tuple(files), tuple(findings))
@@ -80,7 +83,8 @@ def _examined(
         result = detect_drive(signals, vehicle)
     except AqualogError as error:
         whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
-        return Examination(tuple(files), (*findings, whole), (), tuple((d, ()) for d in DETECTORS))
+        missing = tuple((d, ()) for d in DETECTORS)
+        return Examination(tuple(files), (*findings, whole), (), missing, tuple(pictures))
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
     # what the drive leaves out as frozen need not be looked at
     findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]
@@ -89,13 +93,14 @@ def _examined(
     findings += [*_of_signals(findings, notes, frozen), *(_of_check(r, signals) for r in result.checks)]
     missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
     lacking = {u.detector for u in result.unavailable}
-    return Examination(tuple(files), tuple(findings), tuple(d for d in DETECTORS if d not in lacking), missing)
+    ready = tuple(d for d in DETECTORS if d not in lacking)
+    return Examination(tuple(files), tuple(findings), ready, missing, tuple(pictures))
 
 
 def _file(
     path: Path, options: ReadOptions, *, signal_map: SignalMap, vehicle: Vehicle
-) -> tuple[FileState, list[Finding], Quantity | None]:
-    """Return the state of one file, its faults, and the speed that it carries."""
+) -> tuple[FileState, list[Finding], Quantity | None, list[Picture]]:
+    """Return the state of one file, its faults, the speed that it carries, and pictures of faulty channels."""
     size = sum(p.stat().st_size for p in (path.rglob("*") if path.is_dir() else [path]) if p.is_file())
     try:
         with open_log(path, options) as reader:
@@ -105,7 +110,7 @@ def _file(
         # the line names the file itself
         what = error.what + (f"; expected {error.expected}" if error.expected else "")
         unreadable = Finding("unreadable", "unreadable", path.name, "", what, error.hint)
-        return FileState(path.name, "", size), [unreadable], None
+        return FileState(path.name, "", size), [unreadable], None, []
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
@@ -117,13 +122,15 @@ def _file(
     state = FileState(path.name, kind, size, len(channels), samples, 0.0, float(end - origin) * 1e-9)
     advice = "copy the file again: the copy may be damaged"
     findings = [Finding("lost", "lost_group", path.name, "", what, advice) for what in lost]
-    findings += [*_of_file(path.name, kind, faults), *channel_findings(found, channels, watch.finish())]
+    standing = watch.finish()
+    findings += [*_of_file(path.name, kind, faults), *channel_findings(found, channels, standing)]
+    pictures = list(pictures_of(findings, channels, standing))
     findings += [
         Finding("doubt", "mounting", path.name, "", text.removeprefix(f"{path.name}:")) for text in find_mounting(found)
     ]
     if not channels:
         findings.append(Finding("doubt", "empty", path.name, "", "holds no channel of numbers"))
-    return state, findings, speed
+    return state, findings, speed, pictures
 
 
 def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Examination", "FileState", "Finding", "Level"]
+from aqualog.core.records import FloatArray
+
+__all__ = ["Examination", "FileState", "Finding", "Level", "Picture"]
 
 Level = Literal["unreadable", "lost", "mended", "doubt"]
 """`unreadable`: nothing could be read; `lost`: samples are gone or not used; `mended`: a fault of the time stamps was
@@ -44,13 +46,33 @@ class FileState:
 
 
 @dataclass(frozen=True, slots=True)
+class Picture:
+    """A channel (n,) with the times [s] from its first sample between which it is faulty.
+
+    Values are as the file has them, in `unit`; NaN leaves a gap. A span of no length is one moment.
+    """
+
+    file: str
+    channel: str
+    unit: str
+    t: FloatArray
+    values: FloatArray
+    spans: tuple[tuple[float, float], ...]
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Examination:
-    """Everything that was found in the files of one drive; `missing` are signals that a detector lacks, by detector."""
+    """Everything that was found in the files of one drive.
+
+    `missing` are signals that a detector lacks, by detector; `pictures` channels that a finding names.
+    """
 
     files: tuple[FileState, ...]
     findings: tuple[Finding, ...]
     ready: tuple[str, ...] = ()
     missing: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    pictures: tuple[Picture, ...] = ()
 
     @property
     def is_unreadable(self) -> bool:

@@ -287,8 +287,15 @@ class Health(Result):
         return made
 
     def files(self) -> Writers:
-        """Return `doctor.json` and `doctor.txt`."""
-        return {"doctor.json": self._json_file(), "doctor.txt": text_file(self.text)}
+        """Return `doctor.json`, `doctor.txt` and `doctor.html`."""
+        return {
+            "doctor.json": self._json_file(), "doctor.txt": text_file(self.text),
+            "doctor.html": self._page(self.drive.title),
+        }  # fmt: skip
+
+    def write_page(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page; return its path."""
+        return self._write_as("doctor.html", path, force=force)
 
 
 def exit_code(found: Examination) -> ExitCode:

@@ -10,17 +10,36 @@ from numpy.typing import NDArray
 
 from aqualog.core.records import BoolArray, Event, FloatArray
 
-__all__ = ["ALL_SAMPLES", "POINTS", "Plan", "Spans", "make_plan", "merge_spans", "reduce_indices", "spans_of"]
+__all__ = [
+    "ALL_SAMPLES", "DRIVE", "POINTS", "Budget", "Plan", "Spans", "make_plan", "merge_spans", "reduce_indices",
+    "spans_of",
+]  # fmt: skip
 
 Spans = NDArray[np.int64]
 """Half-open index ranges (m, 2), sorted."""
 
 POINTS = 4000  # per line over the whole drive: more than twice the pixels of a wide screen
 ALL_SAMPLES = 20_000  # a drive up to this length goes into the page as it is
-MARGIN_S = 3.0  # [s] of every sample before and after an event
 LONG_S = 20.0  # [s] of a longer event only both ends are shown in full: nothing sudden happens between them
 MAX_WINDOWS = 40
-DETAIL_SAMPLES = 40_000  # per line in all windows together; bounds the page at high sample rates
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How many samples of a line a page may hold.
+
+    A drive of up to `all_samples` goes in as it is. Of a longer one every sample from `margin_s` [s] before to
+    `margin_s` after an event does, `detail_samples` at most in all windows together: this bounds the page at high
+    sample rates.
+    """
+
+    all_samples: int = ALL_SAMPLES
+    margin_s: float = 3.0
+    detail_samples: int = 40_000
+
+
+DRIVE = Budget()
+"""Of the page of one drive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +59,7 @@ class Plan:
         return bool(self.windows.size) and int(self.windows[0, 0]) == 0 and int(self.windows[0, 1]) == self.n
 
 
-def make_plan(events: Sequence[Event], n: int, dt: float) -> Plan:
+def make_plan(events: Sequence[Event], n: int, dt: float, budget: Budget = DRIVE) -> Plan:
     """Windows of full resolution around the most important events, within the budget.
 
     Parameters
@@ -51,15 +70,16 @@ def make_plan(events: Sequence[Event], n: int, dt: float) -> Plan:
         Samples of the drive.
     dt : float
         Sample time. [s]
+    budget : Budget, optional
     """
-    if n <= ALL_SAMPLES:
+    if n <= budget.all_samples:
         return Plan(n, np.array([[0, n]], dtype=np.int64).reshape(-1, 2)[: int(n > 0)], len(events))
     windows = np.empty((0, 2), dtype=np.int64)
     done = 0
     for event in events:
-        grown = merge_spans(np.vstack([windows, _windows_of(event, n, dt)]))
+        grown = merge_spans(np.vstack([windows, _windows_of(event, n, dt, budget.margin_s)]))
         # several detectors report one incident; an event in or next to an existing window costs little
-        if len(grown) <= MAX_WINDOWS and _size(grown) <= DETAIL_SAMPLES:
+        if len(grown) <= MAX_WINDOWS and _size(grown) <= budget.detail_samples:
             windows, done = grown, done + 1
     return Plan(n, windows, done)
 
@@ -68,11 +88,11 @@ def _size(spans: Spans) -> int:
     return int((spans[:, 1] - spans[:, 0]).sum())
 
 
-def _windows_of(event: Event, n: int, dt: float) -> Spans:
+def _windows_of(event: Event, n: int, dt: float, margin_s: float) -> Spans:
     ends = [(event.start_s, event.end_s)]
     if event.end_s - event.start_s > LONG_S:
         ends = [(event.start_s, event.start_s), (event.end_s, event.end_s)]
-    cut = [(np.floor((a - MARGIN_S) / dt), np.ceil((b + MARGIN_S) / dt) + 1) for a, b in ends]
+    cut = [(np.floor((a - margin_s) / dt), np.ceil((b + margin_s) / dt) + 1) for a, b in ends]
     return np.clip(np.array(cut), 0, n).astype(np.int64)
 
 

@@ -53,7 +53,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """A list of sentences. A page folds what is beyond `most`; a terminal shows `most_text` and names the rest."""
+    """A list of sentences. A page folds what is beyond `most`; a terminal shows `most_text` and names the rest.
+
+    `fold` is what the page calls the folded ones.
+    """
 
     lines: Sequence[Line]
     id: str = ""
@@ -61,6 +64,7 @@ class Lines:
     most_text: int = 1000
     where: Where = "everywhere"
     looks: Sequence[str] = ()
+    fold: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ _DETECTOR_COLOURS = {"resistance": "#E69F00", "tie_rod": "#7F6BB3", "slip_slope_
 # Placeholders that the page's script replaces by the text colours of the light or the dark scheme.
 INK = "@ink"
 MUTED = "@muted"
-LIGHT = {INK: "#1f2933", MUTED: "#66727f", "@paper": "#ffffff"}
+LIGHT = {INK: "#1f2933", MUTED: "#5b6671", "@paper": "#ffffff"}
 """The placeholders in the light scheme of the pages."""
 
 GRID = "rgba(128,128,128,0.22)"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from aqualog.core.records import Event
 from aqualog.report.reduce import (
     ALL_SAMPLES,
-    DETAIL_SAMPLES,
+    DRIVE,
     MAX_WINDOWS,
     POINTS,
     make_plan,
@@ -140,7 +140,7 @@ def test_windows_are_bounded():
     assert len(many.windows) == MAX_WINDOWS
     fast = make_plan([event(20.0 * k, 20.0 * k + 1.0) for k in range(170)], 3_600_000, 0.001)
     assert 0 < fast.events_in_full < MAX_WINDOWS
-    assert (fast.windows[:, 1] - fast.windows[:, 0]).sum() <= DETAIL_SAMPLES
+    assert (fast.windows[:, 1] - fast.windows[:, 0]).sum() <= DRIVE.detail_samples
 
 
 def test_events_inside_the_windows_of_others_need_no_room():

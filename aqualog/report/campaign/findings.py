@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from aqualog.campaign.bins import Group, Plan, group_of
+from aqualog.campaign.bins import DEPTH_KEYS, Group, Plan, group_of
 from aqualog.campaign.full_speed import FullSpeed, full_speeds
 from aqualog.campaign.means import MeanRow, ResistanceTable, resistances
 from aqualog.campaign.results import CampaignData
@@ -59,7 +59,8 @@ class Curve:
 @dataclass(frozen=True, slots=True)
 class Findings:
     """Results of all regressions. `groups`: configurations of all runs, in order; `left_out`: samples by reason, per
-    kind of regression; `notes`: remarks on the regressions for the reader.
+    kind of regression; `notes`: remarks on the regressions for the reader; `dry`: resistance on dry road, of a campaign
+    without water alone.
     """
 
     plan: Plan
@@ -70,6 +71,7 @@ class Findings:
     left_out: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     robust: bool = False
+    dry: tuple[Curve, ...] = ()
 
 
 def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report = lambda _: None) -> Findings:
@@ -89,6 +91,10 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
     slopes = slip_slopes(data, plan, robust=robust)
     report("resistance")
     resistance = resistances(data, plan, robust=robust)
+    dry: tuple[Curve, ...] = ()
+    if not any(r.road == "wet" for r in resistance.rows):
+        dry = resistance_curves(resistances(data, replace(plan, road="dry"), robust=robust), "dry")
+    groups = groups_of(data, plan.keys)
     report("speeds of full aquaplaning")
     notes = [
         f"{d.vehicle}: v_x is {1e3 * d.value:+.0f} ms later than the wheels (95 %: {1e3 * d.ci[0]:+.0f} … "
@@ -98,14 +104,22 @@ def find(data: CampaignData, plan: Plan, *, robust: bool = False, report: Report
     ]  # fmt: skip
     return Findings(
         plan,
-        groups_of(data, plan.keys),
+        groups,
         slope_curves(slopes),
         resistance_curves(resistance),
         full_speeds(data, plan, slopes),
         {"slip slope": slopes.left_out, "resistance": resistance.left_out},
         tuple(notes),
         robust,
+        _among(dry, groups),
     )
+
+
+def _among(dry: Sequence[Curve], groups: Sequence[Group]) -> tuple[Curve, ...]:
+    """Curves on dry road, which know no depth, each under the first configuration that is its own but for that."""
+    bare = {g: tuple(kv for kv in g if kv[0] not in DEPTH_KEYS) for g in reversed(groups)}
+    own = {b: g for g, b in bare.items()}
+    return tuple(replace(c, group=own[c.group]) for c in dry if c.group in own)
 
 
 def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
@@ -126,22 +140,24 @@ def slope_curves(table: SlopeTable) -> tuple[Curve, ...]:
             group, place, tuple(_point(r, r.slope, r.slope_ci, r.expected.slope) for r in own), own[0].slope_dry,
             own[0].slope_dry_ci, own[0].runs_dry,
         )
-        for (group, place), own in _on_water(table.rows, lambda r: r.wheel).items()
+        for (group, place), own in _on_road(table.rows, lambda r: r.wheel).items()
     )  # fmt: skip
 
 
-def resistance_curves(table: ResistanceTable) -> tuple[Curve, ...]:
-    """Rows on water as curves."""
+def resistance_curves(table: ResistanceTable, road: str = "wet") -> tuple[Curve, ...]:
+    """Rows on one road as curves."""
     return tuple(
         Curve(group, place, tuple(_point(r, r.value, r.ci) for r in own))
-        for (group, place), own in _on_water(table.rows, lambda r: r.place).items()
+        for (group, place), own in _on_road(table.rows, lambda r: r.place, road).items()
     )
 
 
-def _on_water(rows: Sequence[_Row], place_of: Callable[[_Row], str]) -> dict[tuple[Group, str], list[_Row]]:
+def _on_road(
+    rows: Sequence[_Row], place_of: Callable[[_Row], str], road: str = "wet"
+) -> dict[tuple[Group, str], list[_Row]]:
     found: dict[tuple[Group, str], list[_Row]] = {}
     for r in rows:
-        if r.road == "wet":
+        if r.road == road:
             found.setdefault((r.group, place_of(r)), []).append(r)
     return found
 

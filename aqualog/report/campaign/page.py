@@ -78,10 +78,30 @@ def campaign_page(
         off_water=off_water(facts),
         has_losses=any(p.weight == "loss" for p in problems),
         quality_line=_quality_line(problems),
+        empty=_empty(findings, answers, facts),
+        is_dry=bool(findings.dry),
         level_text=f"{RESISTANCE_LEVEL:g}",
         behind=f"{BEHIND_S:g}",
         made=_made(data, findings),
     )
+
+
+_SECTIONS = {
+    "answers": "speeds", "slopes": "slip slope", "resistance": "resistance", "full": "full aquaplaning",
+    "detections": "detections",
+}  # fmt: skip
+
+
+def _empty(findings: Findings, answers: Sequence[Answer], facts: Sequence[RunFacts | None]) -> dict[str, str]:
+    """Sections that have nothing to show whatever the filters leave, with their short names."""
+    has = {
+        "answers": bool(answers),
+        "slopes": any(c.points for c in findings.slopes),
+        "resistance": any(c.points for c in (*findings.resistance, *findings.dry)),
+        "full": bool(findings.full),
+        "detections": any(f is not None and (f.lane_s > 0.0 or f.events) for f in facts),
+    }  # fmt: skip
+    return {name: title for name, title in _SECTIONS.items() if not has[name]}
 
 
 def _quality_line(problems: Sequence[Problem]) -> str:
@@ -149,6 +169,7 @@ def _data(
     constant = [k for k in findings.plan.keys if len({_value(r, k) for r in data.runs}) == 1]
     return {
         "level": RESISTANCE_LEVEL,
+        "is_dry": bool(findings.dry),
         "facets": [f["shown"] for f in facets],
         "keys": [i for i, f in enumerate(facets) if f["key"] in findings.plan.keys],
         "detectors": [detector_name(d) for d in DETECTORS],
@@ -159,7 +180,7 @@ def _data(
         ],
         "runs": _runs(data, facts, pages, facets, index, findings.plan.keys),
         "slopes": [_curve(c, index) for c in findings.slopes],
-        "resistance": [_curve(c, index) for c in findings.resistance],
+        "resistance": [_curve(c, index) for c in findings.dry or findings.resistance],
         "full": [
             [index[f.group], f.place, f.way, *(_n(KMH * x) for x in (f.v, *f.ci)), f.rests_on, f.reason]
             for f in findings.full

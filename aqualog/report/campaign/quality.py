@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.matrix import TOO_FEW
@@ -18,36 +18,40 @@ __all__ = ["MOST_KINDS", "Problem", "problems_of"]
 
 MOST_KINDS = 25  # of notes that have a line of their own
 _LANE_SLACK_S = 1.0  # [s] clocks of a lane and of a log
+_NO_VALUE = re.compile(r": no value for (\d+) % of the drive")  # as `missing_notes` has it
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One kind of problem. `weight`: `loss` (data or runs are missing), `limit` (something cannot be judged) or `note`;
-    `means` states the consequence; `runs` are (index, detail of this run).
+    `means` states the consequence; `runs` are (index, detail of this run); `worst` is the largest share of a run that
+    is missing, 0 where it is not known.
     """
 
     weight: str
     title: str
     means: str
     runs: tuple[tuple[int, str], ...]
+    worst: float = 0.0
 
 
 _Test = Callable[[RunInfo], str]
 
 
 def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
-    """All kinds of problems that occur, losses first, then by number of runs."""
+    """All kinds of problems that occur: losses first, there the worst run first, then by number of runs."""
     found = [
-        _problem(data.runs, "loss", "without results", "not in any result",
-                 lambda r: "" if r.is_done else r.reason or r.state),
+        replace(_problem(data.runs, "loss", "without results", "not in any result",
+                         lambda r: "" if r.is_done else r.reason or r.state), worst=1.0),
+        _without_value(data),
         *(_problem(data.done, weight, title, means, test) for weight, title, means, test in _KINDS),
         *_unavailable(data),
         _few(data, keys),
         *_notes(data),
     ]  # fmt: skip
     order = ("loss", "limit", "note")
-    return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -len(p.runs))))
+    return tuple(sorted((p for p in found if p.runs), key=lambda p: (order.index(p.weight), -p.worst, -len(p.runs))))
 
 
 def _problem(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:
@@ -101,6 +105,21 @@ _KINDS: tuple[tuple[str, str, str, _Test], ...] = (
 """Problems of runs with results: weight, title, consequence, and what is wrong with a run (empty: nothing)."""
 
 
+def _without_value(data: CampaignData) -> Problem:
+    """Runs in which signals have no value for much of the drive, the worst first."""
+    hits = []
+    for r in data.done:
+        notes = [(int(m[1]), note) for note in map(str, r.about["notes"]) if (m := _NO_VALUE.search(note))]
+        if notes:
+            hits.append(
+                (max(n for n, _ in notes), r.index, cut("; ".join(note for _, note in sorted(notes)[::-1]), 300))
+            )
+    hits.sort(key=lambda hit: (-hit[0], hit[1]))
+    worst = hits[0][0] if hits else 0
+    title = f"signals without a value for {'up to ' if len(hits) > 1 else ''}{worst} % of the drive"
+    return Problem("loss", title, "nothing is judged there", tuple((i, text) for _, i, text in hits), 0.01 * worst)
+
+
 def _unavailable(data: CampaignData) -> list[Problem]:
     """One problem per detector, with its missing signals."""
     found: dict[tuple[str, str, str], list[tuple[int, str]]] = {}
@@ -136,6 +155,8 @@ def _notes(data: CampaignData) -> list[Problem]:
     found: dict[str, list[tuple[int, str]]] = {}
     for r in data.done:
         for note in dict.fromkeys(map(str, r.about["notes"])):
+            if _NO_VALUE.search(note):  # a kind of its own
+                continue
             found.setdefault(_NUMBER.sub("…", note), []).append((r.index, note))
     kinds = sorted(found.values(), key=lambda hits: -len(hits))
     out = [_note(hits) for hits in kinds[:MOST_KINDS]]

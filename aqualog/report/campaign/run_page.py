@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
@@ -24,12 +25,12 @@ from aqualog.report.drive.judged import (
     headline,
     level,
 )
-from aqualog.report.drive.report import EVENT_HEADS, event_cells
+from aqualog.report.drive.report import EVENT_HEADS, by_importance, event_cells
 from aqualog.report.page import report_page
-from aqualog.report.reduce import spans_of
-from aqualog.report.sections import Cell, Code, Headline, Line, Lines, Para, Report, Section, Stack, Table
+from aqualog.report.reduce import LONG_S, Budget, Plan, make_plan, spans_of
+from aqualog.report.sections import Cell, Code, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS, detector_colour
-from aqualog.report.values import KMH, counted, cut, number, place
+from aqualog.report.values import KMH, counted, cut, number, place, upper_first
 from aqualog.report.wording import detector_name
 
 __all__ = ["BEHIND_S", "EventCount", "RunFacts", "command_of", "facts_of", "run_page"]
@@ -37,7 +38,8 @@ __all__ = ["BEHIND_S", "EventCount", "RunFacts", "command_of", "facts_of", "run_
 BEHIND_S = 1.0  # [s] after the water in which an event still counts as on water, as in `evaluate`
 LEAST_S = 0.5  # [s] on the lane that count as a pass, as for the speed of full aquaplaning
 _OFF, _ON, _UNKNOWN = "off", "on", "unknown"
-MOST_SAMPLES = 300  # per line; beyond, means and extremes of several samples
+POINTS = 240  # per line away from the events: means and extremes of several samples
+_BUDGET = Budget(all_samples=POINTS, margin_s=5.0, detail_samples=500)
 MOST_EVENTS = 80  # in the table and in the figure
 
 
@@ -56,20 +58,17 @@ def run_page(
     configuration = [(key_title(k), value_text(k, v, is_alone=False)) for k, v in info.run.values.items()]
     has_load = any(info.run.values.get(f"load_{a}_kg", 0.0) for a in ("front", "rear"))
     more = f"and {len(info.events) - MOST_EVENTS} more events" if len(info.events) > MOST_EVENTS else ""
-    rows = [_event(e) for e in info.events[:MOST_EVENTS]]
+    rows = [_cells(_event(e)) for e in info.events[:MOST_EVENTS]]
     judgement = info.judgement
     main = [e for e in judgement.episodes if e.kind not in FOLDED]
     fold = "; ".join([*(folded_line(k, judgement.of(k)) for k in FOLDED if judgement.of(k)),
                       f"{counted(len(info.events), 'detection')}, one by one"])  # fmt: skip
-    over_time = (
-        "blue: on the lane; drag to zoom, double click to reset; rim speeds and slips: extremes of every 0.1 s, "
-        "relative to the vehicle's speed"
-    )
+    drawn, island = _over_time(info, samples) if samples is not None else ([], {})
     sections = [
         Section("", [Headline(headline(judgement) if info.is_done else "No results", _answers(info))], "verdict",
                 look=f"verdict events {level(judgement)}"),
         Section("Notes", [Lines(_problems(info), most=1000)], "quality", look="problems"),
-        *([Section("Over time", [Stack()], "plot-section", over_time)] if info.is_done else []),
+        *drawn,
         Section("Episodes", [Table(EPISODE_HEADS, [episode_cells(e) for e in main], "episodes", (0, 3, 4, 10))],
                 "episode-section"),
         Section("Events", [Table(EVENT_HEADS, rows, "events", (0, 1, 5, 8), wide=(8,)), Para(more)], "events-section",
@@ -83,7 +82,7 @@ def run_page(
     report = Report(
         f"run {info.index + 1} – {cut(data.name)}", f"run {info.index + 1} of {len(data.runs)}", sections,
         [*configuration, *_facts(info, facts)], footer="From the campaign's samples, ten a second.",
-        islands={"run-data": _plots(info, samples) if samples is not None else {}}, scripts=("loader.js", "run.js"),
+        islands={"run-data": island}, scripts=("loader.js", "run.js"),
     )  # fmt: skip
     return report_page(
         report, title=cut(info.name, 160), template="run.html.j2", plotly="../plotly.min.js", back=back,
@@ -141,34 +140,85 @@ def _problems(info: RunInfo) -> list[str]:
     return [cut(x, 300) for x in [*found, *info.about["notes"]]][:20]
 
 
-def _event(e: Mapping[str, Any]) -> list[Cell]:
+def _event(e: Mapping[str, Any]) -> Event:
     peak, threshold = (math.nan if e[k] is None else float(e[k]) for k in ("peak", "threshold"))
-    event = Event(
+    return Event(
         e["detector"], e["wheel"], e["side"], e["start_s"], e["end_s"], e["severity"], peak, threshold, e["evidence"]
     )  # fmt: skip
+
+
+def _cells(event: Event) -> list[Cell]:
     cells = event_cells(event)
     return [*cells[:-1], Cell(cut(cells[-1].text, 300))]
 
 
-def _plots(info: RunInfo, samples: RunSamples) -> dict[str, Any]:
-    """Lines on one grid of time, the lane, and events; numbers short, so that thousands of pages stay small."""
+# --- over time --------------------------------------------------------------------------------------------------------
+
+
+def _over_time(info: RunInfo, samples: RunSamples) -> tuple[list[Section], dict[str, Any]]:
+    """The section that the page's script draws, and its data."""
+    plan = _plan(info, samples)
+    hint = "blue: on the lane; drag to zoom, double click to reset"
+    parts: list[Part] = [Stack(), Para(_note(info, samples, plan))]
+    return [Section("Over time", parts, "plot-section", hint)] if info.is_done else [], _plots(info, samples, plan)
+
+
+def _plan(info: RunInfo, samples: RunSamples) -> Plan:
+    """Where the page holds every sample of the store."""
     n = samples.t.size
-    step = max(1, math.ceil(n / MOST_SAMPLES))
+    begin, step_s = (float(samples.t[0]), samples.step_s) if n > 1 else (0.0, 1.0)
+    events = by_importance([_event(e) for e in info.events])
+    return make_plan([replace(e, start_s=e.start_s - begin, end_s=e.end_s - begin) for e in events], n, step_s, _BUDGET)
+
+
+def _starts(plan: Plan) -> NDArray[np.int64]:
+    """First index of each part that is drawn as one point: a sample near events, several elsewhere."""
+    step = _step(plan)
+    near = [np.arange(a, b) for a, b in plan.windows]
+    ends = [0, *plan.windows.ravel().tolist(), plan.n]
+    away = [np.arange(a, b, step) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    return np.sort(np.concatenate([*near, *away])).astype(np.int64)
+
+
+def _step(plan: Plan) -> int:
+    """Samples in one point away from the events."""
+    inside = int((plan.windows[:, 1] - plan.windows[:, 0]).sum())
+    return max(1, math.ceil((plan.n - inside) / POINTS))
+
+
+def _note(info: RunInfo, samples: RunSamples, plan: Plan) -> str:
+    """What a point of the figure stands for."""
+    every = f"{samples.step_s:.2g} s" if samples.t.size > 1 else "sample"
+    about = f"Rim speeds and slips are extremes of every {every}, relative to the vehicle's speed."
+    if plan.is_complete or not plan.n:
+        return f"One point every {every}. {about}"
+    coarse = f"one point every {_step(plan) * samples.step_s:.2g} s (mean, and extremes of the slip)"
+    events = len(info.events)
+    if not events:
+        return f"{upper_first(coarse)}. {about}"
+    which = "the events" if plan.events_in_full == events else f"{plan.events_in_full} of {events} events"
+    if any(e["end_s"] - e["start_s"] > LONG_S for e in info.events):
+        which += f" (of those longer than {LONG_S:g} s: of their beginning and end)"
+    return f"One point every {every} within {_BUDGET.margin_s:g} s of {which}; elsewhere {coarse}. {about}"
+
+
+def _plots(info: RunInfo, samples: RunSamples, plan: Plan) -> dict[str, Any]:
+    """Lines on one grid of time, the lane, and events; numbers short, so that thousands of pages stay small."""
+    starts = _starts(plan)
     v = samples.array("v_x")
-    lines: dict[str, list[list[Any]]] = {"speed": [["v_x", "", _mean(KMH * v, step, 2)]]}
+    lines: dict[str, list[list[Any]]] = {"speed": [["v_x", "", _mean(KMH * v, starts, 2)]]}
     low, high = ({w: samples.array(f"slip_{end}_{w}") for w in WHEELS} for end in ("min", "max"))
     # (3.13) is against the wheel's own speed and has no value where the wheel stops; the extremes are against the car
     rims = {w: KMH * v * (1.0 + 0.5 * (low[w] + high[w])) for w in WHEELS}
-    lines["speed"] += [[w.upper(), w, _mean(x, step, 2)] for w, x in rims.items()]
+    lines["speed"] += [[w.upper(), w, _mean(x, starts, 2)] for w, x in rims.items()]
     for name, slips, extreme in (("low", low, np.fmin), ("high", high, np.fmax)):
-        parts = {w: extreme.reduce(_parts(100.0 * x, step), axis=1) for w, x in slips.items()}
+        parts = {w: extreme.reduceat(100.0 * x, starts) if starts.size else x for w, x in slips.items()}
         lines[name] = [[w.upper(), w, _short(x, 2)] for w, x in parts.items()]
-    lines["traction"] = [[w.upper(), w, _mean(samples.array(f"mu_{w}"), step, 4)] for w in WHEELS]
-    lines["resistance"] = [["resistance", "", _mean(samples.array("delta_a_x"), step, 3)]]
+    lines["traction"] = [[w.upper(), w, _mean(samples.array(f"mu_{w}"), starts, 4)] for w in WHEELS]
+    lines["resistance"] = [["resistance", "", _mean(samples.array("delta_a_x"), starts, 3)]]
     lines = {k: [x for x in own if any(y is not None for y in x[2])] for k, own in lines.items()}
     return {
-        "t": _mean(samples.t, step, 3),
-        "step_s": round(step * samples.step_s, 3) if n > 1 else 0.0,
+        "t": _mean(samples.t, starts, 3),
         "lines": lines,
         "colours": dict(WHEEL_COLOURS),
         "lane": _lane(info, samples),
@@ -190,20 +240,14 @@ def _lane(info: RunInfo, samples: RunSamples) -> list[list[float]]:
     return [[round(float(samples.t[a]) - half, 3), round(float(samples.t[b - 1]) + half, 3)] for a, b in spans]
 
 
-def _mean(x: FloatArray, step: int, decimals: int) -> list[float | None]:
-    parts = _parts(x, step)
-    known = np.isfinite(parts).any(axis=1)
-    mean = np.full(len(parts), np.nan)
-    mean[known] = np.nanmean(parts[known], axis=1)
-    return _short(mean, decimals)
-
-
-def _parts(x: FloatArray, step: int) -> FloatArray:
-    """Rows of `step` samples, the last one filled up with NaN."""
-    rows = -(-x.size // step)
-    padded = np.full(rows * step, np.nan)
-    padded[: x.size] = x
-    return padded.reshape(rows, step)
+def _mean(x: FloatArray, starts: NDArray[np.int64], decimals: int) -> list[float | None]:
+    """Mean of what is known in each part."""
+    if not starts.size:
+        return []
+    known = np.isfinite(x)
+    count = np.add.reduceat(known.astype(np.int64), starts)
+    total = np.add.reduceat(np.where(known, x, 0.0), starts)
+    return _short(np.where(count > 0, total / np.maximum(count, 1), np.nan), decimals)
 
 
 def _short(x: FloatArray, decimals: int) -> list[float | None]:

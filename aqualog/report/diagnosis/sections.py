@@ -119,7 +119,10 @@ def _on_isolability(d: Mapping[str, Any], said: Mapping[str, list[str]], figures
     return [
         Section("Effects that this log can distinguish", [
             Beside([
-                Section("Looks exactly the same", [Lines(said["relations"], "relations")]),
+                Section("Looks exactly the same", [
+                    Lines(said["relations"], "relations"),
+                    Lines(said["relation_sizes"], most=0, fold="sizes that look the same"),
+                ]),
                 Section(f"Right name in less than {sure} of cases", [Lines(said["confused"], "confused")]),
             ]),
             Figures([x for x in ("isolability",) if x in figures]),

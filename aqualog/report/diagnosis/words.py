@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 from aqualog.report.values import interval_text, measured, percent, pretty_unit, short, upper_first
@@ -25,7 +25,7 @@ _VERDICTS = {
 }
 _CHANNELS = {
     "force_balance": "force balance",
-    "kinematic": "acceleration against wheel speeds",
+    "kinematic": "accelerometer against the change of speed",
     "axle_slip": "slip, axle against axle",
     "side_slip_f": "front wheels, left against right",
     "side_slip_r": "rear wheels, left against right",
@@ -84,9 +84,9 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
     """All sentences of the page by section.
 
     `headline` holds one; `test`, `score`, `channels` (error of each, the most changed first), `gain_notes`,
-    `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations`, `confused`,
-    `unexplained`, `untested`, `notes` hold any number. `causes_relations` and `causes_confused` hold those that involve
-    one of the causes.
+    `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations` (groups of
+    effects that look alike), `relation_sizes` (each with its sizes), `confused`, `unexplained`, `untested`, `notes`
+    hold any number. `causes_relations` and `causes_confused` hold those that involve one of the causes.
     """
     causes = {c["key"] for c in document["causes"]}
     confused = _confused(document)
@@ -97,8 +97,9 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "test": _test(document["significance"]),
         "causes": [c["sentence"] for c in document["causes"] if c["sentence"] not in ("", document["sentence"])],
         "alternatives": [_alternative(a) for a in document["alternative_sets"]],
-        "relations": _relations(sorted(document["isolability"], key=lambda c: not _parties(c) & causes)),
-        "causes_relations": _relations(c for c in document["isolability"] if _parties(c) & causes),
+        "relations": _alike(document["isolability"], causes),
+        "relation_sizes": _relations(sorted(document["isolability"], key=lambda c: not _parties(c) & causes)),
+        "causes_relations": _alike([c for c in document["isolability"] if _parties(c) & causes], causes),
         "confused": [_confusion(c) for c in confused][:_MOST_CONFUSED],
         "causes_confused": [_confusion(c) for c in confused if _parties(c) & causes][:_MOST_CONFUSED],
         "score": _score(document["gain"]) + worse,
@@ -191,6 +192,29 @@ def _parties(c: Mapping[str, Any]) -> set[str]:
 
 def _relations(confusions: Iterable[Mapping[str, Any]]) -> list[str]:
     return list(dict.fromkeys(c["relation"] for c in confusions if c["relation"]))
+
+
+def _alike(confusions: Sequence[Mapping[str, Any]], causes: Set[str]) -> list[str]:
+    """One sentence for each group of effects that look exactly alike, those with a cause first."""
+    groups: list[set[str]] = []
+    like: dict[tuple[str, ...], list[str]] = {}
+    for c in confusions:
+        if not c["relation"]:
+            continue
+        if len(c["rivals"]) > 1:
+            like.setdefault(tuple(c["rivals"]), []).append(c["effect"])
+            continue
+        own = _parties(c)
+        groups = [g for g in groups if not g & own] + [own.union(*(g for g in groups if g & own))]
+    said = []
+    for group in groups:
+        names = "; ".join(map(effect_title, sorted(group)))
+        said.append((not group & causes, f"{upper_first(names)} look exactly alike."))
+    for rivals, effects in like.items():
+        names, verb = "; ".join(map(effect_title, effects)), "looks" if len(effects) == 1 else "each look"
+        sentence = f"{upper_first(names)} {verb} exactly like {' with '.join(map(effect_title, rivals))}."
+        said.append((not {*rivals, *effects} & causes, sentence))
+    return [sentence for _, sentence in sorted(said, key=lambda x: x[0])]
 
 
 def _confused(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:

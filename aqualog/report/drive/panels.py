@@ -64,9 +64,41 @@ def _rows(r: DriveResult) -> Iterator[Row]:
     yield _slip_slope(r)
     yield _resistance(r)
     yield _tie_rods(r)
+    yield from _as_logged(r)
     columns = [(label, colour, _feature(r.signals.frame, s)) for s, (label, colour) in _DEPTHS.items()]
     depths = tuple(Line(label, VEHICLE, colour, v, units=("m", "mm")) for label, colour, v in columns if v is not None)
     yield Row("Water depth", "as logged", "mm", depths, include=(0.0,), height=100)
+
+
+def _as_logged(r: DriveResult) -> Iterator[Row]:
+    """The raw signals that the detectors work on."""
+
+    def lines(units: tuple[str, str], **labels: tuple[str, str]) -> tuple[Line, ...]:
+        found = [(label, colour, _feature(r.signals.frame, s)) for s, (label, colour) in labels.items()]
+        return tuple(Line(label, VEHICLE, colour, v, units=units) for label, colour, v in found if v is not None)
+
+    torques = [(w, _feature(r.signals.frame, f"torque_{w}")) for w in WHEELS]
+    yield Row(
+        "Wheel torque", "as logged: drive minus brake", "N·m",
+        tuple(Line(w.upper(), w, wheel_colour(w), v) for w, v in torques if v is not None), include=(-50.0, 50.0),
+        decimals=0,
+    )  # fmt: skip
+    yield Row(
+        "Acceleration", "as logged: a_x forward, a_y to the left", "m/s²",
+        lines(("-", "-"), a_x=("a_x", INK), a_y=("a_y", PALETTE[0])), include=(-1.0, 1.0),
+    )  # fmt: skip
+    yield Row(
+        "Yaw rate", "as logged: left turn positive", "°/s", lines(("rad/s", "°/s"), yaw_rate=("yaw rate", INK)),
+        include=(-2.0, 2.0), height=100,
+    )  # fmt: skip
+    yield Row(
+        "Steering angle", "at the road wheels, left positive", "°",
+        lines(("rad", "deg"), steer_angle=("steering angle", _STEERING)), include=(-1.0, 1.0), height=100,
+    )  # fmt: skip
+    yield Row(
+        "Brake pressure", "as logged", "bar", lines(("Pa", "bar"), brake_pressure=("brake pressure", PALETTE[1])),
+        include=(0.0, 1.0), height=100,
+    )  # fmt: skip
 
 
 def _wheel_lines(r: DriveResult, stem: str, units: tuple[str, str] = ("-", "-")) -> tuple[Line, ...]:

@@ -26,7 +26,7 @@ from aqualog.report.drive.judged import (
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.stack import VEHICLE, groups, stack
 from aqualog.report.page import report_page
-from aqualog.report.reduce import DETAIL_SAMPLES, LONG_S, MARGIN_S, POINTS, Plan, make_plan
+from aqualog.report.reduce import DRIVE, LONG_S, POINTS, Plan, make_plan
 from aqualog.report.sections import Cell, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import counted, number, place, pretty_unit
@@ -112,8 +112,9 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         Section("Time stamps", [_faults(result)], "quality-section", where="page"),
     ]  # fmt: skip
     return Report(
-        "", "aquaplaning in one drive", sections, _facts(result), islands={"drive-data": island}, scripts=("drive.js",)
-    )
+        "", "aquaplaning in one drive", sections, _facts(result), islands={"drive-data": island},
+        scripts=("paper.js", "panels.js", "drive.js"),
+    )  # fmt: skip
 
 
 # --- episodes --------------------------------------------------------------------------------------------------------
@@ -335,11 +336,11 @@ def _note(result: DriveResult, plan: Plan) -> str:
     if not events:
         return text
     which = f"each of the {events} events" if plan.events_in_full == events else (
-        f"{plan.events_in_full} of {events} events (the most important ones; the page holds {DETAIL_SAMPLES} such "
-        "samples per line)"
+        f"{plan.events_in_full} of {events} events (the most important ones; the page holds {DRIVE.detail_samples} "
+        "such samples per line)"
     )  # fmt: skip
     return (
-        f"{text} Every sample is kept from {MARGIN_S:g} s before to {MARGIN_S:g} s after {which}; "
+        f"{text} Every sample is kept from {DRIVE.margin_s:g} s before to {DRIVE.margin_s:g} s after {which}; "
         f"of events longer than {LONG_S:g} s, around beginning and end."
     )
 

@@ -109,7 +109,10 @@ def stack(rows: Sequence[Row], plan: Plan, dt: float) -> dict[str, Any]:
         "rows": [
             {
                 "axis": _axis(k, "yaxis"),
+                "title": plot_text(r.title),
+                "decimals": r.decimals,
                 "include": [*r.include, *r.thresholds],
+                "thresholds": list(r.thresholds),
                 "least_span": r.least_span,
                 "has_lines": bool(r.lines),
                 "strips": None if r.shades is None else {"colour": WATER_SHADE, "spans": _indices(r.shades)},

@@ -10,7 +10,7 @@ const WAYS = {
 const FEW = 9; // panels that are drawn without being asked for
 const drawn = new Map(); // id -> function that draws it
 const stale = new Set();
-let observer = null, colourKey = -1;
+let observer = null, colourKey = -1, paperWidth;
 const all = { slopes: false, resistance: false };
 
 function see(colour, opacity) {
@@ -38,11 +38,7 @@ function layout(title, x, y, height) {
   };
 }
 
-function paint(id, data, lay) {
-  const plot = byId(id);
-  plot.style.height = lay.height + "px";
-  return Plotly.react(plot, coloured(data), coloured(lay), sharedConfig);
-}
+function show(id, data, lay) { return paint(byId(id), coloured(data), coloured(lay), sharedConfig, paperWidth); }
 
 // Drawn when it comes into view: a campaign has more panels than a screen. Its height is kept free, so that nothing moves.
 function later(id, height, draw) {
@@ -65,15 +61,13 @@ function startFigures() {
     for (const e of entries) if (e.isIntersecting) drawNow(e.target.id);
   }, { rootMargin: "400px" });
   for (const id of stale) observer.observe(byId(id));
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () {
-    for (const id of [...drawn.keys()]) later(id, byId(id).clientHeight, drawn.get(id));
-  });
-  window.addEventListener("beforeprint", function () {
-    for (const id of [...stale]) drawNow(id);
-    for (const plot of document.querySelectorAll(".js-plotly-plot")) Plotly.relayout(plot, { width: PRINT_WIDTH });
-  });
-  window.addEventListener("afterprint", function () {
-    for (const plot of document.querySelectorAll(".js-plotly-plot")) Plotly.relayout(plot, { width: null, autosize: true });
+  redrawn(function (width) {
+    paperWidth = width;
+    for (const [id, draw] of drawn) {
+      if (width) draw();
+      else later(id, byId(id).clientHeight, draw);
+      if (width) stale.delete(id);
+    }
   });
 }
 
@@ -206,7 +200,7 @@ function drawPanel(id, curves, limits, unit, yTitle, level) {
   lay.height = 270 + 24 * lines;
   lay.legend.y = -44 / (lay.height - lay.margin.b - lay.margin.t);
   lay.showlegend = colourKey >= 0;
-  return paint(id, data, lay);
+  return show(id, data, lay);
 }
 
 function drawPanels(kind, unit, yTitle, level) {
@@ -307,7 +301,7 @@ function drawFull() {
     lay.margin.t = 12;
     lay.legend = { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { size: 11 } };
     lay.margin.t = 36;
-    return paint("full", data, lay);
+    return show("full", data, lay);
   });
 }
 
@@ -321,7 +315,7 @@ function buildFigures() {
   pick.addEventListener("change", function () { colourKey = Number(pick.value); update(); });
   followers.push(
     function () { drawPanels("slopes", "", "slip slope C_s / F_z [–]", null); },
-    function () { drawPanels("resistance", "m/s²", "resistance [m/s²]", D.level); },
+    function () { drawPanels("resistance", "m/s²", "resistance [m/s²]", D.is_dry ? null : D.level); },
     drawFull,
   );
 }

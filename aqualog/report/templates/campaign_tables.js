@@ -213,7 +213,7 @@ function drawDetectionsOverSpeed(live) {
   const x = axis("mean speed on the lane [km/h]"), y = axis("");
   x.type = y.type = "category";
   y.autorange = "reversed";
-  return paint("detections", data, layout("passes with at least one event, over speed", x, y, 110 + 26 * Math.max(2, live.length)));
+  return show("detections", data, layout("passes with at least one event, over speed", x, y, 110 + 26 * Math.max(2, live.length)));
 }
 
 function eventWords(i) {

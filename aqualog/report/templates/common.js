@@ -4,7 +4,13 @@ const plotConfig = {
   showEditInChartStudio: false,
 };
 
+// The colours of @media print in page.css, which count only once the browser has laid the paper out.
+const PAPER = { "@ink": "#000", "@muted": "#555", "@paper": "#fff", "@accent": "#0b5cad" };
+const PRINT_WIDTH = 700; // [px] inside the margins of A4 and Letter
+let isOnPaper = false;
+
 function schemeColours() {
+  if (isOnPaper) return PAPER;
   const style = getComputedStyle(document.documentElement);
   const get = function (name) { return style.getPropertyValue(name).trim(); };
   return { "@ink": get("--ink"), "@muted": get("--muted"), "@paper": get("--paper"), "@accent": get("--accent") };
@@ -23,11 +29,19 @@ function plotText(text) {
     .replaceAll("$", "＄");
 }
 
-const PRINT_WIDTH = 700; // [px] inside the margins of A4 and Letter
+// A figure in its element, as wide as the paper or as the element, whose height plotly measures.
+function paint(plot, data, layout, config, width) {
+  plot.style.height = layout.height + "px";
+  return Plotly.react(plot, data, width ? { ...layout, width: width } : layout, config).then(function () {
+    // without a width plotly keeps the last one until it has to measure
+    const isKept = !width && plot.clientWidth && Math.abs(plot._fullLayout.width - plot.clientWidth) > 1;
+    return isKept ? Plotly.Plots.resize(plot) : null;
+  });
+}
 
-// When the scheme changes, and before and after printing: `draw` with the width of the paper, or without.
-function redrawn(draw, after) {
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { draw(); });
-  window.addEventListener("beforeprint", function () { draw(PRINT_WIDTH); });
-  window.addEventListener("afterprint", after);
+// Figures again when the scheme changes, with the width of the paper before printing, and on the screen after it.
+function redrawn(draw) {
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { if (!isOnPaper) draw(); });
+  window.addEventListener("beforeprint", function () { isOnPaper = true; draw(PRINT_WIDTH); });
+  window.addEventListener("afterprint", function () { isOnPaper = false; draw(); });
 }

@@ -8,19 +8,17 @@
   const now = { coordinate: D.start, drive: 0, raw: true };
   const byId = function (id) { return document.getElementById(id); };
   const stale = new Set();
-  let panels = [];
+  let panels = [], paperWidth;
 
   function see(colour, opacity) {
     const n = parseInt(colour.slice(1), 16);
     return `rgba(${n >> 16},${(n >> 8) & 255},${n & 255},${opacity})`;
   }
 
-  function css(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
-
   function axis(title) {
     return {
-      title: { text: title, font: { size: 12 } }, gridcolor: "rgba(128,128,128,0.22)", zerolinecolor: css("--muted"),
-      linecolor: css("--muted"), tickcolor: css("--muted"), tickfont: { size: 11 }, automargin: true,
+      title: { text: title, font: { size: 12 } }, gridcolor: "rgba(128,128,128,0.22)", zerolinecolor: "@muted",
+      linecolor: "@muted", tickcolor: "@muted", tickfont: { size: 11 }, automargin: true,
     };
   }
 
@@ -69,13 +67,13 @@
     if (view.limits) y.range = view.limits;
     const layout = {
       title: { text: view.title, font: { size: 13 }, x: 0.01, y: 0.985, yanchor: "top" }, showlegend: false,
-      font: { color: css("--ink"), size: 12, family: 'system-ui, "Segoe UI", Helvetica, Arial, sans-serif' },
+      font: { color: "@ink", size: 12, family: 'system-ui, "Segoe UI", Helvetica, Arial, sans-serif' },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", height: HEIGHT,
       margin: { l: 48, r: 12, t: 30, b: 42 }, hovermode: "x",
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--muted"), activecolor: css("--ink") },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: "@muted", activecolor: "@ink" },
       xaxis: axis(chosen[1]), yaxis: y,
     };
-    return Plotly.react(panel.node, traces(view, now.coordinate, chosen[2]), layout, config);
+    return paint(panel.node, traces(view, now.coordinate, chosen[2]), coloured(layout), config, paperWidth);
   }
 
   const seen = new IntersectionObserver(function (entries) {
@@ -126,11 +124,9 @@
   byId("drive-choice").addEventListener("change", function (e) { now.drive = Number(e.target.value); lay(); });
   byId("raw-choice").addEventListener("change", function (e) { now.raw = e.target.checked; update(); });
   lay();
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", update);
-  window.addEventListener("beforeprint", function () {
-    for (const p of panels) { if (stale.has(p)) draw(p); Plotly.relayout(p.node, { width: PRINT_WIDTH }); }
-  });
-  window.addEventListener("afterprint", function () {
-    for (const p of panels) Plotly.relayout(p.node, { width: null, autosize: true });
+  redrawn(function (width) {
+    paperWidth = width;
+    if (width) panels.forEach(draw);
+    else update();
   });
 })();

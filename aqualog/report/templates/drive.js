@@ -3,6 +3,7 @@
   const data = JSON.parse(document.getElementById("drive-data").textContent);
   const plot = document.getElementById("plots");
   const POINTS = 3000; // per line in view: about two per pixel
+  const SOME = 1000; // values per line by which peaks are known
   const collator = new Intl.Collator("en");
 
   // --- samples ------------------------------------------------------------------------------------------------
@@ -168,29 +169,38 @@
   const lines = (data.lines || []).map(unpack);
   const hidden = new Set();
   const held = {}; // y axes that the user has scaled, until "show all"
+  const inFull = new Set(); // panels that show their peaks too
+  let bars = null; // above the panels
   let view = whole.slice();
   let selected = ["", -1]; // table and row
 
   function isHidden(i) { return hidden.has(data.figure.data[i].legendgroup); }
 
+  // The range that a panel shows, and what lies beyond it.
   function valueRange(k, range) {
     let low = Infinity, high = -Infinity;
+    const some = [];
     lines.forEach(function (line, i) {
       if (line.row !== k || isHidden(i)) return;
       const a = Math.max(0, firstAtOrAfter(line.t, range[0]) - 1);
       const b = Math.min(line.t.length, firstAtOrAfter(line.t, range[1]) + 1);
+      const every = Math.ceil((b - a) / SOME);
       for (let j = a; j < b; j++) {
         const v = line.y[j];
         if (v < low) low = v;
         if (v > high) high = v;
+        if ((j - a) % every === 0 && !Number.isNaN(v)) some.push(v);
       }
     });
     if (low > high) { low = 0; high = 0; }
+    const least = low, greatest = high;
+    if (!inFull.has(k)) [low, high] = withoutPeaks(low, high, some, data.rows[k].thresholds);
+    const beyond = [least < low ? least : null, greatest > high ? greatest : null];
     for (const v of data.rows[k].include) { low = Math.min(low, v); high = Math.max(high, v); }
     const short = 0.5 * (data.rows[k].least_span - (high - low));
     if (short > 0) { low -= short; high += short; }
     const span = high - low || Math.max(1, Math.abs(high)) * 0.1;
-    return [low - 0.06 * span, high + 0.1 * span];
+    return [[low - 0.06 * span, high + 0.1 * span], beyond];
   }
 
   function selectionShape() {
@@ -222,7 +232,10 @@
     layout.shapes.push(...selectionShape());
     for (const axis of ["xaxis", "xaxis2"]) layout[axis + ".range"] = range.slice();
     data.rows.forEach(function (row, k) {
-      if (row.has_lines && !held[row.axis]) layout[row.axis + ".range"] = valueRange(k, range);
+      if (!row.has_lines || held[row.axis]) return;
+      const [shown, beyond] = valueRange(k, range);
+      layout[row.axis + ".range"] = shown;
+      if (bars) bars.tell(k, beyond, inFull.has(k));
     });
     return [change, layout];
   }
@@ -243,6 +256,7 @@
 
   function showAll() {
     for (const name of Object.keys(held)) delete held[name];
+    inFull.clear();
     mark("", -1);
     return draw(whole.slice());
   }
@@ -254,7 +268,9 @@
     if (b === undefined) b = change["xaxis2.range[1]"];
     for (const name of Object.keys(change)) {
       const axis = /^(yaxis\d*)\.range/.exec(name);
-      if (axis) held[axis[1]] = true;
+      if (!axis) continue;
+      held[axis[1]] = true;
+      bars.tell(data.rows.findIndex(function (row) { return row.axis === axis[1]; }), [], true);
     }
     if (change["xaxis.autorange"] || change["xaxis2.autorange"]) { showAll(); return; }
     if (a !== undefined || b !== undefined) draw([a === undefined ? view[0] : +a, b === undefined ? view[1] : +b]);
@@ -442,7 +458,6 @@
   function build(width) {
     const figure = coloured(data.figure);
     shapes = figure.layout.shapes;
-    if (width) figure.layout.width = width;
     figure.data.forEach(function (trace) { trace.visible = !hidden.has(trace.legendgroup); });
     tellView();
     const [change, layout] = contents(view);
@@ -457,7 +472,7 @@
       ...plotConfig, doubleClick: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
-    return Plotly.react(plot, figure.data, figure.layout, config);
+    return paint(plot, figure.data, figure.layout, config, width);
   }
 
   for (const button of document.querySelectorAll(".toggle")) {
@@ -474,11 +489,43 @@
     if (button) button.addEventListener("click", function () { step(by); });
   }
 
+  // Values of a panel's lines at a time, with their colours.
+  function valuesAt(k, x) {
+    return lines.flatMap(function (line, i) {
+      if (line.row !== k || isHidden(i) || !line.t.length) return [];
+      const after = Math.min(firstAtOrAfter(line.t, x), line.t.length - 1), before = Math.max(0, after - 1);
+      return [[traces[i], line.y[x - line.t[before] < line.t[after] - x ? before : after]]];
+    });
+  }
+
+  bars = panelBars(plot, data.rows, {
+    values: valuesAt,
+    zoom: function (k, factor) {
+      const axis = data.rows[k].axis, [low, high] = plot.layout[axis].range;
+      const middle = low <= 0 && high > 0 ? 0 : 0.5 * (low + high);
+      Plotly.relayout(plot, { [axis + ".range"]: [middle + (low - middle) * factor, middle + (high - middle) * factor] });
+    },
+    fit: function (k) {
+      const isFree = inFull.has(k) || held[data.rows[k].axis];
+      delete held[data.rows[k].axis];
+      if (isFree) inFull.delete(k); else inFull.add(k);
+      draw(view);
+    },
+  });
+
   build().then(function () {
+    bars.place();
+    plot.on("plotly_hover", function (e) { bars.show(e.xvals[0]); });
+    plot.on("plotly_unhover", function () { bars.show(null); });
     plot.on("plotly_relayout", onRelayout);
     plot.on("plotly_doubleclick", showAll);
     plot.dataset.ready = document.body.dataset.ready = "true";
   });
-  // without a width plotly keeps the last one until it has to measure again
-  redrawn(build, function () { build().then(function () { Plotly.Plots.resize(plot); }); });
+  const sheets = document.createElement("div");
+  sheets.id = "sheets";
+  plot.after(sheets);
+  redrawn(function (width) {
+    build(width);
+    sheets.replaceChildren(...(width ? cutUp(plot, data.rows) : []));
+  });
 })();

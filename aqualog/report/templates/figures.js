@@ -18,17 +18,11 @@
       return before.then(function () {
         const figure = coloured(figures[id]);
         const plot = document.getElementById(id);
-        if (width) figure.layout.width = width;
-        plot.style.height = figure.layout.height + "px"; // plotly measures it when the window changes
-        return Plotly.react(plot, figure.data, figure.layout, plotConfig).then(function () { return fitLegend(plot); });
+        return paint(plot, figure.data, figure.layout, plotConfig, width).then(function () { return fitLegend(plot); });
       });
     }, Promise.resolve());
   }
 
-  function resize() {
-    for (const id of Object.keys(figures)) Plotly.Plots.resize(document.getElementById(id));
-  }
-
   build().then(function () { document.body.dataset.ready = "true"; });
-  redrawn(build, function () { build().then(resize); });
+  redrawn(build);
 })();

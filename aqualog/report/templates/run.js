@@ -67,17 +67,16 @@ function build() {
   return [data, layout];
 }
 
-function draw() {
+function draw(width) {
   const plot = document.getElementById("plots");
   if (plot) {
     const [data, layout] = build();
-    plot.style.height = layout.height + "px";
-    return Plotly.react(plot, coloured(data), coloured(layout), sharedConfig).then(function () {
+    return paint(plot, coloured(data), coloured(layout), sharedConfig, width).then(function () {
       document.body.dataset.ready = "true";
     });
   }
   document.body.dataset.ready = "true";
 }
 
-window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { if (window.Plotly) draw(); });
 withPlotly(draw);
+redrawn(function (width) { if (window.Plotly) draw(width); });

@@ -14,13 +14,15 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
+from aqualog.campaign.bins import plan
 from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.report.campaign.answers import answers_of
-from aqualog.report.campaign.findings import Curve, Point, crossing
+from aqualog.report.campaign.findings import Curve, Point, crossing, find
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
 from aqualog.report.campaign.labels import file_name, group_text, value_text
+from aqualog.report.campaign.page import campaign_page
 from aqualog.report.campaign.quality import MOST_KINDS, problems_of
 from aqualog.report.campaign.run_page import command_of, facts_of, run_page
 from aqualog.report.values import cut
@@ -75,6 +77,37 @@ def test_notes_that_differ_in_numbers_are_one_kind(case):
     kinds = problems_of(SimpleNamespace(runs=wild, done=wild), ("tyre",))
     assert len(kinds) < MOST_KINDS + 10
     assert len({i for p in kinds if p.weight == "note" for i, _ in p.runs}) == 500
+
+
+def test_the_log_with_most_missing_comes_before_all_remarks(case):
+    def noted(*notes):
+        return {"notes": notes, "unavailable": {}, "limited": {}, "duration_s": 10.0, "quality": {}}
+
+    about = (
+        noted("wheels.csv: v: the name of a column is odd", "a.csv: omega_fl: no value for 25 % of the drive: not"),
+        noted("wheels.csv: v: the name of a column is odd", "b.csv: a_x: no value for 60 % of the drive: not"),
+    )
+    runs = [replace(r, about=a) for r, a in zip(case.runs, about, strict=False)]
+    found = problems_of(SimpleNamespace(runs=runs, done=runs), ())
+    first = found[0]
+    assert (first.weight, first.title) == ("loss", "signals without a value for up to 60 % of the drive")
+    assert [i for i, _ in first.runs] == [1, 0]
+    assert [p.title for p in found].count("wheels.csv: v: the name of a column is odd") == 1
+    assert found[-1].weight == "note"
+
+
+def test_a_dry_campaign_shows_its_resistance_and_names_what_it_cannot_show(case):
+    dry = [r for r in case.runs if r.is_done and r.run.values.get("water_depth_mm") == 0.0]
+    data = SimpleNamespace(
+        **{n: getattr(case, n) for n in ("configured", "keys", "name", "samples")}, runs=dry, done=dry
+    )
+    found = find(data, plan(data, ()))
+    assert found.dry
+    html = campaign_page(data, found, [facts_of(r, case.samples(r)) for r in dry], ["runs/1.html"])
+    assert data_of(html)["resistance"]
+    assert "Resistance over speed, dry road" in html
+    assert '<section id="slopes-section" hidden>' in html
+    assert "Not shown: speeds, slip slope, full aquaplaning" in html
 
 
 def test_runs_and_filters_are_in_the_data(page, case):
@@ -186,6 +219,23 @@ def test_long_drive_makes_a_small_page(case):
     huge = RunInfo(9, "l" * 10**6, run, info.key, "done", "", info.vehicle, about, "lane times")
     html = run_page(case, huge, samples, facts_of(huge, samples), back="../index.html")
     assert len(html) < 100_000
+
+
+def test_a_long_run_shows_every_sample_near_its_events_and_says_what_a_point_is_elsewhere(case):
+    n, info = 6000, case.runs[0]
+    some = next(e for r in case.done for e in r.events)
+    frame = pl.DataFrame({"v_x": np.where(np.arange(n) == 2003, 40.0, 30.0), "delta_a_x": np.full(n, 0.1)})
+    samples = RunSamples(frame, np.arange(n) * 0.1, np.zeros(n))
+    event = {**some, "start_s": 200.0, "end_s": 201.0}
+    page = run_page(case, replace(info, about={**info.about, "events": [event]}), samples, None, back="")
+    data = data_of(page, "run-data")
+    t, speed = np.array(data["t"]), np.array(data["lines"]["speed"][0][2])
+    near = (t >= 195.0) & (t <= 206.0)
+    assert np.diff(t[near]) == pytest.approx(0.1)
+    assert speed[near].max() == 144.0
+    assert np.diff(t[t < 194.0]).max() == pytest.approx(2.5)
+    assert "One point every 0.1 s within 5 s of the events; elsewhere one point every 2.5 s (mean" in page
+    assert "extremes of every 0.1 s" in page
 
 
 def test_rim_of_a_wheel_that_stops_stands_still(case):

@@ -191,6 +191,24 @@ def test_confused_sets_are_told_once_and_exact_relations_apart():
     assert said["causes_relations"] == []
 
 
+def test_effects_that_look_alike_are_one_line_for_all():
+    d = document_of()
+    keys = ["brake_drag@fl", "brake_drag@fr", "torque_gain", "torque_offset@f"]
+
+    def like(effect, *rivals):
+        return {"effect": effect, "rivals": list(rivals), "separation": 0.0, "p_correct": 0.5, "sizes": [],
+                "relation": f"{effect} like {rivals}."}  # fmt: skip
+
+    pairs = [like(a, b) for a in keys for b in keys if a != b]
+    sets = [like(k, "wheel_inertia", "road_grade") for k in ("aero_drag", "head_wind")]
+    said = sentences(d | {"isolability": [*pairs, *sets]})
+    assert said["relations"] == [
+        "Brake drag, FL; brake drag, FR; torque gain; torque offset, front look exactly alike.",
+        "Aero drag; head wind each look exactly like wheel inertia with road grade.",
+    ]
+    assert len(said["relation_sizes"]) == len(pairs) + len(sets)
+
+
 def test_the_headline_is_never_empty():
     assert sentences(document_of(sentence=""))["headline"] == ["One cause."]
 

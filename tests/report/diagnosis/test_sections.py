@@ -170,8 +170,10 @@ def test_long_lists_are_folded():
     d = document_of()
     one = next(c for c in d["isolability"] if c["relation"])
     d["isolability"] = [dict(one, relation=f"relation {i}") for i in range(30)]
+    d["notes"] = []
     page = render_page(d, (), "t")
-    assert page.index("relation 7<") < page.index("<summary>22 more</summary>") < page.index("relation 8<")
+    assert page.index(" exactly like ") < page.index("<summary>30 sizes that look the same</summary>")
+    assert page.index("<summary>30") < page.index("relation 0<") < page.index("relation 29<")
 
 
 def test_runs_of_a_campaign_have_no_step_and_wide_bins():

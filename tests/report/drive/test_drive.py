@@ -4,6 +4,7 @@ import re
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aqualog.report.drive.report import drive_page
@@ -194,18 +195,79 @@ def test_sorting_keeps_rows_and_their_events_together(show, short):
     assert x_range(browser)[0] <= starts[0] <= x_range(browser)[1]
 
 
-def test_plots_take_the_width_of_paper_and_come_back(show, short):
+def outline(browser):
+    """Width and height of the plots [px], and heights of their panels."""
+    script = """
+      const plot = document.getElementById('plots'), box = plot.querySelector('.main-svg').getBoundingClientRect();
+      return [box.width, box.height, Array.from(plot.querySelectorAll('.nsewdrag'), r => Number(r.getAttribute('height')))]"""
+    return browser.execute_script(script)
+
+
+def test_printing_puts_each_panel_on_paper_and_leaves_the_screen_as_it_was(show, short):
     browser = show(short)
-    width = "return document.querySelector('#plots .main-svg').getBoundingClientRect().width"
-    screen = browser.execute_script(width)
     click(browser, "#events tbody tr")
     wait_for(lambda: x_range(browser) != [0, 30])
-    zoomed = x_range(browser)
+    screen, zoomed = outline(browser), x_range(browser)
+    assert min(screen[2]) > 50
     browser.execute_script("window.dispatchEvent(new Event('beforeprint'))")
-    wait_for(lambda: browser.execute_script(width) == 700)
+    assert outline(browser)[0] == 700
+    assert outline(browser)[1:] == screen[1:]
+    sheets = browser.execute_script(
+        "return [...document.querySelectorAll('.sheet')].map(s => s.querySelectorAll('svg').length)"
+    )
+    assert sheets == [2] * len(screen[2])
     browser.execute_script("window.dispatchEvent(new Event('afterprint'))")
-    wait_for(lambda: browser.execute_script(width) == screen)
+    wait_for(lambda: outline(browser) == screen)
     assert x_range(browser) == zoomed
+    browser.execute_cdp_cmd("Page.printToPDF", {})
+    wait_for(lambda: outline(browser) == screen)
+    assert browser.execute_script("return document.querySelectorAll('.sheet').length") == 0
+    assert severe(browser) == []
+
+
+def click_on(browser, element):
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", element)
+    element.click()
+
+
+def y_range(browser, axis):
+    return browser.execute_script("return document.getElementById('plots').layout[arguments[0]].range", axis)
+
+
+def test_a_peak_hides_no_limit_until_it_is_asked_for(show, short):
+    from selenium.webdriver.common.by import By
+
+    track = next(t for t in short.tracks if t.detector == "minor_spin_down" and t.wheel == "fl")
+    track = replace(track, statistic=np.where(np.arange(3000) == 1500, 5000.0, track.statistic))
+    others = tuple(t for t in short.tracks if (t.detector, t.wheel) != ("minor_spin_down", "fl"))
+    browser = show(replace(short, tracks=(*others, track)))
+    rows = browser.execute_script("return JSON.parse(document.getElementById('drive-data').textContent).rows")
+    axis = next(r["axis"] for r in rows if r["title"] == "Minor spin-down")
+    assert y_range(browser, axis)[1] < 60.0  # ten times the limit of 5
+    tools = browser.find_element(By.CSS_SELECTOR, ".tools[aria-label='range of Minor spin-down']")
+    fit, closer, _ = tools.find_elements(By.TAG_NAME, "button")
+    assert fit.text == "full range, to 5000.00"
+    click_on(browser, fit)
+    wait_for(lambda: y_range(browser, axis)[1] > 5000.0)
+    assert fit.text == "fit"
+    click_on(browser, fit)
+    wait_for(lambda: y_range(browser, axis)[1] < 60.0)
+    before = y_range(browser, axis)[1]
+    click_on(browser, closer)
+    wait_for(lambda: y_range(browser, axis)[1] == pytest.approx(0.5 * before))
+    assert fit.text == "fit"
+
+
+def test_the_pointer_tells_the_values_of_all_panels(show, short):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+
+    browser = show(short)
+    area = browser.find_element(By.CSS_SELECTOR, "#plots .nsewdrag")
+    ActionChains(browser).move_to_element(area).perform()
+    told = "return [...document.querySelectorAll('.panel-bar .values')].map(v => v.textContent)"
+    wait_for(lambda: all(browser.execute_script(told)))
+    assert browser.execute_script(told)[0].startswith("v_x reference")
 
 
 def test_hour_shows_the_spike_and_every_sample_of_an_event(show):

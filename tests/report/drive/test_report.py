@@ -178,10 +178,11 @@ def test_figure_is_valid_and_complete(page):
     rows = [re.match(r"<b>(.*?)</b>", t)[1] for t in titles]
     assert rows[:4] == ["Speed", "Detections", "Speed difference", "Acceleration difference"]
     assert rows[4:] == [
-        "Spin-down", "Minor spin-down", "Spin-up", "Resistance", "Joint criteria", "Resistance measure", "Water depth",
+        "Spin-down", "Minor spin-down", "Spin-up", "Resistance", "Joint criteria", "Resistance measure", "Acceleration",
+        "Water depth",
     ]  # fmt: skip
     units = [figure.layout[r["axis"]].title.text for r in data["rows"] if r["has_lines"]]
-    assert units == ["km/h", "km/h", "m/s²", "m/s", "(m/s²)²", "m/s", "m/s", "–", "m/s²", "mm"]
+    assert units == ["km/h", "km/h", "m/s²", "m/s", "(m/s²)²", "m/s", "m/s", "–", "m/s²", "m/s²", "mm"]
     colours = {}
     for trace in figure.data:
         if trace.legendgroup:
@@ -194,11 +195,25 @@ def _plain(figure):
     return json.loads(re.sub(r'"@\w+"', '"#000"', json.dumps(figure)))
 
 
+def test_raw_signals_have_panels_in_units_of_the_road(short):
+    names = ("torque_fl", "torque_rr", "a_y", "yaw_rate", "steer_angle")
+    frame = short.signals.frame.with_columns(**{n: pl.lit(0.5) for n in names}, brake_pressure=pl.lit(2e6))
+    data = data_of(drive_page(replace(short, signals=replace(short.signals, frame=frame)), title="t"))
+    rows = {r["title"]: [] for r in data["rows"]}
+    titles = list(rows)
+    for line in data["lines"]:
+        rows[titles[line["row"]]].append(float(decode(line)["full"][0]))
+    raw = {t: rows[t] for t in ("Wheel torque", "Yaw rate", "Steering angle", "Brake pressure")}
+    degrees = pytest.approx([np.degrees(0.5)])
+    assert raw == {"Wheel torque": [0.5, 0.5], "Yaw rate": degrees, "Steering angle": degrees, "Brake pressure": [20.0]}
+    assert len(rows["Acceleration"]) == 2
+
+
 def test_absent_signals_leave_no_row(short):
     features = short.features.drop("delta_a_x").with_columns(a_w_delta_fl=pl.lit(None, dtype=pl.Float64))
     bare = replace(
         short, features=features.drop("a_w_delta_fr", "a_w_delta_rl", "a_w_delta_rr"), tracks=(), events=(),
-        signals=replace(short.signals, frame=short.signals.frame.drop("^water_.*$", "on_water")),
+        signals=replace(short.signals, frame=short.signals.frame.drop("^water_.*$", "on_water", "a_x")),
     )  # fmt: skip
     text = drive_page(bare, title="t")
     assert len(data_of(text)["rows"]) == 2
