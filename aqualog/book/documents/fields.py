@@ -12,8 +12,8 @@ from aqualog.detect.registry import DETECTORS
 
 __all__ = [
     "BIN", "CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "JUDGEMENT", "LACKING", "PLACE_KEYS",
-    "TERMS", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe", "number",
-    "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
+    "TERMS", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe",
+    "number", "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
 ]  # fmt: skip
 
 Kind = Literal["number", "whole number", "text", "true or false", "interval", "object", "list", "by name", "any"]
