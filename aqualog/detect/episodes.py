@@ -26,6 +26,7 @@ STEP_S = 0.1  # [s] of the way that is kept
 
 _JOINT = tuple(d.name for d in all_of("joint"))
 _WHEELS = (SPIN_DOWN.name, MINOR_SPIN_DOWN.name, SPIN_UP.name)
+_FORCES = (*_JOINT, RESISTANCE.name)  # what the water does to the car as a whole
 _EFFECT = {MINOR_SPIN_DOWN.name: SPIN_DOWN.name}  # both see the same wheel slow down
 
 Stretch = Callable[[float, float], tuple[float, float]]
@@ -83,19 +84,25 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
     tuple of Episode
         In order of their beginning; each event is in exactly one of them.
 
-    Detections are one episode where less than 1 s lies between their causes. What began under a braking force is apart:
-    lock-ups less than 3 s from each other are one braking. A lock-up within an episode of aquaplaning belongs to it.
+    What the water does to the car makes an episode: joint warnings and resistance whose causes are less than 1 s apart.
+    Its wheels belong to it as long as they follow without a second's pause. One that was stopped or spun needs seconds
+    to find the road's speed again. So wheels neither join two episodes nor move the end of one, and a joint warning
+    that such a wheel sets off, without an alarm of the resistance, belongs to the episode before. Other detections are
+    one episode where less than 1 s lies between them. What began under a braking force is apart: lock-ups less than 3 s
+    from each other are one braking, and a lock-up within an episode of aquaplaning belongs to it.
     """
     numbered = list(enumerate(events))
-    free = _with_slopes([x for x in numbered if not _is_braking(x[1])])
-    braked = _groups([x for x in numbered if _is_braking(x[1])], BRAKING_GAP_S)
-    made = [_episode(_kind(e for _, e in group), group, way) for group in free]
-    wet = [x for x in made if x.kind == "aquaplaning"]
-    for group in braked:
-        start, end = _span(e for _, e in group)
-        host = next((i for i, x in enumerate(made) if x in wet and start < x.end_s and end > x.start_s), None)
+    free = [x for x in numbered if not _is_braking(x[1])]
+    water = [_Water(group) for group in _groups([x for x in free if x[1].detector in _FORCES], GAP_S)]
+    others = _by_begin(x for x in free if x[1].detector not in _FORCES)
+    alone = [x for x in others if not any(w.takes(x) for w in _last(water, x))]
+    made = [_episode(w.members, way, w.span) for w in _without_echoes(water)]
+    made += [_episode(group, way, _span(group)) for group in _groups(alone, GAP_S)]
+    for group in _groups([x for x in numbered if _is_braking(x[1])], BRAKING_GAP_S):
+        start, end = _span(group)
+        host = next((i for i, x in enumerate(made) if _is_wet_at(x, start, end)), None)
         if host is None:
-            made.append(_episode("wheel_lock", group, way))
+            made.append(replace(_episode(group, way, (start, end)), kind="wheel_lock"))
         else:
             made[host] = _with(made[host], group)
     order = list(EPISODE_KINDS)
@@ -113,19 +120,29 @@ def _cause(event: Event) -> tuple[float, float]:
     return event.cause_s or (event.start_s, event.end_s)
 
 
-def _span(events: Iterable[Event]) -> tuple[float, float]:
-    found = list(events)
-    # the estimate of the slip slope recovers seconds after the tyre has
-    prompt = [e for e in found if e.detector != SLIP_SLOPE_DROP.name]
-    starts, ends = zip(*map(_cause, prompt or found), strict=True)
+def _is_wet_at(episode: Episode, start_s: float, end_s: float) -> bool:
+    return episode.kind == "aquaplaning" and start_s < episode.end_s and end_s > episode.start_s
+
+
+def _with(episode: Episode, group: Sequence[_Numbered]) -> Episode:
+    """An episode with lock-ups that happened within it, which change nothing else of it."""
+    return replace(episode, events=tuple(sorted((*episode.events, *(i for i, _ in group)))))
+
+
+def _span(group: Iterable[_Numbered]) -> tuple[float, float]:
+    starts, ends = zip(*(_cause(e) for _, e in group), strict=True)
     return min(starts), max(ends)
+
+
+def _by_begin(events: Iterable[_Numbered]) -> list[_Numbered]:
+    return sorted(events, key=lambda x: (*_cause(x[1]), x[0]))
 
 
 def _groups(events: Sequence[_Numbered], gap_s: float) -> list[list[_Numbered]]:
     """Events whose causes are nearer than a gap, also through others."""
     groups: list[list[_Numbered]] = []
     end = -math.inf
-    for item in sorted(events, key=lambda x: _cause(x[1])):
+    for item in _by_begin(events):
         begin, until = _cause(item[1])
         if begin - end < gap_s and groups:
             groups[-1].append(item)
@@ -136,17 +153,45 @@ def _groups(events: Sequence[_Numbered], gap_s: float) -> list[list[_Numbered]]:
     return groups
 
 
-def _with_slopes(events: Sequence[_Numbered]) -> list[list[_Numbered]]:
-    """Groups of detections. A lost slip slope belongs to what it goes on with, and joins nothing itself."""
-    slopes = [x for x in events if x[1].detector == SLIP_SLOPE_DROP.name]
-    groups = _groups([x for x in events if x not in slopes], GAP_S)
-    spans = [_span(e for _, e in group) for group in groups]
-    alone = []
-    for item in slopes:
+class _Water:
+    """Joint warnings and resistance of one episode, and the detections at wheels that follow them."""
+
+    def __init__(self, forces: Sequence[_Numbered]) -> None:
+        self.members = list(forces)
+        self.span = _span(forces)
+        self.reach = self.span[1]
+
+    def takes(self, item: _Numbered) -> bool:
+        """Take a detection that overlaps the episode or follows it; detections come in order of their beginning."""
         begin, end = _cause(item[1])
-        near = (g for g, (a, b) in zip(groups, spans, strict=True) if begin - b < GAP_S and a - end < GAP_S)
-        next(near, alone).append(item)
-    return [*groups, *_groups(alone, GAP_S)]
+        start = self.span[0]
+        if not (start - end < GAP_S and begin - self.reach < GAP_S):
+            return False
+        self.members.append(item)
+        if item[1].detector in _WHEELS:
+            self.reach = max(self.reach, end)
+            if start - begin < GAP_S:
+                # the first wheel meets the water before the car as a whole shows it
+                self.span = min(start, begin), self.span[1]
+        return True
+
+
+def _without_echoes(water: Sequence[_Water]) -> list[_Water]:
+    """Episodes without those that a wheel of the one before has set off alone, which become part of it."""
+    kept: list[_Water] = []
+    for one in water:
+        if kept and one.span[0] < kept[-1].reach and not any(e.detector == RESISTANCE.name for _, e in one.members):
+            kept[-1].members += one.members
+            kept[-1].reach = max(kept[-1].reach, one.reach)
+        else:
+            kept.append(one)
+    return kept
+
+
+def _last(water: Sequence[_Water], item: _Numbered) -> Sequence[_Water]:
+    """The episode that has begun last before a detection, then the next one."""
+    begun = sum(w.span[0] - GAP_S < _cause(item[1])[0] for w in water)
+    return [*water[max(begun - 1, 0) : begun], *water[begun : begun + 1]]
 
 
 def _kind(events: Iterable[Event]) -> EpisodeKind:
@@ -163,25 +208,19 @@ def _kind(events: Iterable[Event]) -> EpisodeKind:
     return "suspected" if len({_EFFECT.get(d, d) for d in found}) > 1 else "single_detector"
 
 
-def _episode(kind: EpisodeKind, group: Sequence[_Numbered], way: Stretch) -> Episode:
+def _episode(group: Sequence[_Numbered], way: Stretch, span: tuple[float, float]) -> Episode:
     events = [e for _, e in sorted(group, key=lambda x: (x[1].start_s, x[0]))]
     joint = [e for e in events if e.detector in _JOINT]
-    start, end = _span(events)
-    metres, seconds = way(start, end)
+    metres, seconds = way(*span)
     wheels = _wheels(events)
     decided = [d for e in joint for d in e.evidence.get("decided_by", ())] or [e.detector for e in events]
     return Episode(
-        kind, start, end, wheels, _shared(wheels, AXLES), _shared(wheels, SIDES),
+        _kind(events), *span, wheels, _shared(wheels, AXLES), _shared(wheels, SIDES),
         "full" if any(e.severity == "full" for e in joint or events) else "partial",
         metres / seconds if seconds > 0.0 else math.nan, tuple(dict.fromkeys(decided)),
         max(_known(events, "delta_a_x_max"), default=math.nan), min(_known(events, "slip_min"), default=math.nan),
         metres if seconds > 0.0 else math.nan, tuple(sorted(i for i, _ in group)),
     )  # fmt: skip
-
-
-def _with(episode: Episode, group: Sequence[_Numbered]) -> Episode:
-    """An episode with lock-ups that happened within it, which change nothing else of it."""
-    return replace(episode, events=tuple(sorted((*episode.events, *(i for i, _ in group)))))
 
 
 def _wheels(events: Sequence[Event]) -> tuple[str, ...]:

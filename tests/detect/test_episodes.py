@@ -76,6 +76,24 @@ def test_a_lost_slope_neither_joins_nor_lengthens():
     assert kinds(drop, event("slip_slope_drop", 6.5, 8.0, "rr")) == [("other_surface", 2.0, 8.0)]
 
 
+def test_a_wheel_that_returns_neither_joins_nor_lengthens():
+    """A wheel that was stopped or spun needs seconds to find the road's speed again."""
+    wet = [event("joint_cusum", a, a + 2.0) for a in (1.0, 6.0)]
+    wheel = event("spin_up", 2.0, 7.0, "rl", slip_max=0.9)
+    assert kinds(*wet, event("resistance", 6.1, 8.0), wheel) == [("aquaplaning", 1.0, 3.0), ("aquaplaning", 6.0, 8.0)]
+    assert kinds(*wet, wheel) == [("aquaplaning", 1.0, 3.0)]  # an echo: no resistance of its own
+    assert kinds(wet[0], wheel, event("spin_down", 7.5, 7.7, "rr")) == [("aquaplaning", 1.0, 3.0)]
+    assert [k for k, *_ in kinds(wet[0], wheel, event("spin_down", 8.5, 8.7, "rr"))] == [
+        "aquaplaning", "single_detector",
+    ]  # fmt: skip
+
+
+def test_the_first_wheel_in_the_water_is_the_beginning():
+    wheel = event("spin_down", 0.4, 1.5, "fr")
+    assert kinds(event("joint_cusum", 1.0, 3.0), wheel) == [("aquaplaning", 0.4, 3.0)]
+    assert kinds(event("joint_cusum", 2.0, 3.0), wheel) == [("aquaplaning", 2.0, 3.0)]
+
+
 def test_edges_are_those_of_the_cause():
     held = replace(event("joint_criteria", 2.0, 9.0), cause_s=(1.2, 7.5))
     later = replace(event("resistance", 8.0, 9.0), cause_s=(7.8, 8.4))
