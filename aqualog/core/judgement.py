@@ -15,7 +15,7 @@ Verdict = Literal["aquaplaning", "none", "cannot_be_judged"]
 EPISODE_KINDS: dict[EpisodeKind, str] = {
     "aquaplaning": "a joint detector decided",
     "suspected": "two different effects at once, no joint detector decided",
-    "other_surface": "the slip slope was lost without the resistance of water: snow, ice or gravel",
+    "other_surface": "the slip slope was lost without the resistance of water: snow, ice, gravel, or a wrong estimate",
     "wheel_lock": "wheels slowed down while a brake acted on them",
     "single_detector": "one effect alone",
 }

@@ -281,7 +281,7 @@ def test_what_no_detector_can_work_with_says_what_to_try(tmp_path, capsys):
         app(["doctor", str(path)])
     out = capsys.readouterr().out
     assert "no detector can run\n    try: `aqualog inspect LOG --write-map map.toml`" in out
-    assert "resistance: missing torque_rl, torque_rr (or torque_r), " in out
+    assert "resistance: missing torque of the driven wheels, vehicle.drivetrain, " in out
 
 
 def test_a_mounting_names_its_file_once(tmp_path, capsys):

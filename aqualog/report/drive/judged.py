@@ -13,7 +13,7 @@ from aqualog.report.wording import detector_name
 
 __all__ = [
     "EPISODE_HEADS", "FOLDED", "KIND_NAMES", "card_lines", "episode_cells", "episode_sentence", "folded_line",
-    "headline", "level", "lines_of", "missing_words",
+    "headline", "judged_by", "level", "lines_of", "missing_words",
 ]  # fmt: skip
 
 KIND_NAMES: Mapping[EpisodeKind, str] = {
@@ -93,12 +93,15 @@ def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
 
 def card_lines(judgement: Judgement, duration_s: float, most: int = 4) -> list[Line]:
     """What stands under the headline of a page: episodes, and which detectors have judged."""
+    return [*lines_of(judgement, most), judged_by(judgement, duration_s)]
+
+
+def judged_by(judgement: Judgement, duration_s: float) -> tuple[str, str]:
+    """Which detectors ran, and for how long the joint ones could judge, as a head and a sentence."""
     ran = ", ".join(detector_name(d) for d in judgement.ran) or "no detector"
     if judgement.verdict == "cannot_be_judged":
-        judged = f"{ran}; no single detector decides by itself"
-    else:
-        judged = f"{number(min(judgement.judged_s, duration_s), 1)} of {number(duration_s, 1)} s, by {ran}"
-    return [*lines_of(judgement, most), ("Ran:" if judgement.verdict == "cannot_be_judged" else "Judged:", judged)]
+        return "Ran:", f"{ran}; no single detector decides by itself"
+    return "Judged:", f"{number(min(judgement.judged_s, duration_s), 1)} of {number(duration_s, 1)} s, by {ran}"
 
 
 def episode_cells(episode: Episode) -> list[str | Cell]:

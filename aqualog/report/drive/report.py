@@ -21,6 +21,7 @@ from aqualog.report.drive.judged import (
     episode_cells,
     folded_line,
     headline,
+    judged_by,
     level,
 )
 from aqualog.report.drive.panels import drive_rows
@@ -89,8 +90,9 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     sections = [
         Section("", [
             Headline(headline(judgement), answers),
-            Para(f"{result.vehicle_name}: {signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, "
-                 f"{len(signals.symbols)} signals", where="text"),
+            Para(f"{' '.join(judged_by(judgement, signals.duration_s))}\n{result.vehicle_name}: "
+                 f"{signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, {len(signals.symbols)} signals",
+                 where="text"),
         ], "verdict", look=f"verdict events {level(judgement)}"),
         Section("Problems of the data", [Lines(_problems(result), most=1000)], "problems", look="problems",
                 where="page"),
