@@ -69,8 +69,9 @@ def run_page(
                 look=f"verdict events {level(judgement)}"),
         Section("Notes", [Lines(_problems(info), most=1000)], "quality", look="problems"),
         *drawn,
-        Section("Episodes", [Table(EPISODE_HEADS, [episode_cells(e) for e in main], "episodes", (0, 3, 4, 10))],
-                "episode-section"),
+        Section("Episodes", [
+            Table(EPISODE_HEADS, [episode_cells(e) for e in main[:MOST_EVENTS]], "episodes", (0, 3, 4, 10)),
+        ], "episode-section"),
         Section("Events", [Table(EVENT_HEADS, rows, "events", (0, 1, 5, 8), wide=(8,)), Para(more)], "events-section",
                 fold=fold),
         Section("The full page of this run", [

@@ -75,9 +75,9 @@ def test_filter_acts_on_figures_matrix_tables_and_count(page):
 
 
 def test_wheels_and_pooled_groups_are_told(page):
-    before = texts(page, "#runs tbody tr td:nth-child(4)")
+    before = texts(page, "#runs tbody tr td:nth-child(6)")
     pick(page, "RL")
-    after = texts(page, "#runs tbody tr td:nth-child(4)")
+    after = texts(page, "#runs tbody tr td:nth-child(6)")
     assert sum(map(int, after)) < sum(map(int, before))
     shown(page, "#slopes")
     assert texts(page, "#slopes-key")[0].startswith("RL")
@@ -134,7 +134,7 @@ def test_search_sort_and_problems(page):
     head.send_keys(Keys.ENTER)
     head.send_keys(Keys.ENTER)
     assert head.get_attribute("aria-sort") == "descending"
-    speeds = [float(t) if t != "–" else -1.0 for t in texts(page, "#runs tbody tr td:nth-child(3)")]
+    speeds = [float(t) if t != "–" else -1.0 for t in texts(page, "#runs tbody tr td:nth-child(5)")]
     assert speeds == sorted(speeds, reverse=True)
     page.execute_script("document.querySelector('#problem-list details').open = true")
     wait_for(lambda: texts(page, "#problem-list li"))

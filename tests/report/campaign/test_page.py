@@ -18,7 +18,8 @@ from aqualog.campaign.bins import plan
 from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
-from aqualog.report.campaign.answers import answers_of
+from aqualog.core.judgement import Judgement
+from aqualog.report.campaign.answers import answers_of, verdicts
 from aqualog.report.campaign.findings import Curve, Point, crossing, find
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
 from aqualog.report.campaign.labels import file_name, group_text, value_text
@@ -148,10 +149,33 @@ def test_events_on_water_are_those_of_the_store(page, case):
     assert sum(e[2] for e in runs["events"][9]) > 0  # 1.3 mm, 110 km/h
 
 
-def test_tables_are_beside_the_page(folder, findings):
+def test_verdict_of_each_run_and_of_all(page, case):
+    runs = data_of(page)["runs"]
+    wet = [r for r in case.done if r.judgement.verdict == "aquaplaning"]
+    assert len(wet) >= 3
+    assert [runs["verdict"][i] for i in (9, 12, 13)] == [0, 1, -1]  # 1.3 mm at 110 km/h; dry; no log
+    assert runs["episodes"][9] == 1
+    told = verdicts(case)
+    assert told[0] == f"Aquaplaning in {len(wet)} runs: {sum(len(r.judgement.of('aquaplaning')) for r in wet)} episodes"
+    assert all(f"<li>{line}</li>" in page for line in told)
+
+
+def test_run_that_cannot_be_judged_is_neither_green_nor_orange(case):
+    info = case.runs[9]
+    assert 'class="verdict events partial"' in run_page(case, info, case.samples(info), None, back="")
+    lost = Judgement("cannot_be_judged", ("torque_rl",), ("spin_down",), info.judgement.episodes[:0])
+    blind = replace(info, about={**info.about, **lost.document()})
+    page = run_page(case, blind, case.samples(info), None, back="")
+    assert 'class="verdict events open"' in page
+    assert "Aquaplaning cannot be judged: no wheel torque" in page
+    assert '<details class="fold">' in page
+
+
+def test_tables_are_beside_the_page(folder, findings, case):
     with (folder / "data" / "runs.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 15
+    assert (rows[9]["verdict"], rows[9]["episodes"], rows[13]["verdict"]) == ("aquaplaning", "1", "")
     assert rows[13]["state"] == "failed"
     assert (folder / rows[0]["page"]).is_file()
     assert rows[12]["x_note"] == f"'{FORMULA}"
