@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from aqualog.face.diagnose import diagnose
     from aqualog.face.drive import Drive, convert, read
     from aqualog.face.evaluate import evaluate
+    from aqualog.face.init import init
     from aqualog.face.inspect import doctor, inspect
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
@@ -48,6 +49,7 @@ _FACE = {
     "calibrate": "aqualog.face.calibrate",
     "doctor": "aqualog.face.inspect",
     "evaluate": "aqualog.face.evaluate",
+    "init": "aqualog.face.init",
     "inspect": "aqualog.face.inspect",
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
@@ -79,6 +81,7 @@ __all__ = [
     "diagnose",
     "doctor",
     "evaluate",
+    "init",
     "inspect",
     "physics",
     "read",

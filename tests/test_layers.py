@@ -102,6 +102,7 @@ def test_detectors_read_no_truth_and_no_labels():
             for c in (
                 "detect",
                 "inspect",
+                "init",
                 "align",
                 "simulate",
                 "figures",

@@ -169,7 +169,7 @@ def separate_drives(names: int, files: Iterable[str]) -> SignalError:
         f"several channels bear the same {names} names: these look like separate drives",
         where=", ".join(dict.fromkeys(files)),
         expected="the files of ONE drive",
-        hint="run them one by one, or all by `aqualog batch`",
+        hint="run them one by one, or all by `aqualog campaign init FOLDER` and `aqualog batch`",
     )
 
 

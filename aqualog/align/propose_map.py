@@ -7,11 +7,11 @@ other names in other drives become a list in order of preference. What one map c
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aqualog.align.mapping import Entry, SignalMap, matching
+from aqualog.align.mapping import OF_SEPARATE_DRIVES, Entry, SignalMap, matching, separate_drives
 from aqualog.align.propose import CANONICAL, Proposal, look_at, words_of
 from aqualog.core.errors import AqualogError, listed
 from aqualog.core.notation import WHEELS
@@ -20,7 +20,10 @@ from aqualog.core.units import is_unit
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions
 
-__all__ = ["LogFile", "MapProposal", "measures_wheels", "propose_signals", "unmapped_names"]
+__all__ = [
+    "LogFile", "MapProposal", "check_one_drive", "lacking_notes", "measures_wheels", "propose_signals",
+    "unmapped_names",
+]  # fmt: skip
 
 MOST_MISSING = 0.1  # share of drives that may lack a signal that the map names: those drives cannot be used then
 
@@ -165,25 +168,43 @@ def _joined(
             entries[symbol] = entry
             remarks[symbol] = own[0].remark
     notes += [f"{', '.join(symbols)}: {told}" for told, symbols in absent.items()]
+    unmapped = _unmapped(kinds, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
+    notes[:0] = lacking_notes([*found, *left_out], unmapped)
+    return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found), unmapped)
+
+
+def check_one_drive(channels: Iterable[tuple[str, str]], proposals: Iterable[Proposal]) -> None:
+    """Raise a SignalError if several files bear the same names: (file, path) of all channels, and what is proposed."""
+    files: dict[str, set[str]] = {}
+    for file, path in channels:
+        files.setdefault(path, set()).add(file)
+    names = [p.entry.channel[0] for p in proposals]
+    doubled = [n for n in names if any(len(files.get(x, ())) > 1 for x in (n, n.partition(":")[2]))]
+    if len(doubled) >= OF_SEPARATE_DRIVES:
+        raise separate_drives(len(doubled), sorted(set().union(*files.values())))
+
+
+def lacking_notes(found: Collection[str], unmapped: Sequence[str]) -> list[str]:
+    """Return sentences on the signals that a drive lacks, by the symbols that are found; the gravest first."""
+    notes = []
     missing = [f"omega_{w}" for w in WHEELS if f"omega_{w}" not in found]
     if missing:
-        notes.insert(0, f"no channel looks like {', '.join(missing)}: aquaplaning cannot be detected without")
+        notes.append(f"no channel looks like {', '.join(missing)}: aquaplaning cannot be detected without")
     if not any(s.startswith("torque_") for s in found):
         notes.append(
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
         )
-    unmapped = _unmapped(kinds, [e.channel for e in entries.values()] + [(s,) for s in found if s not in entries])
 
     def is_road_speed(words: set[str]) -> bool:
         return bool({"speed", "velocity"} & words) and not _NO_ROAD_SPEED & words
 
-    speeds = [n for n in unmapped if "[" not in n and is_road_speed(set(words_of(n)))]
-    if "v_x" not in found and "v_x" not in left_out:
+    if "v_x" not in found:
+        speeds = [n for n in unmapped if "[" not in n and is_road_speed(set(words_of(n)))]
         hint = (
             f"; {', '.join(speeds[:3])} may be it, but the file gives no unit: map it with its unit" if speeds else ""
         )
         notes.append(f"no v_x: slip refers to the free wheels, not to the road{hint}")
-    return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found), unmapped)
+    return notes
 
 
 _NO_ROAD_SPEED = {"wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad"}

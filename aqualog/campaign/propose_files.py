@@ -8,12 +8,13 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from aqualog.campaign.propose_drives import Drive, tokens
 from aqualog.campaign.propose_names import NameTable
 from aqualog.core.vehicle import KEYS, POLYNOMIALS
 
-__all__ = ["NEEDED", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
+__all__ = ["NEEDED", "Fact", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
 
 NEEDED = ("drivetrain", "mass", "l_f", "l_r", "wheels.r_e_f", "wheels.r_e_r")
 """Keys without which forces, loads or slip would be those of another car."""
@@ -87,17 +88,27 @@ def _words(name: str) -> tuple[str, ...]:
     return tuple(w for t in tokens(name) for w in t.split(".") if w)
 
 
-def vehicle_text(name: str) -> str:
-    """A vehicle file without values: every key is there behind #, with unit, bounds and meaning.
+class Fact(NamedTuple):
+    """What is known of a key: its value as TOML writes it, where it is from, and whether it needs no check."""
 
-    The defaults are not in it, so that none of them counts as a value given by the user.
+    value: str
+    origin: str
+    is_sure: bool = False
+
+
+def vehicle_text(name: str, facts: Mapping[str, Fact] | None = None) -> str:
+    """A vehicle file without values but those of `facts`: every key is there behind #, with unit, bounds and meaning.
+
+    The defaults are not in it, so that none of them counts as a value given by the user. A fact that is not sure stays
+    behind #, too.
     """
+    known = facts or {}
     lines = [
-        "# No value of this car is known yet. Remove the # before each key that you know and write its value.",
+        "# Remove the # before each key that you know and write its value. What stands behind a # is not used.",
         "# SET marks keys that slip, forces and loads need in order to be right. Missing keys get the value of a",
         "# mid-size car, and detectors that need them report that.",
         f"name = {_quoted(name)}",
-        '# drivetrain = ""             # SET  "rwd", "fwd" or "awd"',
+        _key_line("drivetrain", known.get("drivetrain"), '""', 'SET  "rwd", "fwd" or "awd"'),
     ]
     section = ""
     for key in KEYS.values():
@@ -105,11 +116,19 @@ def vehicle_text(name: str) -> str:
             section = key.section
             lines += ["", f"[{section}]"]
         mark = "SET  " if key.path in NEEDED else ""
-        left = f"# {key.name} ="
-        lines.append(f"{left:<30}# {mark}[{key.unit}] {key.meaning}; {key.low:g} ... {key.high:g}")
+        about = f"{mark}[{key.unit}] {key.meaning}; {key.low:g} ... {key.high:g}"
+        lines.append(_key_line(key.name, known.get(key.path), "", about))
     for section, meaning in POLYNOMIALS.items():
         lines += ["", f"# [{section}]  # {meaning}; `aqualog calibrate` writes it"]
     return "\n".join(lines) + "\n"
+
+
+def _key_line(name: str, fact: Fact | None, blank: str, about: str) -> str:
+    if fact is None:
+        return f"{f'# {name} = {blank}'.rstrip():<30}# {about}"
+    mark = "" if fact.is_sure else "# "
+    about = about.removeprefix("SET  ") if fact.is_sure else about
+    return f"{f'{mark}{name} = {fact.value}':<30}# {about}; {fact.origin}"
 
 
 def campaign_text(name: str, vehicle: str, signals: str | None, runs: str) -> str:

@@ -39,6 +39,9 @@ COMMANDS = {
         "logs",
         "List what a log holds, and propose which channel is which signal; of a campaign file, show the test matrix.",
     ),
+    "init": Command(
+        "logs", "Begin with one drive: write its signal map and a vehicle file to fill in, and print what to do next."
+    ),
     "doctor": Command("logs", "Report what is wrong with a log, what was lost of it, and what to do."),
     "convert": Command(
         "logs", "Write the aligned signals of one drive as one log, in SI units and with canonical names."

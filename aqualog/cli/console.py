@@ -77,6 +77,16 @@ class Console:
         finally:
             heard.clear()
 
+    def can_ask(self) -> bool:
+        """Whether somebody is there to answer."""
+        return not self.quiet and sys.stdin is not None and sys.stdin.isatty()
+
+    def ask(self, text: str) -> str:
+        """Ask something on the terminal; an empty answer is none."""
+        sys.stderr.write(f"{clean_line(text)} ")
+        sys.stderr.flush()
+        return sys.stdin.readline().strip()
+
     def error(self, text: str) -> None:
         """Something that failed, while the rest goes on."""
         sys.stderr.write(f"error: {clean(text)}\n")

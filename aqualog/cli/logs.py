@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from aqualog.core.records import Signals
     from aqualog.core.vehicle import Vehicle
 
-__all__ = ["align", "cache", "convert", "doctor", "inspect"]
+__all__ = ["align", "cache", "convert", "doctor", "init", "inspect"]
 
 
 @command("logs signals dbc write_map:proposed data force")
@@ -59,6 +59,41 @@ def _campaign(run: Run, *, has_log_options: bool) -> Output:
         )
     found = matrix(names[0])
     return Output(found, code=None if found.logs_there else int(ExitCode.NOTHING_USABLE))
+
+
+@command("logs out:start vehicle:proposed dbc data force")
+def init(run: Run, out: Path) -> Output:
+    """Begin with one drive: write its signal map and a vehicle file to fill in, and print what to do next.
+
+    Guesses channel, unit and sign of each signal from names, units, size and motion. What stands behind a # in the
+    files says why, what is not mapped, and what is to be filled in (SET). At most two questions are asked, and only on
+    a terminal: which axle is driven, and what names and data leave open. An empty answer leaves a mark in the file.
+
+    \b
+    Examples:
+      aqualog init drive.mf4 -o work
+      aqualog init can.mf4 --dbc car.dbc -o work
+      aqualog init wheels.csv imu.csv gps.csv -o work --vehicle car.toml
+    """
+    from aqualog.face.init import Question, init
+
+    drive = run.drive()
+
+    def ask(question: Question) -> str:
+        hear.clear()
+        choices = f"{', '.join(question.choices)}; " if question.choices else ""
+        answer = run.console.ask(f"{question.text} ({choices}empty: not known)")
+        while not question.takes(answer):
+            answer = run.console.ask(f"{answer!r} is no answer to that ({choices}empty: not known)")
+        return answer
+
+    with run.hearing() as hear:
+        found = init(
+            drive, out, run.vehicle, ask=ask if run.console.can_ask() and not run.json else None, force=run.force,
+            progress=hear,
+        )  # fmt: skip
+        found.write_files(force=run.force)
+    return Output(found, code=int(found.exit_code))
 
 
 @command("logs vehicle signals dbc out:page data force")

@@ -56,7 +56,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "vehicle:believed": _file(
         "Vehicle file (TOML): what the simulation believes. Drives need one; a campaign names its own.", "--vehicle",
     ),
-    "vehicle:proposed": _file("Vehicle file of all runs; without it one to fill is written.", "--vehicle"),
+    "vehicle:proposed": _file("Vehicle file that is there; without it one to fill in is written.", "--vehicle"),
     "signals": _file("Signal map (TOML): which channel is which signal.", "--signals"),
     "dbc": _option(
         list[Path] | None, None, "--dbc", help="CAN database for raw frames; may be given several times.",
@@ -114,6 +114,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "debug": _flag("Show a traceback on errors.", "--debug"),
     # one log
     "write_map:proposed": _file("Write the proposed signal map to this file.", "--write-map"),
+    "out:start": _file("Folder for map.toml and vehicle.toml.", metavar="DIR", default=...),
     "write_map:clocks": _file("Write the signal map with the clocks found.", "--write-map"),
     "out:log": _file("File to write: .mf4, .mcap, .csv or .parquet.", default=...),
     "decimal_comma": _flag("CSV with decimal comma and semicolons.", "--decimal-comma"),

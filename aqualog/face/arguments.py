@@ -29,6 +29,7 @@ __all__ = [
     "text_of",
     "whole_number",
     "write_text",
+    "write_together",
     "write_whole",
     "writing",
 ]
@@ -221,6 +222,12 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     """Write a file whole or not at all, see `aqualog.io.atomic_write.write_whole`; an AqualogError if that fails."""
     with writing(path):
         atomic_write.write_whole(path, write)
+
+
+def write_together(files: Mapping[Path, Callable[[Path], None]]) -> None:
+    """Write files whole, all of them or none; an AqualogError if one fails."""
+    with writing(next(iter(files)).parent if files else Path()):
+        atomic_write.write_together(files)
 
 
 def write_text(path: Path, text: str) -> None:

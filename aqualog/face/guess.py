@@ -76,8 +76,8 @@ def _guesses(drive: Drive) -> Mapping[str, Proposal]:
         If the files are those of several drives.
     """
     from aqualog.align.load import LONG, read_options
-    from aqualog.align.mapping import OF_SEPARATE_DRIVES, separate_drives
     from aqualog.align.propose import CANONICAL, look_at
+    from aqualog.align.propose_map import check_one_drive
     from aqualog.io.open_log import DriveLog
 
     try:
@@ -88,10 +88,7 @@ def _guesses(drive: Drive) -> Mapping[str, Proposal]:
     except AqualogError:
         return {}
     found = {s: p for s, p in look_at(channels).proposals.items() if p.reason != CANONICAL}
-    files = {name: {c.info.file for c in channels if c.info.path == name} for name in {c.info.path for c in channels}}
-    doubled = [p for p in found.values() if len(files.get(p.entry.channel[0].partition(":")[2], ())) > 1]
-    if len(doubled) >= OF_SEPARATE_DRIVES:
-        raise separate_drives(len(doubled), (c.info.file for c in channels))
+    check_one_drive([(c.info.file, c.info.path) for c in channels], found.values())
     return found
 
 
@@ -102,5 +99,5 @@ def _note(found: Mapping[str, Proposal]) -> str:
     unsure = f"; the units of {', '.join(doubt)} are in doubt" if doubt else ""
     return (
         f"no signal map: {len(found)} signals are guessed from names, units and data "
-        f"({', '.join(some)}{more}){unsure}. `aqualog inspect LOG --write-map map.toml` writes them down to check"
+        f"({', '.join(some)}{more}){unsure}. `aqualog init LOG -o FOLDER` writes them down to check"
     )

@@ -5,14 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 
 from aqualog.guard.reading import unfinished
 
-__all__ = ["only_here", "write_text", "write_whole"]
+__all__ = ["only_here", "write_text", "write_together", "write_whole"]
 
 _ASKING = Lock()
 
@@ -25,6 +25,32 @@ def write_whole(path: Path, write: Callable[[Path], object], *, makes_folder: bo
     """
     if makes_folder:
         path.parent.mkdir(parents=True, exist_ok=True)
+    with _finished(path, write) as temporary:
+        temporary.replace(path)
+
+
+def write_together(files: Mapping[Path, Callable[[Path], object]]) -> None:
+    """Write files as `write_whole` does, and rename none before all are complete; new folders go if one fails."""
+    made: list[Path] = []
+    try:
+        with ExitStack() as stack:
+            done = []
+            for path, write in files.items():
+                made += [p for p in (path.parent, *path.parent.parents) if not p.exists()]
+                path.parent.mkdir(parents=True, exist_ok=True)
+                done.append((stack.enter_context(_finished(path, write)), path))
+            for temporary, path in done:
+                temporary.replace(path)
+    except BaseException:
+        for folder in made:  # the innermost first; one that holds anything stays
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+@contextmanager
+def _finished(path: Path, write: Callable[[Path], object]) -> Iterator[Path]:
+    """Let `write` make a file under a temporary name beside its place; it is gone at the end if it is not renamed."""
     handle, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}-", suffix=f"{path.suffix}.tmp", dir=path.parent)
     os.close(handle)
     temporary = Path(name)
@@ -37,7 +63,7 @@ def write_whole(path: Path, write: Callable[[Path], object], *, makes_folder: bo
                 mask = os.umask(0)
                 os.umask(mask)
             temporary.chmod(0o666 & ~mask)
-            temporary.replace(path)
+            yield temporary
         finally:
             temporary.unlink(missing_ok=True)
 

@@ -89,6 +89,13 @@ def test_documents_of_drives(name):
     assert complaints(name, printed(*DRIVES[name], "--json")) == []
 
 
+def test_document_of_a_start(tmp_path):
+    assert (
+        complaints("init", printed("init", str(SAMPLES / "lane_drive.csv"), "-o", str(tmp_path / "work"), "--json"))
+        == []
+    )
+
+
 def test_document_of_clocks(tmp_path):
     late = pl.read_parquet(MONDAY).select((pl.col("t") + 0.3).alias("t [s]"), pl.col("v_x").alias("v_x [m/s]"))
     late.write_csv(tmp_path / "late.csv")

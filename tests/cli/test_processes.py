@@ -15,6 +15,7 @@ CAR = ("--vehicle", "vehicle.toml")
 CALLS = {
     "detect": (("lane_drive.mf4", *CAR, "--fail-on-event", "--json"), 5, "minor_spin_down"),
     "inspect": (("lane_drive.mf4",), 0, "omega_fl"),
+    "init": (("lane_drive.mf4", "-o", "work"), 0, "aqualog detect lane_drive.mf4"),
     "doctor": (("cut.mcap", *CAR), 3, "cut.mcap"),
     "convert": (("lane_drive.mf4", *CAR, "-o", "again.parquet"), 0, ""),
     "align": (("lane_drive.mf4",), 2, "at least one source"),

@@ -18,6 +18,7 @@ ON_LOGS = {
     "read": aq.read,
     "detect": lambda x: aq.detect(x, CAR),
     "inspect": aq.inspect,
+    "init": lambda x: aq.init(x, "never"),
     "doctor": aq.doctor,
     "convert": lambda x: aq.convert(x, "never.csv"),
     "slip_slope": lambda x: aq.slip_slope(x, CAR),

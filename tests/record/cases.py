@@ -76,6 +76,8 @@ ONE_DRIVE = (
     Case("inspect_rav4", f"inspect {RAV4_LOG} --json --write-map {{o}}/map.toml"),
     Case("inspect_porsche", f"inspect {PORSCHE} --json --write-map {{o}}/map.toml"),
     Case("inspect_canedge", f"inspect {CANEDGE_LOG} --json"),
+    Case("init_csv", f"init {S}/lane_drive.csv -o {{o}}/work --json"),
+    Case("init_porsche", f"init {PORSCHE} -o {{o}}/work"),
     Case("doctor_mf4", f"doctor {S}/lane_drive.mf4 {CAR} --json"),
     Case("doctor_mcap", f"doctor {S}/lane_drive.mcap {CAR} --signals {S}/map_mcap.toml --json"),
     Case("doctor_csv", f"doctor {S}/lane_drive.csv {CAR} --signals {S}/map_csv.toml --json"),

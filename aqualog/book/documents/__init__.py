@@ -10,7 +10,7 @@ __all__ = ["DOCUMENTS"]
 DOCUMENTS: dict[str, Document] = {
     d.name: d
     for d in (
-        drives.DETECT, drives.SLIP_SLOPE, drives.INSPECT, drives.DOCTOR, drives.ALIGN, drives.CALIBRATE,
+        drives.DETECT, drives.SLIP_SLOPE, drives.INIT, drives.INSPECT, drives.DOCTOR, drives.ALIGN, drives.CALIBRATE,
         judged.DIAGNOSE, judged.EVALUATE, drives.SIMULATE, campaigns.INIT, campaigns.INSPECT, campaigns.BATCH,
         campaigns.PLAN, campaigns.BIN_SLIP_SLOPE, campaigns.BIN_RESISTANCE, judged.FIGURES, judged.REPRODUCE,
         drives.CACHE, campaigns.MANIFEST, campaigns.HISTORY,

@@ -168,6 +168,35 @@ SLIP_SLOPE = Document(
     files=("slip_slope.json",),
 )  # fmt: skip
 
+_PROPOSED = (
+    text("channel", "channel"),
+    text("unit", "unit to put into the map; null where the file has it", null=True),
+    number("scale", "-", "factor to put into the map"),
+    text("reason", "why this channel"),
+    several("doubt", "other units that it may have, where the file gives none and the data do not decide"),
+)
+
+INIT = Document(
+    "init",
+    "aqualog init LOG -o FOLDER --json",
+    "A start for one drive: guessed signals, files that were written, what is to be filled in, and what is next.",
+    (
+        *HEAD,
+        text("folder", "folder of the files"),
+        several("written", "files that were written"),
+        by_name("signals", "channel of each signal, as the map has it", _PROPOSED),
+        several("unmapped", "channels that look like no signal, `name [unit]`"),
+        rows("questions", "what was asked on the terminal", (
+            text("key", "file and key that the answer is for"),
+            text("text", "the question"),
+            text("answer", "the answer; null if it is not known", null=True),
+        )),
+        several("set", "keys of the vehicle file that wait for a value"),
+        several("next", "the three commands that come next"),
+        several("notes", "sentences on the files, and on what is missing"),
+    ),
+)  # fmt: skip
+
 INSPECT = Document(
     "inspect",
     "aqualog inspect LOG --json",
@@ -195,13 +224,7 @@ INSPECT = Document(
             obj("faults", "faults of the time stamps", FAULTS),
             text("remark", "what is remarkable; empty without a remark"),
         )),
-        by_name("proposed", "proposed channel of each signal", (
-            text("channel", "channel"),
-            text("unit", "unit to put into the map; null where the file has it", null=True),
-            number("scale", "-", "factor to put into the map"),
-            text("reason", "why this channel"),
-            several("doubt", "other units that it may have, where the file gives none and the data do not decide"),
-        )),
+        by_name("proposed", "proposed channel of each signal", _PROPOSED),
         several("unmapped", "channels that look like no signal, `name [unit]`"),
         several("notes", "sentences on the files"),
     ),
