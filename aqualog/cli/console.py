@@ -82,7 +82,7 @@ class Console:
         return not self.quiet and sys.stdin is not None and sys.stdin.isatty()
 
     def ask(self, text: str) -> str:
-        """Ask something on the terminal; an empty answer is none."""
+        """Ask something on the terminal; the answer may be empty."""
         sys.stderr.write(f"{clean_line(text)} ")
         sys.stderr.flush()
         return sys.stdin.readline().strip()
