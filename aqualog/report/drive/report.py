@@ -25,10 +25,11 @@ from aqualog.report.drive.judged import (
     level,
 )
 from aqualog.report.drive.panels import drive_rows
+from aqualog.report.drive.route import route_figure
 from aqualog.report.drive.stack import VEHICLE, groups, stack
 from aqualog.report.page import report_page
 from aqualog.report.reduce import DRIVE, LONG_S, POINTS, Plan, make_plan
-from aqualog.report.sections import Cell, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
+from aqualog.report.sections import Cell, Figures, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import counted, number, place, pretty_unit
 from aqualog.report.wording import detector_name, evidence_parts, not_judged, speed_kmh
@@ -43,6 +44,9 @@ EVENT_HEADS: Sequence[str | tuple[str, str]] = (
     ("Peak / threshold", "peak / limit"), ("v_x [km/h]", "v km/h"), "Evidence",
 )  # fmt: skip
 _EPISODE_WORDS = (0, 3, 4, 10)
+_ROUTE = (
+    "Metres from the first position. A click on an episode zooms all plots to it. No map: the page needs no network."
+)
 _HINT = "click a row (or Enter) to zoom all plots to it; click a head to sort"
 _SLOPES = (
     "Where", "At the end", "Dry", "Dry from", ("Compared [s]", ""), ("Estimated [s]", "estimated s"),
@@ -80,6 +84,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         more=events[first:],
     )  # fmt: skip
     drawn, island = _drawn(result, table) if is_drawn else ([], {})
+    route = route_figure(result, _choices(judgement)) if is_drawn else None
     lacks = lacking(result)
     signals = result.signals
     answers: list[Line] = [
@@ -103,6 +108,8 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
                   where="text"),
         ], "event-section", _HINT, fold=f"{counted(len(events), 'detection')}, one by one"),
         *drawn,
+        Section("The drive from above", [Figures(["route"] if route else []), Para(_ROUTE)] if route else [],
+                "route-section", where="page"),
         *not_judged(*([(u.detector, u.missing) for u in some] for some in (result.unavailable, result.limited))),
         Section("Detectors", [_detectors(result)], "detector-section", where="page"),
         Section("Slip slope", [Table(_SLOPES, [_slope(s) for s in result.slopes], "slopes", (0, 3, 10), wide=(10,))],
@@ -114,8 +121,9 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         Section("Time stamps", [_faults(result)], "quality-section", where="page"),
     ]  # fmt: skip
     return Report(
-        "", "aquaplaning in one drive", sections, _facts(result), islands={"drive-data": island},
-        scripts=("paper.js", "panels.js", "drive.js"),
+        "", "aquaplaning in one drive", sections, _facts(result), {"route": route} if route else {},
+        islands={"drive-data": island},
+        scripts=(*(["figures.js"] if route else []), "paper.js", "panels.js", "filters.js", "drive.js"),
     )  # fmt: skip
 
 
@@ -149,6 +157,11 @@ def _parted(judgement: Judgement) -> tuple[Sequence[Episode], Sequence[Episode]]
     """Episodes that may be an answer to the question for water, and those that are none."""
     rest = judgement.of(*FOLDED)
     return [e for e in judgement.episodes if e not in rest], rest
+
+
+def _choices(judgement: Judgement) -> dict[str, Sequence[Episode]]:
+    """Episodes by the table that has them as rows."""
+    return dict(zip(("episodes", "more-episodes"), _parted(judgement), strict=True))
 
 
 def lacking(result: DriveResult) -> list[str]:
@@ -308,8 +321,8 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
     rows = drive_rows(result)
     plan = make_plan(by_importance(result.events), result.signals.frame.height, result.signals.dt)
     spans = [[round(e.start_s, 6), round(e.end_s, 6), int(e.severity == "full")] for e in result.events]
-    parted = zip(("episodes", "more-episodes"), _parted(result.judgement), strict=True)
-    chosen = {id: [[round(e.start_s, 6), round(e.end_s, 6)] for e in found] for id, found in parted}
+    tables = _choices(result.judgement)
+    chosen = {id: [[round(e.start_s, 6), round(e.end_s, 6)] for e in found] for id, found in tables.items()}
     island: dict[str, Any] = {"events": spans, "episodes": chosen}
     if events.more:
         island["table"] = event_columns([*events.rows, *events.more])

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.core.records import DriveResult, Event, FloatArray
-from aqualog.report.figures import axis, dots, figure, rounded
-from aqualog.report.theme import INK, MUTED
-from aqualog.report.values import KMH, place, plot_text
-from aqualog.report.wording import detector_name
+from aqualog.core.judgement import Episode, EpisodeKind
+from aqualog.core.records import DriveResult, FloatArray
+from aqualog.report.drive.judged import KIND_NAMES, episode_sentence
+from aqualog.report.figures import axis, dots, figure, line, rounded
+from aqualog.report.theme import INK, MUTED, THRESHOLD
+from aqualog.report.values import KMH, plot_text
 
 __all__ = ["route_figure", "route_metres"]
 
 EARTH_M = 6_371_000.0  # mean radius of the earth
+_PARTS = 20  # points of a mark
 LEAST_M = 30.0  # a shorter way than this is the noise of a position
 POINTS = 2500  # of the whole way, at equal distances
-MOST_EVENTS = 400  # that are marked, the most important ones
-_LOOKS = (("partial", "event", "#E69F00"), ("full", "event, full", "#B2182B"))
+MOST_MARKS = 400  # of a kind of episode
+_LOOKS: Mapping[EpisodeKind, str] = {
+    "aquaplaning": THRESHOLD, "suspected": "#E69F00", "other_surface": "#8C6D31", "wheel_lock": "#7F6BB3",
+    "single_detector": "#7F6BB3",
+}  # fmt: skip
+"""Colour of each kind of episode; the first ones lie above."""
 
 
 def route_metres(latitude: FloatArray, longitude: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -34,8 +40,8 @@ def route_metres(latitude: FloatArray, longitude: FloatArray) -> tuple[FloatArra
     Returns
     -------
     east, north : array (n,)
-        [m] on a plane that touches the earth there, which is off by less than 0.1 % within 100 km of the equator's
-        side of 60 degrees; NaN where unknown.
+        [m] NaN where unknown. The scale to the east is that of the first position: 100 km to the north of it, at 50
+        degrees, it is 2 % too large.
     """
     known = np.isfinite(latitude) & np.isfinite(longitude) & ((latitude != 0.0) | (longitude != 0.0))
     east, north = np.full(latitude.size, np.nan), np.full(latitude.size, np.nan)
@@ -48,48 +54,55 @@ def route_metres(latitude: FloatArray, longitude: FloatArray) -> tuple[FloatArra
     return east, north
 
 
-def route_figure(result: DriveResult, events: Sequence[Event]) -> dict[str, Any] | None:
+def route_figure(result: DriveResult, tables: Mapping[str, Sequence[Episode]]) -> dict[str, Any] | None:
     """The figure; None for a log without positions, or of a car that stood.
 
     Parameters
     ----------
     result : DriveResult
-    events : sequence of Event
-        The most important first. A mark has the index of its event in `result.events` for the page's script.
+    tables : mapping
+        Episodes by the page's table that has them as rows. A mark has both, so that a click can lead there.
     """
-    frame = result.signals.frame
-    if not {"latitude", "longitude"} <= set(frame.columns):
+    if not {"latitude", "longitude"} <= set(result.signals.frame.columns):
         return None
     east, north = route_metres(*(result.signals.array(s) for s in ("latitude", "longitude")))
     step = np.hypot(np.diff(east, prepend=east[:1]), np.diff(north, prepend=north[:1]))
     way = np.cumsum(np.nan_to_num(step))
     if not way.size or way[-1] < LEAST_M:
         return None
-    dt = result.signals.dt
     shown = _spread(way, np.isfinite(east))
-    v = KMH * (
-        result.features["v_x_hat"].to_numpy() if "v_x_hat" in result.features.columns else np.full(way.size, np.nan)
-    )
-    fast = [None if x is None else round(x, 1) for x in rounded(v[shown])]
-    has_speed = any(x is not None for x in fast)
-    colour = {
-        "color": fast, "colorscale": "Cividis", "showscale": True,
-        "colorbar": {"title": {"text": "v_x [km/h]", "side": "right"}, "thickness": 12, "outlinewidth": 0},
-    } if has_speed else {"color": MUTED}  # fmt: skip
     data = [
-        *_marks(result, events, east, north),
-        {
-            "type": "scatter", "mode": "markers", "name": "drive", "showlegend": False, "x": rounded(east[shown]),
-            "y": rounded(north[shown]), "marker": {"size": 5, **colour},
-            "customdata": [[round(float(i) * dt, 2), x] for i, x in zip(shown, fast, strict=True)],
-            "hovertemplate": "%{customdata[0]:.2f} s, %{customdata[1]} km/h<extra></extra>",
-        },
+        *_marks(tables, east, north, result.signals.dt),
+        _drive(result, east, north, shown),
         _end("start", "circle-open", east[shown[0]], north[shown[0]]),
         _end("end", "x", east[shown[-1]], north[shown[-1]]),
-    ]  # fmt: skip
+    ]
     return figure(
         data, "", axis("east [m]"), axis("north [m]", scaleanchor="x", scaleratio=1), height=480, showlegend=True,
         margin={"t": 10, "l": 66},
+    )  # fmt: skip
+
+
+def _drive(result: DriveResult, east: FloatArray, north: FloatArray, shown: NDArray[np.int64]) -> dict[str, Any]:
+    """The way as dots, coloured by speed where that is known."""
+    v = (
+        result.features["v_x_hat"].to_numpy()[shown]
+        if "v_x_hat" in result.features.columns
+        else np.full(shown.size, np.nan)
+    )
+    fast = [None if x is None else round(x, 1) for x in rounded(KMH * v)]
+    times = [round(float(i) * result.signals.dt, 2) for i in shown]
+    if all(x is None for x in fast):
+        hover, colour = "%{customdata[0]:.2f} s<extra></extra>", {"color": MUTED}
+    else:
+        hover = "%{customdata[0]:.2f} s, %{customdata[1]} km/h<extra></extra>"
+        colour = {
+            "color": fast, "colorscale": "Cividis", "showscale": True,
+            "colorbar": {"title": {"text": "v_x [km/h]", "side": "right"}, "thickness": 12, "outlinewidth": 0},
+        }  # fmt: skip
+    return dots(
+        "drive", east[shown], north[shown], None, style=colour, showlegend=False, hovertemplate=hover,
+        customdata=[list(x) for x in zip(times, fast, strict=True)],
     )  # fmt: skip
 
 
@@ -100,31 +113,28 @@ def _spread(way: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.int64]:
     return inside[np.concatenate([[True], np.diff(steps[inside]) > 0])].astype(np.int64)
 
 
-def _marks(result: DriveResult, events: Sequence[Event], east: FloatArray, north: FloatArray) -> list[dict[str, Any]]:
-    """Each event as a thick line under the drive, where it begins as a marker; by severity."""
-    dt, found = result.signals.dt, []
-    index = {id(e): i for i, e in enumerate(result.events)}
-    for severity, name, colour in _LOOKS:
+def _marks(
+    tables: Mapping[str, Sequence[Episode]], east: FloatArray, north: FloatArray, dt: float
+) -> list[dict[str, Any]]:
+    """Each episode as a thick line under the drive; one trace for each kind."""
+    found = []
+    for kind in reversed(_LOOKS):
+        own = [(t, i, e) for t, of in tables.items() for i, e in enumerate(of) if e.kind == kind][:MOST_MARKS]
         x: list[float | None] = []
         y: list[float | None] = []
         which: list[list[Any] | None] = []
-        for event in events[:MOST_EVENTS]:
-            if event.severity != severity:
-                continue
-            begin, end = (int(np.clip(round(t / dt), 0, east.size - 1)) for t in (event.start_s, event.end_s))
-            own = np.unique(np.linspace(begin, end, min(20, end - begin + 1)).astype(np.int64))
-            x += [*rounded(east[own]), None]
-            y += [*rounded(north[own]), None]
-            where = place(event.wheel, event.side)
-            text = f"{detector_name(event.detector)} {where}".rstrip()
-            words = plot_text(f"{text}, {event.start_s:.2f} – {event.end_s:.2f} s")
-            which += [[index[id(event)], words]] * own.size + [None]
-        if x:
-            found.append({
-                "type": "scatter", "mode": "lines+markers", "name": name, "x": x, "y": y, "customdata": which,
-                "line": {"color": colour, "width": 13}, "marker": {"color": colour, "size": 13}, "opacity": 0.75,
-                "hovertemplate": "%{customdata[1]}<extra></extra>",
-            })  # fmt: skip
+        for table, row, episode in own:
+            begin, end = (int(np.clip(round(t / dt), 0, east.size - 1)) for t in (episode.start_s, episode.end_s))
+            part = np.unique(np.linspace(begin, end, min(_PARTS, end - begin + 1)).astype(np.int64))
+            x += [*rounded(east[part]), None]
+            y += [*rounded(north[part]), None]
+            words = plot_text(f"{KIND_NAMES[kind].capitalize()}: {episode_sentence(episode)}")
+            which += [*[[table, row, words]] * part.size, None]
+        if own:
+            found.append(line(
+                KIND_NAMES[kind], x, y, _LOOKS[kind], width=13, mode="lines+markers", customdata=which, opacity=0.75,
+                marker={"color": _LOOKS[kind], "size": 13}, hovertemplate="%{customdata[2]}<extra></extra>",
+            ))  # fmt: skip
     return found
 
 

@@ -29,6 +29,8 @@ function plotText(text) {
     .replaceAll("$", "＄");
 }
 
+let figuresDrawn = Promise.resolve(); // the figures of figures.js
+
 // A figure in its element, as wide as the paper or as the element, whose height plotly measures.
 function paint(plot, data, layout, config, width) {
   plot.style.height = layout.height + "px";

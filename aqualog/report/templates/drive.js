@@ -84,10 +84,11 @@
   });
   const strips = (data.rows || []).map(function (row) { return row.strips && spansOf(row.strips.spans); });
 
-  // Union of events of one severity.
+  // Union of wanted events of one severity.
   function shaded(isFull) {
     const begin = [], end = [];
-    for (const [a, b, full] of data.events.slice().sort(function (p, q) { return p[0] - q[0]; })) {
+    const shown = data.events.filter(function (_, i) { return isWanted(i); });
+    for (const [a, b, full] of shown.sort(function (p, q) { return p[0] - q[0]; })) {
       const last = end.length - 1;
       if (Boolean(full) !== isFull) continue;
       if (last >= 0 && a <= end[last]) end[last] = Math.max(end[last], b);
@@ -95,7 +96,8 @@
     }
     return { begin: begin, end: end };
   }
-  const shades = { partial: shaded(false), full: shaded(true) };
+  let isWanted = function () { return true; }; // an event, by the filters
+  let shades = { partial: shaded(false), full: shaded(true) };
 
   // Spans in a range, as [begin, end]; those that are closer than can be seen are one, and none is shorter than `least`.
   function inside(spans, from, to, unseen, least = 0) {
@@ -316,7 +318,8 @@
   function step(by) {
     const isLong = long && stepped === "events";
     const rows = choices[stepped].body.rows;
-    const order = isLong ? long.order : Array.from(rows, function (r) { return Number(r.dataset.row); });
+    const seen = Array.from(rows).filter(function (r) { return !r.hidden; });
+    const order = isLong ? long.order : seen.map(function (r) { return Number(r.dataset.row); });
     if (!order.length) return;
     const at = selected[0] === stepped ? order.indexOf(selected[1]) : -1;
     const next = at < 0 ? (by > 0 ? 0 : order.length - 1) : (at + by + order.length) % order.length;
@@ -395,7 +398,7 @@
       return columns.map(function (column) { return column(i)[0]; }).join(" ").toLowerCase();
     });
     const found = data.events.map(function (_, i) { return i; }).filter(function (i) {
-      return words.every(function (word) { return long.words[i].includes(word); });
+      return isWanted(i) && words.every(function (word) { return long.words[i].includes(word); });
     });
     const heads = Array.from(eventTable.tHead.rows[0].cells);
     const column = heads.findIndex(function (head) { return head.hasAttribute("aria-sort"); });
@@ -419,6 +422,23 @@
     let first = 0;
     window.addEventListener("beforeprint", function () { first = long.first; fillEvents(0, Infinity); });
     window.addEventListener("afterprint", function () { fillEvents(first); });
+  }
+
+  // --- filters ------------------------------------------------------------------------------------------------
+
+  if (eventBody) {
+    const rows = Array.from(eventBody.rows).sort(function (p, q) { return p.dataset.row - q.dataset.row; });
+    const texts = function (i) {
+      const cells = [0, 1, 8];
+      if (long) return cells.map(function (c) { return columns[c](i)[0]; });
+      return cells.map(function (c) { return rows[i].cells[c].textContent.trim(); });
+    };
+    isWanted = eventFilters(eventTable, data.events.length, texts, function () {
+      if (long) orderEvents();
+      else for (const row of rows) row.hidden = !isWanted(Number(row.dataset.row));
+      shades = { partial: shaded(false), full: shaded(true) };
+      if (plot) draw(view);
+    });
   }
 
   // --- sorting ------------------------------------------------------------------------------------------------
@@ -511,6 +531,14 @@
       if (isFree) inFull.delete(k); else inFull.add(k);
       draw(view);
     },
+  });
+
+  const route = document.getElementById("route");
+  if (route) figuresDrawn.then(function () {
+    route.on("plotly_click", function (e) {
+      const found = e.points.map(function (p) { return p.customdata; }).find(function (c) { return c && choices[c[0]]; });
+      if (found) zoomTo(found[0], found[1], true);
+    });
   });
 
   build().then(function () {

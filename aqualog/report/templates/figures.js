@@ -23,6 +23,7 @@
     }, Promise.resolve());
   }
 
-  build().then(function () { document.body.dataset.ready = "true"; });
+  figuresDrawn = build();
+  figuresDrawn.then(function () { document.body.dataset.ready = "true"; });
   redrawn(build);
 })();

@@ -195,6 +195,30 @@ def test_sorting_keeps_rows_and_their_events_together(show, short):
     assert x_range(browser)[0] <= starts[0] <= x_range(browser)[1]
 
 
+def test_events_are_filtered_with_their_shades(show, short):
+    from selenium.webdriver.support.ui import Select
+
+    event = next(e for e in short.events if e.detector == "spin_down" and e.wheel == "rl")
+    brakes = replace(event, evidence={**event.evidence, "braking_at_start": True})
+    browser = show(replace(short, events=tuple(brakes if e is event else e for e in short.events)))
+    browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    labels = browser.find_elements("css selector", "#events-filters label")
+    assert [label.text.split()[0] for label in labels] == ["Detector", "Where", "Braking"]
+    seen = "return [...document.querySelectorAll('#events tbody tr')].filter(r => !r.hidden).map(r => Number(r.dataset.row))"
+    Select(labels[2].find_element("css selector", "select")).select_by_value("while braking")
+    index = [i for i, e in enumerate(short.events) if e is event]
+    assert browser.execute_script(seen) == index
+    wait_for(lambda: shade(browser, FULL_SHADE) == [] and len(shade(browser, EVENT_SHADE)) == 1)
+    Select(labels[2].find_element("css selector", "select")).select_by_value("")
+    Select(labels[1].find_element("css selector", "select")).select_by_value("RR")
+    assert [short.events[i].wheel for i in browser.execute_script(seen)] == ["rr"] * 1
+    assert (
+        browser.execute_script("return document.querySelector('#events-filters [role=status]').textContent")
+        == "1 of 15"
+    )
+    assert severe(browser) == []
+
+
 def outline(browser):
     """Width and height of the plots [px], and heights of their panels."""
     script = """

@@ -6,7 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.report.drive.report import by_importance
+from aqualog.core.judgement import Episode
+from aqualog.report.drive.report import drive_page
 from aqualog.report.drive.route import POINTS, route_figure, route_metres
 from tests.report import fake_result as fake
 
@@ -33,22 +34,32 @@ def test_metres_across_the_date_line_and_without_a_fix():
     assert north[2:] == pytest.approx([0.0, 111.2, 0.0], abs=0.1)
 
 
-def test_speed_is_the_colour_and_events_lie_on_the_way(result):
-    figure = route_figure(result, by_importance(result.events))
+def episode(kind, start_s, end_s):
+    return Episode(kind, start_s, end_s, ("fl",), "f", "left", "partial", 28.0, (), 0.5, -0.1, 20.0, (0,))
+
+
+def test_speed_is_the_colour_and_episodes_lie_on_the_way(result):
+    tables = {"episodes": [episode("aquaplaning", 9.0, 12.0)], "more-episodes": [episode("wheel_lock", 3.0, 3.01)]}
+    figure = route_figure(result, tables)
     drive = next(t for t in figure["data"] if t["name"] == "drive")
     assert len(drive["x"]) <= POINTS + 1
     assert drive["x"][-1] == pytest.approx(800.0, abs=1.0)
     assert drive["marker"]["color"][0] == pytest.approx(3.6 * result.features["v_x_hat"][0], abs=0.1)
-    marks = [t for t in figure["data"] if t["name"].startswith("event")]
-    assert {i for t in marks for c in t["customdata"] if c for i in c[:1]} == set(range(len(result.events)))
-    event = result.events[0]
-    mark = next(t for t in marks if any(c and c[0] == 0 for c in t["customdata"]))
-    at = [x for x, c in zip(mark["x"], mark["customdata"], strict=True) if c and c[0] == 0]
-    assert at[0] == pytest.approx(800.0 * event.start_s / 30.0, abs=1.0)
+    lock, wet = figure["data"][:2]
+    assert [lock["name"], wet["name"]] == ["wheel lock", "aquaplaning"]
+    assert wet["x"][0] == pytest.approx(800.0 * 9.0 / 30.0, abs=1.0)
+    assert wet["x"][-2] == pytest.approx(800.0 * 12.0 / 30.0, abs=1.0)
+    assert wet["customdata"][0] == ["episodes", 0, "Aquaplaning: 9.0–12.0 s, 101 km/h, front left, partial"]
+    assert lock["customdata"][0][:2] == ["more-episodes", 0]
     assert figure["layout"]["yaxis"]["scaleanchor"] == "x"
 
 
 @pytest.mark.parametrize("east", [np.zeros(3000), np.full(3000, np.nan)])
 def test_a_car_that_stood_or_has_no_fix_has_no_figure(result, east):
-    assert route_figure(driven(result, east), ()) is None
-    assert route_figure(fake.make_result(), ()) is None
+    assert route_figure(driven(result, east), {}) is None
+    assert route_figure(fake.make_result(), {}) is None
+
+
+def test_the_page_has_the_route_of_a_log_with_positions(result):
+    assert 'id="route"' in drive_page(result, title="t")
+    assert 'id="route"' not in drive_page(fake.make_result(), title="t")
