@@ -91,9 +91,29 @@ class ClockFit:
         """Return how far the peak stands above the second best, relative to the peak: 0 ambiguous, 1 and more clear."""
         return (self.peak - self.runner_up) / self.peak
 
+    @property
+    def has_slip(self) -> bool:
+        """Return whether part of `offset_s` is tyre slip and no time: the intervals of both offsets do not overlap."""
+        low, high = self.slip_offset_ci95
+        return bool(low > self.offset_ci95[1] or high < self.offset_ci95[0])
+
+    @property
+    def taken_s(self) -> float:
+        """Return the offset to use: that with tyre slip in the model where slip is seen, else `offset_s`. [s]"""
+        return self.slip_offset_s if self.has_slip else self.offset_s
+
+    @property
+    def taken_because(self) -> str:
+        """Return why this one of two offsets is taken; empty where there is one only."""
+        if np.isnan(self.slip_offset_s):
+            return ""
+        if self.has_slip:
+            return "tyre slip is part of the plain offset: the two intervals do not overlap"
+        return "no tyre slip is seen, the two intervals overlap; the plain fit has the fewer unknowns"
+
     def to_reference(self, t_ns: TimeArray) -> TimeArray:
         """Return stamps (n,) on the reference's clock, a new array: t - offset - drift * (t - t_mid). int64"""
-        shift = np.full(t_ns.shape, self.offset_s)
+        shift = np.full(t_ns.shape, self.taken_s)
         if self.drift_significant:
             shift += self.drift_ppm * 1e-6 * ((t_ns - self.mid_ns) * 1e-9)
         return t_ns - np.rint(shift * 1e9).astype(np.int64)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.align.mapping import SignalMap
-from aqualog.core.errors import AqualogError, ConfigError
+from aqualog.core.errors import AqualogError, ConfigError, SignalError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import names_of, number_of, text_of
 from aqualog.face.drive import Drive, read, vehicle_of
@@ -31,8 +31,8 @@ __all__ = ["Alignment", "align", "check_quantity"]
 class Alignment(Result):
     """Clock offset, drift and scale of each source against a reference.
 
-    `fits` and `refused` have an entry for each source that could and could not be aligned. `compared` are the
-    samples, that of the reference first; `before` is the signal map that was given.
+    `fits` and `refused` have an entry for each source that could and could not be aligned, `left_out` for each file
+    without the quantity. `compared` are the samples, that of the reference first; `before` is the map that was given.
     """
 
     compared: tuple[Quantity, ...]
@@ -40,11 +40,12 @@ class Alignment(Result):
     refused: Mapping[str, AqualogError]
     quantity: str
     before: SignalMap
+    left_out: Mapping[str, AqualogError]
 
     @property
     def offsets(self) -> dict[str, float]:
         """By how much each source is late against the reference. [s]"""
-        return {file: fit.offset_s for file, fit in self.fits.items()}
+        return {file: fit.taken_s for file, fit in self.fits.items()}
 
     @cached_property
     def map(self) -> SignalMap:
@@ -54,14 +55,14 @@ class Alignment(Result):
         clocks = dict(self.before.clocks)
         for file, fit in self.fits.items():
             drift = fit.drift_ppm if fit.drift_significant else 0.0
-            clocks[file] = SourceClock(round(fit.offset_s, 6), round(drift, 3), round(fit.mid_ns * 1e-9, 3))
+            clocks[file] = SourceClock(round(fit.taken_s, 6), round(drift, 3), round(fit.mid_ns * 1e-9, 3))
         return replace(self.before, clocks=clocks)
 
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.alignment import alignment_document
 
-        return alignment_document(self.compared, {**self.fits, **self.refused}, self.quantity)
+        return alignment_document(self.compared, {**self.fits, **self.refused}, self.quantity, self.left_out)
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -71,16 +72,17 @@ class Alignment(Result):
     def _report(self) -> Report:
         from aqualog.report.alignment import alignment_report
 
-        return alignment_report(self.compared, {**self.fits, **self.refused}, self.quantity)
+        return alignment_report(self.compared, {**self.fits, **self.refused}, self.quantity, self.left_out)
 
     def headline(self) -> str:
         reference = self.compared[0]
         lines = [f"{self.quantity.replace('_', ' ')} against {reference.file} ({reference.label})"]
         for file, fit in self.fits.items():
-            low, high = fit.offset_ci95
+            low, high = fit.slip_offset_ci95 if fit.has_slip else fit.offset_ci95
             drift = f", drift {fit.drift_ppm:+.0f} ppm" if fit.drift_significant else ""
-            lines.append(f"  {file}: {fit.offset_s:+.4f} s (95 %: {low:+.4f} ... {high:+.4f}){drift}")
-        return "\n".join([*lines, *(f"  {file}: refused: {e.what}" for file, e in self.refused.items())])
+            lines.append(f"  {file}: {fit.taken_s:+.4f} s (95 %: {low:+.4f} ... {high:+.4f}){drift}")
+        lines += [f"  {file}: refused: {e.what}" for file, e in self.refused.items()]
+        return "\n".join([*lines, *(f"  {file}: left out: {e.what}" for file, e in self.left_out.items())])
 
     def plot(self) -> go.Figure:
         """Return the quantity of all sources on the clock of the reference, and each source less the reference."""
@@ -181,7 +183,7 @@ def align(
                 f'channel "{file}={channel}"', expected=f"FILE=CHANNEL with FILE one of {', '.join(files)}"
             )
     with drive.reading():
-        compared = _compared(drive, vehicle_of(vehicle, drive), quantity, channels or {}, hear)
+        compared, left_out = _compared(drive, vehicle_of(vehicle, drive), quantity, channels or {}, hear)
         fits: dict[str, ClockFit] = {}
         refused: dict[str, AqualogError] = {}
         for source in compared[1:]:
@@ -192,10 +194,12 @@ def align(
                 refused[source.file] = error
     for file, refusal in refused.items():
         hear.failed(file, refusal.line())
-    changes = drive.changes()
+    notes = list(drive.changes())
+    if files[0] in left_out:
+        notes.append(f"{files[0]} carries no {quantity.replace('_', ' ')}: {compared[0].file} is the reference")
     return Alignment(
-        tuple(compared), fits, refused, quantity, drive.signal_map, notes=changes, has_loss=bool(refused or changes),
-        sources=drive.sources,
+        tuple(compared), fits, refused, quantity, drive.signal_map, left_out, notes=tuple(notes),
+        has_loss=bool(refused or left_out or notes), sources=drive.sources,
     )  # fmt: skip
 
 
@@ -209,7 +213,8 @@ def check_quantity(quantity: str) -> None:
 
 def _compared(
     drive: Drive, vehicle: Vehicle, quantity: str, channels: Mapping[str, str], hear: Listener
-) -> list[Quantity]:  # fmt: skip
+) -> tuple[list[Quantity], dict[str, AqualogError]]:
+    """Return the quantity of each file that carries it, and of the others why they are left out."""
     from aqualog.align.load import read_options
     from aqualog.align.quantity import find_quantity
     from aqualog.io.open_log import DriveLog
@@ -217,13 +222,23 @@ def _compared(
     with DriveLog(list(drive.paths), read_options(drive.signal_map, list(drive.dbc))) as log:
         hear("reading")
         found = log.read(log.channels())
-        return [
-            find_quantity(
-                [c for (file, _), c in found.items() if file == p.name],
-                quantity=quantity, signal_map=drive.signal_map, vehicle=vehicle, named=channels.get(p.name),
+    compared: list[Quantity] = []
+    left_out: dict[str, AqualogError] = {}
+    for name in (p.name for p in drive.paths):
+        own = [c for (file, _), c in found.items() if file == name]
+        try:
+            compared.append(
+                find_quantity(
+                    own, quantity=quantity, signal_map=drive.signal_map, vehicle=vehicle, named=channels.get(name)
+                )
             )
-            for p in drive.paths
-        ]  # fmt: skip
+        except SignalError as error:
+            if name in channels:  # asked for by name
+                raise
+            left_out[name] = error
+    if len(compared) < 2:
+        raise next(iter(left_out.values()))
+    return compared, left_out
 
 
 def _compare(

@@ -25,9 +25,14 @@ __all__ = ["alignment_document", "alignment_figures", "alignment_report"]
 Fits = Mapping[str, ClockFit | AqualogError]
 
 
-def alignment_report(compared: Sequence[Quantity], fits: Fits, quantity: str) -> Report:
+def alignment_report(
+    compared: Sequence[Quantity], fits: Fits, quantity: str, left_out: Mapping[str, AqualogError]
+) -> Report:
     """Offset, drift, scale and match of each source; the first source is the reference."""
     sections = [_section(compared[0], c, fits[c.file], quantity) for c in compared[1:]]
+    if left_out:
+        rest = Lines([f"left out: {file}: {error.what}" for file, error in left_out.items()])
+        sections.append(Section("", [rest]))
     return Report("clocks", "clocks of several loggers", sections)
 
 
@@ -48,18 +53,20 @@ def _section(reference: Quantity, source: Quantity, fit: ClockFit | AqualogError
     ]  # fmt: skip
     if quantity == "speed" and not math.isnan(fit.slip_offset_s):
         low, high = fit.slip_offset_ci95
-        is_slip = low > fit.offset_ci95[1] or high < fit.offset_ci95[0]
-        remark = "with tyre slip in the model" + (": part of the offset is tyre slip, not time" if is_slip else "")
+        remark = "with tyre slip in the model"
         rows.insert(1, ("", f"{fit.slip_offset_s:+.4f} s", f"{low:+.4f} ... {high:+.4f}", remark))
     match = (
         f"correlation {fit.peak:.3f} (limit {fit.peak_limit:.3f}, next best {fit.runner_up:.3f}) over "
         f"{fit.overlap_s:.0f} s, residual {fit.rms:.3g} {QUANTITIES[quantity]}"
     )
     table = Table(("Clock", "Value", "95 %", "Remark"), rows, words=(0, 3), wide=(3,))
-    return Section("", [Para(head, "everywhere"), table, Lines([("match", match), *notes])])
+    taken = [("taken", f"{fit.taken_s:+.4f} s: {fit.taken_because}")] if fit.taken_because else []
+    return Section("", [Para(head, "everywhere"), table, Lines([*taken, ("match", match), *notes])])
 
 
-def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) -> dict[str, Any]:
+def alignment_document(
+    compared: Sequence[Quantity], fits: Fits, quantity: str, left_out: Mapping[str, AqualogError]
+) -> dict[str, Any]:
     """Return the JSON document; NaN and infinities become null."""
     sources = []
     for source in compared[1:]:
@@ -69,6 +76,7 @@ def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) 
             entry["refused"] = fit.line()
         else:
             entry |= plain(dataclasses.asdict(fit), None)
+            entry |= {"taken_s": plain(fit.taken_s, None), "taken_because": fit.taken_because}
         sources.append(entry)
     return {
         "schema_version": 1,
@@ -76,6 +84,7 @@ def alignment_document(compared: Sequence[Quantity], fits: Fits, quantity: str) 
         "quantity": quantity,
         "reference": {"file": compared[0].file, "channel": compared[0].label},
         "sources": sources,
+        "left_out": [{"file": file, "reason": error.line()} for file, error in left_out.items()],
     }
 
 

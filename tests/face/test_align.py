@@ -91,3 +91,45 @@ def test_wrong_arguments(folder, arguments, said):
 def test_one_file_is_too_few(folder):
     with pytest.raises(aq.AqualogError, match="at least one source"):
         aq.align(folder / "wheels.csv")
+
+
+@pytest.fixture
+def others(tmp_path):
+    """Two files without any speed."""
+    t = np.arange(0.0, 200.0, 0.1)
+    for name, column in (("brake.csv", "BRK_PRESS"), ("steer.csv", "STEER_POS")):
+        pl.DataFrame({"t": t, column: 40.0 * np.sin(0.3 * t)}).write_csv(tmp_path / name)
+    return tmp_path / "brake.csv", tmp_path / "steer.csv"
+
+
+def test_files_without_the_quantity_are_left_out_and_said(folder, others):
+    files = others[0], folder / "wheels.csv", folder / "gps.csv", others[1]
+    result = aq.align(files)
+    assert result.offsets["gps.csv"] == pytest.approx(LATE, abs=0.02)
+    assert list(result.left_out) == ["brake.csv", "steer.csv"]
+    assert result.compared[0].file == "wheels.csv"
+    assert "brake.csv carries no speed: wheels.csv is the reference" in result.notes
+    printed, _ = command("align", *files, "--json", code=3)
+    assert printed == result.to_json() + "\n"
+    assert "left out: steer.csv: no speed found" in result.text()
+    check_shown(result)
+    assert "no speed found" in command("align", others[0], folder / "gps.csv", code=4)[1]
+    with pytest.raises(aq.AqualogError, match="no channel"):
+        aq.align(files, channels={"steer.csv": "speed"})
+
+
+@pytest.mark.parametrize(("slip", "taken"), [(0.0, "the two intervals overlap"), (0.002, "tyre slip is part")])
+def test_of_two_offsets_one_is_taken_and_it_says_why(tmp_path, slip, taken):
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 400.0, 0.05)
+    v = 25.0 + 9.0 * np.sin(0.11 * t) + 4.0 * np.sin(0.53 * t + 1.0) + np.sin(1.9 * t)
+    wheels = v + slip * v * np.gradient(v, t)
+    pl.DataFrame({"t": t, "v_x": wheels + 0.01 * rng.standard_normal(t.size)}).write_csv(tmp_path / "a.csv")
+    pl.DataFrame({"t": t + LATE, "v_x": v + 0.01 * rng.standard_normal(t.size)}).write_csv(tmp_path / "b.csv")
+    result = aq.align(tmp_path / "a.csv", tmp_path / "b.csv")
+    fit = result.fits["b.csv"]
+    assert fit.has_slip == bool(slip)
+    assert result.offsets["b.csv"] == (fit.slip_offset_s if slip else fit.offset_s)
+    assert result.map.clocks["b.csv"].offset_s == pytest.approx(LATE, abs=0.01)
+    assert taken in result.text()
+    assert result.document["sources"][0]["taken_s"] == pytest.approx(result.offsets["b.csv"])

@@ -178,7 +178,7 @@ _PROPOSED = (
 
 INIT = Document(
     "init",
-    "aqualog init LOG -o FOLDER --json",
+    "aqualog init LOG --json",
     "A start for one drive: guessed signals, files that were written, what is to be filled in, and what is next.",
     (
         *HEAD,
@@ -273,6 +273,8 @@ _FIT = maybe(
     *or_null(number("slip_offset_s", "s", "offset if the difference may hold tyre slip too; null unless the quantity "
                     "is a speed")),
     interval("slip_offset_ci95", "s", "95 % interval"),
+    number("taken_s", "s", "of the two offsets the one that a map gets"),
+    text("taken_because", "why it is that one; empty where there is one only"),
     number("drift_ppm", "ppm", "growth of the offset"),
     interval("drift_ppm_ci95", "ppm", "95 % interval"),
     flag("drift_significant", "whether the 99 % interval of the drift excludes 0; only then it is used"),
@@ -304,6 +306,7 @@ ALIGN = Document(
         rows("sources", "each other source", (
             text("file", "file"), text("channel", "channel, or how the quantity was made"), *_FIT,
         )),
+        rows("left_out", "each file without the quantity", (text("file", "file"), text("reason", "why"))),
     ),
     files=("alignment.json",),
 )  # fmt: skip
