@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 import typer
 
 from aqualog.core.errors import AqualogError, ConfigError, ExitCode
+from aqualog.core.units import displayed_units
 from aqualog.face.listener import Listener
 from aqualog.guard.command import supervised
 
@@ -22,15 +23,19 @@ if TYPE_CHECKING:
 
 __all__ = ["Console", "Heard", "clean", "clean_line", "guarded", "told_if_interrupted"]
 
-_SHOWN_AT_ONCE = 20  # inputs that failed
+_SHOWN_AT_ONCE = 20  # reasons why inputs failed
+_NAMED = 5  # inputs with one of them
 SLOW_S = 5.0  # a first step that takes longer than this is compiling
 _LINE = 2000  # characters that anybody reads of a line
 PROGRESS_MODES = ("auto", "bar", "plain", "off")
 
 
 def clean(text: str) -> str:
-    """Text without control characters, so that a name in a log cannot drive the terminal; endless lines are cut."""
-    shown = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
+    """Text without control characters, so that a name in a log cannot drive the terminal; endless lines are cut.
+
+    Units stand as on pages.
+    """
+    shown = "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in displayed_units(text))
     lines = shown.split("\n")
     return "\n".join(x if len(x) <= _LINE else f"{x[: _LINE - 40]}… ({len(x)} characters)" for x in lines)
 
@@ -76,6 +81,7 @@ class Console:
             yield heard
         finally:
             heard.clear()
+            heard.tell_rest()
 
     def can_ask(self) -> bool:
         """Whether somebody is there to answer."""
@@ -101,7 +107,8 @@ class Heard(Listener):
 
     def __init__(self, console: Console, mode: str) -> None:
         self.console, self.mode = console, mode
-        self._width = self._failed = 0
+        self._width = 0
+        self._failed: dict[str, list[str]] = {}  # of each reason the inputs, in order
 
     def __call__(self, step: str) -> None:
         """Show a step."""
@@ -128,18 +135,30 @@ class Heard(Listener):
         self.console.detail(text)
 
     def failed(self, name: str, reason: str) -> None:
-        """Show an input that failed; of many the first ones."""
-        self._failed += 1
-        if self._failed <= _SHOWN_AT_ONCE:
+        """Show an input that failed; of many the first ones, and of those with one reason the first."""
+        text = reason if name in reason else f"{name}: {reason.removeprefix(f'{Path(name).name}: ')}"
+        inputs = self._failed.setdefault(text.replace(name, "", 1), [])
+        inputs.append(name)
+        if len(inputs) == 1 and len(self._failed) <= _SHOWN_AT_ONCE:
             self.clear()
-            text = reason if name in reason else f"{name}: {reason.removeprefix(f'{Path(name).name}: ')}"
             sys.stderr.write(f"error: {clean_line(text)}\n")
 
     def settled(self, where: str) -> None:
-        """Show how many more failed."""
-        if self._failed > _SHOWN_AT_ONCE:
-            self.clear()
-            sys.stderr.write(f"error: and {self._failed - _SHOWN_AT_ONCE} more; all are in {where}\n")
+        """Show how many more failed, and where all are listed."""
+        self.clear()
+        self.tell_rest(f"; all are in {where}")
+
+    def tell_rest(self, where: str = "") -> None:
+        """Show the inputs that failed for a reason that was shown, and how many failed for others."""
+        reasons = list(self._failed.values())
+        for first, *same in reasons[:_SHOWN_AT_ONCE]:
+            if same:
+                names = ", ".join(same[:_NAMED]) + (", ..." if len(same) > _NAMED else "")
+                sys.stderr.write(f"error: {clean_line(f'the same as of {first} for {len(same)} more: {names}')}\n")
+        rest = sum(map(len, reasons[_SHOWN_AT_ONCE:]))
+        if rest:
+            sys.stderr.write(f"error: and {rest} more{where}\n")
+        self._failed = {}
 
     @contextmanager
     def slow(self, what: str) -> Iterator[None]:

@@ -224,8 +224,9 @@ def evaluate(
         found.write_page(out, force=True)
     if junit is not None:  # also without a drive: the build server then shows why
         found.write_junit(junit, force=True)
-    for name, reason in found.evaluation.failed.items():
-        run.console.error(reason if name in reason else f"{name}: {reason}")
+    with run.hearing() as hear:
+        for name, reason in found.evaluation.failed.items():
+            hear.failed(name, reason)
     if not has_records:
         return Output(code=int(ExitCode.NOTHING_USABLE))
     for name, reason in found.late.items():

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["figures", "reproduce", "simulate"]
 
 _WIDTH = {"figures": 100, "reproduce": 90}
-"""Characters of a finding on a terminal; it is whole where it is kept or passed on."""
+"""Characters of a line of a finding on a terminal; it is one line where it is kept or passed on."""
 
 
 @command("what out:simulated model:simulated seed jobs:drives json force")
@@ -115,7 +115,7 @@ def figures(run: Run, numbers: list[str], out: Path, campaign: Path | None, form
     with run.hearing(BATCH_BROKEN_OFF if own else "") as hear:
         found = figures(numbers, own, out=out, formats=wanted, force=run.force, jobs=run.jobs, progress=hear)
     pages = ", ".join(p.name for p in found.written if p.suffix == ".html")
-    notes = [f"{len(found.written)} files are in {out}" + (f": {pages}" if pages else "")]
+    notes = [f"{len(found.written)} files are in {out}" + (f": {pages}" if pages else "")] if found.written else []
     text = found.text(width=_WIDTH["figures"]) if sys.stdout.isatty() else None
     if not found.made:
         return Output(found, notes, text=text, code=int(ExitCode.NOTHING_USABLE))

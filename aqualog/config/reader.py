@@ -8,7 +8,7 @@ import io
 import math
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -36,6 +36,7 @@ LARGEST_TABLE = 64 * 2**20  # [byte]
 DEEPEST = 100  # levels of tables and lists that any file needs
 _MOST_PARTS = 100  # parts of a dotted key; tomllib takes time with their square
 _MOST_TOLD = 20  # faults of a file; each is looked for in the whole text
+_MOST_LINES = 6  # of one fault
 _LONGEST = 500  # characters of one fault; a cell may be of any length
 _LONGEST_KEY = 60  # characters of an unknown key that are shown
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
@@ -109,8 +110,18 @@ def read(path: Path, what: str) -> Table:
     except RecursionError as error:  # at some hundred levels, as it happens
         raise ConfigError(f"{what} is nested deeper than {DEEPEST} levels", where=str(path)) from error
     except ValueError as error:  # also numbers of thousands of digits
-        raise ConfigError(f"{what} is not valid TOML: {error}", where=str(path)) from error
+        raise ConfigError(f"{what} is not valid TOML: {_at_key(error, text)}", where=str(path)) from error
     return Table(document, Faults(path), lines=text.splitlines())
+
+
+def _at_key(error: ValueError, text: str) -> str:
+    """What the parser says, with the line that it stumbled over."""
+    at = re.search(r"\(at line (\d+), column \d+\)", str(error))
+    if at is None:
+        return str(error)
+    line = text.split("\n")[int(at[1]) - 1].strip()
+    shown = line if len(line) <= _LONGEST_KEY else f"{line[:_LONGEST_KEY]} ..."
+    return f"{error}: {shown}" if line else str(error)
 
 
 def read_csv(path: Path, what: str) -> list[list[str]]:
@@ -167,7 +178,7 @@ class Faults:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._found: list[str] = []
+        self._found: dict[str, list[int]] = {}
         self._untold = 0
 
     @property
@@ -176,18 +187,29 @@ class Faults:
         return len(self._found) == _MOST_TOLD
 
     def add(self, message: str, find_line: Callable[[], int | None] = lambda: None) -> None:
-        """Note a fault; its line (from 1) is looked for only where it is spelt out."""
-        if self.is_full:
+        """Note a fault; its line (from 1) is looked for only where it is spelt out. Equal ones become one."""
+        if self.is_full and message not in self._found:
             self._untold += 1
             return
+        lines = self._found.setdefault(message, [])
         line = find_line()
-        self._found.append(f"line {line}: {message}" if line else message)
+        if line:
+            lines.append(line)
 
     def raise_if_any(self) -> None:
         """Raise one ConfigError with the faults."""
         if self._found:
             more = [f"and {self._untold} more"] if self._untold else []
-            raise ConfigError("; ".join([*self._found, *more]), where=str(self._path))
+            told = [f"{_lines_text(lines)}{message}" for message, lines in self._found.items()]
+            raise ConfigError("; ".join([*told, *more]), where=str(self._path))
+
+
+def _lines_text(lines: Sequence[int]) -> str:
+    """`line 3: `, `lines 3, 4, 7: `, of many the first ones."""
+    if not lines:
+        return ""
+    more = f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else ""
+    return f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:_MOST_LINES]))}{more}: "
 
 
 class Table:
@@ -197,7 +219,7 @@ class Table:
     """
 
     def __init__(
-        self, values: Mapping[str, Any], faults: Faults, *, lines: list[str], name: str = "", index: int = 0,
+        self, values: Mapping[str, Any], faults: Faults, *, lines: list[str], name: str = "", index: int | None = None,
         parent: Table | None = None,
     ) -> None:  # fmt: skip
         self.values = values
@@ -218,7 +240,8 @@ class Table:
         """Return the line (from 1) of a key or table in this table, else of the table itself; None if not found."""
         headers = [(i, re.sub("[\"']", "", m[1])) for i, line in enumerate(self.lines) if (m := _HEADER.match(line))]
         own = [i for i, name in headers if name == self.name]
-        begin = -1 if not self.name else own[self._index] if self._index < len(own) else None
+        index = self._index or 0
+        begin = -1 if not self.name else own[index] if index < len(own) else None
         if begin is None:  # written in braces, or with points
             return self._parent.line_of(self.name.rpartition(".")[2]) if self._parent else None
         end = next((i for i, _ in headers if i > begin), len(self.lines))
@@ -256,9 +279,14 @@ class Table:
             return None
         value = self._number(name, of.unit)
         if value is not None and (not of.low <= value <= of.high or not abs(value) < 1e300):
-            self.add(name, f"{name} = {value:g} is outside {of.low:g} ... {of.high:g} {of.unit}".rstrip())
+            bounds = f"{of.low:g} ... {of.high:g} {of.unit}".rstrip()
+            self.add(name, f"{self._path_of(name)} = {value:g} is outside {bounds}")
             return None
         return value
+
+    def _path_of(self, name: str) -> str:
+        """A key with the table that it stands in; of tables in a list the line says which one."""
+        return f"{self.name}.{name}" if self.name and self._index is None else name
 
     def _number(self, name: str, unit: str) -> float | None:
         value = self.values[name]
@@ -267,8 +295,8 @@ class Table:
         if isinstance(value, str) and reads_as_number(value.strip().replace(",", ".")):
             told = f'"{value[:40]}" is a text, not a number; write it without quotes, with a point'
         else:
-            told = f"{str(value)[:40]} is not a number"
-        self.add(name, f"{name} = {told}")
+            told = f"{repr(value)[:40]} is not a number"
+        self.add(name, f"{self._path_of(name)} = {told}")
         return None
 
     def numbers(self, keys: Mapping[str, Bounded], *extra: str) -> dict[str, float]:

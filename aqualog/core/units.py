@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from aqualog.core.errors import SignalError
 
-__all__ = ["Unit", "convert", "displayed_text", "displayed_unit", "is_unit", "parse_unit", "spellings"]
+__all__ = [
+    "Unit",
+    "convert",
+    "displayed_text",
+    "displayed_unit",
+    "displayed_units",
+    "is_unit",
+    "parse_unit",
+    "spellings",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +169,17 @@ def displayed_unit(unit: str) -> str:
     if unit == "-":
         return "–"
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), unit).replace("*", "·")
+
+
+_ATOM = r"(?:1|k?g|[km]?m|s|h|min|k?N|rad|deg|k?Pa|K|W|J)(?:\^-?\d)?"
+_WORD = re.compile(rf"(?<![\w/*^.\\-])\(?{_ATOM}(?:[*/]{_ATOM})*(?:\)\^-?\d)?(?![\w/*^\\]|\.\w)")
+
+
+def displayed_units(text: str) -> str:
+    """A text in which each word that is a unit stands as `displayed_unit` shows it; paths and names stay."""
+    if "^" not in text and "*" not in text:
+        return text
+    return _WORD.sub(lambda word: displayed_unit(word[0]), text)
 
 
 def displayed_text(text: str) -> str:

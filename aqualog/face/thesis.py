@@ -85,9 +85,7 @@ class Figures(Result):
         return {"findings": self.tables["findings"]}
 
     def text(self, *, width: int = _WHOLE) -> str:
-        """Return claim, figure, verdict and finding; `width` cuts the findings."""
-        from textwrap import shorten
-
+        """Return claim, figure, verdict and finding, which goes on below after `width` characters."""
         from aqualog.report.text import table
 
         has_values = any(c.ci95 is not None for _, c in self.findings)
@@ -97,12 +95,12 @@ class Figures(Result):
                 f.number,
                 c.verdict,
                 *((_value(c),) if has_values else ()),
-                shorten(displayed_text(c.found), width, placeholder=" ..."),
+                displayed_text(c.found),
             )
             for f, c in self.findings
         ]
         head = ("claim", "figure", "verdict", *(("value, 95 %",) if has_values else ()), "found")
-        return table(head, rows, most=_WHOLE) + "\n" if rows else ""
+        return table(head, rows, most=_WHOLE, wrapped={len(head) - 1: width}) + "\n" if rows else ""
 
     def headline(self) -> str:
         return "\n".join(
@@ -285,8 +283,6 @@ def _make_all(
     made: list[Figure] = []
     not_made: dict[str, str] = {}
     written: list[Path] = []
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
     with _pictures(formats if out is not None else ()) as pictures:
         for i, number in enumerate(numbers):
             hear(f"figure {number} ({i + 1} of {len(numbers)})")
@@ -367,20 +363,12 @@ class Reproduction(Result):
         return {"claims": pl.read_csv(StringIO(claims_csv(self.conclusions)), infer_schema_length=None)}
 
     def text(self, *, width: int = _WHOLE) -> str:
-        """Return claim, verdict and finding, and how many there are of each verdict; `width` cuts the findings."""
-        from textwrap import shorten
-
+        """Return claim, verdict and finding, and how many there are of each verdict; lines as in `Figures.text`."""
         from aqualog.report.text import table
 
-        rows = [
-            (
-                c.claim.id,
-                c.verdict,
-                shorten(displayed_text("; ".join(k.found for k in c.checks)), width, placeholder=" ..."),
-            )
-            for c in self.conclusions
-        ]
-        return table(("claim", "verdict", "found"), rows) + f"\n{self.headline()}\n"
+        rows = [(c.claim.id, c.verdict, displayed_text("; ".join(k.found for k in c.checks))) for c in self.conclusions]
+        listed = table(("claim", "verdict", "found"), rows, most=_WHOLE, wrapped={2: width})
+        return f"{listed}\n{self.headline()}\n"
 
     def headline(self) -> str:
         from aqualog.thesis.export import counts_of

@@ -34,9 +34,10 @@ class Cell(NamedTuple):
 class Table:
     """Rows under a header. A head that is a pair has a shorter form for a terminal; empty: a column of pages alone.
 
-    `words` are the columns that hold words; all others are numbers, to the right. `wide` columns hold sentences.
-    `below` are lines under rows, by index. `more` rows are not in the page's text: its script fills the table by pages.
-    With `is_choice` the page's script acts when the reader picks a row.
+    `words` are the columns that hold words; all others are numbers, to the right. `wide` columns hold sentences, of
+    which a terminal shows those in `brief` up to the first phrases only. `below` are lines under rows, by index.
+    `more` rows are not in the page's text: its script fills the table by pages. With `is_choice` the page's script acts
+    when the reader picks a row.
     """
 
     header: Sequence[str | tuple[str, str]]
@@ -45,6 +46,7 @@ class Table:
     words: Sequence[int] = (0,)
     below: Mapping[int, str] = field(default_factory=dict)
     wide: Sequence[int] = ()
+    brief: Sequence[int] = ()
     is_sortable: bool = False
     is_choice: bool = False
     more: Sequence[Sequence[str | Cell]] = ()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
 
+from aqualog.core.units import displayed_units
 from aqualog.report.sections import Bars, Beside, Cell, Headline, Line, Lines, Para, Part, Report, Section, Table, shown
-from aqualog.report.values import CELL, cut, ordinary
+from aqualog.report.values import CELL, NOTE, cut, ordinary
 
 __all__ = ["report_text", "table"]
 
 _MORE = "more: --json or --page"
-_BRIEF = 100  # characters of phrases
+_LINE = 100  # characters of a line in a column of sentences
+_BRIEF = 100  # of the first phrases
 
 
 def report_text(report: Report) -> str:
@@ -36,11 +39,16 @@ def _part(part: Part) -> list[str]:
             return _listed([f"{b.name} from {b.size}" for b in bars if b.width], most)
         case Beside(sections):
             return [line for s in sections for line in ("", *_section(s))]
-        case Table(header, rows, below=below, wide=wide, more=more):
+        case Table(header, rows, below=below, wide=wide, brief=brief, more=more):
             heads = [(i, h if isinstance(h, str) else h[1]) for i, h in enumerate(header)]
             kept = [(i, _small(h)) for i, h in heads if h or isinstance(header[i], str)]
-            cells = [[_brief(_cell(row[i])) if i in wide else _cell(row[i]) for i, _ in kept] for row in (*rows, *more)]
-            text = table([h for _, h in kept], cells)
+            cells = [
+                [_brief(_cell(row[i])) if i in brief else _cell(row[i]) for i, _ in kept] for row in (*rows, *more)
+            ]
+            sentences = set(wide) - set(brief)
+            text = table(
+                [h for _, h in kept], cells, wrapped={k: _LINE for k, (i, _) in enumerate(kept) if i in sentences}
+            )
             return [*text.splitlines(), *(f"  {_cell(rows[i][0])}: {line}" for i, line in below.items() if line)]
     return []
 
@@ -69,11 +77,26 @@ def _brief(text: str) -> str:
     return first
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], most: int = CELL) -> str:
-    """Columns padded to their widest cell; numbers to the right. A cell is one line, of `most` characters at most."""
-    header, *rows = ([cut(str(c), most) for c in r] for r in (header, *rows))
-    widths = [max(len(r[i]) for r in (header, *rows)) for i in range(len(header))]
-    return "\n".join("  ".join(_pad(c, w) for c, w in zip(r, widths, strict=True)).rstrip() for r in (header, *rows))
+def table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], most: int = CELL, *, wrapped: Mapping[int, int] | None = None
+) -> str:
+    """Columns padded to their widest cell; numbers to the right.
+
+    A cell is one line, of `most` characters at most. Those of `wrapped` columns go on below after so many characters.
+    """
+    wrapped = wrapped or {}
+    lines = [line for r in (header, *rows) for line in _wrapped([displayed_units(str(c)) for c in r], wrapped, most)]
+    widths = [max(len(r[i]) for r in lines) for i in range(len(header))]
+    return "\n".join("  ".join(_pad(c, w) for c, w in zip(r, widths, strict=True)).rstrip() for r in lines)
+
+
+def _wrapped(row: Sequence[str], wrapped: Mapping[int, int], most: int) -> list[list[str]]:
+    """The lines of a row."""
+    parts = [
+        wrap(cut(c, max(most, NOTE)), wrapped[i], break_on_hyphens=False) or [""] if i in wrapped else [cut(c, most)]
+        for i, c in enumerate(row)
+    ]
+    return [[p[k] if k < len(p) else "" for p in parts] for k in range(max(map(len, parts)))]
 
 
 def _pad(cell: str, width: int) -> str:

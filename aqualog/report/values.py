@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.core.units import displayed_unit
+from aqualog.core.units import displayed_unit, displayed_units
 
 __all__ = [
     "CELL", "KMH", "LONGEST_WORD", "NOTE", "counted", "cut", "ends", "fields_of", "interval_text", "measured",
@@ -156,6 +156,7 @@ def readable(text: str, most: int = LONGEST_TEXT) -> str:
         text = f"{text[: most - 40]}… ({len(text)} characters)"
     if len(text) > LONGEST_WORD:
         text = _LONG_WORD.sub(lambda word: f"{word[0][: LONGEST_WORD - 20]}… ({len(word[0])} characters)", text)
+    text = displayed_units(text)
     return text if text.isprintable() else _OBEYED.sub("\ufffd", text)
 
 

@@ -1,7 +1,10 @@
 """The README is two screens, names every command, shows the commands that are checked, and leads into the book."""
 
+import re
+
 import pytest
 
+from aqualog.model.programme import PROGRAMMES
 from tests.conftest import ROOT
 
 DOCS = ROOT / "aqualog" / "docs"
@@ -37,3 +40,16 @@ def test_every_page_of_the_guide_is_linked():
     for page in (DOCS / "guide").glob("*.md"):
         assert f"](aqualog/docs/guide/{page.name})" in README, page.name
         assert f"](guide/{page.name})" in index, page.name
+
+
+@pytest.mark.parametrize(("programme", "what"), [("thesis", "drives"), ("situations", "situations")])
+def test_the_size_of_a_programme_is_what_it_makes(programme, what):
+    told = [
+        int(n)
+        for page in (ROOT / "README.md", *(DOCS / "guide").glob("*.md"), *(DOCS / "method").glob("*.md"))
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if f"campaign {programme} " in line or "thesis' test programme" in line or "thesis' programme" in line
+        for n in re.findall(rf"(\d+) {what}", line)
+    ]
+    assert told
+    assert set(told) == {len(PROGRAMMES[programme]())}

@@ -102,7 +102,7 @@ labels = "none.csv"
 """))  # fmt: skip
     for part in (
         'line 2: unknown key "vehicel" (did you mean "vehicle"?)', "line 5: vehicle = 'missing.toml'",
-        'line 6: unknown key "tire" (did you mean "tyre"?)', "line 7: tread_depth_mm = deep is not a number",
+        'line 6: unknown key "tire" (did you mean "tyre"?)', "line 7: tread_depth_mm = 'deep' is not a number",
         "line 11: wear = 'used'", "line 12: pressure_front_bar = 230 is outside 0.2 ... 20 bar",
         "line 13: lane_start_s and lane_end_s go together", "a run names no log", "line 18: labels = 'none.csv'",
     ):  # fmt: skip
@@ -145,7 +145,7 @@ def test_what_is_no_campaign_is_told(folder, text, part):
 
 
 def test_many_faults_are_counted(folder):
-    rows = "".join(f"a{i}.mf4,thick\n" for i in range(50))
+    rows = "".join(f"a{i}.mf4,thick{i}\n" for i in range(50))
     text = faults(written(folder, HEAD + 'runs = "runs.csv"\n', "log,water_depth_mm\n" + rows))
     assert text.count("is not a number") == 20
     assert "and 30 more" in text

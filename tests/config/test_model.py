@@ -73,7 +73,7 @@ effect = "road_grade"
     for part in (
         "line 2: unknown effect 'paylod_mass' (did you mean \"payload_mass\"?)", 'line 5: unknown key "delta_mas"',
         "line 6: delta_mass = 1e+09 is outside", "line 7: payload_mass cannot sit at 'fl'; expected f, r", "line 8: term names no effect",
-        "line 12: head_wind cannot sit at 'f'", "line 13: speed = much is not a number",
+        "line 12: head_wind cannot sit at 'f'", "line 13: speed = 'much' is not a number",
         "line 18: road_grade is in the model already", 'unknown key "tern" (did you mean "term"?)',
     ):  # fmt: skip
         assert part in line

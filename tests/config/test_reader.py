@@ -1,10 +1,12 @@
 """Files that no reader of settings can take: each is one line of a ConfigError."""
 
 import os
+from pathlib import Path
 
 import pytest
 
 from aqualog.config.model import load_model
+from aqualog.config.reader import Faults, Key, Row
 from aqualog.config.scenario import load_scenario
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
@@ -49,3 +51,34 @@ def test_what_is_no_file(tmp_path):
     ):  # fmt: skip
         with pytest.raises(ConfigError, match=said):
             load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[signals]\n\na_x = { channel = "x", scale = "minus 1" }', "line 3: signals.a_x.scale = 'minus 1' is not"),
+        ('[signals]\na_x.channel = "x"\na_x.scale = [1]', "line 2: signals.a_x.scale = [1] is not a number"),
+        ('[signals.a_x]\nchannel = "x"\nscale = 1e13', "line 3: signals.a_x.scale = 1e+13 is outside"),
+        (
+            '[signals]\na_x = { channel = "x", scale = minus 1 }',
+            'line 2, column 32): a_x = { channel = "x", scale = minus',
+        ),
+    ],
+)
+def test_a_fault_has_its_line_and_its_key(tmp_path, text, said):
+    (tmp_path / "m.toml").write_text(text + "\n")
+    with pytest.raises(ConfigError) as error:
+        load_signal_map(tmp_path / "m.toml")
+    assert said in str(error.value)
+
+
+def test_equal_faults_of_many_lines_are_one():
+    faults = Faults(Path("runs.csv"))
+    for line in range(2, 12):
+        Row({"depth": "deep"}, faults, line).number("depth", Key("", "depth", "number", "mm", None, ""))
+    Row({"depth": "wet"}, faults, 12).number("depth", Key("", "depth", "number", "mm", None, ""))
+    with pytest.raises(ConfigError) as error:
+        faults.raise_if_any()
+    first, second = error.value.line().removeprefix("runs.csv: ").split("; ")
+    assert first == "lines 2, 3, 4, 5, 6, 7 and 4 more: depth = 'deep' is not a number"
+    assert second == "line 12: depth = 'wet' is not a number"

@@ -222,11 +222,11 @@ def test_faults(folder, text, part):
 def test_the_line_is_that_of_the_right_table(folder):
     good = LANE + "start_s = {}\nend_s = {}\n"
     text = SHORT + good.format(1, 2) + good.format(3, 4) + good.format(5, "'x'")
-    assert "line 14: end_s = x is not a number" in refused(folder, text)
+    assert "line 14: end_s = 'x' is not a number" in refused(folder, text)
     text = 'vehicle = "awd.toml"\nspeed_kmh = 36\n[steering]\namplitude_deg = 1\nperiod_s = 2\n'
     text += '[excitation]\nkind = "sine"\namplitude_mu = 0.1\nperiod_s = 0\n'
-    assert "line 9: period_s = 0 is outside" in refused(folder, text)
-    assert "line 3: period_s = 0" in refused(folder, SHORT + "steering = { amplitude_deg = 1, period_s = 0 }")
+    assert "line 9: excitation.period_s = 0 is outside" in refused(folder, text)
+    assert "line 3: steering.period_s = 0" in refused(folder, SHORT + "steering = { amplitude_deg = 1, period_s = 0 }")
     front = 'tyre_front = "new_winter"\ntyre = "x"'
     assert "line 4: tyre = 'x'" in refused(folder, SHORT + front)
     points = "brake_profile = [\n[0, 1],\n[1, 2],\n]\nsed = 3"

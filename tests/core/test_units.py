@@ -3,7 +3,7 @@ import pytest
 
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import ACCEPTED, SYMBOLS
-from aqualog.core.units import convert, is_unit, parse_unit
+from aqualog.core.units import convert, displayed_units, is_unit, parse_unit
 
 
 @pytest.mark.parametrize(
@@ -56,3 +56,15 @@ def test_input_is_not_changed():
 
 def test_every_symbol_has_a_unit_of_the_table():
     assert all(is_unit(s.unit) for s in (*SYMBOLS.values(), *ACCEPTED.values()))
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("5 m/s^2, up to -3 m/s^2.", "5 m/s², up to -3 m/s²."), ("(m/s^2)^2 [kg*m^2]", "(m/s²)² [kg·m²]"),
+        ("1/s^2; N*m; s^2/m^2", "1/s²; N·m; s²/m²"),
+        ("run^2/m^2.mf4 a^2 dry*.mf4 /m^2/", "run^2/m^2.mf4 a^2 dry*.mf4 /m^2/"),
+    ],
+)  # fmt: skip
+def test_units_in_a_text_are_written_one_way_and_names_stay(text, shown):
+    assert displayed_units(text) == shown

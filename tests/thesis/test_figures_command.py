@@ -1,12 +1,14 @@
 """`aqualog figures`: what it writes and says."""
 
 import json
+from importlib import import_module
 
 import pytest
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.thesis.claims import VERDICTS
+from aqualog.thesis.evidence.selection import NotInCampaign
 
 
 def run(*words):
@@ -22,6 +24,18 @@ def test_one_figure(tmp_path):
     assert [r.split()[:2] for r in rows] == [["C81", "3.1"], ["C82", "3.1"]]
     assert "2 files are in" in result.stderr
     assert (tmp_path / "out/figure_3_01.csv").read_text().splitlines()[0].startswith("slip [%],dry asphalt: ")
+
+
+def test_no_figure_leaves_no_folder(tmp_path, monkeypatch):
+    def make(number, _):
+        raise NotInCampaign(f"figure {number}: no such run")
+
+    monkeypatch.setattr(import_module("aqualog.thesis.run"), "make", make)
+    result = run("3.1", "-o", tmp_path / "out")
+    assert (result.exit_code, result.stdout) == (4, "")
+    assert result.stderr.count("no such run") == 1
+    assert "files are in" not in result.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_several_figures_and_json(tmp_path):
