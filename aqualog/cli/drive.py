@@ -14,7 +14,7 @@ __all__ = ["detect", "slip_slope"]
 
 
 @command(
-    "logs vehicle signals dbc out:results write rate history configuration reference thresholds model "
+    "logs vehicle signals dbc out:results write rate correct_offsets history configuration reference thresholds model "
     "fail_on_event cache data force"
 )
 def detect(
@@ -104,7 +104,9 @@ def _history_notes(result: Detection, path: Path | None, configuration: str) -> 
     return [f"{text}; the name is new, known are {shown}"]
 
 
-@command("logs vehicle:needed signals dbc out:slopes method traction mu_max delay rate cache data force")
+@command(
+    "logs vehicle:needed signals dbc out:slopes method traction mu_max delay rate correct_offsets cache data force"
+)
 def slip_slope(run: Run, out: Path | None, method: str, traction: str, mu_max: float, delay: float | None) -> Output:
     """Estimate the slip slope C_s/F_z of each driven wheel, its interval, and whether it stayed the same.
 

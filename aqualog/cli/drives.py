@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 __all__ = ["calibrate", "diagnose", "evaluate"]
 
 
-@command("logs:drives vehicle:needed signals dbc out:vehicle fix accept page:calibration rate cache data force")
+@command(
+    "logs:drives vehicle:needed signals dbc out:vehicle fix accept page:calibration rate correct_offsets cache "
+    "data force"
+)
 def calibrate(run: Run, out: Path | None, fix: list[str] | None, accept: bool, page: Path | None) -> Output:
     """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
@@ -68,7 +71,7 @@ def _fixed(texts: list[str]) -> dict[str, float]:
 
 @command(
     "logs:diagnosed vehicle:believed model:known signals dbc holdout out:model page:diagnosis level seed:drawn "
-    "surrogates bootstrap rate cache data force"
+    "surrogates bootstrap rate correct_offsets cache data force"
 )
 def diagnose(
     run: Run,
@@ -105,6 +108,7 @@ def diagnose(
     strange = {
         "--holdout": bool(holdout),
         "--rate": run.rate is not None,
+        "--correct-offsets": run.correct_offsets,
         "--no-bootstrap": not bootstrap,
         "--cache": run.cache is True,
     }

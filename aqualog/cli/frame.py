@@ -55,6 +55,7 @@ class Run:
     signals: Path | None = None
     dbc: tuple[Path, ...] = ()
     rate: float | None = None
+    correct_offsets: bool = False
     cache: bool | None = False
     store: str | None = None
     thresholds: Path | None = None
@@ -118,6 +119,7 @@ class Run:
             self._cache(),
             own,
             before,
+            correct_offsets=self.correct_offsets,
         )
 
     def _cache(self) -> SignalCache | None:

@@ -62,6 +62,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         list[Path] | None, None, "--dbc", help="CAN database for raw frames; may be given several times.",
         metavar="FILE",
     ),
+    "correct_offsets": _flag("Take off what accelerometers and gyro show at standstill.", "--correct-offsets"),
     "rate": _option(
         float | None, None, "--rate", help="Grid rate in Hz; default that of the wheel speeds.", min=0.1, max=1e5
     ),

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from aqualog.calibrate.records import Calibration as Found
+    from aqualog.checks.several import OfDrives
     from aqualog.core.records import Signals
     from aqualog.report.sections import Report
 
@@ -30,13 +31,15 @@ __all__ = ["Calibration", "calibrate"]
 class Calibration(Result):
     """Parameters of a car with 95 % intervals, and what the drives do not determine.
 
-    `found` holds the records, `drives` the drives that were used, `before` the vehicle that was given.
+    `found` holds the records, `drives` the drives that were used, `before` the vehicle that was given,
+    `checks` what does not fit among the signals.
     """
 
     drives: tuple[Drive, ...]
     before: Vehicle
     found: Found
     file_notes: tuple[str, ...] = ()
+    checks: OfDrives = ()
 
     @cached_property
     def vehicle(self) -> Vehicle:
@@ -48,9 +51,11 @@ class Calibration(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.calibration import calibration_document
+        from aqualog.report.drive.document import drive_remark_rows
 
         logs = [str(p) for d in self.drives for p in d.paths]
-        return calibration_document(self.found, logs=logs, notes=self.file_notes)
+        document = calibration_document(self.found, logs=logs, notes=self.file_notes)
+        return {**document, "checks": drive_remark_rows(self.checks)}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -185,9 +190,13 @@ def calibrate(
         return run(list(signals.values()), list(signals), car, fixed, accept=accept)
 
     found = loaded.tried(work, hear)
-    used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes)
+    from aqualog.checks.several import look_at_all, sentences
+
+    # mass and torque gain are what is estimated
+    checks = look_at_all(loaded.signals, car, but=("torque", "resistance"))
+    used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes, *sentences(checks))
     return Calibration(
-        used, car, found, notes, notes=(*notes, *found.notes),
+        used, car, found, notes, checks, notes=(*notes, *found.notes),
         has_loss=loaded.has_loss or bool(loaded.changes) or len(found.drives) < len(used),
         sources=sources_of((p for d in all_drives for p in d.sources), vehicle),
     )  # fmt: skip

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
     import polars as pl
 
+    from aqualog.checks.several import OfDrives
     from aqualog.core.records import Signals
     from aqualog.diagnose.records import Diagnosis as Found
     from aqualog.model.term import Model
@@ -39,7 +40,7 @@ class Diagnosis(Result):
     """Verdict, causes with size and interval, and what the extended model predicts better.
 
     `found` holds the records, `logs` the files as they were named, `vehicle_name` the cars, `model_file` the file of
-    the extended model that document and page name.
+    the extended model that document and page name, `checks` what does not fit among the signals.
     """
 
     found: Found
@@ -47,6 +48,7 @@ class Diagnosis(Result):
     vehicle_name: str
     file_notes: tuple[str, ...] = ()
     model_file: str | None = None
+    checks: OfDrives = ()
 
     @property
     def verdict(self) -> str:
@@ -61,11 +63,13 @@ class Diagnosis(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.diagnosis.document import diagnosis_document
+        from aqualog.report.drive.document import drive_remark_rows
 
-        return diagnosis_document(
+        document = diagnosis_document(
             self.found, logs=self.logs, tool_version=document_head()["tool_version"], notes=self.file_notes,
             vehicle=self.vehicle_name, extended_model=self.model_file,
         )  # fmt: skip
+        return {**document, "checks": drive_remark_rows(self.checks)}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -269,11 +273,15 @@ def diagnose(
 
     found = loaded.tried(work, hear, names)
     used = [d for d in loaded.used if d.label not in names]
-    notes = (*loaded.notes, *loaded.changes)
+    from aqualog.checks.several import look_at_all, sentences
+
+    checks = look_at_all(loaded.signals, car)
+    notes = (*loaded.notes, *loaded.changes, *sentences(checks))
     if isinstance(named, Grouped) and named.repeated:
         notes = (f"{named.repeated} of {named.named} logs given more than once: each counts once", *notes)
     return Diagnosis(
-        found, tuple(str(p) for d in used for p in d.paths), car.name, notes, notes=(*notes, *found.notes),
+        found, tuple(str(p) for d in used for p in d.paths), car.name, notes, checks=checks,
+        notes=(*notes, *found.notes),
         has_loss=loaded.has_loss or bool(loaded.changes) or len(found.drives) < len(used),
         sources=sources_of((p for d in (*own, *unseen) for p in d.sources), vehicle, model),
     )  # fmt: skip

@@ -46,7 +46,8 @@ class Drive:
     """One drive: its files, how to read them, and the signals once they are asked for.
 
     The files are decoded when the signals are needed. Wheel speeds in km/h, steering wheel angles and torques need
-    the vehicle; another vehicle reads them anew. `before` is the state of the files when the drive was named.
+    the vehicle; another vehicle reads them anew. `before` is the state of the files when the drive was named. With
+    `correct_offsets` the signals are less what they show at standstill.
     """
 
     paths: tuple[Path, ...]
@@ -59,6 +60,7 @@ class Drive:
     before: Seen = ()
     given: Signals | None = None
     label: str = ""
+    correct_offsets: bool = False
     _loaded: dict[Any, Signals] = field(default_factory=dict)
 
     @property
@@ -99,7 +101,9 @@ class Drive:
         if key not in self._loaded:
             from aqualog.align.load import load_signals
 
-            self._loaded[key] = load_signals(self.paths, vehicle=vehicle, report=report, **self._how)
+            self._loaded[key] = self._mended(
+                load_signals(self.paths, vehicle=vehicle, report=report, **self._how), vehicle
+            )
         return self._loaded[key]
 
     def load_or_open(
@@ -123,10 +127,18 @@ class Drive:
             return self.load(vehicle)
         from aqualog.align.load import load_drive
 
-        found = load_drive(self.paths, vehicle=vehicle, report=report, note=note, whole_for=whole_for, **self._how)
+        needs = ", ".join(n for n in (whole_for, "the correction of offsets" if self.correct_offsets else "") if n)
+        found = load_drive(self.paths, vehicle=vehicle, report=report, note=note, whole_for=needs, **self._how)
         if isinstance(found, Signals):
-            self._loaded[key] = found
+            found = self._loaded[key] = self._mended(found, vehicle)
         return found
+
+    def _mended(self, signals: Signals, vehicle: Vehicle) -> Signals:
+        if not self.correct_offsets:
+            return signals
+        from aqualog.checks.correct import without_offsets
+
+        return without_offsets(signals, vehicle)
 
     def changes(self) -> tuple[str, ...]:
         """Return a note for each file that has changed since the drive was named."""
@@ -192,6 +204,7 @@ def read(
     dbc: Logs = (),
     rate_hz: float | None = None,
     cache: bool = False,
+    correct_offsets: bool = False,
 ) -> Drive:
     """Name the files of one drive and how to read them.
 
@@ -211,6 +224,8 @@ def read(
         Rate of the time base [Hz], 0.1 to 100000; default that of the wheel speeds.
     cache : bool
         Keep the aligned signals for the next look at the same files.
+    correct_offsets : bool
+        Take off what `a_x`, `a_y` and `yaw_rate` show at standstill, where that is surely no slope of a road.
 
     Raises
     ------
@@ -244,7 +259,7 @@ def read(
     return Drive(
         paths, signal_map, databases, rate_hz, None if vehicle is None else vehicle_of(vehicle),
         cache_of_user() if cache else None, sources_of((*paths, *list_files(names), *databases), map, vehicle),
-        state_of(list(paths)),
+        state_of(list(paths)), correct_offsets=correct_offsets,
     )  # fmt: skip
 
 

@@ -19,8 +19,8 @@ def found(columns):
 
 
 def test_offsets_with_their_intervals():
-    own = found(made(stops=3, a_x_offset=-1.5, a_y_offset=0.8, yaw_rate_offset=0.03))
-    for symbol, value in (("a_x", -1.5), ("a_y", 0.8), ("yaw_rate", 0.03)):
+    own = found(made(stops=3, a_x_offset=-1.5, a_y_offset=1.2, yaw_rate_offset=0.03))
+    for symbol, value in (("a_x", -1.5), ("a_y", 1.2), ("yaw_rate", 0.03)):
         low, high = own[symbol].ci95
         assert low < value < high
         assert own[symbol].counts
@@ -50,8 +50,8 @@ def test_a_car_that_never_moves_shows_no_stop():
 def test_one_line_mends_sign_and_offset():
     mapped = {"channel": ["Lat"], "unit": "g", "scale": 0.5, "offset": 0.2, "invalid": [1023.0]}
     origins = {"a_y": Origin("a_y", "Lat", "imu.csv", "g", 20.0, 9, mapped=mapped)}
-    columns = made(stops=3, a_y_offset=-0.8)
-    columns["a_y"] = -columns["a_y"]  # stands at 0.8, which 0.2 of the map is part of
+    columns = made(stops=3, a_y_offset=-1.2)
+    columns["a_y"] = -columns["a_y"]  # stands at 1.2, which 0.2 of the map is part of
     (sign, offset) = look(signals(columns, origins=origins), CAR)
     assert (sign.kind, offset.kind) == ("sign", "offset")
     assert sign.lines == offset.lines
@@ -59,5 +59,5 @@ def test_one_line_mends_sign_and_offset():
     head, rest = text.split(", offset = ")
     assert head == 'a_y = { channel = "Lat", unit = "g", scale = -0.5'
     assert rest.endswith(", invalid = [1023.0] }")
-    assert float(rest.split(",")[0]) == pytest.approx(0.8 - 0.2, abs=0.02)
+    assert float(rest.split(",")[0]) == pytest.approx(1.2 - 0.2, abs=0.02)
     assert math.isfinite(offset.value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from aqualog.book.documents.fields import (
     CHECKS,
+    DRIVE_CHECKS,
     EVENT,
     EVIDENCE,
     FAULTS,
@@ -367,6 +368,7 @@ CALIBRATE = Document(
         )),
         several("cannot_tell", "what these drives cannot determine, and what would"),
         several("notes", "sentences on the logs and on the estimates"),
+        DRIVE_CHECKS,
     ),
     files=("calibration.json",),
 )  # fmt: skip

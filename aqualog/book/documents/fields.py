@@ -11,9 +11,9 @@ from aqualog.core.notation import WHEELS
 from aqualog.detect.registry import DETECTORS
 
 __all__ = [
-    "BIN", "CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "JUDGEMENT", "LACKING", "PLACE_KEYS",
-    "TERMS", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping", "maybe",
-    "number", "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
+    "BIN", "CHECKS", "DRIVE_CHECKS", "EVENT", "EVIDENCE", "FAULTS", "FAULT_COUNTS", "HEAD", "JUDGEMENT", "LACKING",
+    "PLACE_KEYS", "TERMS", "Document", "Field", "Kind", "anything", "by_name", "count", "flag", "interval", "mapping",
+    "maybe", "number", "obj", "open_ci", "or_null", "paths", "rows", "schema", "several", "text", "with_ci",
 ]  # fmt: skip
 
 Kind = Literal["number", "whole number", "text", "true or false", "interval", "object", "list", "by name", "any"]
@@ -257,14 +257,17 @@ _EVIDENCE = (
     several("decided_by", "detectors that decided when the warning began"),
 )
 
-CHECKS = rows("checks", "what does not fit among the signals, and what to change; the notes say the same", (
+_CHECK = (
     text("kind", "what is in doubt", ("sign", "offset", "scale", "torque", "drivetrain", "resistance")),
     several("signals", "signals, or keys of the vehicle file"),
     text("what", "what does not fit"),
     text("advice", "what to do"),
     several("lines", "lines for [signals] of the map; empty where no line helps"),
     *with_ci("value", "SI unit of the signal", "what was measured"),
-))  # fmt: skip
+)
+_CHECKED = "what does not fit among the signals, and what to change; the notes say the same"
+CHECKS = rows("checks", _CHECKED, _CHECK)
+DRIVE_CHECKS = rows("checks", _CHECKED, (text("drive", "name of the drive"), *_CHECK))
 
 JUDGEMENT = (
     text("verdict", "whether there was aquaplaning; only the joint detectors decide", tuple(VERDICTS)),

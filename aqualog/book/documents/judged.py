@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from aqualog.book.documents.fields import (
+    DRIVE_CHECKS,
     HEAD,
     TERMS,
     Document,
@@ -179,6 +180,7 @@ DIAGNOSE = Document(
             number("told_apart", "-", "probability of the right name from which two causes count as distinguished"),
         )),
         several("notes", "sentences on the logs and on the diagnosis"),
+        DRIVE_CHECKS,
     ),
     files=("diagnosis.json",),
 )  # fmt: skip

@@ -18,7 +18,8 @@ from aqualog.report.values import fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
 __all__ = [
-    "SCHEMA_VERSION", "document", "remark_rows", "result_events", "result_groups", "signal_groups", "track_name",
+    "SCHEMA_VERSION", "document", "drive_remark_rows", "remark_rows", "result_events", "result_groups", "signal_groups",
+    "track_name",
 ]  # fmt: skip
 
 SCHEMA_VERSION = 1
@@ -65,6 +66,11 @@ def remark_rows(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
     """What does not fit among the signals, for JSON."""
     fields = ("kind", "signals", "what", "advice", "lines", "value")
     return [fields_of(r, *fields, value_ci95="ci95") for r in remarks]
+
+
+def drive_remark_rows(found: Sequence[tuple[str, Remark]]) -> list[dict[str, Any]]:
+    """The same for several drives, by name."""
+    return [{"drive": name, **remark_rows([remark])[0]} for name, remark in found]
 
 
 def _start(start_ns: int | None) -> str | None:
