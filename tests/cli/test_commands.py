@@ -120,8 +120,25 @@ def test_inspect_proposes_a_map_that_works(tmp_path):
     assert {e["detector"] for e in json.loads(result.stdout)["events"]} >= {"joint_criteria", "minor_spin_down"}
 
 
+def test_the_verdict_is_the_first_line_and_in_the_document():
+    assert run("detect", MF4, "--vehicle", CAR).stdout.startswith("Aquaplaning: 8.0-16.1 s, 101 km/h, front right, ")
+    document = json.loads(run("detect", MF4, "--vehicle", CAR, "--json").stdout)
+    assert (document["verdict"], document["missing"]) == ("aquaplaning", [])
+    (episode,) = document["episodes"]
+    assert (episode["kind"], episode["wheels"], episode["axle"]) == ("aquaplaning", ["fr", "fl"], "f")
+    assert (episode["start_s"], episode["end_s"]) == (pytest.approx(8.0, abs=0.3), pytest.approx(16.0, abs=0.3))
+    assert sorted(episode["events"]) == list(range(len(document["events"])))
+
+
 def test_gate(tmp_path):
+    """Only an episode of aquaplaning trips it: no lock-up, no single detector, nothing that cannot be judged."""
     assert run("detect", MF4, "--vehicle", CAR, "--fail-on-event").exit_code == 5
+    told = run("detect", MF4, "--fail-on-event", "--json")
+    assert told.exit_code == 0, told.stderr
+    document = json.loads(told.stdout)
+    assert document["verdict"] == "cannot_be_judged"
+    assert document["missing"] == ["vehicle.drivetrain", "vehicle.mass"]
+    assert {e["detector"] for e in document["events"]} == {"spin_down"}
 
 
 def test_missing_signals_end_with_4_and_one_line(tmp_path):

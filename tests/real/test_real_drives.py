@@ -15,6 +15,9 @@ from aqualog.cli.main import app
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.detect.stream import detect_drive
+from aqualog.report.drive.judged import missing_words
+from aqualog.report.drive.report import drive_report
+from aqualog.report.text import report_text
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.real
@@ -49,6 +52,18 @@ def test_toyota_lists_what_needs_torque(toyota):
         assert {"torque_fl", "torque_fr"} <= missing[detector]
     assert "minor_spin_down" not in missing
     assert "spin_down" not in missing
+
+
+def test_toyota_without_a_vehicle_file_cannot_be_judged(real_logs):
+    """D5: a rear-driven default car gave a spin-up of 0.01 s on this front-driven one."""
+    folder = real_logs / "toyota_rav4"
+    given = ("--dbc", folder / "toyota_2017.dbc", "--signals", HERE / "toyota_map.toml")
+    code, out, _ = command("detect", folder / "can_bus.mf4", *given, "--json")
+    found = json.loads(out)
+    assert (code, found["verdict"], found["events"]) == (0, "cannot_be_judged", [])
+    assert found["missing"] == ["torque of the driven wheels", "vehicle.drivetrain", "vehicle.mass"]
+    assert found["ran"] == ["spin_down"]
+    assert len(found["unavailable"]) == 7
 
 
 def test_toyota_clock(real_logs):
@@ -114,6 +129,20 @@ def test_porsche_events_are_real(porsche, real_logs):
     assert real >= 0.95 * len(result.events)
 
 
+def test_porsche_lock_ups_are_folded(porsche):
+    """D6: over a hundred detections on a dry track, none of which is aquaplaning."""
+    car, signals = porsche
+    result = detect_drive(signals, car)
+    found = Counter(e.kind for e in result.judgement.episodes)
+    assert len(result.events) > 80
+    assert found["aquaplaning"] == 0
+    assert found["wheel_lock"] < 0.4 * len(result.events)
+    assert found["wheel_lock"] > 10 * (found["suspected"] + 1)
+    text = report_text(drive_report(result))
+    assert len(text.splitlines()) < 45
+    assert "Wheel lock: " in text
+
+
 def test_porsche_gps_clock(real_logs):
     folder = real_logs / "porsche_981"
     code, out, _ = command(
@@ -133,6 +162,9 @@ def test_bmw_resistance_runs_on_every_trip(real_logs, trip):
     moving = signals.array("v_x") > 14.0
     measure = result.features["delta_a_x"].to_numpy()[moving & (signals.array("torque_rl") > 5.0)]
     assert abs(np.nanmedian(measure)) < 0.1
+    assert result.judgement.verdict == "cannot_be_judged"
+    assert missing_words(result.judgement.missing) == "no wheel speeds"
+    assert "resistance" in result.judgement.ran
 
 
 @pytest.mark.parametrize("name", ["00000001-60FE3F04.MF4", "00000002-60FE415D.MF4"])

@@ -1,0 +1,50 @@
+"""When a change began and ended, from the sum that reports it late."""
+
+import numpy as np
+import pytest
+
+from aqualog.detect import cusum
+from aqualog.detect.resistance import alarm_params
+
+DT = 0.01
+
+
+def edges(x, cuts=()):
+    """Begin and end of the alarm and of its cause [s], for any cut into pieces."""
+    params, state, ages = alarm_params(DT), cusum.initial_state(), cusum.new_ages()
+    parts = []
+    for piece in np.split(np.asarray(x, dtype=float), cuts):
+        g, bits, state = cusum.scan(params, state, piece)
+        since, after, ages = cusum.ages(DT, ages, g, bits)
+        parts.append((bits, since, after))
+    bits, since, after = (np.concatenate(p) for p in zip(*parts, strict=True))
+    first, last = np.flatnonzero(bits)[[0, -1]]
+    return (first * DT, (last + 1) * DT), (first * DT - since[first], (last + 1) * DT - after[last])
+
+
+@pytest.mark.parametrize("level", [0.25, 0.5, 0.8])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_cause_is_where_the_change_is(level, seed):
+    t = np.arange(0.0, 20.0, DT)
+    x = np.where((t >= 5.0) & (t < 12.0), level, 0.0) + 0.1 * np.random.default_rng(seed).standard_normal(t.size)
+    alarm, cause = edges(x)
+    assert cause == (pytest.approx(5.0, abs=0.15), pytest.approx(12.0, abs=0.15))
+    assert alarm[1] > 13.5
+    assert alarm[0] > cause[0] + 0.2
+
+
+def test_it_ends_with_the_change_though_the_sum_is_zero_before_the_end_is_asked_for():
+    """A gate is held open after its sum has come back."""
+    x = np.concatenate([np.zeros(100), np.full(300, 0.5), np.zeros(1000)])
+    g, bits, _ = cusum.scan(alarm_params(DT), cusum.initial_state(), x)
+    _, after, _ = cusum.ages(DT, cusum.new_ages(), g, bits)
+    assert g[-1] == 0.0
+    assert after[-1] == pytest.approx(10.0, abs=0.02)
+
+
+@pytest.mark.parametrize("cuts", [(1,), (250, 251, 700)])
+def test_any_cut_and_gaps_give_the_same(cuts):
+    rng = np.random.default_rng(4)
+    x = np.concatenate([np.zeros(300), np.full(400, 0.4), np.zeros(500)]) + 0.1 * rng.standard_normal(1200)
+    x[350:360] = np.nan
+    assert edges(x, cuts) == edges(x)
