@@ -135,7 +135,7 @@ class Detection(Result):
 
     @property
     def printed(self) -> Mapping[str, pl.DataFrame]:
-        """`events` with speed and evidence in words, `slip_slope`, and `not_judged`: what detectors miss."""
+        """`episodes`, `events` with speed and evidence in words, `slip_slope`, `not_judged`: what detectors miss."""
         import polars as pl
 
         from aqualog.report.values import ordinary
@@ -146,6 +146,7 @@ class Detection(Result):
         speeds = pl.Series("v_x_kmh", [speed_kmh(e) for e in found], pl.Float64)
         lacking = [*self.document["unavailable"], *self.document["limited"]]
         return {
+            "episodes": self.episodes,
             "events": self.events.drop("evidence").with_columns(speeds, pl.Series("evidence", words, pl.String)),
             "slip_slope": rows_table(
                 {k.replace(" ", "_"): v for k, v in flat(s).items()} for s in self.document["slip_slope"]
@@ -199,7 +200,7 @@ class Detection(Result):
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
 
-        The first two hold the events, too: as event blocks of MDF and as messages `foxglove.Event`.
+        The first two hold the episodes and events, too: as event blocks of MDF and as messages `foxglove.Event`.
         """
         from aqualog.io.write_log import check_suffix
 

@@ -21,10 +21,11 @@ def table(tmp_path_factory):
 
 def test_the_printed_tables(tmp_path):
     done = run("detect", LOG, "--vehicle", CAR, "--csv", "e.csv", "--decimal-comma", cwd=tmp_path)
-    assert "note: tables: e.csv, e_slip_slope.csv, e_not_judged.csv\n" in done.stderr
-    events, slopes = (
-        pl.read_csv(tmp_path / f"{n}.csv", separator=";", decimal_comma=True) for n in ("e", "e_slip_slope")
+    assert "note: tables: e.csv, e_events.csv, e_slip_slope.csv, e_not_judged.csv\n" in done.stderr
+    episodes, events, slopes = (
+        pl.read_csv(tmp_path / f"{n}.csv", separator=";", decimal_comma=True) for n in ("e", "e_events", "e_slip_slope")
     )
+    assert episodes["kind"].to_list() == ["aquaplaning"]
     assert done.stdout.count("\n") > events.height > 5
     assert events["start_s"].is_sorted()
     assert events["v_x_kmh"].is_between(95, 105).all()

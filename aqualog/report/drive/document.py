@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -14,6 +14,7 @@ from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import DriveResult, Event, Remark, Signals, Track
 from aqualog.io.log_event import LogEvent
 from aqualog.io.write_log import LogGroup
+from aqualog.report.drive.judged import KIND_NAMES, episode_sentence
 from aqualog.report.values import fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
@@ -117,22 +118,30 @@ def result_groups(result: DriveResult) -> list[LogGroup]:
 
 
 def result_events(result: DriveResult) -> list[LogEvent]:
-    """The events as spans of a log, in the order of the document."""
-    return [_log_event(e) for e in result.events]
+    """Episodes, then events, as spans of a log in the order of the document.
+
+    The property `kind` is that of the episode, or `event`.
+    """
+    episodes = [
+        _span(KIND_NAMES[e.kind].capitalize(), episode_sentence(e), e.document()) for e in result.judgement.episodes
+    ]
+    return [*episodes, *map(_log_event, result.events)]
 
 
 def _log_event(event: Event) -> LogEvent:
     place = event.wheel.upper() if event.wheel else event.side
     fields = fields_of(event, *_EVENT)
     evidence = fields.pop("evidence")
-    properties = {"kind": "event", **fields, **evidence}
-    return LogEvent(
-        " ".join(filter(None, (detector_name(event.detector), place))),
-        round(event.start_s * 1e9),
-        round(event.end_s * 1e9),
-        "; ".join((event.severity, *evidence_parts(event.evidence))),
-        {k: v if isinstance(v, str) else json.dumps(v) for k, v in properties.items() if v is not None},
+    name = " ".join(filter(None, (detector_name(event.detector), place)))
+    return _span(
+        name, "; ".join((event.severity, *evidence_parts(event.evidence))), {"kind": "event", **fields, **evidence}
     )
+
+
+def _span(name: str, text: str, properties: Mapping[str, Any]) -> LogEvent:
+    begin, end = (round(properties[n] * 1e9) for n in ("start_s", "end_s"))
+    plain_words = {k: v if isinstance(v, str) else json.dumps(v) for k, v in properties.items() if v is not None}
+    return LogEvent(name, begin, end, text, plain_words)
 
 
 def track_name(track: Track) -> str:
