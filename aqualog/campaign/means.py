@@ -52,13 +52,17 @@ class MeanRow:
 
 @dataclass(frozen=True, slots=True)
 class ResistanceTable:
-    """Rows [m/s²], whether each run's own dry level is subtracted, samples left out by reason."""
+    """Rows [m/s²], whether each run's own dry level is subtracted, samples left out by reason.
+
+    `elsewhere`: without any row, the other roads that have some.
+    """
 
     plan: Plan
     rows: tuple[MeanRow, ...]
     is_relative: bool
     left_out: Mapping[str, int]
     robust: bool
+    elsewhere: tuple[str, ...] = ()
 
 
 def resistances(
@@ -86,13 +90,17 @@ def resistances(
             level = found
         return Picked({"v_x": samples.array("v_x"), "y": delta - level})
 
+    def of(road: str) -> tuple[list[Cell], Counter[str]]:
+        keys = plan.keys if road == "wet" else tuple(k for k in plan.keys if k not in DEPTH_KEYS)
+        return cells(data, plan, wheels=lambda _: ("",), columns=columns, road=road, keys=keys)
+
     rows: list[MeanRow] = []
     for road in plan.roads:
-        keys = plan.keys if road == "wet" else tuple(k for k in plan.keys if k not in DEPTH_KEYS)
-        found, without = cells(data, plan, wheels=lambda _: ("",), columns=columns, road=road, keys=keys)
+        found, without = of(road)
         left_out.update(without)
         rows += [mean_of_cell(c, "y", limits, robust=robust) for c in found]
-    return ResistanceTable(plan, tuple(rows), relative, dict(left_out), robust)
+    elsewhere = () if rows else tuple(r for r in sorted({"wet", "dry"} - set(plan.roads)) if of(r)[0])
+    return ResistanceTable(plan, tuple(rows), relative, dict(left_out), robust, elsewhere)
 
 
 def dry_level(samples: RunSamples, delta: FloatArray) -> float | None:

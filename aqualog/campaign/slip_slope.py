@@ -107,7 +107,10 @@ class SlopeRow:
 
 @dataclass(frozen=True, slots=True)
 class SlopeTable:
-    """Rows, the dry references (all speeds) among them as `dry`, delays of v_x by car, samples left out by reason."""
+    """Rows, the dry references (all speeds) among them as `dry`, delays of v_x by car, samples left out by reason.
+
+    `dry_left_out`: those of the references. `elsewhere`: without any row, the other roads that have some.
+    """
 
     plan: Plan
     rows: tuple[SlopeRow, ...]
@@ -115,6 +118,8 @@ class SlopeTable:
     delays: tuple[Delay, ...]
     left_out: Mapping[str, int]
     robust: bool
+    dry_left_out: Mapping[str, int] = field(default_factory=dict)
+    elsewhere: tuple[str, ...] = ()
 
 
 def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits: Limits = LIMITS) -> SlopeTable:
@@ -137,7 +142,7 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
     def columns(info: RunInfo, samples: RunSamples, wheel: str) -> Picked | str:
         slip, mu = samples.array(f"slip_{wheel}"), samples.array(f"mu_{wheel}")
         if np.isnan(slip).all():
-            return "no slip: neither v_x nor a free wheel on the wheel's side"
+            return _without_slip(info)
         if np.isnan(mu).all():
             return "no traction: no torque of the driven wheels"
         without = {
@@ -147,23 +152,33 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
         u = samples.array("a_over_v") if source_of(info) in late else np.zeros_like(slip)
         return Picked({"v_x": samples.array("v_x"), "slip": slip, "mu": mu, "u": u}, without)
 
-    def of(road: str, keys: tuple[str, ...], *, by_speed: bool) -> list[SlopeRow]:
-        found, without = cells(
-            data, plan, wheels=driven_of, columns=columns, road=road, by_speed=by_speed, keys=keys
-        )  # fmt: skip
-        if by_speed:
-            left_out.update(without)
+    def of(road: str, keys: tuple[str, ...], without: Counter[str], *, by_speed: bool) -> list[SlopeRow]:
+        found, lost = cells(data, plan, wheels=driven_of, columns=columns, road=road, by_speed=by_speed, keys=keys)
+        without.update(lost)
         return [_row(c, late, limits, robust=robust) for c in found]
 
     dry_keys = tuple(k for k in plan.keys if k not in DEPTH_KEYS)
-    dry = of("dry", dry_keys, by_speed=False)
+    dry_left_out: Counter[str] = Counter()
+    dry = of("dry", dry_keys, dry_left_out, by_speed=False)
     reference = {(r.group, r.wheel): r for r in dry}
     rows = [
         _with_dry(r, reference.get((tuple((k, v) for k, v in r.group if k not in DEPTH_KEYS), r.wheel)))
         for road in plan.roads
-        for r in of(road, plan.keys if road == "wet" else dry_keys, by_speed=True)
+        for r in of(road, plan.keys if road == "wet" else dry_keys, left_out, by_speed=True)
     ]
-    return SlopeTable(plan, tuple(rows), tuple(dry), tuple(late.values()), dict(left_out), robust)
+    others = [] if rows else sorted({"wet", "dry"} - set(plan.roads))
+    elsewhere = tuple(r for r in others if (dry if r == "dry" else of(r, plan.keys, Counter(), by_speed=False)))
+    return SlopeTable(
+        plan, tuple(rows), tuple(dry), tuple(late.values()), dict(left_out), robust, dict(dry_left_out), elsewhere
+    )  # fmt: skip
+
+
+def _without_slip(info: RunInfo) -> str:
+    """Why a run has no slip of its driven wheels."""
+    missing = [f"omega_{w}" for w in driven_of(info) if f"omega_{w}" not in info.about.get("signals", ())]
+    if missing:
+        return f"no slip: wheel speeds are missing ({', '.join(missing)})"
+    return "no slip: neither v_x nor a free wheel on the wheel's side"
 
 
 def _row(cell: Cell, late: Mapping[Source, Delay], limits: Limits, *, robust: bool) -> SlopeRow:

@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 import typer
@@ -132,3 +133,47 @@ def test_water_that_nobody_tells_is_told(campaign, tmp_path):
     car.write_text(vehicle_toml(SEDAN))
     done = invoke("bin-resistance", *sorted(bare.iterdir()), "--vehicle", car, "--store", tmp_path / "s", "--jobs", 1)
     assert "no samples: on or off the water is not known\ntry: water_depth_mm = 0" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def no_wheels(tmp_path_factory):
+    """Two dry runs of a car whose log has a speed and a torque, and no wheel speeds; one of a road that is not known."""
+    folder = tmp_path_factory.mktemp("n")
+    (folder / "car.toml").write_text(vehicle_toml(SEDAN))
+    t = np.arange(0.0, 30.0, 0.05)
+    v = 20.0 + 4.0 * np.sin(0.4 * t)
+    a = 1.6 * np.cos(0.4 * t)
+    for name in ("a", "b", "c"):
+        torque = 540.0 * a + 120.0 + 1e-3 * len(name)
+        pl.DataFrame({"t": t, "v_x": v, "a_x": a, "torque_r": torque}).write_csv(folder / f"{name}.csv")
+    dry = "".join(f'[[run]]\nlog = "{n}.csv"\nwater_depth_mm = 0.0\n' for n in ("a", "b"))
+    head = 'name = "n"\nvehicle = "car.toml"\n'
+    (folder / "dry.toml").write_text(head + dry)
+    (folder / "some.toml").write_text(f'{head}{dry}[[run]]\nlog = "c.csv"\nx_weather = "rain"\n')
+    return folder
+
+
+MISSING = "no slip: wheel speeds are missing (omega_rl, omega_rr)"
+
+
+@pytest.mark.parametrize(
+    ("file", "road", "said"),
+    [
+        ("dry.toml", "dry", (f"all samples on dry road are left out, most of them because: {MISSING}",)),
+        ("dry.toml", "wet", ("no samples on wet road",)),
+        ("some.toml", "dry", (f"most of them because: {MISSING}\nsome samples: on or off the water is not known",)),
+    ],
+)
+def test_a_table_without_a_row_says_what_is_missing_and_sends_nobody_in_a_circle(no_wheels, file, road, said):
+    done = invoke("bin-slipslope", no_wheels / file, "--road", road, "--jobs", 1, "-q")
+    assert all(s in done.stdout for s in said), done.stdout
+    assert f"no dry slope, so no contact ratio; of the dry driving: {MISSING}" in done.stdout
+    assert "neither v_x" not in done.stdout
+    assert "no dry driving" not in done.stdout
+    assert "--road" not in done.stdout
+
+
+def test_another_road_is_proposed_where_it_has_rows(no_wheels):
+    done = invoke("bin-resistance", no_wheels / "dry.toml", "--road", "wet", "--jobs", 1, "-q")
+    assert "no samples on wet road\ntry: --road dry\n" in done.stdout
+    assert "try:" not in invoke("bin-resistance", no_wheels / "dry.toml", "--road", "dry", "--jobs", 1, "-q").stdout

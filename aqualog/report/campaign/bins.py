@@ -182,7 +182,7 @@ def slope_report(
         Section("", [Para(_LEGEND, "everywhere")]),
         Section("", [
             _table((*_titles(keys), *_SLOPE_HEADS), [_slope_cells(r, keys) for r in slopes.rows]),
-            Para("" if slopes.rows else _nothing(slopes.plan, slopes.left_out), "everywhere"),
+            Para("" if slopes.rows else _nothing(slopes), "everywhere"),
         ]),
         _reasons([(_where(r.group, r.wheel, r.road, r.low_kmh, r.high_kmh), r.reason) for r in slopes.rows]),
         Section("", [
@@ -190,7 +190,7 @@ def slope_report(
                 (*_values(r.group), r.wheel, ends(r.mu_range, 2), _shown(r.slope), ends(r.slope_ci), str(r.runs),
                  _shown(r.expected.slope)) for r in slopes.dry
             ]),
-            Para("" if slopes.dry else "no dry driving in these configurations: no contact ratio", "everywhere"),
+            Para("" if slopes.dry else _no_reference(slopes.dry_left_out), "everywhere"),
         ]),
         Section("", [Para("\n".join(
             f"{d.vehicle}: the delay of v_x is not available: {d.reason}" if d.reason else
@@ -232,7 +232,7 @@ def resistance_report(found: ResistanceTable) -> Report:
                 (*_values(r.group, keys), r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
                  _shown(r.value, 3), ends(r.ci, 3), _shown(r.scatter, 3)) for r in found.rows
             ]),
-            Para("" if found.rows else _nothing(found.plan, found.left_out), "everywhere"),
+            Para("" if found.rows else _nothing(found), "everywhere"),
         ]),
         _reasons([(_where(r.group, "", r.road, r.low_kmh, r.high_kmh), r.reason) for r in found.rows]),
         _left_out(found.left_out),
@@ -244,15 +244,32 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     return Table(header, rows, words=range(len(header)))
 
 
-def _nothing(plan: Plan, left_out: Mapping[str, int]) -> str:
-    """Reason why a table has no row, and what to try."""
-    if any(_UNKNOWN in reason for reason in left_out):
-        return (
-            f"no samples: {_UNKNOWN}\n"
-            "try: water_depth_mm = 0 for dry runs; lane_start_s and lane_end_s, labels or on_water for wet ones"
-        )
-    other = sorted({"wet", "dry"} - set(plan.roads))
-    return f"no samples on {' or '.join(plan.roads)} road" + (f"\ntry: --road {other[0]}" if other else "")
+def _nothing(found: SlopeTable | ResistanceTable) -> str:
+    """Reason why a table has no row, and what to try: another road only if it has rows."""
+    road = " or ".join(found.plan.roads)
+    known = _known(found.left_out)
+    most = max(known, key=lambda reason: known[reason], default="")
+    lines = [f"all samples on {road} road are left out, most of them because: {most}" if known else ""]
+    if sum(found.left_out.values()) > sum(known.values()):
+        lines += [
+            f"{'some' if known else 'no'} samples: {_UNKNOWN}",
+            "try: water_depth_mm = 0 for dry runs; lane_start_s and lane_end_s, labels or on_water for wet ones",
+        ]
+    lines = [line for line in lines if line] or [f"no samples on {road} road"]
+    return "\n".join([*lines, *(f"try: --road {other}" for other in found.elsewhere)])
+
+
+def _known(left_out: Mapping[str, int]) -> Mapping[str, int]:
+    """Samples left out on a road that is known."""
+    return {reason: n for reason, n in left_out.items() if _UNKNOWN not in reason}
+
+
+def _no_reference(left_out: Mapping[str, int]) -> str:
+    """Why there is no dry slope."""
+    known = _known(left_out)
+    if not known:
+        return "no dry driving in these configurations: no contact ratio"
+    return f"no dry slope, so no contact ratio; of the dry driving: {max(known, key=lambda reason: known[reason])}"
 
 
 def _slope_cells(r: SlopeRow, keys: Sequence[str]) -> tuple[str, ...]:
