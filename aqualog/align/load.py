@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from aqualog.align.mapping import SignalMap, resolve
+from aqualog.align.mapping import MAP_HINT, SignalMap, resolve
 from aqualog.align.table import Found, build_signals
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
 from aqualog.core.errors import SignalError, listed
@@ -255,5 +255,5 @@ def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) 
         + (f" ({notes[0]})" if notes else "")
         + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",
         where=", ".join(p.name for p in paths),
-        hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
+        hint=MAP_HINT,
     )

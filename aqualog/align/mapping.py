@@ -15,9 +15,13 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.io.reader import CsvFormat
 
 __all__ = [
-    "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text", "matching",
-    "quoted", "resolve", "separate_drives", "values_read",
+    "MAP_HINT", "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text",
+    "matching", "quoted", "resolve", "separate_drives", "values_read",
 ]  # fmt: skip
+
+
+MAP_HINT = "`aqualog init LOG -o FOLDER` writes a signal map; then the log with --signals FOLDER/map.toml"
+"""What to try where signals are missing."""
 
 
 @dataclass(frozen=True, slots=True)

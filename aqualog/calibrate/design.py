@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
@@ -193,7 +194,7 @@ def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> No
         raise SignalError(
             f"cannot calibrate without {', '.join(missing)}", where=name,
             expected="accelerometer, torques of the driven wheels, and velocity or wheel speeds",
-            hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
+            hint=MAP_HINT,
         )  # fmt: skip
     # what never changes is frozen or not connected, and would be fitted to the last digit
     speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
@@ -94,7 +95,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     if not channels:
         raise SignalError(
             "nothing to compare", where=name, expected="accelerometer or wheel speeds, and a velocity",
-            hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
+            hint=MAP_HINT,
         )  # fmt: skip
     vehicle = _as_known(vehicle, signals)
     columns = {s: signals.array(s) for s in present}

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
@@ -433,5 +434,5 @@ def check_something_to_do(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=name,
         expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
-        hint="`aqualog inspect LOG --write-map map.toml`, then the log with this signal map",
+        hint=MAP_HINT,
     )

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from aqualog import __version__
+from aqualog.align.mapping import MAP_HINT
 from aqualog.doctor.findings import Examination, Finding, Picture
 from aqualog.report.figures import axis, figure, line
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
@@ -16,7 +17,6 @@ from aqualog.report.wording import detector_name, not_judged
 
 __all__ = ["examination_document", "examination_report"]
 
-_MAP = "`aqualog inspect LOG --write-map map.toml` proposes which channel is which signal; then --signals map.toml"
 _HEADS = {
     "unreadable": "Cannot be read:",
     "lost": "Lost or not used:",
@@ -48,7 +48,7 @@ def examination_report(found: Examination) -> Report:
     closing = "no problem found" if not found.findings else ""
     able = f"detectors that can run: {', '.join(found.ready)}" if found.ready else ""
     if lacks and not found.ready:
-        able = f"no detector can run\n    try: {_MAP}"
+        able = f"no detector can run\n    try: {MAP_HINT}"
     figures = _figures(found)
     sections = [
         *_page(found, lacks, figures),
@@ -100,7 +100,7 @@ def _page(found: Examination, lacks: list[tuple[str, tuple[str, ...]]], figures:
                 "pictures-section", where="page"),
         Section("Detectors", [
             Table(("Detector", "State", "Signals"), _detectors(found, dict(lacks)), "detectors", (0, 1, 2), wide=(2,)),
-            Para("" if found.ready else f"Try {_MAP}."),
+            Para("" if found.ready else f"Try {MAP_HINT}."),
         ], "detector-section", where="page"),
         Section("Files", [
             Table(("File", "Format", "Bytes", "Channels", "Samples", "Length [s]"), files, "files", (0, 1)),

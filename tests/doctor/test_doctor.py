@@ -280,7 +280,7 @@ def test_what_no_detector_can_work_with_says_what_to_try(tmp_path, capsys):
     with pytest.raises(SystemExit):
         app(["doctor", str(path)])
     out = capsys.readouterr().out
-    assert "no detector can run\n    try: `aqualog inspect LOG --write-map map.toml`" in out
+    assert "no detector can run\n    try: `aqualog init LOG -o FOLDER`" in out
     assert "resistance: missing torque of the driven wheels, vehicle.drivetrain, " in out
 
 
@@ -314,7 +314,7 @@ def test_unknown_names_say_what_to_try(tmp_path, capsys):
     with pytest.raises(SystemExit) as leave:
         app(["doctor", str(path)])
     assert leave.value.code == 4
-    assert "--write-map" in capsys.readouterr().out
+    assert "aqualog init LOG" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

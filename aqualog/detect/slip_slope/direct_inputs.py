@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
@@ -192,8 +193,6 @@ TractionSource = Literal["torque", "accelerometer"]
 METHODS = ("auto", "axle", "velocity", "differential")
 TRACTIONS = ("auto", "torque", "accelerometer")
 
-_MAP_HINT = "`aqualog inspect LOG --write-map map.toml`, then the log with this signal map"
-
 
 class Way(NamedTuple):
     """Sources of slip and traction; `notes` are sentences on substitutes that were used."""
@@ -253,7 +252,7 @@ def _method(vehicle: Vehicle, have: set[str], method: str, where: str) -> Method
     if omega:
         raise SignalError(
             f"no slip without wheel speeds: missing {', '.join(omega)}", where=where,
-            expected=f"the speeds of {'the driven' if chosen == 'velocity' else 'all four'} wheels", hint=_MAP_HINT,
+            expected=f"the speeds of {'the driven' if chosen == 'velocity' else 'all four'} wheels", hint=MAP_HINT,
         )  # fmt: skip
     if chosen == "velocity" and "v_x" not in have:
         raise SignalError(
@@ -276,13 +275,13 @@ def _traction(vehicle: Vehicle, have: set[str], traction: str, where: str) -> tu
             why = "; with all wheels driven an accelerometer cannot replace them" if is_awd else ""
             raise SignalError(
                 f"no traction: missing {', '.join(torque)}{why}", where=where, expected="wheel or axle torques",
-                hint=_MAP_HINT if is_awd or "a_x" not in have else "--traction accelerometer",
+                hint=MAP_HINT if is_awd or "a_x" not in have else "--traction accelerometer",
             )  # fmt: skip
         return "torque", ()
     if "a_x" not in have:
         raise SignalError(
             f"no traction: missing {', '.join(torque)}, and a_x in their place", where=where,
-            expected="wheel torques or an accelerometer", hint=_MAP_HINT,
+            expected="wheel torques or an accelerometer", hint=MAP_HINT,
         )  # fmt: skip
     if traction == "accelerometer":
         return "accelerometer", ()
