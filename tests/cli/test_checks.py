@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from aqualog.align.load import load_drive
 from aqualog.core.vehicle import vehicle_toml
+from aqualog.detect.long import detect_long
 from aqualog.diagnose import run
 from tests import commands
 from tests.checks.made import CAR, DT, made, signals
@@ -83,3 +85,24 @@ def test_a_map_that_speaks_of_another_file_is_refused(folder, tmp_path):
         result = commands.run(command, folder / "drive.csv", "--vehicle", folder / "car.toml", "--signals", path)
         assert result[0] == 2
         assert 'map.toml: line 3: [sources."drive2.csv"] fits no file (did you mean "drive.csv"?)' in result[2]
+
+
+def test_a_drive_in_windows_has_the_same_remarks(folder, monkeypatch):
+    whole, _ = document(folder, "detect")
+    monkeypatch.setattr(load_drive, "__kwdefaults__", {**load_drive.__kwdefaults__, "least": 1})
+    monkeypatch.setattr("aqualog.detect.long.detect_long", lambda *a, **k: detect_long(*a, **k, rows=777))
+    assert document(folder, "detect")[0]["checks"] == whole["checks"] != []
+
+
+def test_a_map_of_a_campaign_may_speak_of_the_files_of_any_run(folder, tmp_path):
+    text = 'name = "c"\nvehicle = "car.toml"\nsignals = "map.toml"\n[[run]]\nlog = "a.csv"\n[[run]]\nlog = "b.csv"\n'
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "car.toml").write_text((folder / "car.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t [s],v_x [m/s]\n0,1\n1,1\n", encoding="utf-8")
+    for name, fits in (("b.csv", True), ("c.csv", False)):
+        (tmp_path / "map.toml").write_text(f'[sources."{name}"]\noffset_s = 0.2\n', encoding="utf-8")
+        code, _, err = commands.run("inspect", tmp_path / "campaign.toml")
+        found = commands.run("evaluate", tmp_path / "campaign.toml")
+        assert ("fits no file" in found[2]) != fits, (code, err)
+        assert found[0] == 2 or fits
