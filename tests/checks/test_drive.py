@@ -37,7 +37,7 @@ def test_a_gain_of_the_file_is_multiplied():
 
 
 def test_without_a_mass_no_gain_is_judged():
-    assert said(replace(CAR, given=frozenset()), **dict.fromkeys(TORQUES, 0.5)) == []
+    assert said(replace(CAR, given=frozenset()), **dict.fromkeys(TORQUES, 2.0)) == []
 
 
 def test_turned_torques():

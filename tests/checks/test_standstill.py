@@ -31,6 +31,7 @@ def test_offsets_with_their_intervals():
 def test_more_stops_narrow_the_interval():
     one, three = (found(made(stops=k))["a_x"].ci95 for k in (1, 3))
     assert np.diff(three) < 0.6 * np.diff(one)
+    assert np.diff(one) == pytest.approx(2.0 * 2.776 * 0.25, rel=1e-3)  # Student's t of four, a slope of 2.5 %
 
 
 @pytest.mark.parametrize("offset", [0.25, 0.5])
