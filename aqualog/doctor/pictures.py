@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,6 +16,7 @@ __all__ = ["MOST_PICTURES", "pictures_of"]
 MOST_PICTURES = 12  # of a file
 _STRETCHES = 600  # of a picture: least and greatest value of each
 _MOST_SPANS = 100
+_NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?")
 _OF_VALUES = ("not_finite", "frozen", "code")
 
 
@@ -61,12 +63,19 @@ def _spans(
         if stop is not None:
             yield stop.from_s, stop.from_s + stop.length_s
     elif finding.kind == "not_finite":
-        bad: BoolArray = ~np.isfinite(values)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8))).reshape(-1, 2)
-        for a, b in edges.tolist():
-            yield float(t[a]), float(t[b - 1])
+        yield from _stretches(~np.isfinite(values), t)
+    elif finding.kind == "code":
+        first = finding.what.split(" ", 1)[0]
+        if _NUMBER.fullmatch(first):
+            yield from _stretches(values == float(first), t)
     elif finding.first_s is not None:
         yield finding.first_s, finding.first_s
+
+
+def _stretches(bad: BoolArray, t: FloatArray) -> Iterator[tuple[float, float]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8))).reshape(-1, 2)
+    for a, b in edges.tolist():
+        yield float(t[a]), float(t[b - 1])
 
 
 def _thinned(values: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:

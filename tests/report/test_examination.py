@@ -30,15 +30,19 @@ def found():
         Finding("mended", "wraps", FILE, "torque", "2 overflows of the time counter", "", 2, 10_000, 12.5),
         Finding("doubt", "frozen", FILE, "speed", "stands at 50 for 20 s", "check this part"),
         Finding("lost", "not_finite", FILE, "torque", "100 of 10000 samples are no numbers"),
+        Finding("doubt", "code", FILE, "gear", "1022 looks like an error code", "invalid = [1022] in the map"),
     )
-    pictures = tuple(pictures_of(findings, [channel("speed", speed), channel("torque", torque)]))
+    gear = np.where(np.arange(10_000) >= 9000, 1022.0, 3.0)
+    channels = [channel("speed", speed), channel("torque", torque), channel("gear", gear)]
+    pictures = tuple(pictures_of(findings, channels))
     return Examination((FileState(FILE, "mdf", 1000, 2, 20_000, 0.0, 100.0),), findings, ("spin_down",), (), pictures)
 
 
 def test_pictures_have_few_samples_and_the_times_of_the_faults(found):
-    torque, speed = found.pictures
+    torque, speed, gear = found.pictures
     assert np.array(torque.spans) == pytest.approx(np.array([(12.5, 12.5), (30.0, 30.99)]))
     assert np.array(speed.spans) == pytest.approx(np.array([(40.0, 59.99)]), abs=0.02)
+    assert np.array(gear.spans) == pytest.approx(np.array([(90.0, 99.99)]))
     assert speed.t.size < 2000
     assert speed.values.max() > 53.0
     assert np.isnan(torque.values).any()
@@ -47,7 +51,7 @@ def test_pictures_have_few_samples_and_the_times_of_the_faults(found):
 def test_page_begins_with_the_gravest_finding_and_marks_it(found):
     page = report_page(examination_report(found), title="drive")
     words = re.sub(r"<[^>]+>|\s+", " ", page[page.index("<h1>") : page.index("<footer>")])
-    assert "3 findings: 1 lost or not used, 1 worth checking, 1 mended" in words
+    assert "4 findings: 1 lost or not used, 2 worth checking, 1 mended" in words
     assert words.index("100 of 10000 samples") < words.index("Stands at 50") < words.index("2 overflows")
     assert words.index("2 overflows") < words.index("Detectors")
     figures = json.loads(re.search(r'id="figure-data">(.*?)</script>', page, re.DOTALL)[1])

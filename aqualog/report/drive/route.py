@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aqualog.core.judgement import Episode, EpisodeKind
 from aqualog.core.records import DriveResult, FloatArray
-from aqualog.report.drive.judged import KIND_NAMES, episode_sentence
+from aqualog.report.drive.judged import FOLDED, KIND_NAMES, episode_sentence
 from aqualog.report.figures import axis, dots, figure, line, rounded
 from aqualog.report.theme import INK, MUTED, THRESHOLD
 from aqualog.report.values import KMH, plot_text
@@ -24,7 +24,7 @@ POINTS = 2500  # of the whole way, at equal distances
 MOST_MARKS = 400  # of a kind of episode
 _LOOKS: Mapping[EpisodeKind, str] = {
     "aquaplaning": THRESHOLD, "suspected": "#E69F00", "other_surface": "#8C6D31", "wheel_lock": "#7F6BB3",
-    "single_detector": "#7F6BB3",
+    "single_detector": "#CC79A7",
 }  # fmt: skip
 """Colour of each kind of episode; the first ones lie above."""
 
@@ -131,9 +131,10 @@ def _marks(
             words = plot_text(f"{KIND_NAMES[kind].capitalize()}: {episode_sentence(episode)}")
             which += [*[[table, row, words]] * part.size, None]
         if own:
+            width = 7 if kind in FOLDED else 13
             found.append(line(
-                KIND_NAMES[kind], x, y, _LOOKS[kind], width=13, mode="lines+markers", customdata=which, opacity=0.75,
-                marker={"color": _LOOKS[kind], "size": 13}, hovertemplate="%{customdata[2]}<extra></extra>",
+                KIND_NAMES[kind], x, y, _LOOKS[kind], width=width, mode="lines+markers", customdata=which, opacity=0.75,
+                marker={"color": _LOOKS[kind], "size": width}, hovertemplate="%{customdata[2]}<extra></extra>",
             ))  # fmt: skip
     return found
 

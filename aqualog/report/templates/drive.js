@@ -478,6 +478,7 @@
   function build(width) {
     const figure = coloured(data.figure);
     shapes = figure.layout.shapes;
+    if ((width || plot.clientWidth) < NARROW) makeNarrow(figure.layout, data.rows);
     figure.data.forEach(function (trace) { trace.visible = !hidden.has(trace.legendgroup); });
     tellView();
     const [change, layout] = contents(view);
@@ -552,6 +553,12 @@
   const sheets = document.createElement("div");
   sheets.id = "sheets";
   plot.after(sheets);
+  let wasNarrow = plot.clientWidth < NARROW;
+  window.addEventListener("resize", function () {
+    if (plot.clientWidth < NARROW === wasNarrow || isOnPaper) return;
+    wasNarrow = !wasNarrow;
+    build();
+  });
   redrawn(function (width) {
     build(width);
     sheets.replaceChildren(...(width ? cutUp(plot, data.rows) : []));

@@ -2,6 +2,14 @@
 const OVER_LIMIT = 10; // a panel with a limit shows up to so many times the limit, where twice as much would come
 const OVER_MOST = 10; // any other leaves out what is farther from nearly all values than so many times their range
 
+const NARROW = 620; // [px] below, titles are without their captions and names of lanes small
+
+function makeNarrow(layout, rows) {
+  layout.margin.l = 92;
+  for (const title of layout.annotations) title.text = title.text.replace(/^(<b>.*?<\/b>) – .*$/, "$1");
+  for (const row of rows) if (!row.has_lines) layout[row.axis].tickfont.size = 9;
+}
+
 // The range of values without peaks that would press all else flat.
 function withoutPeaks(low, high, some, limits) {
   if (limits.length) {
