@@ -121,17 +121,20 @@ def _without_value(data: CampaignData) -> Problem:
 
 
 def _unavailable(data: CampaignData) -> list[Problem]:
-    """One problem per detector, with its missing signals."""
-    found: dict[tuple[str, str, str], list[tuple[int, str]]] = {}
+    """One problem for all detectors that lack the same signals in the same runs."""
+    found: dict[tuple[str, str, str], list[int]] = {}
     for r in data.done:
         for state in ("unavailable", "limited"):
             for detector, missing in r.about[state].items():
-                at = (state, detector, ", ".join(missing))
-                found.setdefault(at, []).append((r.index, ""))
-    out = []
+                found.setdefault((state, detector, ", ".join(missing)), []).append(r.index)
+    alike: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
     for (state, detector, missing), runs in found.items():
-        title = f"{detector_name(detector)} {'not judged' if state == 'unavailable' else 'judged in part'}"
-        out.append(Problem("limit", title, cut(f"needs {missing}" if missing else "", 200), tuple(runs)))
+        alike.setdefault((state, missing, tuple(runs)), []).append(detector_name(detector))
+    out = []
+    for (state, missing, indices), names in alike.items():
+        title = f"{', '.join(names)} {'not judged' if state == 'unavailable' else 'judged in part'}"
+        means = cut(f"needs {missing}" if missing else "", 200)
+        out.append(Problem("limit", title, means, tuple((i, "") for i in indices)))
     return out
 
 

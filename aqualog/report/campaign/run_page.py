@@ -190,17 +190,21 @@ def _step(plan: Plan) -> int:
 def _note(info: RunInfo, samples: RunSamples, plan: Plan) -> str:
     """What a point of the figure stands for."""
     every = f"{samples.step_s:.2g} s" if samples.t.size > 1 else "sample"
-    about = f"Rim speeds and slips are extremes of every {every}, relative to the vehicle's speed."
+    has_slips = any(np.isfinite(samples.array(f"slip_min_{w}")).any() for w in WHEELS)
+    about = (
+        f" Rim speeds and slips are extremes of every {every}, relative to the vehicle's speed." if has_slips else ""
+    )
     if plan.is_complete or not plan.n:
-        return f"One point every {every}. {about}"
-    coarse = f"one point every {_step(plan) * samples.step_s:.2g} s (mean, and extremes of the slip)"
+        return f"One point every {every}.{about}"
+    kind = "mean, and extremes of the slip" if has_slips else "mean"
+    coarse = f"one point every {_step(plan) * samples.step_s:.2g} s ({kind})"
     events = len(info.events)
     if not events:
-        return f"{upper_first(coarse)}. {about}"
+        return f"{upper_first(coarse)}.{about}"
     which = "the events" if plan.events_in_full == events else f"{plan.events_in_full} of {events} events"
     if any(e["end_s"] - e["start_s"] > LONG_S for e in info.events):
         which += f" (of those longer than {LONG_S:g} s: of their beginning and end)"
-    return f"One point every {every} within {_BUDGET.margin_s:g} s of {which}; elsewhere {coarse}. {about}"
+    return f"One point every {every} within {_BUDGET.margin_s:g} s of {which}; elsewhere {coarse}.{about}"
 
 
 def _plots(info: RunInfo, samples: RunSamples, plan: Plan) -> dict[str, Any]:

@@ -106,6 +106,7 @@ function largest(curves, level) {
   const sure = of(true), values = (sure.length ? sure : of(false)).concat(curves.map(function (c) { return c[3] ?? 0; }));
   const tops = curves.flatMap(function (c) { return c[2].map(function (p) { return p[5] ?? 0; }); });
   const top = Math.max(level ?? 0, ...values);
+  if (D.is_dry) return Math.max(top, ...tops); // around zero
   return Math.min(1.3 * top, Math.max(top, ...tops)) || 1;
 }
 

@@ -107,7 +107,7 @@ function drawMatrix() {
     });
     body.append(line);
   }
-  byId("matrix").replaceChildren(header([column < 0 ? "" : `configuration \\ ${facets[column].title}`, ...columns]), body);
+  byId("matrix").replaceChildren(header([column < 0 ? "Configuration" : `configuration \\ ${facets[column].title}`, ...columns]), body);
 }
 
 function cellButton(hits, left, most, row, c) {

@@ -490,7 +490,7 @@
       else figure.layout[axis] = value;
     }
     const config = {
-      ...plotConfig, doubleClick: false,
+      ...plotConfig, doubleClick: false, displayModeBar: plot.clientWidth < NARROW ? false : "hover",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetScale2d"],
     };
     return paint(plot, figure.data, figure.layout, config, width);
@@ -557,7 +557,7 @@
   window.addEventListener("resize", function () {
     if (plot.clientWidth < NARROW === wasNarrow || isOnPaper) return;
     wasNarrow = !wasNarrow;
-    build();
+    build().then(bars.place);
   });
   redrawn(function (width) {
     build(width);

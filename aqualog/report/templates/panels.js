@@ -63,16 +63,16 @@ function panelBars(plot, rows, act) {
       const { t, b } = plot._fullLayout.margin, inner = plot._fullLayout.height - t - b;
       rows.forEach(function (row, k) {
         if (!bars[k]) return;
-        if (k === 0) bars[k].node.style.right = "150px"; // beside plotly's own buttons
+        if (k === 0) bars[k].node.style.right = plot.clientWidth < NARROW ? "" : "150px"; // beside plotly's own buttons
         bars[k].node.style.top = t + (1 - plot.layout[row.axis].domain[1]) * inner - (k ? 24 : 41) + "px";
       });
     },
     // `beyond` are values that the panel does not show.
     tell: function (k, beyond, isFree) {
       const { fit } = bars[k], told = beyond.filter(function (v) { return v !== null && v !== undefined; });
-      const peaks = told.map(function (v) { return format(v, rows[k]); }).join(" and ");
+      const peaks = told.map(function (v) { return String(Number(v.toPrecision(3))).replace("-", "−"); }).join(" and ");
       fit.hidden = !isFree && !peaks;
-      fit.textContent = isFree ? "fit" : `full range, to ${peaks}`;
+      fit.textContent = isFree ? "fit" : `${plot.clientWidth < NARROW ? "" : "full range, "}to ${peaks}`;
       fit.setAttribute("aria-label", `${fit.textContent}, ${rows[k].title}`);
     },
     // Values of all panels at a time; none without one.

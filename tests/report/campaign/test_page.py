@@ -97,6 +97,15 @@ def test_the_log_with_most_missing_comes_before_all_remarks(case):
     assert found[-1].weight == "note"
 
 
+def test_detectors_that_lack_the_same_are_one_line(case):
+    lacks = {"spin_down": ("omega_fl",), "spin_up": ("omega_fl",), "tie_rod": ("tie_rod_fl",)}
+    about = {"notes": (), "unavailable": lacks, "limited": {}, "duration_s": 10.0, "quality": {}}
+    runs = [replace(case.done[0], about=about)]
+    titles = [p.title for p in problems_of(SimpleNamespace(runs=runs, done=runs), ())]
+    assert "Spin-down, Spin-up not judged" in titles
+    assert "Tie-rod force not judged" in titles
+
+
 def test_a_dry_campaign_shows_its_resistance_and_names_what_it_cannot_show(case):
     dry = [r for r in case.runs if r.is_done and r.run.values.get("water_depth_mm") == 0.0]
     data = SimpleNamespace(
@@ -248,7 +257,7 @@ def test_long_drive_makes_a_small_page(case):
 def test_a_long_run_shows_every_sample_near_its_events_and_says_what_a_point_is_elsewhere(case):
     n, info = 6000, case.runs[0]
     some = next(e for r in case.done for e in r.events)
-    frame = pl.DataFrame({"v_x": np.where(np.arange(n) == 2003, 40.0, 30.0), "delta_a_x": np.full(n, 0.1)})
+    frame = pl.DataFrame({"v_x": np.where(np.arange(n) == 2003, 40.0, 30.0), "slip_min_fl": np.full(n, -0.1)})
     samples = RunSamples(frame, np.arange(n) * 0.1, np.zeros(n))
     event = {**some, "start_s": 200.0, "end_s": 201.0}
     page = run_page(case, replace(info, about={**info.about, "events": [event]}), samples, None, back="")
