@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 __all__ = [
-    "EVENT_SHADE", "FULL_SHADE", "GRID", "INK", "LIGHT", "MUTED", "THRESHOLD", "WATER", "WATER_SHADE", "WHEEL_COLOURS",
-    "detector_colour", "in_light", "wheel_colour",
+    "EVENT_SHADE", "FULL_SHADE", "GRID", "INK", "LIGHT", "MUTED", "OTHER_SHADE", "THRESHOLD", "WATER",
+    "WATER_SHADE", "WHEEL_COLOURS", "detector_colour", "in_light", "wheel_colour",
 ]  # fmt: skip
 
 # Okabe and Ito's palette [okabe2008]: distinguishable with any common colour blindness, on white and on dark ground,
@@ -26,6 +26,7 @@ WATER = "#3A9BDC"
 WATER_SHADE = "rgba(58,155,220,0.65)"
 EVENT_SHADE = "rgba(230,159,0,0.13)"
 FULL_SHADE = "rgba(178,24,43,0.13)"
+OTHER_SHADE = "rgba(128,128,128,0.16)"
 
 
 def wheel_colour(wheel: str | None) -> str:

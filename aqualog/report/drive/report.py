@@ -320,7 +320,9 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
     """The section that the page's script draws, if there is anything to draw, and all that the script needs."""
     rows = drive_rows(result)
     plan = make_plan(by_importance(result.events), result.signals.frame.height, result.signals.dt)
-    spans = [[round(e.start_s, 6), round(e.end_s, 6), int(e.severity == "full")] for e in result.events]
+    wet = {i for e in result.judgement.of("aquaplaning") for i in e.events}
+    levels = [(1 + (e.severity == "full")) * (i in wet) for i, e in enumerate(result.events)]
+    spans = [[round(e.start_s, 6), round(e.end_s, 6), n] for e, n in zip(result.events, levels, strict=True)]
     tables = _choices(result.judgement)
     chosen = {id: [[round(e.start_s, 6), round(e.end_s, 6)] for e in found] for id, found in tables.items()}
     island: dict[str, Any] = {"events": spans, "episodes": chosen}
@@ -328,7 +330,8 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
         island["table"] = event_columns([*events.rows, *events.more])
     if not rows or not plan.n:
         return [], island
-    shades = [("partial", "event"), ("full", "full")] if spans else []
+    names = (("other", "other event"), ("partial", "aquaplaning"), ("full", "full aquaplaning"))
+    shades = [names[n] for n in sorted(set(levels))]
     shades += [("water", "on water")] if "on_water" in result.signals.frame.columns else []
     toggles = [(g, g if g == VEHICLE else g.upper(), WHEEL_COLOURS.get(g, "")) for g in groups(rows)]
     note = _note(result, plan) + " Drag to zoom, double click to show all; on an axis, drag to pan."

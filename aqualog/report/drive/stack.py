@@ -19,7 +19,7 @@ from aqualog.core.records import FloatArray
 from aqualog.core.units import convert
 from aqualog.report.figures import FRAME, plotly_figure
 from aqualog.report.reduce import ALL_SAMPLES, Plan, Spans, make_plan, reduce_indices
-from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, GRID, INK, MUTED, THRESHOLD, WATER_SHADE
+from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, GRID, INK, MUTED, OTHER_SHADE, THRESHOLD, WATER_SHADE
 from aqualog.report.values import plot_text
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def stack(rows: Sequence[Row], plan: Plan, dt: float) -> dict[str, Any]:
         "windows": plan.windows.tolist(),
         "lines": lines,
         "lanes": [{"level": level, "spans": _indices(lane.spans)} for lane, level, _ in lanes],
-        "shades": {"partial": EVENT_SHADE, "full": FULL_SHADE},
+        "shades": {"other": OTHER_SHADE, "partial": EVENT_SHADE, "full": FULL_SHADE},
         "rows": [
             {
                 "axis": _axis(k, "yaxis"),

@@ -84,20 +84,21 @@
   });
   const strips = (data.rows || []).map(function (row) { return row.strips && spansOf(row.strips.spans); });
 
-  // Union of wanted events of one severity.
-  function shaded(isFull) {
+  // Union of wanted events of one level: 0 no aquaplaning, 1 partial, 2 full.
+  function shaded(level) {
     const begin = [], end = [];
     const shown = data.events.filter(function (_, i) { return isWanted(i); });
-    for (const [a, b, full] of shown.sort(function (p, q) { return p[0] - q[0]; })) {
+    for (const [a, b, own] of shown.sort(function (p, q) { return p[0] - q[0]; })) {
       const last = end.length - 1;
-      if (Boolean(full) !== isFull) continue;
+      if (own !== level) continue;
       if (last >= 0 && a <= end[last]) end[last] = Math.max(end[last], b);
       else { begin.push(a); end.push(b); }
     }
     return { begin: begin, end: end };
   }
   let isWanted = function () { return true; }; // an event, by the filters
-  let shades = { partial: shaded(false), full: shaded(true) };
+  function allShades() { return { other: shaded(0), partial: shaded(1), full: shaded(2) }; }
+  let shades = allShades();
 
   // Spans in a range, as [begin, end]; those that are closer than can be seen are one, and none is shorter than `least`.
   function inside(spans, from, to, unseen, least = 0) {
@@ -130,7 +131,7 @@
   }
 
   function shadesAndStrips(from, to, unseen) {
-    const found = ["partial", "full"].flatMap(function (severity) {
+    const found = ["other", "partial", "full"].flatMap(function (severity) {
       return rectangles(inside(shades[severity], from, to, unseen, 2 * unseen), "paper", 1, data.shades[severity]);
     });
     data.rows.forEach(function (row, k) {
@@ -436,7 +437,7 @@
     isWanted = eventFilters(eventTable, data.events.length, texts, function () {
       if (long) orderEvents();
       else for (const row of rows) row.hidden = !isWanted(Number(row.dataset.row));
-      shades = { partial: shaded(false), full: shaded(true) };
+      shades = allShades();
       if (plot) draw(view);
     });
   }

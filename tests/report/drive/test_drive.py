@@ -9,7 +9,7 @@ import pytest
 
 from aqualog.report.drive.report import drive_page
 from aqualog.report.page import write_page
-from aqualog.report.theme import EVENT_SHADE, FULL_SHADE
+from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, OTHER_SHADE
 from tests.headless import PATIENCE, click, requests, severe, wait_for
 from tests.report import fake_result as fake
 
@@ -208,7 +208,8 @@ def test_events_are_filtered_with_their_shades(show, short):
     Select(labels[2].find_element("css selector", "select")).select_by_value("while braking")
     index = [i for i, e in enumerate(short.events) if e is event]
     assert browser.execute_script(seen) == index
-    wait_for(lambda: shade(browser, FULL_SHADE) == [] and len(shade(browser, EVENT_SHADE)) == 1)
+    wait_for(lambda: len(shade(browser, OTHER_SHADE)) == 1)
+    assert shade(browser, FULL_SHADE) == shade(browser, EVENT_SHADE) == []  # of aquaplaning alone
     Select(labels[2].find_element("css selector", "select")).select_by_value("")
     Select(labels[1].find_element("css selector", "select")).select_by_value("RR")
     assert [short.events[i].wheel for i in browser.execute_script(seen)] == ["rr"] * 1
@@ -323,7 +324,7 @@ def eventful():
     events = [
         replace(drive.events[k % len(drive.events)], start_s=t, end_s=round(t + 0.1, 6)) for k, t in enumerate(starts)
     ]
-    return replace(drive, events=tuple(events))
+    return fake.with_events(drive, events)
 
 
 def event_starts(browser):
@@ -337,7 +338,7 @@ def check_shades(browser, result):
     begin, end = x_range(browser)
     inside = {(e.start_s, e.end_s) for e in result.events if e.end_s >= begin and e.start_s <= end}
     assert len(inside) >= 2
-    assert inside <= {(a, b) for c in (EVENT_SHADE, FULL_SHADE) for a, b in shade(browser, c)}
+    assert inside <= {(a, b) for c in (EVENT_SHADE, FULL_SHADE, OTHER_SHADE) for a, b in shade(browser, c)}
 
 
 def test_thousands_of_events_by_pages_searched_sorted_and_stepped_through(show, eventful):
