@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from aqualog import __version__
@@ -40,7 +40,7 @@ from aqualog.report.evaluation_words import (
     verdicts,
 )
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
-from aqualog.report.values import fields_of, number, plain
+from aqualog.report.values import counted, fields_of, number, plain
 
 __all__ = ["evaluation_document", "evaluation_report"]
 
@@ -56,6 +56,8 @@ _SCORES = (
     "False alarms", ("Per hour (95 %)", "per h (95 %)"), "Per 100 km", ("On water, contact above 0.7", "on water"),
 )  # fmt: skip
 _ROC = ("Detector", "Times", "Threshold", "Full", "Partial", "False alarms", ("Per hour (95 %)", "per h (95 %)"))
+_MATRICES = ("recall-matrix", "alarm-matrix")
+_NOTHING = ("", "-", "–", "- / -", "–/h")
 _FOOTER = (
     "Intervals: Wilson [wilson1927] for shares, exact Poisson [garwood1936] for rates, 95 %. A false alarm is an event "
     "that begins outside water and the second after it."
@@ -95,13 +97,22 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
         ], "gates")]),
         Section("Not evaluated", [Lines(list(evaluation.failed.items()), most=1000)], "failed", look="problems",
                 where="page"),
-        Section("All drives", [Table(_SCORES, _score_rows(scores), "detectors"), Para(_LEGEND, where="text")]),
+        Section("Situations", [Figures(_MATRICES)], "matrix-section"),
+        Section("All drives", [
+            replace(_with_values(Table(_SCORES, _score_rows(scores), "scores")), where="page"),
+            Table(_SCORES, _score_rows(scores), where="text"), Para(_LEGEND, where="text"),
+        ]),
         *(
-            Section(f"{name} ({len(some)} drives)", [Table(_SCORES, _score_rows(score_all(some)))])
+            Section(f"{name} ({counted(len(some), 'drive')})", [Table(_SCORES, _score_rows(score_all(some)))],
+                    where="text")
             for name, some in groups
         ),
-        Section("Confusion: episodes with an event, and events per hour", [_confusion(records)], "confusion-section"),
-        Section("Situations, thresholds, latency", [Figures(list(plots))], "plot-section"),
+        Section("By configuration", [_configurations(groups)], "group-section", where="page",
+                fold=counted(len(groups), "configuration")),
+        Section("Confusion", [_confusion(records)], "confusion-section", "episodes with an event, and events per hour",
+                fold="each detector by what was there"),
+        Section("Over thresholds and time", [Figures([n for n in plots if n not in _MATRICES])], "plot-section",
+                fold="curves"),
         *_situation_sections(records, situations),
         Section("Over thresholds", [Table(_ROC, [
             (title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", recall_text(p.full), recall_text(p.partial),
@@ -145,14 +156,30 @@ def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
     ]
 
 
+def _configurations(groups: Sequence[tuple[str, Sequence[RunRecord]]]) -> Table:
+    """The scores of all configurations in one table, without columns in which nothing was measured."""
+    rows = [(name, *row) for name, some in groups for row in _score_rows(score_all(some))]
+    return _with_values(Table(("Configuration", *_SCORES), rows, "configurations", (0, 1), is_sortable=True))
+
+
+def _with_values(table: Table) -> Table:
+    """A table without the columns that hold no value."""
+    texts = [[c if isinstance(c, str) else c.text for c in row] for row in table.rows]
+    kept = [i for i in range(len(table.header)) if any(row[i] not in _NOTHING for row in texts)]
+    return replace(
+        table, header=[table.header[i] for i in kept], rows=[[row[i] for i in kept] for row in table.rows],
+        words=[k for k, i in enumerate(kept) if i in table.words],
+    )  # fmt: skip
+
+
 def _confusion(records: Sequence[RunRecord]) -> Table:
-    def counted(c: Counts | None) -> str:
+    def share_text(c: Counts | None) -> str:
         return "–" if c is None else f"{c.hit}/{c.episodes} · {short(_per_hour(c))}/h"
 
     cells = confusion(records)
     names = list(dict.fromkeys(n for row in cells.values() for n in row))
-    rows = [(row, *(counted(columns.get(n)) for n in names)) for row, columns in cells.items()]
-    return Table(("Label", *(title_of(n) for n in names)), rows, "confusion")
+    rows = [(title_of(n), *(share_text(columns.get(n)) for columns in cells.values())) for n in names]
+    return Table(("Detector", *cells), rows, "confusion")
 
 
 def _per_hour(c: Counts) -> float:

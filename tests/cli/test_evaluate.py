@@ -64,7 +64,12 @@ def test_page_needs_no_network(whole):
     assert "src=" not in text.split("<script>")[0]
     head = text[: text.index('<script type="application/json"')]
     assert "short drives" in head
-    assert head.index('class="headline"') < head.index('id="detectors"') < head.index('id="confusion"')
+    assert (
+        head.index('class="headline"')
+        < head.index('id="recall-matrix"')
+        < head.index('id="scores"')
+        < head.index('id="confusion"')
+    )
     assert "of full aquaplaning within 0.5 s" in head
     assert "broken.mf4" in head
     assert "rival" in head
