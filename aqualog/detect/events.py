@@ -102,11 +102,13 @@ class _Builder:
         opened, self._open = self._open, None
         start_s, end_s = opened.start * self._dt_ns / 1e9, end * self._dt_ns / 1e9
         since, after = (opened.evidence.pop(name, 0.0) for name in (SINCE, AFTER))
+        # a wheel may report a puddle when the car has left it: then the cause is over before the event begins
+        cause_end = max(end_s - after, 0.0)
         return [
             Event(
                 **self._place, start_s=start_s, end_s=end_s, severity=self._severity(opened.evidence),
                 peak=opened.peak, threshold=self._threshold, evidence=self._explain(opened.evidence),
-                cause_s=(max(start_s - since, 0.0), max(end_s - after, start_s)),
+                cause_s=(min(max(start_s - since, 0.0), cause_end), cause_end),
             )
         ]  # fmt: skip
 

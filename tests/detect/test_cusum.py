@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from aqualog.core.records import Track
 from aqualog.detect import cusum
+from aqualog.detect.events import AFTER, EventBook
 from aqualog.detect.resistance import alarm_params
 
 DT = 0.01
@@ -48,3 +50,16 @@ def test_any_cut_and_gaps_give_the_same(cuts):
     x = np.concatenate([np.zeros(300), np.full(400, 0.4), np.zeros(500)]) + 0.1 * rng.standard_normal(1200)
     x[350:360] = np.nan
     assert edges(x, cuts) == edges(x)
+
+
+def test_a_cause_may_be_over_before_its_event_begins():
+    """A wheel reports a puddle when the car has left it."""
+    bits, zero = np.zeros(100, dtype=bool), np.zeros(100)
+    bits[50:70] = True
+    after = np.arange(100) * DT - 0.4  # the force ended at 0.4 s
+    book = EventBook(10_000_000)
+    track = Track("joint_cusum", None, None, "-", zero, 1.0, bits)
+    (event,) = book.take(track, {AFTER: ("last", after)}, lambda _: "partial")
+    assert (event.start_s, event.end_s) == (0.5, 0.7)
+    assert event.cause_s == (pytest.approx(0.41), pytest.approx(0.41))
+    assert AFTER not in event.evidence

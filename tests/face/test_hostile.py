@@ -145,7 +145,7 @@ def test_modules_of_a_folder_beside_a_function():
 def test_a_detection_without_samples(tmp_path):
     found = aq.detect(LOG, CAR, samples=False)
     assert not found.has_samples
-    assert set(found.tables) == {"events", "signals"}
+    assert set(found.tables) == {"events", "episodes", "signals"}
     assert found._repr_html_().startswith("<pre>")
     assert [p.name for p in found.save(tmp_path)] == ["events.json"]
     for ask in (found.plot, lambda: found.tracks, lambda: found.features, lambda: found.write(tmp_path / "a.csv")):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from aqualog.core.judgement import Episode, EpisodeKind, Judgement
 from aqualog.report.sections import Cell, Line
@@ -16,7 +16,7 @@ __all__ = [
     "headline", "judged_by", "level", "lines_of", "missing_words",
 ]  # fmt: skip
 
-KIND_NAMES: Mapping[EpisodeKind, str] = {
+KIND_NAMES: dict[EpisodeKind, str] = {
     "aquaplaning": "aquaplaning", "suspected": "suspected", "other_surface": "other surface",
     "wheel_lock": "wheel lock", "single_detector": "single detector",
 }  # fmt: skip
