@@ -116,7 +116,7 @@ _COORDINATES: dict[str, tuple[str, str]] = {
 }
 _CHANNELS: dict[str, tuple[str, str]] = {
     "force_balance": ("force balance", "m/s²"),
-    "kinematic": ("accelerometer against wheel acceleration", "m/s²"),
+    "kinematic": ("accelerometer against the change of speed", "m/s²"),
     "lateral": ("lateral acceleration", "m/s²"),
     "axle_slip": ("slip between the axles", "m/s"),
     "side_slip_f": ("slip between the front wheels", "m/s"),

@@ -17,6 +17,7 @@ __all__ = ["diagnosis_report"]
 
 _LOOKS = {"no_effect": "", "named": "told", "compound": "told", "cannot_tell": "partial", "unexplained": "partial"}
 _DECADES = (-1.0, 2.0)  # range of the bars: limit over smallest size worth naming
+_BEFOREHAND = "from how the log was driven alone, with each effect at its reference size"
 _MOST_LIMITS, _MOST_CONFUSED, _MOST_CHANNELS = 6, 5, 3  # in the terminal
 
 
@@ -86,8 +87,8 @@ def _on_causes(d: Mapping[str, Any], said: Mapping[str, list[str]], level: str) 
 
 def _on_gain(said: Mapping[str, list[str]], figures: Mapping[str, Any]) -> list[Section]:
     hint = (
-        "log score: natural logarithm of the likelihood of the measurement; errors: root mean square of a channel, "
-        "one sample ahead or in free simulation"
+        "log score: a gain of 1 makes the measurement 2.7 times as probable; errors: root mean square, for the next "
+        "sample or in a simulation that runs on by itself"
     )
     gain = said["score"] + said["channels"] + said["gain_notes"]
     return [
@@ -125,9 +126,9 @@ def _on_isolability(d: Mapping[str, Any], said: Mapping[str, list[str]], figures
                 ]),
                 Section(f"Right name in less than {sure} of cases", [Lines(said["confused"], "confused")]),
             ]),
-            Figures([x for x in ("isolability",) if x in figures]),
-        ], "isolability-section",
-        "computed from the log's excitation alone, with each effect at its reference size", where="page"),
+        ], "isolability-section", _BEFOREHAND, where="page"),
+        Section("Pairs of effects", [Figures([x for x in ("isolability",) if x in figures])], "pairs-section",
+                _BEFOREHAND, where="page", fold="how often each pair of effects would get the right name"),
     ]  # fmt: skip
 
 

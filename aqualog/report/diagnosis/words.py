@@ -51,6 +51,8 @@ COORDINATES: dict[str, tuple[str, str, float, float]] = {
 """Name of a coordinate, its unit on pages, and factor and offset to that unit."""
 
 _PLACES = {"f": "front", "r": "rear"}
+_OF_BUSES = ("clock_skew",)  # one signal stands for its bus, whether or not the log has that one
+_BUSES = {"torque_fl": "wheel torque"}
 _WHEELS = ("fl", "fr", "rl", "rr")
 _MOST_CONFUSED = 12
 
@@ -72,6 +74,8 @@ def effect_title(key: str) -> str:
     """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name."""
     effect, _, where = key.partition("@")
     place = where.upper() if where in _WHEELS else _PLACES.get(where, where)
+    if effect in _OF_BUSES:
+        place = _BUSES.get(where, place)
     return effect.replace("_", " ") + (f", {place}" if place else "")
 
 

@@ -62,6 +62,14 @@ def test_panels_change_with_coordinate_drive_and_samples(show):
     assert requests(browser) == []
 
 
+def test_what_is_folded_has_the_width_of_the_page_once_it_is_open(show):
+    browser = show("named")
+    width = "return document.querySelector('#isolability .main-svg')?.getBoundingClientRect().width ?? 0"
+    browser.execute_script("document.querySelector('#pairs-section details').open = true")
+    wait_for(lambda: browser.execute_script(width) > 1000)
+    assert severe(browser) == []
+
+
 # `named` is drawn above; these two have what it lacks, the others are parts of them
 _SUITE = ("unexplained", "not_testable")
 

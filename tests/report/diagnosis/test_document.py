@@ -191,6 +191,11 @@ def test_confused_sets_are_told_once_and_exact_relations_apart():
     assert said["causes_relations"] == []
 
 
+def test_the_clock_of_a_bus_is_named_by_no_single_wheel():
+    assert effect_title("clock_skew@torque_fl") == "clock skew, wheel torque"
+    assert effect_title("tyre_radius@fl") == "tyre radius, FL"
+
+
 def test_effects_that_look_alike_are_one_line_for_all():
     d = document_of()
     keys = ["brake_drag@fl", "brake_drag@fr", "torque_gain", "torque_offset@f"]
