@@ -13,6 +13,7 @@ from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.views import binned, view_data
 from aqualog.report.diagnosis.words import by_sharpness, sentences
 from aqualog.report.page import report_page
+from aqualog.report.values import readable
 from tests.report.diagnosis.test_document import VERDICTS, document_of, round_trip
 from tests.report.diagnosis_case import cases, view, views_of
 
@@ -39,7 +40,7 @@ def test_all_sentences_are_on_the_page(pages, verdict):
     for key, lines in said.items():
         if key not in ("untested", "causes_confused"):
             for line in lines:
-                assert " ".join(line.split()) in text, key
+                assert readable(" ".join(line.split())) in text, key
     assert text.index(said["headline"][0]) < 700
     assert pages[verdict].startswith("<!DOCTYPE html>")
 
