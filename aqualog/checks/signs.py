@@ -15,6 +15,7 @@ import numpy as np
 from aqualog.checks.doubts import Change, Doubt
 from aqualog.checks.relations import Relation, changes, relate
 from aqualog.checks.windows import Windows
+from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 
 __all__ = ["sign_doubts"]
@@ -26,6 +27,7 @@ LATERAL = 0.06  # [m/s^2] changes of less are no steering, but wind and the crow
 MOVING = 3.0  # [m/s] below, wheels stand or go backwards without a sign
 BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what is no bend the other way
 OVAL_SHARE = 0.05  # of the drive
+SLIDING = 0.015  # half of the slip between the axles from which a driver may steer against the turning
 UNDERSTEER = 0.003  # [rad s^2/m] of a car; it only weighs fast driving against slow
 TURN = Change(-1.0)
 
@@ -79,7 +81,12 @@ def _turning(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
 def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
     """Return the lateral acceleration (n,) that each witness of turning stands for, where the car moves. [m/s²]"""
     car = windows.vehicle
+    wheels = windows.wheels
     v = np.where(speed > MOVING, speed, np.nan)
+    if len(wheels) == len(WHEELS):
+        front, rear = (wheels[f"{a}l"] + wheels[f"{a}r"] for a in AXLES)
+        with np.errstate(invalid="ignore"):
+            v = np.where(np.abs(front - rear) < SLIDING * (front + rear), v, np.nan)
     found = {}
     if "yaw_rate" in windows:
         found["yaw_rate"] = v * windows["yaw_rate"]
@@ -87,7 +94,6 @@ def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
         found["a_y"] = np.where(np.isfinite(v), windows["a_y"], np.nan)
     if "steer_angle" in windows:
         found["steer_angle"] = v**2 * windows["steer_angle"] / (car.wheelbase + UNDERSTEER * v**2)
-    wheels = windows.wheels
     for axle in ("front", "rear"):
         left, right = f"{axle[0]}l", f"{axle[0]}r"
         if left in wheels and right in wheels:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -21,6 +20,7 @@ RATIO = (
 )
 OFF = 0.05  # of speeds: no wear and no GNSS is so far off; a tyre of another size is
 MOVING = 3.0  # [m/s] from which a ratio of speeds means something
+STEADY = 0.04  # between the quartiles of such a ratio: the resolution of slow wheels, and a bend
 _UNITS = {3.6: "km/h read as m/s", 2.23694: "mph read as m/s", 1.60934: "mph read as km/h"}
 _NEAR = 0.04  # about such a factor
 
@@ -63,10 +63,16 @@ def _factor(ratio: float) -> str:
 
 
 def _ratio(x: FloatArray, y: FloatArray) -> float:
-    """Return the median of x over y where both are known and the faster one moves; 1 where too few do."""
+    """Return the median of x over y where both are known and the faster one moves.
+
+    1 where too few do, or where the ratio changes on the way, as with wheels that slip: a scale is always the same.
+    """
     with np.errstate(invalid="ignore"):
         good = (np.maximum(x, y) > MOVING) & (np.minimum(x, y) > 0.0)
-    return float(np.median(x[good] / y[good])) if int(good.sum()) >= LEAST_WINDOWS else 1.0
+    if int(good.sum()) < LEAST_WINDOWS:
+        return 1.0
+    low, ratio, high = np.quantile(x[good] / y[good], (0.25, 0.5, 0.75))
+    return float(ratio) if high - low < STEADY * ratio else 1.0
 
 
 def _acceleration(windows: Windows) -> Iterator[Doubt]:
@@ -76,9 +82,10 @@ def _acceleration(windows: Windows) -> Iterator[Doubt]:
     x, y = changes(windows["a_x"], step), changes(np.gradient(windows.speed, step), step)
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
-    if x.size < LEAST_WINDOWS or not x.any() or not y.any() or np.corrcoef(x, y)[0, 1] < LEAST_CORRELATION:
+    if x.size < LEAST_WINDOWS or not x.any() or not y.any():
         return
-    ratio = float(y.std() / x.std())
-    if not 1 / RATIO < ratio < RATIO and math.isfinite(ratio):
+    r, ratio = float(np.corrcoef(x, y)[0, 1]), float(y.std() / x.std())
+    # the scale lies between both regressions: noise, or grades in a_x, make one of the signals the larger one
+    if r > LEAST_CORRELATION and (r * ratio > RATIO or ratio / r < 1.0 / RATIO):
         what = f"wheel speeds change {ratio:.1f} times as fast as a_x says"
         yield Doubt("scale", ("a_x",), what, "check the units of both (km/h, g)", value=ratio)

@@ -70,3 +70,9 @@ def test_sound_drives_have_no_remark(how, seed):
 
 def test_too_little_driving_is_not_judged():
     assert said(made(seconds=600.0, turning=0.002, accelerating=0.02), turned=("a_x", "yaw_rate")) == []
+
+
+def test_a_driver_who_steers_against_a_slide_has_no_turned_steering():
+    """Braking on snow: the axles slip, and the steering follows the yaw rate with the opposite sign."""
+    slides = {n: x * (1.08 if n in ("omega_fl", "omega_fr") else 1.0) for n, x in DRIVE.items()}
+    assert said({**slides, "steer_angle": -0.1 * DRIVE["yaw_rate"]}) == []

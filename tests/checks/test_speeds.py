@@ -1,5 +1,6 @@
 """Scales of speeds: one wheel against the others, wheels against v_x; the unit that was mistaken is named."""
 
+import numpy as np
 import pytest
 
 from aqualog.checks.look import look
@@ -35,3 +36,11 @@ def test_wheels_against_the_velocity(factor, unit):
     assert len(remark.lines) == 5
     assert " or " in remark.advice
     assert float(remark.lines[0].split("scale = ")[1].rstrip(" }")) == pytest.approx(factor, rel=0.02)
+
+
+def test_wheels_that_slip_for_most_of_the_time_have_no_other_scale():
+    """Snow: the driven wheels are faster, but not always by the same share."""
+    rng = np.random.default_rng(1)
+    slip = 1.0 + np.repeat(rng.uniform(0.0, 0.3, DRIVE["v_x"].size // 200), 200)
+    columns = {n: x * slip if n in ("omega_rl", "omega_rr") else x for n, x in DRIVE.items()}
+    assert not [r for r in look(signals(columns), CAR) if r.kind == "scale"]
