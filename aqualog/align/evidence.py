@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.guess_units import CHOICES, UnitGuess, by_acceleration, by_factor, by_range, top_of
+from aqualog.align.guess_units import CHOICES, Choice, UnitGuess, by_acceleration, by_factor, by_range, top_of
 from aqualog.align.mapping import Entry
 from aqualog.align.motion import Fit, Motion, derivative, fit, on_grid, smooth
 from aqualog.core.records import Channel, FloatArray
@@ -20,10 +20,15 @@ __all__ = [
 
 _SURE = 0.7  # correlation from which a turned sign is proposed, not only said
 _AS_WELL = 0.05  # correlations that differ by less are alike
+_CLEAR = 0.9  # correlation from which an accelerometer shows the unit of a speed: no hill is in it
 _FOLLOWS = 0.5  # below, a channel does not follow what it is compared with
 _AXIS_SPREAD = 0.6  # of factors of accelerations and angles: grades, offsets, steering ratios, delays
 _TURNS = 0.03  # scatter of the lateral acceleration from which the car turns at all [m/s^2]
-_GRIP = 14.0  # lateral acceleration that no road car reaches for long [m/s^2]
+_NOISE = 0.3  # of an acceleration: vibration, road, and what the wheels' difference does not show [m/s^2]
+_WANDERS = 1.5  # of what a steering wheel would give that holds the car against wind, camber and water [m/s^2]
+_EVEN = 0.15  # scatter of the derivative of a speed that hardly changes [m/s^2]
+_BRAKES = 2.0  # deceleration from which the brakes are most of it [m/s^2]
+_GRIP = 25.0  # lateral acceleration that no car on tyres holds for long [m/s^2]
 _STEERS = 60.0  # steering ratio times wheelbase, at most [m]
 _RADIUS = 0.32  # usual rolling radius [m]
 
@@ -125,7 +130,7 @@ def speed_unit(
     if accelerometer is not None and allowed:
         a, unit = accelerometer
         follows = fit(derivative(raw), smooth(a))
-        if abs(follows.r) >= 0.7:
+        if abs(follows.r) >= _CLEAR:
             units = CHOICES["acceleration"]
             named = [c for c in units if unit and parse_unit(unit).factor == parse_unit(c.unit).factor]
             tall = top_of(a)
@@ -140,23 +145,45 @@ def speed_unit(
 # --- what follows from the speed -------------------------------------------------------------------------------------
 
 
+class _Size(NamedTuple):
+    """How large a channel is in its own unit, and between what it must lie in SI."""
+
+    raw: float
+    least: float
+    most: float
+
+    def allows(self, choice: Choice) -> bool:
+        """Whether the channel may have this unit; also where its size is not known."""
+        si = self.raw * parse_unit(choice.unit).factor
+        return not (si < self.least or si > self.most)
+
+
 def _unit_by(
-    p: Proposal, channel: Channel, found: Fit, spread: float, *, name: str = "", lateral: FloatArray | None = None
+    p: Proposal, channel: Channel, found: Fit, spread: float, *, name: str = "", sizes: Sequence[_Size] = ()
 ) -> Proposal:
     """Return a proposal without a unit with the one in which it is as large as what it follows; else by its range.
 
-    `lateral` (n,): the lateral acceleration that its values mean in SI [m/s²]; tyres give only so much of it.
+    Units in which it would not have all of the `sizes` are ruled out, unless that leaves none.
     """
     if p.entry.unit or channel.info.unit:
         return p
     choices = CHOICES[quantity_of(p.entry.symbol)]
-    if lateral is not None:
-        top = top_of(lateral)
-        choices = tuple(c for c in choices if not top * parse_unit(c.unit).factor > _GRIP) or choices
-    unit = by_factor(found.factor, choices, spread=spread) if abs(found.r) >= _FOLLOWS else None
+    choices = tuple(c for c in choices if all(size.allows(c) for size in sizes)) or choices
+    unit = by_factor(found.factor, choices, spread=spread) if abs(found.r) >= _SURE else None
     if unit is not None:
         return with_unit(p, UnitGuess(unit, f"fits{name and f' {name}'}"))
     return with_unit(p, by_range(channel.values, choices))
+
+
+def _scatter(x: FloatArray) -> float:
+    return float(np.nanstd(x)) if np.isfinite(x).any() else np.nan
+
+
+def _cornering(motion: Motion, lateral: FloatArray, noise: float = _NOISE) -> list[_Size]:
+    """Bound the lateral acceleration (n,) that a channel means in SI: by the tyres, and by what the turning shows."""
+    v = smooth(motion.v)
+    seen = max((s for _, turn in motion.turns if np.isfinite(s := _scatter(v * turn))), default=np.nan)
+    return [_Size(top_of(lateral), 0.0, _GRIP), _Size(_scatter(lateral), 0.0, 2.0 * seen + noise)]
 
 
 def _turned(p: Proposal) -> Proposal:
@@ -164,11 +191,16 @@ def _turned(p: Proposal) -> Proposal:
 
 
 def _acceleration(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
-    found = fit(smooth(on_grid(channel, motion.grid)), motion.dv)
-    p = _unit_by(p, channel, found, _AXIS_SPREAD)
+    raw = smooth(on_grid(channel, motion.grid))
+    _, found = _best(raw, [("", change) for change in motion.changes])
+    changes = max(_scatter(change) for change in motion.changes)
+    size = _Size(_scatter(raw), 0.3 * changes, 2.0 * changes + _NOISE)
+    p = _unit_by(p, channel, found, _AXIS_SPREAD, sizes=[size])
     if np.isnan(found.r) or p.score < 0.0:
         return p
     p = replace(p, reason=f"{p.reason}; correlation {found.r:+.2f} with the derivative of the speed")
+    if abs(found.r) < _FOLLOWS and changes < _EVEN:
+        return replace(p, reason=f"{p.reason}: the speed changes too little to check it")
     if abs(found.r) < _FOLLOWS:
         return replace(p, reason=f"{p.reason}: not the car's a_x", score=-1.0)
     if found.r < 0:
@@ -187,7 +219,7 @@ def _best(raw: FloatArray, expected: Iterable[tuple[str, FloatArray]]) -> tuple[
 def _yaw(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
     raw = smooth(on_grid(channel, motion.grid))
     name, found = _best(raw, motion.turns)
-    p = _unit_by(p, channel, found, 3.0, lateral=motion.v * raw)
+    p = _unit_by(p, channel, found, 3.0, sizes=_cornering(motion, smooth(motion.v) * raw))
     if np.isnan(found.r) or p.score < 0.0:
         return p
     if abs(found.r) < _FOLLOWS:
@@ -201,7 +233,8 @@ def _lateral(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
     v = smooth(motion.v)
     expected = [(f"the speed times {name}", v * turn) for name, turn in motion.turns]
     turning = [(name, x) for name, x in expected if np.isfinite(x).any() and float(np.nanstd(x)) > _TURNS]
-    return _signed(p, channel, *_best(smooth(on_grid(channel, motion.grid)), turning), _AXIS_SPREAD)
+    raw = smooth(on_grid(channel, motion.grid))
+    return _signed(p, channel, *_best(raw, turning), _AXIS_SPREAD, _cornering(motion, raw))
 
 
 def _steering(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
@@ -210,14 +243,12 @@ def _steering(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
     with np.errstate(divide="ignore", invalid="ignore"):
         bends = [(f"{name} over the speed", np.where(v > 8.0, turn / v, np.nan)) for name, turn in motion.turns]
     raw = smooth(on_grid(channel, motion.grid))
-    return _signed(p, channel, *_best(raw, bends), 1.0, lateral=v * v * raw / _STEERS)
+    return _signed(p, channel, *_best(raw, bends), 1.0, _cornering(motion, v * v * raw / _STEERS, _WANDERS))
 
 
-def _signed(
-    p: Proposal, channel: Channel, name: str, found: Fit, spread: float, lateral: FloatArray | None = None
-) -> Proposal:
+def _signed(p: Proposal, channel: Channel, name: str, found: Fit, spread: float, sizes: Sequence[_Size]) -> Proposal:
     """Return a proposal with its unit, and turned only where the correlation leaves no doubt."""
-    p = _unit_by(p, channel, found, spread, lateral=lateral)
+    p = _unit_by(p, channel, found, spread, sizes=sizes)
     if np.isnan(found.r) or p.score < 0.0:
         return p
     p = replace(p, reason=f"{p.reason}; correlation {found.r:+.2f} with {name}")
@@ -227,7 +258,10 @@ def _signed(
 def _brake(p: Proposal, channel: Channel, motion: Motion) -> Proposal:
     raw = on_grid(channel, motion.grid)
     is_pressed = raw > 0.05 * top_of(channel.values)
-    found = fit(np.where(is_pressed, smooth(raw), np.nan), -motion.dv)
+    slows = -motion.changes[0]
+    found = fit(np.where(is_pressed, smooth(raw), np.nan), slows)
+    if not np.nanmax(slows, initial=0.0) > _BRAKES:  # drag and engine slow the car as much
+        found = Fit(np.nan, np.nan)
     return _unit_by(p, channel, found, _AXIS_SPREAD, name="the deceleration")
 
 

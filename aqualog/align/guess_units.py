@@ -52,19 +52,19 @@ CHOICES: dict[str, tuple[Choice, ...]] = {
     # a wheel's speed is compared with that of the car: the factor of its turning is the rolling radius [m]
     "wheel": (*_SPEED, Choice("rad/s", 0.24, 0.42, 6.0, 400.0), Choice("rpm", 0.025, 0.044, 400.0, 4000.0)),
     "acceleration": (
-        Choice("m/s^2", 1.0, 1.0, 0.2, 25.0),
-        Choice("g", 9.80665, 9.80665, 0.02, 2.5),
+        Choice("m/s^2", 1.0, 1.0, 0.02, 25.0),
+        Choice("g", 9.80665, 9.80665, 0.002, 2.5),
         Choice("mg", 0.00980665, 0.00980665, 30.0, 2500.0),
     ),
-    "yaw_rate": (Choice("deg/s", _DEG, _DEG, 0.02, 180.0), Choice("rad/s", 1.0, 1.0, 0.01, 2.5)),
+    "yaw_rate": (Choice("deg/s", _DEG, _DEG, 0.05, 180.0), Choice("rad/s", 1.0, 1.0, 0.0005, 2.5)),
     # yaw rate over speed per angle of the steering wheel: 1 / (steering ratio * wheelbase) [1/m]
     "steering": (
-        Choice("deg", _DEG / 100.0, _DEG / 20.0, 0.2, 1000.0),
-        Choice("rad", 1.0 / 100.0, 1.0 / 20.0, 0.02, 16.0),
+        Choice("deg", _DEG / 100.0, _DEG / 20.0, 0.1, 1000.0),
+        Choice("rad", 1.0 / 100.0, 1.0 / 20.0, 0.002, 16.0),
     ),
     # deceleration per brake pressure [m/s^2]: full braking takes 60 to 180 bar
     "brake": (
-        Choice("bar", 0.04, 0.25, 2.0, 250.0),
+        Choice("bar", 0.04, 0.25, 0.1, 250.0),
         Choice("MPa", 0.4, 2.5, 0.2, 25.0),
         Choice("kPa", 0.0004, 0.0025, 200.0, 25000.0),
         Choice("psi", 0.0028, 0.017, 30.0, 3600.0),

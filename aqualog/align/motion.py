@@ -27,14 +27,15 @@ _SLOW = 3.0  # below this speed a course from positions is noise [m/s]
 class Motion:
     """What is known of the motion, each of shape (n,), NaN where it is not known.
 
-    `grid`: stamps [ns]; `v`: speed [m/s]; `dv`: its derivative [m/s²], smoothed; `turns`: yaw rate [rad/s], left
-    positive, smoothed, by what it was found from.
+    `grid`: stamps [ns]; `v`: speed [m/s]; `changes`: derivatives of speeds [m/s²], smoothed, the usual one first;
+    `turns`: yaw rate [rad/s], left positive, smoothed, by what it was found from. `in_doubt`: the unit of a speed is.
     """
 
     grid: TimeArray
     v: FloatArray
-    dv: FloatArray
+    changes: tuple[FloatArray, ...]
     turns: tuple[tuple[str, FloatArray], ...] = ()
+    in_doubt: bool = False
 
 
 class Fit(NamedTuple):

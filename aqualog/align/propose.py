@@ -177,7 +177,12 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
         check = CHECKS.get(rule.symbol)
         if motion is not None and check is not None:
             candidates = [check(p, usable.of(p), motion) for p in candidates]
-        _keep_best(found, rule.symbol, [settle_by_range(p, usable.of(p)) if p.score > 0 else p for p in candidates])
+        settled = [settle_by_range(p, usable.of(p)) if p.score > 0 else p for p in candidates]
+        if motion is not None and motion.in_doubt:
+            settled = [_in_doubt(p, usable.of(p)) for p in settled]
+        if rule.symbol == "a_y":
+            settled = [_as_beside(p, found.get("a_x"), usable) for p in settled]
+        _keep_best(found, rule.symbol, settled)
         if rule.symbol == "yaw_rate" and motion is not None and "yaw_rate" in found:
             channel = usable.of(found["yaw_rate"])
             turn = smooth(to_si(found["yaw_rate"], channel, on_grid(channel, motion.grid))[0])
@@ -327,7 +332,9 @@ def _motion(found: dict[str, Proposal], channels: _Named) -> Motion | None:
     for name, left, right in (("rear", "omega_rl", "omega_rr"), ("front", "omega_fl", "omega_fr")):
         if left in si and right in si:
             turns.append((f"the {name} wheels' difference", wheel_turn(si[left], si[right])))
-    return Motion(grid, v, derivative(si.get("omega_rl", si.get("omega_fl", v))), tuple(turns))
+    # the middle one of the wheels, as one that spins or locks says nothing of the car
+    speeds_of = [*([np.median(wheels, axis=0)] if wheels else []), v]
+    return Motion(grid, v, tuple(derivative(x) for x in speeds_of), tuple(turns), any(found[s].doubt for s in si))
 
 
 def _course(found: Mapping[str, Proposal], channels: _Named, grid: TimeArray) -> tuple[FloatArray, FloatArray] | None:
@@ -341,6 +348,27 @@ def _course(found: Mapping[str, Proposal], channels: _Named, grid: TimeArray) ->
         degrees.append(np.degrees(x) if dimension == "angle" else x)
     v, turn = track(degrees[0], degrees[1])
     return (v, turn) if (v > _MOVING).sum() >= _LEAST else None
+
+
+def _in_doubt(p: Proposal, channel: Channel) -> Proposal:
+    """Return a proposal whose unit was found by a speed in doubt with the doubt that its range leaves."""
+    quantity = quantity_of(p.entry.symbol)
+    if channel.info.unit or p.doubt or not quantity or p.reason == CANONICAL:
+        return p
+    guess = by_range(channel.values, CHOICES[quantity])
+    others = () if guess is None else (guess.unit, *guess.doubt)
+    return replace(p, doubt=tuple(u for u in others if u != p.entry.unit))
+
+
+def _as_beside(p: Proposal, other: Proposal | None, channels: _Named) -> Proposal:
+    """Return a proposal whose unit is in doubt with that of the other axis of its accelerometer, which is not."""
+    if other is None or other.doubt or not p.doubt or not other.entry.unit:
+        return p
+    is_beside = channels.of(p).info.file == channels.of(other).info.file
+    if not is_beside or other.entry.unit not in (p.entry.unit, *p.doubt):
+        return p
+    reason = f"name; the file gives no unit: {other.entry.unit} as a_x"
+    return replace(p, entry=replace(p.entry, unit=other.entry.unit), doubt=(), reason=reason)
 
 
 def _settle_speeds(

@@ -102,13 +102,25 @@ def test_a_turned_sign_is_proposed_with_its_correlation(symbol, name, raw, unit,
     assert found.reason.endswith("sign turned")
 
 
-@pytest.mark.parametrize(("name", "top"), [("YawRate", 0.9), ("STEER_POS", 2.0)])
+@pytest.mark.parametrize(("name", "top"), [("YawRate", 2.0), ("STEER_POS", 5.0)])
 def test_a_straight_drive_in_radians_would_be_a_curve_that_no_tyre_holds(name, top):
     wanders = top * np.random.default_rng(2).uniform(-1.0, 1.0, T.size // 100).repeat(100)
-    found = propose_map([*wheels(1 / 3.6), channel(name, wanders)])
-    (p,) = (p for s, p in found.items() if s in ("yaw_rate", "steering_wheel_angle"))
+    found = propose_map([*wheels(1 / 3.6), channel("GPS Speed", V, "m/s"), channel(name, wanders)])
+    p = found.get("yaw_rate") or found["steering_wheel_angle"]
     assert p.entry.unit.startswith("deg")
     assert not p.doubt
+
+
+def test_what_a_speed_in_doubt_shows_is_in_doubt_too():
+    found = propose_map([*wheels(1.0), channel("YawRate", YAW)])
+    assert found["omega_fl"].doubt
+    assert found["yaw_rate"].doubt
+
+
+def test_the_axes_of_one_accelerometer_have_one_unit():
+    calm = 0.03 * np.random.default_rng(3).standard_normal(T.size)
+    found = propose_map([*wheels(1 / 3.6), *positions(), channel("InlineAcc", A / 9.81), channel("LateralAcc", calm)])
+    assert (found["a_y"].entry.unit, found["a_y"].doubt) == ("g", ())
 
 
 def test_switches_and_strangers_without_a_unit_are_no_signals():

@@ -22,7 +22,7 @@ def test_the_factor_to_si_shows_the_unit(quantity, factor, unit):
     ("quantity", "top", "unit", "doubt"),
     [
         ("wheel", 237.0, "km/h", ("mph", "rad/s")), ("wheel", 900.0, "rpm", ()), ("speed", 30.0, "km/h", ("m/s", "mph")),
-        ("acceleration", 9.0, "m/s^2", ()), ("acceleration", 0.9, "m/s^2", ("g",)), ("acceleration", 0.1, "g", ()),
+        ("acceleration", 9.0, "m/s^2", ()), ("acceleration", 0.9, "m/s^2", ("g",)), ("acceleration", 0.1, "m/s^2", ("g",)), ("acceleration", 0.01, "g", ()),
         ("yaw_rate", 30.0, "deg/s", ()), ("yaw_rate", 0.4, "deg/s", ("rad/s",)), ("steering", 400.0, "deg", ()),
         ("brake", 90.0, "bar", ("psi",)), ("tyre_pressure", 220.0, "kPa", ()), ("torque", 1500.0, "N*m", ()),
         ("tie_rod", 0.9, "kN", ()), ("temperature", 290.0, "K", ()),
