@@ -39,13 +39,13 @@ def bare(symbol, x, t_ns, unit, radius):
 
 def judged(situation, seed, *, without=()):
     """Of each signal of one drive: right, wrong or missing, and whether it was said to be in doubt."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, *situation.encode()])
     drawn = draw(situation, seed, TUNING_POOL)
     signals = as_signals(simulate(drawn.scenario), truth=False)
     t_ns = np.rint(signals.array("t") * 1e9).astype(np.int64)
     car = drawn.scenario.vehicle
     units = {s: str(rng.choice(u)) for s, (_, u) in NAMES.items()}
-    units |= {f"omega_{w}": units["omega_fl"] for w in ("fr", "rl", "rr")}
+    units |= {f"omega_{w}": units["omega_fl"] for w in ("fr", "rl", "rr")} | {"a_y": units["a_x"]}  # of one sensor
     channels = []
     for symbol, unit in units.items():
         source = "steer_angle" if symbol.startswith("steering") else symbol
