@@ -38,10 +38,11 @@ def test_the_cause_is_where_the_change_is(level, seed):
 def test_it_ends_with_the_change_though_the_sum_is_zero_before_the_end_is_asked_for():
     """A gate is held open after its sum has come back."""
     x = np.concatenate([np.zeros(100), np.full(300, 0.5), np.zeros(1000)])
+    x += 0.15 * np.random.default_rng(2).standard_normal(x.size)  # noise alone makes small sums after it
     g, bits, _ = cusum.scan(alarm_params(DT), cusum.initial_state(), x)
     _, after, _ = cusum.ages(DT, cusum.new_ages(), g, bits)
-    assert g[-1] == 0.0
-    assert after[-1] == pytest.approx(10.0, abs=0.02)
+    assert 0.0 in g[600:]
+    assert after[-1] == pytest.approx(10.0, abs=0.1)
 
 
 @pytest.mark.parametrize("cuts", [(1,), (250, 251, 700)])
