@@ -320,12 +320,15 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
     """The section that the page's script draws, if there is anything to draw, and all that the script needs."""
     rows = drive_rows(result)
     plan = make_plan(by_importance(result.events), result.signals.frame.height, result.signals.dt)
-    wet = {i for e in result.judgement.of("aquaplaning") for i in e.events}
+    wet = {i: e for e in result.judgement.of("aquaplaning") for i in e.events}
     levels = [(1 + (e.severity == "full")) * (i in wet) for i, e in enumerate(result.events)]
     spans = [[round(e.start_s, 6), round(e.end_s, 6), n] for e, n in zip(result.events, levels, strict=True)]
+    # what is shaded is the water, not how long a detector holds its alarm
+    causes = [wet.get(i, e) for i, e in enumerate(result.events)]
+    shaded = [[round(c.start_s, 6), round(c.end_s, 6)] for c in causes]
     tables = _choices(result.judgement)
     chosen = {id: [[round(e.start_s, 6), round(e.end_s, 6)] for e in found] for id, found in tables.items()}
-    island: dict[str, Any] = {"events": spans, "episodes": chosen}
+    island: dict[str, Any] = {"events": spans, "shaded": shaded, "episodes": chosen}
     if events.more:
         island["table"] = event_columns([*events.rows, *events.more])
     if not rows or not plan.n:

@@ -84,10 +84,11 @@
   });
   const strips = (data.rows || []).map(function (row) { return row.strips && spansOf(row.strips.spans); });
 
-  // Union of wanted events of one level: 0 no aquaplaning, 1 partial, 2 full.
+  // Union of what wanted events of one level shade: 0 no aquaplaning, 1 partial, 2 full.
   function shaded(level) {
     const begin = [], end = [];
-    const shown = data.events.filter(function (_, i) { return isWanted(i); });
+    const shown = data.events.map(function (e, i) { return [...data.shaded[i], e[2]]; })
+      .filter(function (_, i) { return isWanted(i); });
     for (const [a, b, own] of shown.sort(function (p, q) { return p[0] - q[0]; })) {
       const last = end.length - 1;
       if (own !== level) continue;

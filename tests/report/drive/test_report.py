@@ -106,6 +106,16 @@ def test_verdict_comes_first_and_names_the_episode(page, short):
     assert Reader(page).words.index("Aquaplaning:") < 400
 
 
+def test_shades_end_with_the_water_not_with_the_alarms(page, short):
+    (wet,) = short.judgement.of("aquaplaning")
+    shaded = data_of(page)["shaded"]
+    assert len(shaded) == len(short.events)
+    assert {tuple(shaded[i]) for i in wet.events} == {(wet.start_s, wet.end_s)}
+    alone = [i for i in range(len(shaded)) if i not in wet.events]
+    assert all(shaded[i] == [short.events[i].start_s, short.events[i].end_s] for i in alone)
+    assert any(short.events[i].end_s < wet.end_s for i in wet.events)  # else nothing is shown
+
+
 def test_several_episodes_are_counted_and_listed(short):
     later = [replace(e, start_s=e.start_s + 20.0, end_s=e.end_s + 20.0, severity="full") for e in short.events]
     look, words = card(fake.with_events(short, [*short.events, *later]))
