@@ -11,9 +11,9 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 77_720  # of the package; 60,000 is the goal
-MOST_FILES = 409
-MOST_TEST_LINES = 52_700
+MOST_LINES = 83_000  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
+MOST_FILES = 438
+MOST_TEST_LINES = 56_000
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100
