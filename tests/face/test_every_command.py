@@ -111,7 +111,9 @@ def test_inspect(tmp_path):
 def test_doctor(tmp_path):
     result = aq.doctor(aq.read(LOG), CAR)
     agree(result, "doctor", LOG, "--vehicle", CAR)
-    check_saved(result, tmp_path, ("doctor.json", "doctor.txt"))
+    check_saved(result, tmp_path / "face", ("doctor.json", "doctor.txt", "doctor.html"))
+    command("doctor", LOG, "--vehicle", CAR, "-o", tmp_path / "page.html")
+    assert (tmp_path / "face" / "doctor.html").read_bytes() == (tmp_path / "page.html").read_bytes()
 
 
 def test_doctor_of_a_cut_log(tmp_path):

@@ -295,6 +295,64 @@ def test_the_pointer_tells_the_values_of_all_panels(show, short):
     assert browser.execute_script(told)[0].startswith("v_x reference")
 
 
+def metrics(browser, width):
+    """Set the width of the window [px]; 0: as it was."""
+    if not width:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        return
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+@pytest.mark.parametrize("width", [390, 800, 1600])
+def test_nothing_is_wider_than_the_window_and_evidence_can_be_read(show, short, width):
+    browser = show(short)
+    try:
+        metrics(browser, width)
+        browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+        main = "return document.querySelector('#plots .main-svg').getBoundingClientRect().right"
+        wait_for(lambda: browser.execute_script(main) <= width)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+        evidence = "return document.querySelector('#events td.wide').getBoundingClientRect().width"
+        assert browser.execute_script(evidence) >= 190
+    finally:
+        metrics(browser, 0)
+        wait_for(lambda: outline(browser)[0] > 1000)
+
+
+def test_the_page_by_keyboard_alone(show, short):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    browser = show(short)
+
+    def press(*keys):
+        for key in keys:
+            ActionChains(browser).send_keys(key).perform()
+
+    browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = false; })")
+    summary = browser.find_element("css selector", "#event-section summary")
+    browser.execute_script("arguments[0].focus()", summary)
+    outlined = "return getComputedStyle(document.activeElement).outlineStyle"
+    press(Keys.ENTER)
+    assert browser.execute_script("return document.querySelector('#event-section details').open")
+    seen = []
+    for _ in range(60):
+        press(Keys.TAB)
+        script = "const e = document.activeElement; return [e.tagName, e.id, e.closest('.tools') ? 'tools' : '']"
+        seen.append(tuple(browser.execute_script(script)))
+        assert browser.execute_script(outlined) != "none", seen[-1]
+        if seen[-1][2]:
+            break
+    tags = [s[0] for s in seen]
+    assert tags.index("SELECT") < tags.index("TR") < [s[1] for s in seen].index("show-all")
+    before = y_range(browser, "yaxis")
+    press(Keys.ARROW_RIGHT, Keys.SPACE)  # from closer to farther
+    wait_for(lambda: y_range(browser, "yaxis")[1] > before[1])
+    press(Keys.TAB)
+    assert browser.execute_script("return document.activeElement.closest('.tools') !== null")
+
+
 def test_hour_shows_the_spike_and_every_sample_of_an_event(show):
     result = fake.make_result(3600.0)
     begun = time.monotonic()
