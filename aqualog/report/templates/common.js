@@ -29,12 +29,6 @@ function plotText(text) {
     .replaceAll("$", "＄");
 }
 
-// What was drawn folded had no width.
-document.addEventListener("toggle", function (e) {
-  const plots = e.target.open && window.Plotly ? e.target.querySelectorAll(".js-plotly-plot") : [];
-  for (const plot of plots) if (plot.clientWidth) Plotly.Plots.resize(plot);
-}, true);
-
 let figuresDrawn = Promise.resolve(); // the figures of figures.js
 
 // A figure in its element, as wide as the paper or as the element, whose height plotly measures.

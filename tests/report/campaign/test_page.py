@@ -82,11 +82,13 @@ def test_notes_that_differ_in_numbers_are_one_kind(case):
 
 def test_the_log_with_most_missing_comes_before_all_remarks(case):
     def noted(*notes):
-        return {"notes": notes, "unavailable": {}, "limited": {}, "duration_s": 10.0, "quality": {}}
+        quality = {"time_jumps": 2}  # in more runs, and yet less grave
+        return {"notes": notes, "unavailable": {}, "limited": {}, "duration_s": 10.0, "quality": quality}
 
     about = (
         noted("wheels.csv: v: the name of a column is odd", "a.csv: omega_fl: no value for 25 % of the drive: not"),
         noted("wheels.csv: v: the name of a column is odd", "b.csv: a_x: no value for 60 % of the drive: not"),
+        noted(),
     )
     runs = [replace(r, about=a) for r, a in zip(case.runs, about, strict=False)]
     found = problems_of(SimpleNamespace(runs=runs, done=runs), ())
