@@ -14,13 +14,14 @@ __all__ = ["detect", "slip_slope"]
 
 
 @command(
-    "logs vehicle signals dbc out:results write rate correct_offsets history configuration reference thresholds model "
-    "fail_on_event cache data force"
+    "logs vehicle signals dbc out:results write layouts rate correct_offsets history configuration reference "
+    "thresholds model fail_on_event cache data force"
 )
 def detect(
     run: Run,
     out: Path | None,
     write: Path | None,
+    layouts: bool,
     history: Path | None,
     configuration: str,
     reference: str,
@@ -37,6 +38,7 @@ def detect(
       aqualog detect wheels.csv imu.csv gps.csv --signals map.toml --vehicle car.toml
       aqualog detect can.mf4 --dbc car.dbc --signals map.toml --json
       aqualog detect drive.mcap --vehicle car.toml --write drive_detected.mf4
+      aqualog detect drive.mf4 --vehicle car.toml --write drive_detected.mcap --layouts
       aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
       aqualog detect drive.mf4 --vehicle car.toml --model model.toml
     """
@@ -44,11 +46,14 @@ def detect(
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.detect import DETECT_FILES, detect
     from aqualog.io.write_log import check_suffix
+    from aqualog.report.layouts import layout_texts
 
     targets = [out / name for name in DETECT_FILES] if out else []
     if write is not None:
         check_suffix(write)
-        targets.append(write)
+        targets += [write, *(layout_texts(write, ()) if layouts else ())]
+    elif layouts:
+        raise ConfigError("--layouts without --write", expected="--write FILE.mcap, the log that they show")
     if out is not None and history is not None and out.absolute() == history.absolute():
         raise ConfigError("is the folder of the results", where=str(history), expected="a file of its own")
     given = [p for p in (run.thresholds, run.model) if p is not None]
@@ -65,7 +70,7 @@ def detect(
         if out is not None:
             result.save(out, force=True)
         if write is not None:
-            result.write(write, force=True)
+            result.write(write, layouts=layouts, force=True)
         if history is not None:
             result.remember(history)
     notes = (

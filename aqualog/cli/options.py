@@ -131,9 +131,10 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     # one drive
     "out:results": _file("Folder for events.json, signals.parquet and report.html.", metavar="DIR"),
     "write": _file(
-        "Signals, statistics and detection bits as channels of a log: .mf4, .mcap (with the events), .csv or .parquet.",
-        "--write",
+        "Signals, features, statistics and detection bits as channels of a log: .mf4, .mcap (both with episodes and "
+        "events), .csv or .parquet.", "--write",
     ),
+    "layouts": _flag("Beside --write: a layout for PlotJuggler, and for .mcap one for Foxglove.", "--layouts"),
     "history": _file(
         "Dry slip slopes of this car from earlier drives (JSON); read, and written back with this drive's.",
         "--history",

@@ -14,11 +14,11 @@ from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import file_of, text_of, write_whole
+from aqualog.face.arguments import file_of, refuse_existing, text_of, write_whole
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_of
 from aqualog.face.guess import load_or_guess
 from aqualog.face.listener import Listener, Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, flat, page_file, rows_table, table
+from aqualog.face.result import PathLike, Result, Writers, flat, page_file, rows_table, table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -198,16 +198,25 @@ class Detection(Result):
             del files["signals.parquet"]
         return files if self.has_samples else {"events.json": files["events.json"]}
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write signals, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
+    def write(self, path: PathLike, *, layouts: bool = False, force: bool = False) -> Path:
+        """Write signals, features, statistics and detection bits as channels of a log: .mf4, .mcap, .csv or .parquet.
 
-        The first two hold the episodes and events, too: as event blocks of MDF and as messages `foxglove.Event`.
+        The first two hold the episodes and events, too: as event blocks of MDF and as messages `foxglove.Event`. With
+        `layouts` PATH.plotjuggler.xml is written beside it, and beside an MCAP file PATH.foxglove.json.
         """
         from aqualog.io.write_log import check_suffix
+        from aqualog.report.drive.document import result_groups
+        from aqualog.report.layouts import layout_texts
 
-        suffix = check_suffix(file_of(path, "path"))
+        target = file_of(path, "path")
+        suffix = check_suffix(target)
         self._check_samples()
-        return self._write_to(path, lambda p: self._write(p, suffix), force=force)
+        groups = result_groups(self.drive_result, features=True)
+        beside = layout_texts(target, groups) if layouts else {}
+        refuse_existing([target, *beside], force=force, sources=self.sources)
+        for file, text in beside.items():
+            write_whole(file, text_file(text))
+        return self._write_to(path, lambda p: _write_log(self.drive_result, p, suffix, features=True), force=force)
 
     def _write(self, path: Path, suffix: str) -> None:
         _write_log(self.drive_result, path, suffix)
@@ -381,7 +390,7 @@ def _in_windows(
     return result
 
 
-def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 0) -> None:
+def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 0, features: bool = False) -> None:
     """Write signals, statistics and detection bits, the first of which stand in `first_row` of the drive."""
     import numpy as np
 
@@ -390,7 +399,10 @@ def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 
 
     signals = found.signals
     t_ns = (first_row + np.arange(signals.frame.height, dtype=np.int64)) * signals.dt_ns
-    write_log(path, t_ns, result_groups(found), suffix=suffix, start_ns=signals.start_ns, events=result_events(found))
+    write_log(
+        path, t_ns, result_groups(found, features=features), suffix=suffix, start_ns=signals.start_ns,
+        events=result_events(found),
+    )  # fmt: skip
 
 
 def model_of(model: PathLike | Model | None) -> Model | None:

@@ -3,6 +3,7 @@
 import polars as pl
 import pytest
 
+import aqualog as aq
 from tests.commands import one_error_line, run
 from tests.conftest import ROOT
 
@@ -58,3 +59,16 @@ def test_a_table_beside_is_not_overwritten(table, tmp_path):
     assert done.exit_code == 2
     assert not (tmp_path / "c.csv").exists()
     assert "c_proposed.csv: exists already" in one_error_line(done)
+
+
+def test_layouts_stand_beside_the_written_log(tmp_path):
+    given = ("detect", LOG, "--vehicle", CAR, "-q", "--layouts")
+    assert run(*given, "--write", "a.mcap", cwd=tmp_path).exit_code == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"a.mcap", "a.plotjuggler.xml", "a.foxglove.json"}
+    (tmp_path / "a.mcap").unlink()
+    assert "a.plotjuggler.xml: exists already" in one_error_line(run(*given, "--write", "a.mcap", cwd=tmp_path))
+    assert "--layouts without --write" in one_error_line(run(*given, cwd=tmp_path))
+    assert "opens .mf4" in one_error_line(run(*given, "--write", "a.mf4", cwd=tmp_path))
+    with pytest.raises(aq.AqualogError, match="exists already"):
+        aq.detect(str(LOG), str(CAR)).write(tmp_path / "a.mcap", layouts=True)
+    assert not (tmp_path / "a.mcap").exists()

@@ -8,10 +8,12 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from aqualog import __version__
 from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import DriveResult, Event, Remark, Signals, Track
+from aqualog.features.names import feature_of
 from aqualog.io.log_event import LogEvent
 from aqualog.io.write_log import LogGroup
 from aqualog.report.drive.judged import KIND_NAMES, episode_sentence
@@ -30,7 +32,7 @@ _SLOPE = (
     "seconds", "inactive",
 )  # fmt: skip
 _BAD = ("not_finite", "out_of_range", "invalid_code", "frozen")
-_UNITS = {"(m/s^2)^2": "m^2/s^4"}
+_UNITS = {"(m/s^2)^2": "m^2/s^4", "0 or 1": "bool"}
 
 
 def document(result: DriveResult, *, log: str) -> dict[str, Any]:
@@ -99,8 +101,8 @@ def signal_groups(signals: Signals) -> list[LogGroup]:
     return [LogGroup("signals", columns)]
 
 
-def result_groups(result: DriveResult) -> list[LogGroup]:
-    """Canonical signals, statistics and detection bits as channels of three groups."""
+def result_groups(result: DriveResult, *, features: bool = False) -> list[LogGroup]:
+    """Canonical signals, statistics and detection bits as channels of three groups; on request features of a fourth."""
     statistics = {
         track_name(t): (
             _UNITS.get(t.unit, t.unit),
@@ -113,7 +115,14 @@ def result_groups(result: DriveResult) -> list[LogGroup]:
         f"{track_name(t)}_bit": ("bool", f"detection bit of {t.detector}", t.active.astype(np.float64))
         for t in result.tracks
     }
-    groups = [*signal_groups(result.signals), LogGroup("statistics", statistics), LogGroup("detections", bits)]
+    known = {n: feature_of(n) for n in result.features.columns} if features else {}
+    looked_at = {
+        n: (_UNITS.get(f.unit, f.unit), f.meaning, result.features[n].cast(pl.Float64).to_numpy())
+        for n, f in known.items()
+        if f is not None and n not in SYMBOLS
+    }
+    own = [*signal_groups(result.signals), LogGroup("features", looked_at)]
+    groups = [*own, LogGroup("statistics", statistics), LogGroup("detections", bits)]
     return [g for g in groups if g.columns]
 
 
