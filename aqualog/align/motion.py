@@ -17,6 +17,7 @@ __all__ = [
 
 GRID_NS = 100_000_000
 _LONGEST_NS = 10**15  # 12 days: beyond, the time stamps jump
+_LARGEST = 1e9  # in any unit: an epoch or a broken number
 _WIDTH = 11  # points of the grid
 _EARTH = 6.371e6  # mean radius [m]
 _TRACK = 1.55  # of a car, where only the order of magnitude and the sign count [m]
@@ -54,8 +55,10 @@ def clean_samples(channel: Channel, values: FloatArray | None = None) -> tuple[T
 
 
 def on_grid(channel: Channel, grid: TimeArray) -> FloatArray:
-    """Return a channel's raw values on a grid (n,), NaN across gaps of more than 2 s."""
+    """Return a channel's raw values on a grid (n,), NaN across gaps of more than 2 s and where nothing is so large."""
     t, x = clean_samples(channel)
+    usable = np.abs(x) < _LARGEST
+    t, x = t[usable], x[usable]
     return linear(t, x, grid, gap_ns=2_000_000_000)[0] if t.size else np.full(grid.size, np.nan)
 
 

@@ -129,3 +129,27 @@ def test_switches_and_strangers_without_a_unit_are_no_signals():
         channel("LongitudinalAcc", np.random.default_rng(1).standard_normal(T.size)), channel("PEDAL_POS", V),
     ])  # fmt: skip
     assert not {"brake_pressure", "a_x"} & set(found)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "x", [np.full(T.size, np.nan), np.zeros(T.size), np.append(np.full(T.size - 1, np.nan), 1.0), 1e300 * V]
+)
+def test_channels_that_say_nothing_are_no_error(x):
+    t_ns = np.rint(T * 1e9).astype(np.int64)
+    names = [
+        "WHEEL_FL",
+        "WHEEL_RL",
+        "WHEEL_RR",
+        "GPS Speed",
+        "Latitude",
+        "Longitude",
+        "InlineAcc",
+        "LateralAcc",
+        "YawRate",
+    ]
+    names += ["STEER_POS", "BRK_PRESS", "Altitude"]
+    dead = [Channel(ChannelInfo(n, n, "", T.size, "a.csv"), t_ns, x, False) for n in names]
+    for others in ([], wheels(1 / 3.6), positions()):
+        propose_map([*others, *dead])
+    propose_map([Channel(c.info, c.t_ns[:1], c.values[:1], False) for c in dead])

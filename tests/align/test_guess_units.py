@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from aqualog.align.guess_units import CHOICES, by_acceleration, by_factor, by_range, top_of
+from aqualog.core.units import parse_unit
 
 
 @pytest.mark.parametrize(
@@ -54,3 +55,12 @@ def test_a_code_among_thousands_is_not_the_top():
 def test_an_accelerometer_shows_the_unit_of_a_speed(ratio, units, unit, doubt):
     guess = by_acceleration(ratio, CHOICES["wheel"], [c for c in CHOICES["acceleration"] if c.unit in units])
     assert (guess and guess.unit, guess.doubt if guess else ()) == (unit, doubt)
+
+
+@pytest.mark.parametrize("quantity", CHOICES)
+def test_every_unit_is_one_of_its_quantity(quantity):
+    dimensions = {parse_unit(c.unit).dimension for c in CHOICES[quantity]}
+    assert dimensions <= (
+        {"speed", "angular_speed"} if quantity == "wheel" else {parse_unit(CHOICES[quantity][0].unit).dimension}
+    )
+    assert all(c.low <= c.high and c.least < c.most for c in CHOICES[quantity])
