@@ -100,8 +100,18 @@ def judged_by(judgement: Judgement, duration_s: float) -> tuple[str, str]:
     """Which detectors ran, and for how long the joint ones could judge, as a head and a sentence."""
     ran = ", ".join(detector_name(d) for d in judgement.ran) or "no detector"
     if judgement.verdict == "cannot_be_judged":
-        return "Ran:", f"{ran}; no single detector decides by itself"
+        return "Ran:", f"{ran}; no single detector decides by itself{_resistance(judgement)}"
     return "Judged:", f"{number(min(judgement.judged_s, duration_s), 1)} of {number(duration_s, 1)} s, by {ran}"
+
+
+def _resistance(judgement: Judgement) -> str:
+    """What the resistance shows where it is all that can be said of water."""
+    if "resistance" not in judgement.ran:
+        return ""
+    sizes = [e.delta_a_x_max for e in judgement.episodes if "resistance" in e.decided_by]
+    if not sizes:
+        return "; the resistance raised no alarm"
+    return f"; resistance in {counted(len(sizes), 'episode')}, up to {number(max(sizes), 2)} m/s²"
 
 
 def episode_cells(episode: Episode) -> list[str | Cell]:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,8 +14,9 @@ import polars as pl
 import pytest
 
 import aqualog.report
-from aqualog.core.judgement import Judgement
+from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.records import Quality, Unavailable
+from aqualog.report.drive.judged import judged_by
 from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
 from aqualog.report.reduce import POINTS
@@ -132,6 +134,21 @@ def test_without_the_joint_detectors_nothing_is_green_or_orange(short):
         assert words.startswith("Aquaplaning cannot be judged: no wheel torque, no mass in a vehicle file ")
         assert "Ran: Spin-down; no single detector decides by itself" in words
     assert "Single detector: 8.4–8.9 s" in card(fake.with_events(short, spin))[1]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "said"),
+    [((), "the resistance raised no alarm"), ((0.41, 0.7), "resistance in 2 episodes, up to 0.70 m/s²")],
+)
+def test_resistance_is_shown_where_it_is_all_there_is(sizes, said):
+    """The BMW i3 without wheel speeds."""
+    alone = [
+        Episode("single_detector", 9.0 * i, 9.0 * i + 5.0, (), None, None, "partial", 20.0, ("resistance",), x, math.nan,
+                100.0, (i,)) for i, x in enumerate(sizes)
+    ]  # fmt: skip
+    blind = Judgement("cannot_be_judged", ("omega_fl", "omega_fr"), ("resistance",), tuple(alone))
+    assert judged_by(blind, 100.0) == ("Ran:", f"Resistance; no single detector decides by itself; {said}")
+    assert "resistance" not in judged_by(replace(blind, ran=("spin_down",)), 100.0)[1]
 
 
 def test_no_episode_says_what_was_judged_and_what_was_not(short):
