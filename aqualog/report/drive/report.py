@@ -123,7 +123,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     return Report(
         "", "aquaplaning in one drive", sections, _facts(result), {"route": route} if route else {},
         islands={"drive-data": island},
-        scripts=(*(["figures.js"] if route else []), "paper.js", "panels.js", "filters.js", "drive.js"),
+        scripts=(*(["figures.js"] if route else []), "paper.js", "samples.js", "panels.js", "filters.js", "drive.js"),
     )  # fmt: skip
 
 

@@ -33,6 +33,7 @@ def show(browser, tmp_path_factory):
         browser.get(path.as_uri())
         browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true; })")
         wait_for(lambda: browser.execute_script("return document.getElementById('plots').dataset.ready === 'true'"))
+        browser.execute_script("document.documentElement.style.scrollBehavior = 'auto'")  # else clicks come too early
         last[:] = [result, x_range(browser)]
         return browser
 
