@@ -12,7 +12,7 @@ from aqualog.align.timebase import ClockRepair
 from aqualog.core.records import Channel, FloatArray, TimeFaults
 from aqualog.core.units import is_unit, parse_unit
 
-__all__ = ["ChannelOverview", "find_mounting", "overview", "rotated_channels"]
+__all__ = ["ChannelOverview", "find_mounting", "overview", "rotated_triples"]
 
 _G = 9.80665
 
@@ -110,14 +110,14 @@ def find_mounting(found: Sequence[ChannelOverview]) -> list[str]:
     return sentences
 
 
-def rotated_channels(found: Sequence[ChannelOverview]) -> set[tuple[str, str]]:
-    """Return (file, path) of the accelerometer axes that are not the car's, because gravity is not on z."""
-    return {
-        (axis.file, axis.path)
-        for axes in _triples(found).values()
-        if _gravity(axes)[1] in ("x", "y")
-        for axis in axes.values()
-    }
+def rotated_triples(found: Iterable[ChannelOverview]) -> list[tuple[dict[str, ChannelOverview], str]]:
+    """Return the axes of each accelerometer whose vertical is not z, and the one that points up, such as `-x`."""
+    triples = []
+    for axes in _triples(found).values():
+        mean, down, _ = _gravity(axes)
+        if down in ("x", "y"):
+            triples.append((axes, f"{'-' if mean[down] < 0.0 else ''}{down}"))  # at rest it measures 1 g upwards
+    return triples
 
 
 def _gravity(axes: dict[str, ChannelOverview]) -> tuple[dict[str, float], str | None, float]:

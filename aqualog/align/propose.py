@@ -29,7 +29,8 @@ from aqualog.align.evidence import (
 from aqualog.align.guess_units import CHOICES, by_range
 from aqualog.align.mapping import Entry, channel_id
 from aqualog.align.motion import Motion, derivative, even_times, fit, on_grid, smooth, track, wheel_turn
-from aqualog.align.overview import ChannelOverview, overview, rotated_channels
+from aqualog.align.mounting import gyro_beside, turned_axes
+from aqualog.align.overview import ChannelOverview, overview, rotated_triples
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
@@ -131,20 +132,26 @@ class Look(NamedTuple):
 
 
 def look_at(channels: Sequence[Channel]) -> Look:
-    """Summarise channels and propose signals; axes of accelerometers that are not the car's are passed over.
+    """Summarise channels and propose signals; axes of a turned accelerometer only where the speed shows how.
 
     Times count from the first sample of all channels.
     """
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
-    rotated = rotated_channels(found)
-    return Look(found, propose_map([c for c in channels if (c.info.file, c.info.path) not in rotated]))
+    triples = rotated_triples(found)
+    named = {(c.info.file, c.info.path): c for c in channels}
+    rotated = [({a: named[o.file, o.path] for a, o in axes.items()}, up) for axes, up in triples]
+    passed = {(o.file, o.path) for axes, _ in triples for o in axes.values()}
+    return Look(found, propose_map([c for c in channels if (c.info.file, c.info.path) not in passed], rotated))
 
 
-def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
+def propose_map(
+    channels: Sequence[Channel], rotated: Sequence[tuple[Mapping[str, Channel], str]] = ()
+) -> dict[str, Proposal]:
     """Return the most likely channel of each signal, by symbol, of the channels with samples of one drive.
 
     Name and unit support each of them; the reason holds the evidence of the data. Check a proposal before use.
+    `rotated`: accelerometers by axis that are mounted turned, not among the channels, with the axis that points up.
     """
     usable = _Named(c for c in channels if c.values.size > 1 and np.isfinite(c.values).any())
     found: dict[str, Proposal] = {}
@@ -169,6 +176,9 @@ def propose_map(channels: Sequence[Channel]) -> dict[str, Proposal]:
             candidates = [p for p, name in named if set(words_of(name)) & set(rule.bonus)]
         _keep_best(found, rule.symbol, candidates)
     motion = _motion(found, usable)
+    if motion is not None:
+        for axes, up in rotated:
+            _take_turned(found, usable, axes, up, motion)
     for rule in _RULES:
         candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
         if rule.symbol in ("torque_f", "torque_r"):
@@ -215,6 +225,13 @@ class _Named(list[Channel]):
         for channel in self:
             self.by_address.setdefault(channel.info.path, channel)
             self.by_address.setdefault(channel_id(channel.info), channel)
+
+    def add(self, channel: Channel) -> str:
+        """Take a channel in, if it is not there, and return what a map calls it."""
+        self.by_address.setdefault(channel.info.path, channel)
+        self.by_address.setdefault(channel_id(channel.info), channel)
+        is_alone = self.by_address[channel.info.path] is channel
+        return channel.info.path if is_alone else channel_id(channel.info)
 
     def of(self, proposal: Proposal) -> Channel:
         """Return the channel of a proposal."""
@@ -348,6 +365,16 @@ def _course(found: Mapping[str, Proposal], channels: _Named, grid: TimeArray) ->
         degrees.append(np.degrees(x) if dimension == "angle" else x)
     v, turn = track(degrees[0], degrees[1])
     return (v, turn) if (v > _MOVING).sum() >= _LEAST else None
+
+
+def _take_turned(
+    found: dict[str, Proposal], channels: _Named, axes: Mapping[str, Channel], up: str, motion: Motion
+) -> None:
+    """Propose the axes of a turned accelerometer and the rate beside it, where the speed shows how it is turned."""
+    for symbol, axis in turned_axes(axes, gyro_beside(channels, axes["x"]), up, motion).items():
+        info = axis.channel.info
+        entry = Entry(symbol, (channels.add(axis.channel),), info.unit, scale=axis.scale)
+        found.setdefault(symbol, Proposal(entry, f"unit; {axis.reason}", 3.0))
 
 
 def _in_doubt(p: Proposal, channel: Channel) -> Proposal:

@@ -18,7 +18,7 @@ DRIVES = {
     ),
     "rav4 csv": ("toyota_rav4", "", WHEELS | PLACE | {"v_x", "steer_angle"}),
     "bmw_i3": ("bmw_i3/TripA17.csv", "", {"v_x", "a_x", "altitude", "ambient_temperature"}),
-    "canedge": ("canedge/00000002-60FE415D.MF4", "canedge/canmod-gps.dbc", PLACE | {"v_x"}),
+    "canedge": ("canedge/00000002-60FE415D.MF4", "canedge/canmod-gps.dbc", PLACE | {"v_x", "a_x", "a_y", "yaw_rate"}),
 }  # fmt: skip
 
 
@@ -32,7 +32,10 @@ def test_what_is_written_loads_with_all_signals_and_the_next_command_runs(real_l
     drive = aq.read(logs, map=tmp_path / "work" / "map.toml", dbc=given[1:])
     assert set(drive.signals.symbols) == expected
     first = next(line for line in done.stdout.splitlines() if line.startswith("  1. aqualog doctor "))
-    assert run(*shlex.split(first.removeprefix("  1. aqualog "))).exit_code == 0
+    assert run(*shlex.split(first.removeprefix("  1. aqualog "))).exit_code in (
+        0,
+        3,
+    )  # values out of range count as lost
 
 
 def test_a_folder_of_drives_is_sent_to_campaign_init(real_logs, tmp_path):
