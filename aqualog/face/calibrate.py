@@ -86,7 +86,7 @@ class Calibration(Result):
     def _report(self) -> Report:
         from aqualog.report.calibration import calibration_report
 
-        return calibration_report(self.found, self.file_notes)
+        return calibration_report(self.found, self.file_notes, tuple(r for _, r in self.checks))
 
     def headline(self) -> str:
         from aqualog.report.calibration import parameter_cells

@@ -86,7 +86,7 @@ class SlipSlope(Result):
     def _report(self) -> Report:
         from aqualog.report.slope import slope_report
 
-        return slope_report(self.slopes, self.file_notes)
+        return slope_report(self.slopes, self.file_notes, self.checks)
 
     def headline(self) -> str:
         from aqualog.report.slope import slope_lines, way_sentence

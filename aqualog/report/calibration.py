@@ -11,9 +11,10 @@ import numpy as np
 from aqualog import __version__
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter, TieRodFit
 from aqualog.calibrate.words import left_out
-from aqualog.core.records import FloatArray
+from aqualog.core.records import FloatArray, Remark
 from aqualog.core.units import displayed_text
 from aqualog.report.figures import axis, dots, figure
+from aqualog.report.inputs import input_sections
 from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.report.values import KMH, fields_of, plain, pretty_unit
@@ -67,7 +68,7 @@ def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence
     }  # fmt: skip
 
 
-def calibration_report(c: Calibration, notes: Sequence[str] = ()) -> Report:
+def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequence[Remark] = ()) -> Report:
     """Parameters, drives and polynomials, what could not be estimated, and the residual of the force balance.
 
     Parameters
@@ -75,11 +76,14 @@ def calibration_report(c: Calibration, notes: Sequence[str] = ()) -> Report:
     c : Calibration
     notes : sequence of str
         On the files, beside those of the result.
+    checks : sequence of Remark
+        What does not fit among the signals.
     """
     known = [p for p in c.parameters if p.identified]
     head = f"{c.vehicle_name}: {len(known)} of {len(c.parameters)} parameters estimated from {len(c.drives)} drives"
     plots = {f"residual-{i}": figure for i, figure in enumerate(balance_residuals(c))}
     sections = [
+        *input_sections(checks),
         Section("", [Para(head, where="text")]),
         Section("Parameters", [Table(_PARAMETERS, [parameter_cells(p) for p in known], "parameters", (0, 3, 5))],
                 "parameters-section"),

@@ -8,9 +8,11 @@ from typing import Any
 
 from aqualog import __version__
 from aqualog.core.intervals import Interval
+from aqualog.core.records import Remark
 from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion
 from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.stability import percent
+from aqualog.report.inputs import input_sections, without_remarks
 from aqualog.report.sections import Cell, Figures, Lines, Para, Report, Section, Table
 from aqualog.report.slope_figures import slope_plots
 from aqualog.report.theme import WHEEL_COLOURS
@@ -49,7 +51,7 @@ def way_sentence(result: DirectResult) -> str:
 # --- sections --------------------------------------------------------------------------------------------------------
 
 
-def slope_report(result: DirectResult, notes: Sequence[str] = ()) -> Report:
+def slope_report(result: DirectResult, notes: Sequence[str] = (), checks: Sequence[Remark] = ()) -> Report:
     """Slopes, stability, what was used, and the regressions as figures.
 
     Parameters
@@ -57,6 +59,8 @@ def slope_report(result: DirectResult, notes: Sequence[str] = ()) -> Report:
     result : DirectResult
     notes : sequence of str
         On the files, beside those of the result.
+    checks : sequence of Remark
+        What does not fit among the signals.
     """
     plots = slope_plots(result)
     head = f"{result.vehicle_name}: {result.duration_s:.1f} s at {result.rate_hz:.6g} Hz; {way_sentence(result)}"
@@ -76,13 +80,15 @@ def slope_report(result: DirectResult, notes: Sequence[str] = ()) -> Report:
     ]  # fmt: skip
     stability = [(_name(p), f"{p.stability.sentence}{_per_hour(p)}") for p in places]
     sections = [
+        *input_sections(checks),
         Section("Slip slope C_s/F_z", [Para(head, where="text"), estimated], "slopes-section"),
         Section("Over the session", [
             Table(_PARTS, parts, words=(0, 5)),
             Lines(stability, "stability", looks=[p.stability.verdict.replace(" ", "-") for p in places]),
             Para(_used(result), where="everywhere"),
         ]),
-        Section("Notes", [Lines([*notes, *result.notes], most=1000)], "notes", look="problems", where="page"),
+        Section("Notes", [Lines([*without_remarks(notes, checks), *result.notes], most=1000)], "notes",
+                look="problems", where="page"),
         Section("Slip over traction, and over the session", [Figures(list(plots)), Para(_LINE)], "plot-section"),
     ]  # fmt: skip
     facts = [

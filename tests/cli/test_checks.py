@@ -106,3 +106,15 @@ def test_a_map_of_a_campaign_may_speak_of_the_files_of_any_run(folder, tmp_path)
         found = commands.run("evaluate", tmp_path / "campaign.toml")
         assert ("fits no file" in found[2]) != fits, (code, err)
         assert found[0] == 2 or fits
+
+
+@pytest.mark.parametrize(("command", "after"), [("detect", "Signals"), ("slip-slope", "Over the session")])
+def test_text_and_page_name_the_inputs_before_the_numbers(folder, command, after, tmp_path):
+    out = tmp_path / "out"
+    code, text, _ = commands.run(command, folder / "drive.csv", "--vehicle", folder / "car.toml", "-o", out)
+    assert code == 0
+    assert "check the inputs first\n  a_y (sign); a_x (offset)" in text
+    page = next(out.glob("*.html")).read_text(encoding="utf-8")
+    body = page[page.index("<main") if "<main" in page else 0 :]
+    assert body.index("Check the inputs first") < body.index(after)
+    assert body.count("a_y has the opposite sign of") == 1

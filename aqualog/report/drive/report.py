@@ -27,6 +27,7 @@ from aqualog.report.drive.judged import (
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.route import route_figure
 from aqualog.report.drive.stack import VEHICLE, groups, stack
+from aqualog.report.inputs import input_sections, without_remarks
 from aqualog.report.page import report_page
 from aqualog.report.reduce import DRIVE, LONG_S, POINTS, Plan, make_plan
 from aqualog.report.sections import Cell, Figures, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
@@ -99,6 +100,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
                  f"{signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, {len(signals.symbols)} signals",
                  where="text"),
         ], "verdict", look=f"verdict events {level(judgement)}"),
+        *input_sections(result.checks),
         Section("Problems of the data", [Lines(_problems(result), most=1000)], "problems", look="problems",
                 where="page"),
         *_episodes(result, folded=bool(folded)),
@@ -225,7 +227,7 @@ def _problems(result: DriveResult) -> list[str]:
         found.append(f"{quality.dropped_samples} samples were not used{lost}.")
     if quality.time_jumps:
         found.append(f"The time jumps {'once' if quality.time_jumps == 1 else f'{quality.time_jumps} times'}.")
-    return list(dict.fromkeys([*found, *quality.notes, *result.notes]))
+    return list(dict.fromkeys([*found, *quality.notes, *without_remarks(result.notes, result.checks)]))
 
 
 # --- tables ----------------------------------------------------------------------------------------------------------
