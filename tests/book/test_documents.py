@@ -11,6 +11,7 @@ from aqualog.book.documents import DOCUMENTS
 from aqualog.book.documents.fields import number, obj, paths, rows, schema, text
 from aqualog.book.documents.tables import TABLES
 from aqualog.book.topics import DOCS
+from aqualog.cli.commands import COMMANDS
 from aqualog.cli.main import app
 from tests.conftest import ROOT
 
@@ -42,6 +43,13 @@ def test_schemas_are_schemas(name):
 
 def test_no_schema_is_left_over():
     assert {p.name for p in (DOCS / "schemas").iterdir()} == {f"{n}.schema.json" for n in DOCUMENTS}
+
+
+@pytest.mark.parametrize("command", [*(c for c in COMMANDS if c != "campaign"), "campaign init"])
+def test_every_command_that_prints_json_has_a_document(command):
+    shown = CliRunner().invoke(app, [*command.split(), "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"})
+    has_document = any(f"{d.heading} ".startswith(f"aqualog {command} ") for d in DOCUMENTS.values())
+    assert ("--json" in shown.stdout.split("Options:")[1]) == has_document
 
 
 @pytest.mark.parametrize("document", DOCUMENTS.values(), ids=lambda d: d.name)
@@ -158,7 +166,7 @@ CAMPAIGNS = {
     "batch": ("batch",),
     "bin_slipslope": ("bin-slipslope", "--by", "tyre,x_driver"),
     "bin_resistance": ("bin-resistance",),
-    "evaluate": ("evaluate", "--by", "tyre,x_driver", "--rivals"),
+    "evaluate": ("evaluate", "--by", "tyre,x_driver", "--rivals", "--gate", "joint_criteria.drives>=1"),
 }
 
 
