@@ -119,7 +119,7 @@ def _ages(dt, peak, since, after, g, active):  # type: ignore[no-untyped-def]
 
 
 def ages(dt: float, state: Ages, g: FloatArray, active: BoolArray) -> tuple[FloatArray, FloatArray, Ages]:
-    """Tell when a change began and ended from its sum, which is late at both ends.
+    """Estimate when a change began and ended from its sum, which is late at both ends.
 
     Parameters
     ----------

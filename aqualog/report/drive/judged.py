@@ -84,7 +84,7 @@ def lines_of(judgement: Judgement, most: int) -> list[str]:
 
 
 def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
-    """`Wheel lock: 41 episodes, 112 detections`; one alone is told whole."""
+    """`Wheel lock: 41 episodes, 112 detections`; one alone is shown whole."""
     name = KIND_NAMES[kind].capitalize()
     if len(episodes) == 1:
         return f"{name}: {episode_sentence(episodes[0])}"

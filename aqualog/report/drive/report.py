@@ -156,7 +156,7 @@ def _choice(id: str, found: Sequence[Episode]) -> Table:
 
 
 def _parted(judgement: Judgement) -> tuple[Sequence[Episode], Sequence[Episode]]:
-    """Episodes that may be an answer to the question for water, and those that are none."""
+    """Episodes that may be an answer to the question for water, and the others."""
     rest = judgement.of(*FOLDED)
     return [e for e in judgement.episodes if e not in rest], rest
 
