@@ -152,7 +152,7 @@ def _episodes(result: DriveResult, *, folded: bool) -> list[Section]:
 def _choice(id: str, found: Sequence[Episode]) -> Table:
     """Episodes as a table in which a row is picked."""
     rows = [episode_cells(e) for e in found]
-    return Table(EPISODE_HEADS, rows, id, _EPISODE_WORDS, is_sortable=True, is_choice=True, where="page")
+    return Table(EPISODE_HEADS, rows, id, _EPISODE_WORDS, wide=(10,), is_sortable=True, is_choice=True, where="page")
 
 
 def _parted(judgement: Judgement) -> tuple[Sequence[Episode], Sequence[Episode]]:

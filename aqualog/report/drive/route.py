@@ -131,7 +131,7 @@ def _marks(
             words = plot_text(f"{KIND_NAMES[kind].capitalize()}: {episode_sentence(episode)}")
             which += [*[[table, row, words]] * part.size, None]
         if own:
-            width = 7 if kind in FOLDED else 13
+            width = 9 if kind in FOLDED else 13
             found.append(line(
                 KIND_NAMES[kind], x, y, _LOOKS[kind], width=width, mode="lines+markers", customdata=which, opacity=0.75,
                 marker={"color": _LOOKS[kind], "size": width}, hovertemplate="%{customdata[2]}<extra></extra>",
