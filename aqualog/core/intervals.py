@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
@@ -26,6 +27,7 @@ Interval = tuple[float, float]
 NOWHERE: Interval = (math.nan, math.nan)
 
 
+@lru_cache(maxsize=256)
 def student_quantile(probability: float, dof: float) -> float:
     """Quantile of Student's t [student1908]: 0.5 < probability < 1, real dof >= 1."""
     u = np.linspace(0.0, math.pi / 2.0, 20_001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
