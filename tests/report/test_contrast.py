@@ -40,7 +40,7 @@ def schemes():
         dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in re.findall(r":root \{(.*?)\}", CSS, re.S)
     ]
     light, dark, paper = roots
-    return {"light": light, "dark": light | dark, "paper": light | paper}
+    return {"light": light, "dark": light | dark, "paper": light | paper, "dark on paper": light | dark | paper}
 
 
 def test_contrast_is_that_of_the_standard():
@@ -48,7 +48,7 @@ def test_contrast_is_that_of_the_standard():
     assert contrast("#777", "#fff") == pytest.approx(4.48, abs=0.01)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark", "paper"])
+@pytest.mark.parametrize("scheme", ["light", "dark", "paper", "dark on paper"])
 def test_text_can_be_read_on_all_its_grounds(scheme):
     colours = schemes()[scheme]
     pale = {
