@@ -11,7 +11,7 @@ import aqualog as aq
 from aqualog.cli.commands import COMMANDS
 
 FACE_OF = {
-    "detect": "detect", "inspect": "inspect", "doctor": "doctor", "convert": "convert", "align": "align",
+    "detect": "detect", "inspect": "inspect", "init": "init", "doctor": "doctor", "convert": "convert", "align": "align",
     "slip-slope": "slip_slope", "batch": "Campaign.run", "plan": "Campaign.plan", "bin-slipslope": "Campaign.run",
     "bin-resistance": "Campaign.run", "report": "Campaign.run", "calibrate": "calibrate", "diagnose": "diagnose",
     "evaluate": "evaluate", "simulate": "simulate", "figures": "thesis.figures", "reproduce": "thesis.reproduce",
@@ -23,7 +23,7 @@ def test_names():
     assert sorted(aq.__all__) == aq.__dir__()
     assert set(aq.__all__) == {
         "AqualogError", "Campaign", "Drive", "Model", "Signals", "Vehicle", "__version__", "align", "cache",
-        "calibrate", "convert", "detect", "diagnose", "doctor", "evaluate", "inspect", "physics", "read", "simulate",
+        "calibrate", "convert", "detect", "diagnose", "doctor", "evaluate", "init", "inspect", "physics", "read", "simulate",
         "slip_slope", "thesis",
     }  # fmt: skip
 
