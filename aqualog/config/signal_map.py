@@ -106,7 +106,7 @@ def check_files(signal_map: SignalMap, files: Iterable[Path]) -> None:
     file = read(path, "signal map") if path.is_file() else Table({}, Faults(path), lines=[])
     for table, name in idle:
         shown = f"{name[:_LONGEST]} ..." if len(name) > _LONGEST else name
-        near = get_close_matches(name, names, n=1, cutoff=0.5)
+        near = get_close_matches(name, names, n=1, cutoff=0.6)  # a suffix alone is no likeness
         told = f' (did you mean "{near[0]}"?)' if near else f"; the files are {listed(names, 4)}"
         at = file.line_of(f"{table}.{name}") or file.table(table).line_of(name)
         file.faults.add(f'[{table}."{shown}"] fits no file{told}', partial(int, at) if at else lambda: None)

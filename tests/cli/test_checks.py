@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import aqualog as aq
 from aqualog.align.load import load_drive
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.detect.long import detect_long
@@ -118,3 +119,14 @@ def test_text_and_page_name_the_inputs_before_the_numbers(folder, command, after
     body = page[page.index("<main") if "<main" in page else 0 :]
     assert body.index("Check the inputs first") < body.index(after)
     assert body.count("a_y has the opposite sign of") == 1
+
+
+def test_align_takes_a_map_with_the_clocks_of_other_files(folder, tmp_path):
+    path = tmp_path / "map.toml"
+    path.write_text('[sources."gps.csv"]\noffset_s = 0.2\n', encoding="utf-8")
+    other = tmp_path / "copy.csv"
+    other.write_bytes((folder / "drive.csv").read_bytes())
+    code, _, err = commands.run("align", folder / "drive.csv", other, "--signals", path)
+    assert (code, "fits no file" in err) == (0, False), err
+    with pytest.raises(aq.AqualogError, match=r'\[sources\."gps\.csv"\] fits no file; the files are drive\.csv'):
+        aq.read(folder / "drive.csv", map=path)
