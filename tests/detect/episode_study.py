@@ -2,6 +2,7 @@
 
 python -m tests.detect.episode_study --passes 300 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000
+python -m tests.detect.episode_study --dry-hours 20 --first 1000 --others    # with snow, ice, gravel and damp roads
 """
 
 from __future__ import annotations
@@ -83,13 +84,16 @@ def dry(name: str, seed: int, pool):
     return signals.duration_s, [(drawn.note, e) for e in judgement.of("aquaplaning")]
 
 
-DRY = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
+NUISANCES = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
+_OTHER_ROADS = ("damp", "snow", "ice", "gravel", "split")
+DRY = tuple(n for n in NUISANCES if not any(road in n for road in _OTHER_ROADS))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--passes", type=int, default=0)
     parser.add_argument("--dry-hours", type=float, default=0.0)
+    parser.add_argument("--others", action="store_true")
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--pool", choices=tuple(POOLS), default="scoring")
     a = parser.parse_args()
@@ -111,7 +115,7 @@ def main() -> None:
               f"end {inside[:, 1].mean():.1%}, median {np.median(edges[:, 1]):+.2f} s")  # fmt: skip
     seconds, alarms = 0.0, 0
     while seconds < 3600.0 * a.dry_hours:
-        for name in DRY:
+        for name in NUISANCES if a.others else DRY:
             t, found = dry(name, seed, pool)
             seconds, alarms = seconds + t, alarms + len(found)
             for note, e in found:
