@@ -28,6 +28,8 @@ def test_the_printed_tables(tmp_path):
     )
     assert episodes["kind"].to_list() == ["aquaplaning"]
     assert done.stdout.count("\n") > events.height > 5
+    rows = done.stdout.split("\ndetector ")[1].split("\n\n")[0].splitlines()[1:]
+    assert len(rows) == events.height  # one line each: the first phrases of the evidence
     assert events["start_s"].is_sorted()
     assert events["v_x_kmh"].is_between(95, 105).all()
     assert events["evidence"].str.contains("slip").any()

@@ -81,7 +81,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     events = [event_cells(e, units.get(e.detector, "")) for e in result.events]
     first = len(events) if len(events) <= MOST_ROWS else FIRST_EVENTS
     table = Table(
-        EVENT_HEADS, events[:first], "events", (0, 1, 5, 8), wide=(8,), brief=(8,), is_sortable=True, is_choice=True,
+        EVENT_HEADS, events[:first], "events", (0, 1, 5, 8), wide=(8,), is_sortable=True, is_choice=True,
         more=events[first:],
     )  # fmt: skip
     drawn, island = _drawn(result, table) if is_drawn else ([], {})
@@ -107,7 +107,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         Section("Events", [
             replace(table, where="page"),
             Table(EVENT_HEADS, [c for i, c in enumerate(events) if i not in folded], "events", (0, 1, 5, 8), wide=(8,),
-                  where="text"),
+                  brief=(8,), where="text"),
         ], "event-section", _HINT, fold=f"{counted(len(events), 'detection')}, one by one"),
         *drawn,
         Section("The drive from above", [Figures(["route"] if route else []), Para(_ROUTE)] if route else [],
