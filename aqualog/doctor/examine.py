@@ -83,8 +83,8 @@ def _examined(
         result = detect_drive(signals, vehicle)
     except AqualogError as error:
         whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
-        missing = tuple((d, ()) for d in DETECTORS)
-        return Examination(tuple(files), (*findings, whole), (), missing, tuple(pictures))
+        none: tuple[tuple[str, tuple[str, ...]], ...] = tuple((d, ()) for d in DETECTORS)
+        return Examination(tuple(files), (*findings, whole), (), none, tuple(pictures))
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
     # what the drive leaves out as frozen need not be looked at
     findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]

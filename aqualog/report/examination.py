@@ -81,12 +81,12 @@ def _page(found: Examination, lacks: list[tuple[str, tuple[str, ...]]], figures:
     head = f"{counted(len(ordered), 'finding')}: {', '.join(told)}" if ordered else "No problem found"
     able = f"{counted(len(found.ready), 'detector')} can run" if found.ready else "No detector can run"
     look = "full" if found.has_loss else "partial" if counts["doubt"] or not found.ready else "none"
-    rows = [
+    rows: list[list[str | Cell]] = [
         [Cell(_LEVELS[f.level][0], tag=_LEVELS[f.level][1]), cut(f.file, CELL) or "–", cut(f.channel, CELL) or "–",
          upper_first(cut(f.what, NOTE)), cut(f.advice, NOTE) or "–"]
         for f in ordered
     ]  # fmt: skip
-    files = [
+    files: list[list[str | Cell]] = [
         [cut(f.file, CELL), f.format.upper() or "–", f"{f.size:,}", f"{f.channels:,}", f"{f.samples:,}",
          f"{f.end_s:.1f}" if f.end_s is not None else "–"]
         for f in found.files

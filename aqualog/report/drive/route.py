@@ -93,7 +93,8 @@ def _drive(result: DriveResult, east: FloatArray, north: FloatArray, shown: NDAr
     fast = [None if x is None else round(x, 1) for x in rounded(KMH * v)]
     times = [round(float(i) * result.signals.dt, 2) for i in shown]
     if all(x is None for x in fast):
-        hover, colour = "%{customdata[0]:.2f} s<extra></extra>", {"color": MUTED}
+        hover = "%{customdata[0]:.2f} s<extra></extra>"
+        colour: dict[str, Any] = {"color": MUTED}
     else:
         hover = "%{customdata[0]:.2f} s, %{customdata[1]} km/h<extra></extra>"
         colour = {
@@ -110,15 +111,16 @@ def _spread(way: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Known samples at about equal distances along the way."""
     steps = np.floor(way / way[-1] * POINTS)
     inside = np.flatnonzero(known)
-    return inside[np.concatenate([[True], np.diff(steps[inside]) > 0])].astype(np.int64)
+    first: NDArray[np.int64] = inside[np.concatenate([[True], np.diff(steps[inside]) > 0])].astype(np.int64)
+    return first
 
 
 def _marks(
     tables: Mapping[str, Sequence[Episode]], east: FloatArray, north: FloatArray, dt: float
 ) -> list[dict[str, Any]]:
     """Each episode as a thick line under the drive; one trace for each kind."""
-    found = []
-    for kind in reversed(_LOOKS):
+    found: list[dict[str, Any]] = []
+    for kind in reversed(tuple(_LOOKS)):
         own = [(t, i, e) for t, of in tables.items() for i, e in enumerate(of) if e.kind == kind][:MOST_MARKS]
         x: list[float | None] = []
         y: list[float | None] = []
