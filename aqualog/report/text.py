@@ -19,7 +19,7 @@ _BRIEF = 100  # of the first phrases
 def report_text(report: Report) -> str:
     """The sections of a report, each after an empty line; plain signs alone but for `²`, `³`, `·` and `±`."""
     lines = [line for s in shown(report.sections, "text") for line in ("", *_section(s))]
-    return ordinary("\n".join(lines[1:])) + "\n"
+    return displayed_units(ordinary("\n".join(lines[1:]))) + "\n"
 
 
 def _section(section: Section) -> list[str]:
