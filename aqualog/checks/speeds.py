@@ -21,7 +21,7 @@ RATIO = (
 OFF = 0.05  # of speeds: no wear and no GNSS is so far off; a tyre of another size is
 MOVING = 3.0  # [m/s] from which a ratio of speeds means something
 STEADY = 0.04  # between the quartiles of such a ratio: the resolution of slow wheels, and a bend
-_UNITS = {3.6: "km/h read as m/s", 2.23694: "mph read as m/s", 1.60934: "mph read as km/h"}
+_UNITS = {3.6: ("km/h", "m/s"), 2.23694: ("mph", "m/s"), 1.60934: ("km/h", "mph")}  # true unit, unit taken: too large
 _NEAR = 0.04  # about such a factor
 
 
@@ -56,10 +56,13 @@ def _is_off(ratio: float) -> bool:
 
 
 def _factor(ratio: float) -> str:
-    """A factor, and the unit that would make it."""
+    """A factor, and the mistaken unit that would make it."""
     size = max(ratio, 1.0 / ratio)
-    unit = next((said for x, said in _UNITS.items() if abs(size / x - 1.0) < _NEAR), "")
-    return f"{ratio:.3g}" + (f" ({unit}?)" if unit else "")
+    units = next((u for x, u in _UNITS.items() if abs(size / x - 1.0) < _NEAR), None)
+    if units is None:
+        return f"{ratio:.3g}"
+    true, taken = units if ratio > 1.0 else units[::-1]
+    return f"{ratio:.3g} ({true} read as {taken}?)"
 
 
 def _ratio(x: FloatArray, y: FloatArray) -> float:

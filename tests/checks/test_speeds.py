@@ -26,7 +26,10 @@ def test_a_tyre_of_another_size():
 
 @pytest.mark.parametrize(
     ("factor", "unit"),
-    [(3.6, "km/h read as m/s"), (1 / 3.6, "km/h read as m/s"), (2.237, "mph read as m/s"), (1.609, "mph read as km/h"), (1.1, "")],
+    [
+        (3.6, "km/h read as m/s"), (1 / 3.6, "m/s read as km/h"), (2.237, "mph read as m/s"),
+        (1 / 2.237, "m/s read as mph"), (1.609, "km/h read as mph"), (1 / 1.609, "mph read as km/h"), (1.1, ""),
+    ],
 )  # fmt: skip
 def test_wheels_against_the_velocity(factor, unit):
     (remark,) = said(v_x=1.0 / factor)
