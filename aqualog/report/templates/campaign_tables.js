@@ -222,7 +222,9 @@ function eventWords(i) {
   return words.map(function (w) { return w[1] > 1 ? `${w[0]} ${w[1]}×` : w[0]; }).join(", ");
 }
 
-function sum(i, column) { return countOf(i, -1, column) + (column === 2 ? countOf(i, -1, 4) : 0); }
+// Events of a run on or off water; -1 where the lane is not known.
+function sum(i, column) { return countOf(i, -1, 4) ? -1 : countOf(i, -1, column); }
+function sumText(column) { return function (i) { const n = sum(i, column); return n < 0 ? "–" : String(n); }; }
 
 const STATES = ["done", "failed", "to do"];
 const VERDICTS = ["yes", "none", "cannot be judged"]; // in the order of the document
@@ -233,8 +235,8 @@ const columns = [
   ["Episodes", "num", function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? runs.episodes[i] : -1; },
     function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? String(runs.episodes[i]) : "–"; }],
   ["Lane [km/h]", "num", function (i) { return runs.v[i] ?? -1; }, function (i) { return runs.v[i] === null ? "–" : runs.v[i].toFixed(0); }],
-  ["On water", "num", function (i) { return sum(i, 2); }],
-  ["Off", "num", function (i) { return sum(i, 3); }],
+  ["On water", "num", function (i) { return sum(i, 2); }, sumText(2)],
+  ["Off", "num", function (i) { return sum(i, 3); }, sumText(3)],
   ["Full", "num", function (i) { return runs.full[i]; }],
   ["Events on water", "", eventWords],
   ...facets.map(function (f, n) {
