@@ -34,9 +34,8 @@ TURN = Change(-1.0)
 _NAMES = {"front": "the front wheels (right minus left)", "rear": "the rear wheels (right minus left)"}
 _ONE_FAULT = (
     ({"a_y", "yaw_rate"}, 1),  # an IMU with y to the right and z down
-    ({"a_y", "yaw_rate", "steer_angle"}, 1),  # a log whose axes are those: right turns are positive
     ({"a_y"}, 1), ({"yaw_rate"}, 1), ({"steer_angle"}, 1),
-    ({"front"}, 2), ({"rear"}, 2), ({"front", "rear"}, 2),  # names of wheels are rarely wrong
+    ({"front"}, 2), ({"rear"}, 2), ({"front", "rear"}, 3),  # names of wheels are rarely wrong
 )  # fmt: skip
 """Sets of signals that one mistake turns, and how much it takes to believe it."""
 
@@ -162,7 +161,8 @@ def _undecided(one: set[str], other: set[str], relations: Mapping[tuple[str, str
     ways = tuple(dict.fromkeys(sorted(camp), TURN) for camp in (one, other) if camp.isdisjoint(_NAMES))
     verb = "has" if len(one) == 1 else "have"
     what = f"{told} {verb} the opposite sign of {against}; this log does not show which of them is turned"
-    advice = "in a left turn each must be positive"
+    axles = sorted((one | other) & _NAMES.keys())
+    advice = "in a left turn each must be positive" + (f"; or {_swap(axles)}" if axles else "")
     return Doubt("sign", tuple(sorted(one | other)), what, advice, ways, r)
 
 
@@ -171,8 +171,12 @@ def _swapped(wheels: set[str], right: Collection[str], relations: Mapping[tuple[
     told, r = _against(axles[0], right, relations)
     names = [f"omega_{a[0]}{side}" for a in axles for side in "lr"]
     what = f"{' and '.join(_named(a) for a in axles)} have the opposite sign of {told}"
+    return Doubt("sign", tuple(names), what, _swap(axles), value=r)
+
+
+def _swap(axles: Collection[str]) -> str:
     pairs = ", ".join(f"omega_{a[0]}l and omega_{a[0]}r" for a in axles)
-    return Doubt("sign", tuple(names), what, f"in the signal map, swap the channels of {pairs}", value=r)
+    return f"in the signal map, swap the channels of {pairs}"
 
 
 def _against(name: str, others: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> tuple[str, float]:

@@ -54,6 +54,14 @@ def test_swapped_wheels():
     assert "swap the channels of omega_fl and omega_fr" in remark.advice
 
 
+def test_front_wheels_alone_do_not_outvote_three_signals_that_agree():
+    swapped = {**DRIVE, "omega_fl": DRIVE["omega_fr"], "omega_fr": DRIVE["omega_fl"]}
+    (remark,) = look(signals(swapped, drop=("omega_rl", "omega_rr")), CAR)
+    assert "does not show which" in remark.what
+    assert "swap the channels of omega_fl and omega_fr" in remark.advice
+    assert set(remark.lines) == {line(s) for s in TURNING}
+
+
 @pytest.mark.parametrize(
     "how",
     [
