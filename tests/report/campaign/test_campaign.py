@@ -1,5 +1,8 @@
 """The report of a campaign in headless Chromium, from a disk and without a network: filters act on all, links work."""
 
+import json
+import re
+
 import pytest
 
 from tests.headless import click, requests, severe, wait_for
@@ -183,6 +186,22 @@ def test_script_that_stands_in_the_page_does_not_run(browser, folder, tmp_path):
     browser.execute_script("document.querySelector('i').click()")
     assert "case" in browser.title
     assert len([e for e in browser.get_log("browser") if "Content Security" in e["message"]]) >= 3
+
+
+def test_events_of_an_unknown_lane_are_on_no_water(browser, folder, tmp_path):
+    html = (folder / "index.html").read_text()
+    island = re.search(r'id="campaign-data">(.*?)</script>', html, re.DOTALL)[1]
+    data = json.loads(island)
+    with_events = [i for i, own in enumerate(data["runs"]["events"]) if own]
+    data["runs"]["events"] = [[[d, at, 0, 0, on + off] for d, at, on, off, _ in own] for own in data["runs"]["events"]]
+    (tmp_path / "index.html").write_text(html.replace(island, json.dumps(data).replace("<", "\\u003c")))
+    opened(browser, tmp_path / "index.html")
+    heads = texts(browser, "#runs thead th")
+    for head in ("On water", "Off"):
+        column = next(i for i, text in enumerate(heads) if text.startswith(head)) + 1
+        cells = texts(browser, f"#runs tbody td:nth-child({column})")
+        assert cells.count("–") == len(with_events) > 0
+        assert set(cells) <= {"–", "0"}
 
 
 def test_without_plotly_the_page_says_so(browser, folder, tmp_path):
