@@ -12,7 +12,7 @@ PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
 MOST_LINES = 83_000  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
-MOST_FILES = 438
+MOST_FILES = 440
 MOST_TEST_LINES = 56_000
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500

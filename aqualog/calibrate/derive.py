@@ -15,7 +15,7 @@ from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
-    "identified_values", "keeping",
+    "identified_values", "keeping", "of_kept_mass", "unbalanced_parameters",
 ]  # fmt: skip
 
 FIXABLE: Mapping[str, tuple[float, float]] = {
@@ -108,6 +108,22 @@ def balance_parameters(
     return parameters
 
 
+def unbalanced_parameters(fixed: Mapping[str, float], vehicle: Vehicle, why: str) -> list[Parameter]:
+    """Return the parameters of a balance that the drives do not allow, with the reason; those given stay."""
+    parameters = []
+    for name, unit in _UNITS.items():
+        file_value = float(getattr(vehicle, name)) if name in KEYS and name != "torque_gain" else math.nan
+        if name in fixed:
+            x = fixed[name]
+            parameters.append(Parameter(name, x, (x, x), unit, identified=True, remark="given", file_value=file_value))
+        else:
+            unknown = (math.nan, math.nan)
+            parameters.append(
+                Parameter(name, math.nan, unknown, unit, identified=False, why_not=why, file_value=file_value)
+            )
+    return parameters
+
+
 DIGITS = 7  # of a value in a file: more than any interval has
 _KEYS = {
     "mass": "mass", "drag_area": "drag_area", "rolling_resistance": "rolling_resistance", "r_e_f": "wheels.r_e_f",
@@ -130,6 +146,24 @@ def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Para
     ]  # fmt: skip
 
 
+def of_kept_mass(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Parameter, ...]:
+    """Return the parameters, the drag area with its interval for the file's mass where that one is to be kept.
+
+    The drives show the ratio of drag area and mass, so both scale alike.
+    """
+    mass = next((p for p in contradicted(parameters, vehicle) if p.name == "mass"), None)
+    if mass is None:
+        return tuple(parameters)
+    factor = vehicle.mass / mass.value
+    return tuple(_scaled(p, factor) if p.name == "drag_area" and p.ci95[0] < p.ci95[1] else p for p in parameters)
+
+
+def _scaled(p: Parameter, factor: float) -> Parameter:
+    low, high = p.ci95
+    remark = "; ".join(x for x in ("for the mass of the vehicle file", p.remark) if x)
+    return replace(p, value=factor * p.value, ci95=(factor * low, factor * high), remark=remark)
+
+
 def keeping(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Parameter, ...]:
     """Return the parameters, with those marked as kept that contradict the vehicle file."""
     kept = {p.name for p in contradicted(parameters, vehicle)}
@@ -139,16 +173,11 @@ def keeping(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Paramete
 def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
     """Return the identified values by key of the vehicle file (`wheels.r_e_f`), each with the parameter it comes from.
 
-    A value of the file that is kept is not among them. With a mass that is kept the drag area is that of this mass, for
-    the drives show their ratio. A ratio of radii without their size keeps the file's mean radius. The torque gain
-    applies to the torques as they were read, which the file's own gain has already multiplied.
+    A value of the file that is kept is not among them. A ratio of radii without their size keeps the file's mean
+    radius. The torque gain applies to the torques as they were read, which the file's own gain has already multiplied.
     """
     own = [p for p in parameters if p.identified and not p.kept]
     found = {_KEYS[p.name]: (p.value, p) for p in own if p.name in _KEYS}
-    mass = next((p for p in parameters if p.name == "mass" and p.kept), None)
-    if mass is not None and "drag_area" in found:
-        area, p = found["drag_area"]
-        found["drag_area"] = (area * vehicle.mass / mass.value, p)
     if "torque_gain" in found:
         gain, p = found["torque_gain"]
         found["torque_gain"] = (gain * vehicle.torque_gain, p)

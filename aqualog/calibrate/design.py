@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.align.mapping import MAP_HINT
+from aqualog.checks.driven import no_drivetrain
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
@@ -134,6 +135,7 @@ class Drive(NamedTuple):
     columns: Mapping[str, FloatArray]
     features: Mapping[str, FloatArray]
     has_velocity: bool
+    no_balance: str = ""  # why the torques need not be all of the drive
 
 
 def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
@@ -142,7 +144,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     Parameters
     ----------
     signals : Signals
-        At least `a_x`, the torques of the driven wheels, and `v_x` or wheel speeds.
+        At least `a_x`, the torques of the driven wheels, and `v_x` or wheel speeds. Where the vehicle does not say
+        which wheels are driven, the torques of one axle do for all but the balance of forces (`Drive.no_balance`).
     vehicle : Vehicle
         Radii and inertias are used; mass only for the loads.
     name : str
@@ -158,7 +161,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     """
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
     columns = {s: signals.array(s) for s in present}
-    _check(columns, vehicle, name)
+    no_balance = _check(columns, vehicle, name)
     dt = signals.dt
     features = FeatureStream(vehicle, dt, present).push({s: columns[s] for s in present if s in INPUTS})
     a_x = columns["a_x"]
@@ -181,13 +184,18 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     return Drive(
         name, dt, windows, used, _dry(columns, moving), float(np.count_nonzero(moving)) * dt,
         {r: s for r, s in left_out.items() if s > 0.0}, torque_lag, v_lag, a_x, v, force, columns.get("altitude"),
-        columns, features, "v_x" in present,
+        columns, features, "v_x" in present, no_balance,
     )  # fmt: skip
 
 
-def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> None:
-    needed = ("a_x", *(f"torque_{w}" for w in vehicle.driven))
+def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> str:
+    """Refuse a drive without its signals; return why the torques need not be all of the drive, empty where they are."""
+    torques = [f"torque_{w}" for w in WHEELS if f"torque_{w}" in columns]
+    is_part = not vehicle.knows_drivetrain and len(torques) < len(WHEELS)
+    needed = ("a_x", *(torques if is_part else (f"torque_{w}" for w in vehicle.driving)))
     missing = [s for s in needed if s not in columns]
+    if is_part and not torques:
+        missing += ["torque of the driven wheels", "drivetrain in the vehicle file"]
     if "v_x" not in columns and not all(f"omega_{w}" in columns for w in WHEELS):
         missing.append("v_x or the four wheel speeds")
     if missing:
@@ -199,11 +207,14 @@ def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> No
     # what never changes is frozen or not connected, and would be fitted to the last digit
     speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]
     dead = [s for s in (*needed, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
+    if not vehicle.knows_drivetrain and not set(torques) <= set(dead):  # an axle that is not driven has no torque
+        dead = [s for s in dead if s not in torques]
     if dead:
         raise SignalError(
             f"{', '.join(dead)} never change{'s' if len(dead) == 1 else ''}", where=name,
             expected="measured signals", hint="check the channel in the signal map",
         )  # fmt: skip
+    return no_drivetrain(vehicle, columns).line() if is_part else ""
 
 
 def _reasons(

@@ -14,7 +14,7 @@ from aqualog.calibrate.records import Parameter
 from aqualog.calibrate.spread import BLOCKS_MIN, DRIVES_MIN, Spread, combined, half_width, jackknife, stratified
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.vehicle import Drivetrain, Vehicle
 from aqualog.features.smoothing import earlier
 from aqualog.physics.load import G
 
@@ -52,8 +52,8 @@ def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
         # 0.1 s of delay at the 0.3 m/s^2 of a coasting car would be 0.1 % of radius; free wheels tell it, driven ones
         # lead the velocity by their slip
         v = drive.columns["v_x"]
-        if vehicle.drivetrain != "awd":
-            free = f if vehicle.drivetrain == "rwd" else r
+        if _way(vehicle) != "awd":
+            free = f if _way(vehicle) == "rwd" else r
             v = earlier(v, lag_between(np.gradient(v, drive.dt), np.gradient(free, drive.dt), drive.dt), drive.dt)
     n = max(round(WINDOW_S / drive.dt), 1)
     rows = f.size // n
@@ -72,7 +72,7 @@ def radii_of_blocks(drive: Drive, vehicle: Vehicle) -> list[FloatArray]:
     ]
 
 
-def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Radii:
+def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: Drivetrain) -> Radii:
     """Estimate the radii of wheels at zero torque.
 
     Parameters
@@ -108,7 +108,7 @@ def _constant(columns: Sequence[FloatArray], y: FloatArray) -> float:
     return float(np.linalg.lstsq(np.column_stack(columns), y, rcond=None)[0][0]) if np.isfinite(y).all() else math.nan
 
 
-def radii_spread(drives: Sequence[Sequence[FloatArray]], drivetrain: str) -> Spread:
+def radii_spread(drives: Sequence[Sequence[FloatArray]], drivetrain: Drivetrain) -> Spread:
     """Leave out blocks of 40 s in turn within their drive; from four drives on, whole drives, too."""
 
     def without(j: int, k: int) -> dict[str, float]:
@@ -130,8 +130,8 @@ def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Paramet
     if sum(len(b) for b in by_drive) < BLOCKS_MIN:
         why = words.radius_unknown(ratio_known=False) if not by_drive else words.RADIUS_SHORT
         return [_untold(n, file[n], u, why) for n, u in units.items()]
-    best = fit_radii(by_drive, vehicle.drivetrain)
-    spread = radii_spread(by_drive, vehicle.drivetrain)
+    best = fit_radii(by_drive, _way(vehicle))
+    spread = radii_spread(by_drive, _way(vehicle))
     parameters = []
     for name, unit in units.items():
         value = float(getattr(best, name))
@@ -150,9 +150,14 @@ def radius_parameters(drives: Sequence[Drive], vehicle: Vehicle) -> list[Paramet
 
 def _model_sd(name: str, vehicle: Vehicle) -> float:
     """Return the error that the regression leaves in a radius after any number of drives; 0 on a free axle. [-]"""
-    if vehicle.drivetrain == "awd":
+    if _way(vehicle) == "awd":
         return AWD_SD
-    return 0.0 if name == ("r_e_f" if vehicle.drivetrain == "rwd" else "r_e_r") else SLIP_SD
+    return 0.0 if name == ("r_e_f" if _way(vehicle) == "rwd" else "r_e_r") else SLIP_SD
+
+
+def _way(vehicle: Vehicle) -> Drivetrain:
+    """Return the driven axles of the regression: both where they are not known, which holds for every car."""
+    return vehicle.drivetrain if vehicle.knows_drivetrain else "awd"
 
 
 def _untold(name: str, value: float, unit: str, why: str) -> Parameter:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +18,15 @@ from aqualog.calibrate.derive import (
     contradicted,
     derived,
     estimates,
+    identified_values,
     keeping,
+    of_kept_mass,
+    unbalanced_parameters,
 )
 from aqualog.calibrate.design import Drive, prepare
 from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
-from aqualog.calibrate.spread import half_width, jackknife_of, one_more, spread_of
+from aqualog.calibrate.spread import DRIVES_MIN, Spread, half_width, jackknife_of, one_more, spread_of
 from aqualog.calibrate.tie_rod import transfers
 from aqualog.core.errors import FitError
 from aqualog.core.records import FloatArray, Signals
@@ -148,28 +152,77 @@ def calibrate(
             hint="what was left out: " + "; ".join(f"{d.name}: {words.left_out(d.left_out)}" for d in all_drives),
         )  # fmt: skip
     samples = [Sample(d.windows, energy_offset(d)) for d in usable]
-    best = fit_balance(samples, fixed)
-    spread = spread_of(partial(estimates, fixed=fixed), samples, drag=best.drag, air_density=vehicle.air_density)
-    found = derived(best, fixed)
-    fits = drive_fits(usable, samples, found, vehicle)
+    # without the driven axle the torques of the log need not be all of the drive
+    lacking = next((d.no_balance for d in usable if d.no_balance), "")
+    if lacking:
+        balance = _no_balance(usable, samples, fixed, vehicle, lacking)
+    else:
+        balance = _balance(usable, samples, fixed, vehicle)
+    fits, found, spread = balance.fits, balance.found, balance.spread
     estimated = (
-        *balance_parameters(found, spread, fixed, vehicle, samples),
+        *balance.parameters,
         *radius_parameters(usable, vehicle),
-        *_offsets(fits, samples, best.levels.tolist(), fixed),
+        *_offsets(fits, samples, balance.levels, fixed),
     )
+    if not accept:
+        estimated = of_kept_mass(estimated, vehicle)
     parameters = estimated if accept else keeping(estimated, vehicle)
     car = calibrated(vehicle, parameters)
-    rods, missing = transfers(all_drives, car, torque_scale=car.torque_gain / vehicle.torque_gain)
+    scale = car.torque_gain / vehicle.torque_gain
+    rods, missing = ({}, ()) if lacking else transfers(all_drives, car, torque_scale=scale)
     skipped = [
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]
     shown = {p.name for p in parameters if p.name in SPREAD and p.identified and p.name not in fixed}
-    differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0}
-    odd = words.contradictions(contradicted(estimated, vehicle), found["torque_gain"], accepted=accept)
-    notes = (*odd, *words.notes(fits, samples, found, fixed, by_drive=spread.by_drive), *skipped)
+    # a drag area that is that of a kept mass differs from drive to drive in the same measure
+    scale_of = {p.name: p.value / found[p.name] for p in parameters if p.name == "drag_area" and p.name in shown}
+    differing = {
+        n: sd * scale_of.get(n, 1.0) for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0
+    }
+    odd = words.contradictions(contradicted(estimated, vehicle), found.get("torque_gain", 1.0), accepted=accept)
+    written = identified_values(parameters, vehicle)
+    notes = (*odd, *words.notes(fits, samples, found, fixed, written, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
     )
+
+
+class _Balanced(NamedTuple):
+    """What the balance of forces of the drives has shown; `levels` (J,) of a_x without force and drag [m/s²]."""
+
+    parameters: Sequence[Parameter]
+    fits: list[DriveFit]
+    found: Mapping[str, float]
+    spread: Spread
+    levels: Sequence[float]
+
+
+def _balance(
+    usable: Sequence[Drive], samples: Sequence[Sample], fixed: Mapping[str, float], vehicle: Vehicle
+) -> _Balanced:
+    best = fit_balance(samples, fixed)
+    spread = spread_of(partial(estimates, fixed=fixed), samples, drag=best.drag, air_density=vehicle.air_density)
+    found = derived(best, fixed)
+    fits = drive_fits(usable, samples, found, vehicle)
+    parameters = balance_parameters(found, spread, fixed, vehicle, samples)
+    return _Balanced(parameters, fits, found, spread, best.levels.tolist())
+
+
+def _no_balance(
+    usable: Sequence[Drive], samples: Sequence[Sample], fixed: Mapping[str, float], vehicle: Vehicle, why: str
+) -> _Balanced:
+    """Return the parameters without values, but for what is given, and of each drive what its torques do not enter."""
+    none = np.empty(0)
+    fits = [
+        DriveFit(
+            d.name, math.nan, math.nan, (math.nan,) * 3, s.offset.value, s.offset.sd, math.nan, d.torque_lag_s,
+            d.v_lag_s, float(d.used.sum()) * d.dt, d.driven_s, d.left_out, math.nan, math.nan, none, none, none, none,
+        )
+        for d, s in zip(usable, samples, strict=True)
+    ]  # fmt: skip
+    parameters = unbalanced_parameters(fixed, vehicle, why)
+    spread = Spread({}, {}, by_drive=len(usable) >= DRIVES_MIN)
+    return _Balanced(parameters, fits, dict(fixed), spread, [math.nan] * len(fits))
 
 
 def _offsets(
@@ -181,7 +234,7 @@ def _offsets(
         name = "accelerometer_offset" if len(fits) == 1 else f"accelerometer_offset[{fit.name}]"
         value, half = fit.offset, 1.96 * fit.offset_sd
         remark = "from velocity and altitude" if sample.offset.has_height else "from velocity, the drive taken as level"
-        if "rolling_resistance" in fixed and not sample.offset.has_height:
+        if "rolling_resistance" in fixed and not sample.offset.has_height and math.isfinite(level):
             value, half = level + G * fixed["rolling_resistance"], math.nan
             remark = "from the rolling resistance given; a wind is in it"
             parameters.append(Parameter(name, value, (math.nan, math.nan), "m/s^2", identified=True, remark=remark))

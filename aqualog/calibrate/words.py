@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -137,10 +137,11 @@ def notes(
     samples: Sequence[Sample],
     found: Mapping[str, float],
     fixed: Mapping[str, float],
+    written: Collection[str],
     *,
     by_drive: bool,
 ) -> list[str]:
-    """Return what a reader should know of the result."""
+    """Return what a reader should know of the result; `written` are the keys that the vehicle file gets."""
     said = []
     alone = float(np.median([f.mass for f in fits if math.isfinite(f.mass)] or [math.nan]))
     if {"mass", "torque_gain"} <= set(fixed) and abs(alone / fixed["mass"] - 1.0) > CONTRADICTION:
@@ -148,15 +149,19 @@ def notes(
             f"the drives contradict what is given: with torque_gain = {fixed['torque_gain']:g} they show "
             f"{alone:.0f} kg, not {fixed['mass']:g}; give one of the two"
         )
-    if not PLAUSIBLE_MASS[0] < found["mass"] < PLAUSIBLE_MASS[1] or not 0.5 < found["torque_gain"] < 2.0:
+    mass, gain = found.get("mass", math.nan), found.get("torque_gain", 1.0)
+    if (not PLAUSIBLE_MASS[0] < mass < PLAUSIBLE_MASS[1] and math.isfinite(mass)) or not 0.5 < gain < 2.0:
         said.append(
-            f"a mass of {found['mass']:.0f} kg with a torque gain of {found['torque_gain']:.2f} is hardly that of a "
+            f"a mass of {mass:.0f} kg with a torque gain of {gain:.2f} is hardly that of a "
             "car. Is the torque that of the motor, without the reduction? (scale in the signal map)"
         )
-    if abs(found["torque_gain"] - 1.0) > GAIN_NOTED:
+    if abs(gain - 1.0) > GAIN_NOTED:
         said.append(
-            f"the torques are {found['torque_gain']:.3f} of what was read: torque_gain in the calibrated vehicle file "
+            f"the torques are {gain:.3f} of what was read: torque_gain in the calibrated vehicle file "
             "corrects them on reading; a signal map that does so already must not do it twice"
+            if "torque_gain" in written
+            else f"the torques seem to be {gain:.3f} of what was read, but the drives do not identify it: "
+            "the calibrated vehicle file keeps the torque_gain that it had"
         )
     if sum(math.isfinite(f.mass) for f in fits) > 1:
         masses = np.array([f.mass for f in fits if math.isfinite(f.mass)])

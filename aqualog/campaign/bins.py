@@ -19,8 +19,8 @@ from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "DEFAULT_KEYS", "DEPTH_KEYS", "KMH", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells", "check_plan",
-    "driven_of", "free_of", "group_of", "plan", "pooled", "road_of",
+    "DEFAULT_KEYS", "DEPTH_KEYS", "KMH", "NO_DRIVETRAIN", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells",
+    "check_plan", "driven_of", "free_of", "group_of", "plan", "pooled", "road_of",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
@@ -28,6 +28,7 @@ ROADS = ("wet", "dry", "both")
 DEFAULT_KEYS = ("tyre", "pressure_rear_bar", "water_depth_mm", "load_front_kg", "load_rear_kg")
 DEPTH_KEYS = ("water_depth_mm", "water_depth_left_mm")
 SIDE = "side"
+NO_DRIVETRAIN = "the vehicle file does not say which axle is driven"
 _APART = 10_000_000  # distance between the steps of two wheels of one run, which are not neighbours
 
 Group = tuple[tuple[str, float | str | None], ...]
@@ -133,8 +134,8 @@ def group_of(info: RunInfo, keys: Sequence[str]) -> Group:
 
 
 def driven_of(info: RunInfo) -> tuple[str, ...]:
-    """Driven wheels of a run's car."""
-    return info.vehicle.driven
+    """Driven wheels of a run's car; all of them where its file does not say which: none has a slope (NO_DRIVETRAIN)."""
+    return info.vehicle.driving
 
 
 def free_of(info: RunInfo) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import Cell, Picked, Plan, cells
+from aqualog.campaign.bins import NO_DRIVETRAIN, Cell, Picked, Plan, cells
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.intervals import NOWHERE, Interval
 from aqualog.core.moments import Design
@@ -68,6 +68,8 @@ def delays(data: CampaignData) -> dict[Source, Delay]:
     def columns(info: RunInfo, samples: RunSamples, _: str) -> Picked | str:
         if source_of(info)[1] != "v_x":
             return "no measured velocity"
+        if not info.vehicle.knows_drivetrain:
+            return NO_DRIVETRAIN
         is_awd = info.vehicle.drivetrain == "awd"
         wheels = [w for w in WHEELS if is_awd or w not in info.vehicle.driven]
         slip, mu = (np.mean([samples.array(f"{n}_{w}") for w in wheels], axis=0) for n in ("slip", "mu"))

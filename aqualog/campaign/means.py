@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, cells, driven_of
+from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked, Plan, cells, driven_of
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.campaign.slip_slope import LIMITS, Limits, too_few_runs
 from aqualog.core.intervals import NOWHERE, Interval
@@ -81,6 +81,8 @@ def resistances(
     def columns(info: RunInfo, samples: RunSamples, _: str) -> Picked | str:
         delta = samples.array("delta_a_x")
         if np.isnan(delta).all():
+            if not info.vehicle.knows_drivetrain:
+                return NO_DRIVETRAIN
             return "no resistance measure: no torque of the driven wheels, or no a_x"
         level = 0.0
         if relative:
@@ -147,6 +149,8 @@ def spin_ups(
     """
 
     def columns(info: RunInfo, samples: RunSamples, wheel: str) -> Picked | str:
+        if not info.vehicle.knows_drivetrain:
+            return NO_DRIVETRAIN
         mu = samples.array(f"mu_{wheel}")
         if np.isnan(mu).all():
             return "no traction: no torque of the driven wheels"

@@ -13,7 +13,7 @@ import polars as pl
 from aqualog import __version__
 from aqualog.align.windows import LongDrive
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import BoolArray, DriveResult, Event, FileFaults, FloatArray, Signals, Track
+from aqualog.core.records import BoolArray, DriveResult, Event, FileFaults, FloatArray, Remark, Signals, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import HOLD, BrakeWatch
 from aqualog.detect.long import detect_long, present_in
@@ -125,8 +125,17 @@ def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning) -> Meas
             **{n: getattr(quality.faults, n) for n in type(quality.faults).KINDS},
         },
         "notes": [*quality.notes, *result.notes],
+        "checks": [_remark(r) for r in result.checks],
     }
     return Measurement(samples, about)
+
+
+def _remark(r: Remark) -> dict[str, Any]:
+    low, high = (_plain(x) for x in r.ci95)
+    return {
+        "kind": r.kind, "signals": list(r.signals), "what": r.what, "advice": r.advice, "lines": list(r.lines),
+        "value": _plain(r.value), "value_ci95": [low, high],
+    }  # fmt: skip
 
 
 def _event(e: Event) -> dict[str, Any]:
@@ -297,10 +306,10 @@ def _traction(
     """Traction of each wheel, and its source: torque, accelerometer, or none."""
     n = f["v_x_hat"].size
     out = {w: np.full(n, np.nan) for w in WHEELS}
-    if all(f"torque_{w}" in columns and f"v_line_{w}" in f for w in vehicle.driven):
+    if all(f"torque_{w}" in columns and f"v_line_{w}" in f for w in vehicle.driving):
         out |= {k.removeprefix("mu_"): x for k, x in torque_traction(f, columns, vehicle, dt, width).items()}
         return out, "torque"
-    if vehicle.drivetrain != "awd" and "a_x" in columns:
+    if vehicle.knows_drivetrain and vehicle.drivetrain != "awd" and "a_x" in columns:
         found = accelerometer_traction(f, columns["a_x"], vehicle)
         out |= {k.removeprefix("mu_"): smoothed(x, width) for k, x in found.items()}
         return out, "accelerometer"
@@ -320,10 +329,10 @@ def _slips(
         v = smoothed(columns["v_x"], width)
         for w in wheels:
             out[w] = wheel_slip(f[f"v_line_{w}"] / vehicle.r_e(w), v, vehicle.r_e(w))
-        if all(w in wheels for w in vehicle.driven):
+        if vehicle.knows_drivetrain and all(w in wheels for w in vehicle.driven):
             return out, "v_x", reference_of(v, f, vehicle, dt, None).a_over_v
         return out, "v_x", np.full(n, np.nan)
-    if vehicle.drivetrain == "awd":
+    if not vehicle.knows_drivetrain or vehicle.drivetrain == "awd":
         return out, "none", np.full(n, np.nan)
     for w in (w for w in vehicle.driven if w in wheels):
         free = ("r" if w[0] == "f" else "f") + w[1]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aqualog.campaign.bins import DEPTH_KEYS, Cell, Group, Picked, Plan, Pool, cells, driven_of
+from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked, Plan, Pool, cells, driven_of
 from aqualog.campaign.delay import Delay, Source, delays, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
@@ -140,6 +140,8 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
     left_out: Counter[str] = Counter()
 
     def columns(info: RunInfo, samples: RunSamples, wheel: str) -> Picked | str:
+        if not info.vehicle.knows_drivetrain:
+            return NO_DRIVETRAIN
         slip, mu = samples.array(f"slip_{wheel}"), samples.array(f"mu_{wheel}")
         if np.isnan(slip).all():
             return _without_slip(info)

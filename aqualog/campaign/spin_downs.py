@@ -59,9 +59,9 @@ class SpinDownRow:
 
 
 def passes(data: CampaignData) -> list[Pass]:
-    """All runs with at least half a second on the lane."""
+    """All runs with at least half a second on the lane, of cars whose free wheels are known."""
     found = []
-    for info in data.done:
+    for info in (i for i in data.done if i.vehicle.knows_drivetrain):
         samples = data.samples(info)
         wet = (samples.on_water == 1.0) & np.isfinite(samples.array("v_x"))
         if np.count_nonzero(wet) * samples.step_s < LEAST_S:

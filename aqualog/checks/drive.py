@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
+from aqualog.checks.driven import LEAST_SAMPLES, STILL, drives, shown
 from aqualog.checks.relations import changes, relate
 from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
@@ -16,8 +17,6 @@ from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["drive_doubts"]
 
-LEAST_SAMPLES = 50
-LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less shows no drivetrain
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
 MOVING = 5.0  # [m/s]
@@ -116,18 +115,22 @@ def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> t
 
 
 def _drivetrain(windows: Windows) -> Iterator[Doubt]:
-    """Compare the axles that the torques drive with those in the vehicle file."""
-    known = {a: x[np.isfinite(x)] for a in AXLES if (name := f"torque_{a}") in windows and (x := windows[name]).size}
-    drive = {a: float(np.quantile(x, 0.9)) for a, x in known.items() if x.size >= LEAST_SAMPLES}
+    """Compare the axles that the torques drive with those in the vehicle file; propose them where it says none."""
+    torques = {a: windows[name] for a in AXLES if (name := f"torque_{a}") in windows}
+    drive = drives(torques)
     most = max(drive.values(), default=0.0)
-    if most < LEAST_DRIVE:
-        return
     vehicle = windows.vehicle
+    if not vehicle.knows_drivetrain:
+        seen, line = shown(torques)
+        if line:
+            what = f"no vehicle file says which axle is driven, but {seen}"
+            yield Doubt("drivetrain", ("drivetrain",), what, f"in the vehicle file {line}")
+        return
     for axle, torque in drive.items():
         is_driven = f"{axle}l" in vehicle.driven
         if not is_driven and torque > 0.1 * most:
             told, better = f"are driven with up to {torque:.0f} N m", "awd"
-        elif is_driven and torque < 0.02 * most:
+        elif is_driven and torque < STILL * most:
             told, better = "are never driven", "rwd" if axle == "f" else "fwd"
         else:
             continue
@@ -139,7 +142,7 @@ def _drivetrain(windows: Windows) -> Iterator[Doubt]:
 def _slipping(windows: Windows) -> Iterator[Doubt]:
     """Compare the axle that slips when the car accelerates with the one that the vehicle file drives."""
     car, wheels = windows.vehicle, windows.wheels
-    if car.drivetrain == "awd" or len(wheels) < 4 or windows.speed.size < 3:
+    if car.drivetrain == "awd" or not car.knows_drivetrain or len(wheels) < 4 or windows.speed.size < 3:
         return
     step = windows.step_s
     gained = np.gradient(windows.speed, step)

@@ -179,7 +179,8 @@ def _binned(
         found = find(runs, hear)
     if table is not None:
         found.write(table, force=True)
-    return run.of_runs(runs, result=found, notes=[] if table is None else [f"the table is {table}"])
+    written = [] if table is None else [f"the table is {table}"]
+    return run.of_runs(runs, result=found, notes=[*found.notes, *written])
 
 
 @command("campaign:file out:report by width robust store dbc jobs force")

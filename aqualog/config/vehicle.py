@@ -128,7 +128,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     values = identified_values(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
-    lines = [f"# calibrated from {drives}", f'name = "{name}"', f'drivetrain = "{new.drivetrain}"']
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new)]
     section = ""
     for key in KEYS.values():
         if key.section != section:
@@ -158,6 +158,11 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     if calibration.cannot_tell:
         lines += ["", "# what the drives could not identify", *(f"# - {_plain(s)}" for s in calibration.cannot_tell)]
     return "\n".join(lines) + "\n"
+
+
+def _drivetrain(car: Vehicle) -> str:
+    """The line of the driven axle: a comment where it is not known, so that no assumption looks given."""
+    return f'drivetrain = "{car.drivetrain}"' if car.knows_drivetrain else '# drivetrain: SET "rwd", "fwd" or "awd"'
 
 
 def _source(p: Parameter) -> str:

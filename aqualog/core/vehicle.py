@@ -170,6 +170,11 @@ class Vehicle:
         return {"rwd": WHEELS[2:], "fwd": WHEELS[:2], "awd": WHEELS}[self.drivetrain]
 
     @property
+    def driving(self) -> tuple[str, ...]:
+        """Wheels whose torques together are all of the drive: the driven ones, all four where those are not known."""
+        return self.driven if self.knows_drivetrain else WHEELS
+
+    @property
     def watched_axle(self) -> str:
         """Axle on which minor spin-downs are looked for: the non-driven one, or the front one of an AWD car.
 

@@ -309,8 +309,11 @@ class CampaignRuns(Result):
         Raises
         ------
         ConfigError
+        SignalError
+            If no run's vehicle file says which axle is driven.
         """
         from aqualog.campaign.bins import plan
+        from aqualog.campaign.driven import no_drivetrain, refuse_without_drivetrain
         from aqualog.campaign.full_speed import full_speeds
         from aqualog.campaign.means import spin_ups
         from aqualog.campaign.slip_slope import slip_slopes
@@ -319,6 +322,8 @@ class CampaignRuns(Result):
 
         data, hear = self.data, listener(progress)
         self.campaign.check_bins(by, bin_width=bin_width, road=road)
+        lacking = no_drivetrain(data, "no slip slopes")
+        refuse_without_drivetrain(data, "no slip slopes")
         hear("regressing")
         cells = plan(data, split(by), width_kmh=bin_width, road=road)
         slopes = slip_slopes(data, cells, robust=robust)
@@ -327,8 +332,9 @@ class CampaignRuns(Result):
         speeds = full_speeds(data, wet, slopes if road != "dry" else slip_slopes(data, wet, robust=robust))
         ups = list(zip(spin_ups(data, wet), spin_ups(data, wet, residual=True), strict=True))
         return BinnedSlopes(
-            data.name, slopes, speeds, ups, minor_spin_downs(data, wet), has_loss=self.has_loss, sources=self.sources
-        )
+            data.name, slopes, speeds, ups, minor_spin_downs(data, wet),
+            notes=() if lacking is None else (lacking.line(),), has_loss=self.has_loss, sources=self.sources,
+        )  # fmt: skip
 
     def resistance(
         self,
@@ -354,6 +360,7 @@ class CampaignRuns(Result):
         ConfigError
         """
         from aqualog.campaign.bins import plan
+        from aqualog.campaign.driven import refuse_without_drivetrain
         from aqualog.campaign.means import resistances
         from aqualog.face.campaign_runs import BinnedResistance
 
@@ -361,6 +368,8 @@ class CampaignRuns(Result):
         listener(progress)("averaging")
         cells = plan(self.data, split(by), width_kmh=bin_width, road=road)
         found = resistances(self.data, cells, relative=not as_measured, robust=robust)
+        if not found.rows and not found.elsewhere:
+            refuse_without_drivetrain(self.data, "no resistance")
         return BinnedResistance(self.data.name, found, has_loss=self.has_loss, sources=self.sources)
 
     def report(
@@ -396,9 +405,13 @@ def runs_of(
     campaign: CampaignInputs, data: CampaignData, outcome: BatchOutcome, shard: Shard | None, seconds: float
 ) -> CampaignRuns:
     """Return the runs of a batch that has just ended."""
+    from aqualog.campaign.driven import no_drivetrain
+
     notes = [f"results are in {data.store.name}, {seconds:.0f} s"]
     if shard is not None:
         notes.append("the same without a shard makes the tables, when all parts are done")
+    lacking = no_drivetrain(data, "what depends on the driven axle is not judged")
+    notes += [] if lacking is None else [lacking.line()]
     lost = any(r.about["quality"]["truncated"] or r.about["quality"]["lost_in_files"] for r in data.done)
     return CampaignRuns(
         campaign, data, outcome, shard, seconds, notes=tuple(notes), has_loss=bool(outcome.failed or lost),

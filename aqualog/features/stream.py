@@ -58,7 +58,7 @@ class FeatureStream:
         self.available = frozenset(available) & frozenset(INPUTS)
         self._correct_yaw = correct_yaw
         self._has_wheels = any(f"omega_{w}" in self.available for w in WHEELS)
-        self._has_torque = all(f"torque_{w}" in self.available for w in vehicle.driven)
+        self._has_torque = all(f"torque_{w}" in self.available for w in vehicle.driving)
         self._velocity_params = params_from_seconds(dt, has_accelerometer="a_x" in self.available)
         self._velocity = initial_state()
         self._memory: dict[str, float] = {}

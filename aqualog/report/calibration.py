@@ -117,10 +117,9 @@ def _drive_cells(d: DriveFit) -> tuple[str, ...]:
     against = f"{difference:+.0f} ({low:+.0f} ... {high:+.0f})" if math.isfinite(difference) else ""
     mass, sd = (f"{x:.0f}" if math.isfinite(x) else "" for x in (d.mass, d.mass_sd))
     offset = f"{d.offset:+.3f} ± {1.96 * d.offset_sd:.3f}" if math.isfinite(d.offset) else ""
-    return (
-        d.name, f"{d.used_s:.0f}", mass, sd, against, offset, f"{1e4 * d.drift:+.1f}", f"{d.torque_lag_s:+.2f}",
-        f"{d.rmse_before:.3f}", f"{d.rmse_after:.3f}",
-    )  # fmt: skip
+    drift = f"{1e4 * d.drift:+.1f}" if math.isfinite(d.drift) else ""
+    before, after = (f"{x:.3f}" if math.isfinite(x) else "" for x in (d.rmse_before, d.rmse_after))
+    return d.name, f"{d.used_s:.0f}", mass, sd, against, offset, drift, f"{d.torque_lag_s:+.2f}", before, after
 
 
 def _coefficients(fit: TieRodFit) -> list[tuple[str, str, str]]:

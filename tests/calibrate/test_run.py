@@ -8,9 +8,10 @@ import pytest
 
 from aqualog.align.load import load_signals
 from aqualog.calibrate.balance import energy_offset
-from aqualog.calibrate.derive import calibrated
+from aqualog.calibrate.derive import calibrated, identified_values
 from aqualog.calibrate.design import lag_between, prepare
 from aqualog.calibrate.run import calibrate
+from aqualog.calibrate.words import notes
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Quality, Signals
@@ -36,7 +37,7 @@ def series():
 def test_perfect_sensors_give_the_truth(ideal):
     true, signals = ideal
     known = truth(true, 1.0, signals)
-    result = calibrate([signals], ["drive"], believed(true), {"torque_gain": 1.0})
+    result = calibrate([signals], ["drive"], believed(true), {"torque_gain": 1.0}, accept=True)
     for name, limit in (
         ("mass", 2e-3), ("drag_area", 5e-3), ("r_e_f", 2e-4), ("r_e_r", 2e-4), ("r_e_ratio", 1.5e-4),
         ("rolling_resistance", 0.15),
@@ -137,7 +138,7 @@ def test_braked_and_wet_driving_is_left_out(ideal):
 def test_missing_signals_are_named():
     frame = pl.DataFrame({"t": np.arange(100) * 0.01, "v_x": np.full(100, 20.0)})
     with pytest.raises(SignalError, match=r"a_x, torque_rl, torque_rr"):
-        calibrate([Signals(frame, 10**7, None, {}, Quality(), ("x",))], ["x"], Vehicle())
+        calibrate([Signals(frame, 10**7, None, {}, Quality(), ("x",))], ["x"], Vehicle(given=frozenset({"drivetrain"})))
 
 
 def test_vehicle_file_holds_values_and_intervals(series, tmp_path):
@@ -239,7 +240,7 @@ def test_a_gain_that_is_told_goes_into_the_file_and_onto_the_torques(series, tmp
 def test_a_weighed_mass_that_the_drives_contradict_stays_unless_accepted(series):
     """A file that says 300 kg less than the drives show: the mass or the torques are wrong, and only the user knows."""
     signals, true, _, plain = series
-    light = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"mass"}))
+    light = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"drivetrain", "mass"}))
     kept, taken = (calibrate(signals, ["a", "b"], light, accept=accept) for accept in (False, True))
     for result, word in ((kept, "is kept"), (taken, "is taken")):
         (note,) = (n for n in result.notes if "the vehicle file says mass" in n)
@@ -259,7 +260,81 @@ def test_a_weighed_mass_that_the_drives_contradict_stays_unless_accepted(series)
 
 def test_what_is_not_given_or_fixed_is_no_contradiction(series):
     signals, true, _, plain = series
-    free = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset())
+    free = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"drivetrain"}))
     assert not any(p.kept for p in calibrate(signals, ["a", "b"], free).parameters)
-    given = replace(free, given=frozenset({"mass"}))
+    given = replace(free, given=frozenset({"drivetrain", "mass"}))
     assert not any(p.kept for p in calibrate(signals, ["a", "b"], given, {"mass": true.mass}).parameters)
+
+
+def test_the_drag_area_of_a_kept_mass_has_an_interval_of_its_own(series, tmp_path):
+    """The file's drag area is that of the file's mass: value, interval and spread scale alike, everywhere."""
+    signals, true, _, plain = series
+    light = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"drivetrain", "mass"}))
+    kept, taken = (calibrate(signals, ["a", "b"], light, accept=accept).get("drag_area") for accept in (False, True))
+    factor = light.mass / plain.get("mass").value
+    assert kept.value == pytest.approx(factor * taken.value, rel=1e-3)
+    assert kept.ci95 == pytest.approx([factor * x for x in taken.ci95], rel=1e-3)
+    result = calibrate(signals, ["a", "b"], light)
+    (line,) = (x for x in calibrated_toml(light, result).splitlines() if x.startswith("drag_area"))
+    assert f"95 %: {kept.ci95[0]:.5g} ... {kept.ci95[1]:.5g}" in line
+    assert f"drag_area = {kept.value:.7g}" in line
+
+
+def test_a_torque_gain_that_is_not_identified_is_not_said_to_be_written(series):
+    """With a weighed mass, but forces that hardly tell the gain: the file keeps its own, and the note says that."""
+    signals, true, _, plain = series
+    wide = replace(plain.get("torque_gain"), value=1.2, ci95=(0.9, 1.5), identified=False, why_not="wide")
+    written = identified_values([wide], believed(true))
+    assert written == {}
+    (note,) = (n for n in notes([], [], {"mass": true.mass, "torque_gain": 1.2}, {}, written, by_drive=True))
+    assert "keeps the torque_gain" in note
+    assert "corrects them" not in note
+    given = calibrate(signals, ["a", "b"], believed(true), {"mass": 1.2 * plain.get("mass").value})
+    assert any("torque_gain in the calibrated vehicle file corrects them" in n for n in given.notes)
+    assert "\ntorque_gain = 1.2" in calibrated_toml(believed(true), given)
+
+
+def with_all_torques(signals, true):
+    """As a log that holds the torques of all wheels: those of the axle that is not driven are zero."""
+    free = [f"torque_{w}" for w in ("fl", "fr", "rl", "rr") if w not in true.driven]
+    return replace(signals, frame=signals.frame.with_columns(**dict.fromkeys(free, pl.lit(0.0))))
+
+
+def test_without_a_drivetrain_only_what_needs_no_driven_axle_is_estimated(series, tmp_path):
+    signals, true, gain, plain = series
+    free = ["torque_fl", "torque_fr"] if true.drivetrain == "rwd" else ["torque_rl", "torque_rr"]
+    lone = [replace(s, frame=s.frame.drop(free, strict=False)) for s in signals]
+    bare = replace(believed(true), drivetrain="rwd", given=frozenset())
+    result = calibrate(lone, ["a", "b"], bare)
+    axle = true.driven[0][0]
+    proposed = f"torque_{axle} moves, torque_{'f' if axle == 'r' else 'r'} is not in the log: drivetrain = "
+    for name in ("mass", "drag_area", "rolling_resistance", "mass_per_gain"):
+        assert not result.get(name).identified
+        assert "does not say which axle is driven" in result.get(name).why_not
+        assert proposed in result.get(name).why_not
+    known = truth(true, gain, signals[0])
+    for name in ("r_e_f", "r_e_r", "r_e_ratio"):
+        low, high = result.get(name).ci95
+        assert low <= known[name] <= high, name
+    assert result.get("accelerometer_offset[a]").value == pytest.approx(
+        plain.get("accelerometer_offset[a]").value, abs=1e-6
+    )
+    text = calibrated_toml(bare, result)
+    assert '\n# drivetrain: SET "rwd", "fwd" or "awd"' in text
+    (tmp_path / "car.toml").write_text(text, encoding="utf-8")
+    assert not load_vehicle(tmp_path / "car.toml").knows_drivetrain
+
+
+def test_the_torques_of_all_wheels_need_no_drivetrain(series):
+    signals, true, _, plain = series
+    bare = replace(believed(true), drivetrain="rwd", given=frozenset())
+    result = calibrate([with_all_torques(s, true) for s in signals], ["a", "b"], bare)
+    assert result.get("mass").value == pytest.approx(plain.get("mass").value, rel=2e-3)
+
+
+def test_without_torques_and_drivetrain_nothing_is_left(series):
+    signals, true, _, _ = series
+    bare = replace(believed(true), given=frozenset())
+    none = replace(signals[0], frame=signals[0].frame.drop([n for n in signals[0].symbols if n.startswith("torque")]))
+    with pytest.raises(SignalError, match="without torque of the driven wheels, drivetrain in the vehicle file"):
+        calibrate([none], ["a"], bare)

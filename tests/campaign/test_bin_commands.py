@@ -10,12 +10,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import aqualog as aq
 from aqualog.cli.campaign import bin_resistance, bin_slipslope
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
+from tests.campaign.made import make_campaign
 
 app = typer.Typer()
 app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
@@ -177,3 +179,44 @@ def test_another_road_is_proposed_where_it_has_rows(no_wheels):
     done = invoke("bin-resistance", no_wheels / "dry.toml", "--road", "wet", "--jobs", 1, "-q")
     assert "no samples on wet road\ntry: --road dry\n" in done.stdout
     assert "try:" not in invoke("bin-resistance", no_wheels / "dry.toml", "--road", "dry", "--jobs", 1, "-q").stdout
+
+
+def without_drivetrain(folder):
+    car = folder / "car.toml"
+    car.write_text("\n".join(x for x in car.read_text().splitlines() if not x.startswith("drivetrain")) + "\n")
+
+
+def test_no_axle_is_taken_for_the_driven_one(tmp_path):
+    made = make_campaign(tmp_path, speeds=(), repeats=0)
+    lanes = (Lane(10.0, 14.0, depth_left=8e-4, depth_right=1.3e-3),)
+    scenario = Scenario(SEDAN, duration_s=30.0, speed=((0.0, 20.0), (30.0, 26.0)), lanes=lanes)
+    write_simulation(tmp_path / "long.parquet", simulate(scenario), suffix=".parquet", comment="made")
+    with (tmp_path / "runs.csv").open("a") as rows:
+        rows.write("long.parquet,worn_summer,1.3,1.9,1.9,10,14\n")
+    without_drivetrain(tmp_path)
+    done = invoke("bin-slipslope", made, "--jobs", 1)
+    assert done.exit_code == 4, done.stderr
+    said = " ".join(done.stderr.split())
+    assert "car.toml: no slip slopes for 1 of 1 runs: no file says which axle is driven" in said
+    assert 'expected drivetrain = "rwd", "fwd" or "awd" in the vehicle file' in said
+    assert 'torque_r moves, torque_f does not: in the vehicle file drivetrain = "rwd"?' in said
+    runs = aq.Campaign(made).run(jobs=1)
+    (note,) = (n for n in runs.notes if "driven" in n)
+    assert note.startswith("car.toml: what depends on the driven axle is not judged for 1 of 1 runs")
+    assert "slip slopes and speeds of full aquaplaning are not estimated" in runs.report(tmp_path / "page").read_text()
+
+
+def test_a_car_without_drivetrain_does_not_stop_the_others(tmp_path):
+    made = make_campaign(tmp_path)
+    (tmp_path / "other.toml").write_text((tmp_path / "car.toml").read_text())
+    without_drivetrain(tmp_path)
+    head, *rows = (tmp_path / "runs.csv").read_text().splitlines()
+    lines = [f"{head},vehicle", *(f"{r},{'other' if '_0' in r else 'car'}.toml" for r in rows)]
+    (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
+    done = invoke("bin-slipslope", made, "--json", "--jobs", 1)
+    assert done.exit_code == 0, done.stderr
+    assert "no slip slopes for 2 of 4 runs" in " ".join(done.stderr.split())
+    found = json.loads(done.stdout)
+    assert {r["vehicle"] for r in found["rows"]} == {"other"}
+    assert {r["vehicle"] for r in found["minor_spin_downs"]} <= {"other"}
+    assert found["left_out_samples"]["the vehicle file does not say which axle is driven"] > 0

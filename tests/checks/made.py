@@ -7,7 +7,7 @@ from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
 
-CAR = Vehicle(name="made", given=frozenset({"mass"}))
+CAR = Vehicle(name="made", given=frozenset({"drivetrain", "mass"}))
 DT = 0.05
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aqualog.checks.look import look
@@ -37,7 +38,7 @@ def test_a_gain_of_the_file_is_multiplied():
 
 
 def test_without_a_mass_no_gain_is_judged():
-    assert said(replace(CAR, given=frozenset()), **dict.fromkeys(TORQUES, 2.0)) == []
+    assert said(replace(CAR, given=frozenset({"drivetrain"})), **dict.fromkeys(TORQUES, 2.0)) == []
 
 
 def test_turned_torques():
@@ -51,3 +52,20 @@ def test_the_axle_that_slips_is_the_driven_one():
     assert "the rear wheels slip when the car accelerates" in remark.what
     assert 'drivetrain = "rwd"' in remark.advice
     assert said(replace(CAR, drivetrain="awd"), drop=TORQUES) == []
+
+
+def test_a_driven_axle_that_no_vehicle_file_says_is_proposed_not_assumed():
+    bare = replace(CAR, given=frozenset({"mass"}))
+    rear = "torque_r moves, torque_f is not in the log"
+    (remark,) = said(bare)
+    assert (remark.kind, remark.signals) == ("drivetrain", ("drivetrain",))
+    assert remark.what == f"no vehicle file says which axle is driven, but {rear}"
+    assert remark.advice == 'in the vehicle file drivetrain = "rwd" or "awd"?'
+    still = np.zeros(DRIVE["a_x"].size)
+    columns = {**DRIVE, "torque_fl": still, "torque_fr": still}
+    (remark,) = (r for r in look(signals(columns), bare) if r.kind == "drivetrain")
+    assert remark.sentence.endswith('torque_r moves, torque_f does not: in the vehicle file drivetrain = "rwd"?')
+    columns = {**DRIVE, "torque_fl": DRIVE["torque_rl"], "torque_fr": DRIVE["torque_rr"]}
+    (remark,) = (r for r in look(signals(columns), bare) if r.kind == "drivetrain")
+    assert remark.advice.endswith('drivetrain = "awd"?')
+    assert said(bare, drop=TORQUES) == []  # wheels that slip say less than a torque

@@ -23,7 +23,7 @@ verified.
 """
 _TEXTS = (
     ("name", "text", "the file's name", "name of the car in pages and tables"),
-    ("drivetrain", "text", "rwd", "driven axle: rwd, fwd or awd"),
+    ("drivetrain", "text", "none", "driven axle: rwd, fwd or awd"),
 )
 _POLYNOMIALS = """
 A model of the tie-rod forces lets the detector `tie_rod` work; one of the steering torque serves cars without measured

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.checks.driven import no_drivetrain
 from aqualog.core.errors import ConfigError, FitError, SignalError
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
@@ -79,7 +80,7 @@ def slip_slopes(
     Raises
     ------
     ConfigError, SignalError
-        As `choose_way`.
+        As `choose_way`; SignalError if the vehicle does not say which axle is driven.
     FitError
         If no wheel's slope can be estimated, with the reason.
 
@@ -88,6 +89,9 @@ def slip_slopes(
     """
     where = ", ".join(signals.files)
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
+    if not vehicle.knows_drivetrain:
+        torques = {s: signals.array(s) for s in present if s.startswith("torque_")}
+        raise no_drivetrain(vehicle, torques, "no slip slope", where=where)
     way = choose_way(vehicle, present, method=method, traction=traction, where=where)
     rate = 1e9 / signals.dt_ns
     if rate < MIN_RATE:

@@ -62,7 +62,7 @@ def torque_traction(
     )  # fmt: skip
     found = {}
     for w, load in zip(WHEELS, loads, strict=True):
-        if w in vehicle.driven:
+        if w in vehicle.driving:
             found[f"mu_{w}"] = traction_coefficient(
                 smoothed(columns[f"torque_{w}"], width), load, np.gradient(f[f"v_line_{w}"], dt) / vehicle.r_e(w),
                 r_l=vehicle.r_l(w), inertia=vehicle.inertia(w), r_w=vehicle.rolling_resistance,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from aqualog.campaign.bins import Group, group_of
+from aqualog.campaign.driven import proposed_drivetrain
 from aqualog.campaign.matrix import TOO_FEW
 from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.records import TimeFaults
@@ -79,6 +80,13 @@ def _no_dry_slope(info: RunInfo) -> str:
     return "" if is_given else info.run.vehicle.name
 
 
+def _no_drivetrain(info: RunInfo) -> str:
+    """Report a vehicle file without the driven axle, and what the torques of the log propose."""
+    if info.vehicle.knows_drivetrain:
+        return ""
+    return "; ".join(x for x in (info.run.vehicle.name, proposed_drivetrain(info)) if x)
+
+
 def _lane_beyond(info: RunInfo) -> str:
     """Report a lane that ends or begins after the log's end; it may belong to another log or another clock."""
     lane, end = info.run.lane, info.about["duration_s"]
@@ -97,8 +105,7 @@ _KINDS: tuple[tuple[str, str, str, _Test], ...] = (
      lambda r: "" if r.water_from else "no lane"),
     ("limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
     ("limit", "vehicle file without the drivetrain", "minor spin-downs, spin-ups, resistance and the joint "
-     "detectors are not judged; slip slopes take rear-wheel drive",
-     lambda r: "" if "drivetrain" in r.vehicle.given else r.run.vehicle.name),
+     "detectors are not judged; slip slopes and speeds of full aquaplaning are not estimated", _no_drivetrain),
     ("limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope learnt in the "
      "drive; give tyre.slip_slope_f and tyre.slip_slope_r", _no_dry_slope),
 )  # fmt: skip

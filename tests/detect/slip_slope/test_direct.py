@@ -339,7 +339,7 @@ def test_what_is_not_straight_and_free_is_left_out():
 
 
 def test_wheel_loads_that_are_a_guess_are_said():
-    car = replace(RWD, given=frozenset())
+    car = replace(RWD, given=frozenset({"drivetrain"}))
     assert any("l_f, l_r" in n for n in slip_slopes(drive(car, torque=False), car).notes)
     assert any("mass" in n for n in slip_slopes(drive(car), car).notes)
 
@@ -575,3 +575,16 @@ def test_lag_of_a_million_samples_takes_little_memory():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 50e6
+
+
+def test_no_axle_is_taken_for_the_driven_one():
+    car = replace(RWD, given=frozenset({"mass"}))
+    with pytest.raises(SignalError) as caught:
+        slip_slopes(drive(RWD), car)
+    line = caught.value.line()
+    assert "no slip slope: the vehicle" in line
+    assert "does not say which axle is driven" in line
+    assert 'drivetrain = "rwd", "fwd" or "awd" in the vehicle file' in line
+    assert "torque_r moves" in line
+    with pytest.raises(SignalError, match="does not say which axle is driven"):
+        slip_slopes(drive(RWD, torque=False), car)
