@@ -12,8 +12,7 @@ _EXPECTED = 'drivetrain = "rwd", "fwd" or "awd" in the vehicle file'
 
 def proposed_drivetrain(info: RunInfo) -> str:
     """What the torques of a run's log show of its driven axle; empty where they show nothing."""
-    found = (c for c in info.about.get("checks", ()) if c["kind"] == "drivetrain")
-    return "; ".join(f"{c['what']}: {c['advice']}" for c in found)
+    return "; ".join(c.sentence for c in info.checks if c.kind == "drivetrain")
 
 
 def no_drivetrain(data: CampaignData, what: str) -> SignalError | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,7 +16,7 @@ from aqualog.campaign.jobs import Configured, Job, name_of, plan_jobs
 from aqualog.campaign.store import Store
 from aqualog.core.errors import AqualogError
 from aqualog.core.judgement import Judgement
-from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray, Remark
 from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import AQUAPLANING, Label, Span
 from aqualog.io.fingerprint import Contents
@@ -53,6 +54,17 @@ class RunInfo:
     def judgement(self) -> Judgement:
         """Verdict and episodes; of a run without results that it cannot be judged."""
         return Judgement.of_document(self.about) if self.about else Judgement()
+
+    @property
+    def checks(self) -> tuple[Remark, ...]:
+        """What does not fit among the signals of its log; empty in a store of an older version."""
+        return tuple(
+            Remark(
+                c["kind"], tuple(c["signals"]), c["what"], c["advice"], tuple(c["lines"]), _number(c["value"]),
+                (_number(c["value_ci95"][0]), _number(c["value_ci95"][1])),
+            )
+            for c in self.about.get("checks", ())
+        )  # fmt: skip
 
     @property
     def events(self) -> Sequence[Mapping[str, Any]]:
@@ -167,6 +179,10 @@ def load_results(
         name = name_of(configured.campaign, run.logs)
         runs.append(RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, _water_from(run, about)))
     return CampaignData(configured, store, runs)
+
+
+def _number(x: float | None) -> float:
+    return math.nan if x is None else float(x)
 
 
 def _water_from(run: Run, about: Mapping[str, Any]) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 
 from aqualog.checks.look import look
 from aqualog.core.records import Remark, Signals
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["OfDrives", "look_at_all", "sentences"]
+__all__ = ["OfDrives", "distinct", "look_at_all", "sentences"]
+
+_NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)*")
 
 OfDrives = tuple[tuple[str, Remark], ...]
 """Remarks with the names of their drives."""
@@ -17,6 +20,20 @@ OfDrives = tuple[tuple[str, Remark], ...]
 def look_at_all(drives: Mapping[str, Signals], vehicle: Vehicle, *, but: Collection[str] = ()) -> OfDrives:
     """Return what does not fit in drives, by name; without the kinds of remarks that the caller finds better itself."""
     return tuple((name, r) for name, signals in drives.items() for r in look(signals, vehicle) if r.kind not in but)
+
+
+def distinct(found: OfDrives) -> list[tuple[tuple[str, ...], Remark]]:
+    """Return each remark once, as its first drive has it, with the names of all its drives.
+
+    Remarks that differ only in their numbers are one.
+    """
+    names: dict[tuple[str, tuple[str, ...], str], list[str]] = {}
+    first: dict[tuple[str, tuple[str, ...], str], Remark] = {}
+    for name, remark in found:
+        key = (remark.kind, remark.signals, _NUMBER.sub("", remark.sentence))
+        names.setdefault(key, []).append(name)
+        first.setdefault(key, remark)
+    return [(tuple(dict.fromkeys(names[key])), remark) for key, remark in first.items()]
 
 
 def sentences(found: OfDrives) -> list[str]:

@@ -40,7 +40,8 @@ class Diagnosis(Result):
     """Verdict, causes with size and interval, and what the extended model predicts better.
 
     `found` holds the records, `logs` the files as they were named, `vehicle_name` the cars, `model_file` the file of
-    the extended model that document and page name, `checks` what does not fit among the signals.
+    the extended model that document and page name, `checks` what does not fit among the signals, `is_of_runs` whether
+    the drives are the runs of a campaign: then the document has each remark once.
     """
 
     found: Found
@@ -49,6 +50,7 @@ class Diagnosis(Result):
     file_notes: tuple[str, ...] = ()
     model_file: str | None = None
     checks: OfDrives = ()
+    is_of_runs: bool = False
 
     @property
     def verdict(self) -> str:
@@ -63,13 +65,15 @@ class Diagnosis(Result):
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.diagnosis.document import diagnosis_document
-        from aqualog.report.drive.document import drive_remark_rows
+        from aqualog.checks.several import distinct
+        from aqualog.report.drive.document import drive_remark_rows, run_remark_rows
 
         document = diagnosis_document(
             self.found, logs=self.logs, tool_version=document_head()["tool_version"], notes=self.file_notes,
             vehicle=self.vehicle_name, extended_model=self.model_file,
         )  # fmt: skip
-        return {**document, "checks": drive_remark_rows(self.checks)}
+        rows = run_remark_rows(distinct(self.checks)) if self.is_of_runs else drive_remark_rows(self.checks)
+        return {**document, "checks": rows}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -342,8 +346,13 @@ def _of_campaign(
 
     configured = runs.campaign.configured
     found = diagnose_campaign(configured.campaign, runs.data, model=known, progress=hear, **options)
+    from aqualog.checks.several import sentences
+
     names = dict.fromkeys(car.name for car in configured.vehicles.values())
+    checks = tuple((r.name, c) for r in runs.data.done for c in r.checks)
+    notes = tuple(sentences(checks))
     return Diagnosis(
-        found, runs.campaign.inputs, ", ".join(names), notes=tuple(found.notes), has_loss=runs.has_loss,
+        found, runs.campaign.inputs, ", ".join(names), notes, checks=checks, is_of_runs=True,
+        notes=(*notes, *found.notes), has_loss=runs.has_loss,
         sources=sources_of(runs.campaign.sources, model),
     )  # fmt: skip

@@ -3,12 +3,17 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import aqualog as aq
+from aqualog.core.notation import SYMBOLS
 from aqualog.diagnose import campaign as campaign_diagnosis
 from aqualog.diagnose import run as engine
+from aqualog.io.write_table import TableColumn, write_parquet
 from tests.both_ways import check_saved, check_shown, command
+from tests.checks.made import DT, signals
+from tests.checks.made import made as kinematic
 from tests.diagnose.stand_in import Engine, write_drives
 from tests.report.diagnosis_case import cases
 
@@ -105,3 +110,23 @@ def test_a_campaign(folder, monkeypatch):
         aq.diagnose(path, aq.Vehicle())
     with pytest.raises(aq.AqualogError, match="holdout beside a campaign"):
         aq.diagnose(path, holdout=folder / "a.parquet")
+
+
+def test_the_checks_of_a_campaign_stand_once_with_their_logs(tmp_path, monkeypatch):
+    for k, turned in enumerate((("a_y",), ("a_y",), ())):
+        columns = signals(kinematic(seconds=120.0, seed=k), turned=turned).frame
+        table = [TableColumn("t", "s", DT * np.arange(columns.height))]
+        table += [TableColumn(n, SYMBOLS[n].unit, columns[n].to_numpy()) for n in columns.columns]
+        write_parquet(tmp_path / f"log{k}.parquet", table)
+    (tmp_path / "car.toml").write_text('drivetrain = "rwd"\nmass = 1650.0\n')
+    runs = "".join(f'[[run]]\nlog = "log{k}.parquet"\n' for k in range(3))
+    (tmp_path / "campaign.toml").write_text(f'name = "c"\nvehicle = "car.toml"\n{runs}')
+    found = replace(cases()["named"], drives=("c",))
+    monkeypatch.setattr(campaign_diagnosis, "diagnose_campaign", lambda *args, **kw: found)
+    result = aq.diagnose(tmp_path / "campaign.toml")
+    (row,) = (r for r in json.loads(result.to_json())["checks"] if "a_y" in r["signals"])
+    assert row["kind"] == "sign"
+    assert row["drive"] == "log0.parquet"
+    assert row["logs"] == ["log0.parquet", "log1.parquet"]
+    assert row["lines"]
+    assert any(n.startswith("log0.parquet") and n.endswith("(and in 1 more)") for n in result.notes)

@@ -267,7 +267,11 @@ _CHECK = (
 )
 _CHECKED = "what does not fit among the signals, and what to change; the notes say the same"
 CHECKS = rows("checks", _CHECKED, _CHECK)
-DRIVE_CHECKS = rows("checks", _CHECKED, (text("drive", "name of the drive"), *_CHECK))
+DRIVE_CHECKS = rows("checks", _CHECKED, (
+    text("drive", "name of the drive"),
+    several("logs", "drives that have it; of a campaign each remark is there once, with all its logs"),
+    *_CHECK,
+))  # fmt: skip
 
 JUDGEMENT = (
     text("verdict", "whether there was aquaplaning; only the joint detectors decide", tuple(VERDICTS)),

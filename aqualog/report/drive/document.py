@@ -21,8 +21,8 @@ from aqualog.report.values import fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
 __all__ = [
-    "SCHEMA_VERSION", "document", "drive_remark_rows", "remark_rows", "result_events", "result_groups", "signal_groups",
-    "track_name",
+    "SCHEMA_VERSION", "document", "drive_remark_rows", "remark_rows", "result_events", "result_groups", "run_remark_rows",
+    "signal_groups", "track_name",
 ]  # fmt: skip
 
 SCHEMA_VERSION = 1
@@ -73,7 +73,12 @@ def remark_rows(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
 
 def drive_remark_rows(found: Sequence[tuple[str, Remark]]) -> list[dict[str, Any]]:
     """The same for several drives, by name."""
-    return [{"drive": name, **remark_rows([remark])[0]} for name, remark in found]
+    return run_remark_rows([((name,), remark) for name, remark in found])
+
+
+def run_remark_rows(found: Sequence[tuple[Sequence[str], Remark]]) -> list[dict[str, Any]]:
+    """The same for the runs of a campaign: a remark once, `drive` the first log that has it, `logs` all of them."""
+    return [{"drive": logs[0], "logs": list(logs), **remark_rows([remark])[0]} for logs, remark in found]
 
 
 def _start(start_ns: int | None) -> str | None:
