@@ -64,8 +64,8 @@ class Diagnosis(Result):
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        from aqualog.report.diagnosis.document import diagnosis_document
         from aqualog.checks.several import distinct
+        from aqualog.report.diagnosis.document import diagnosis_document
         from aqualog.report.drive.document import drive_remark_rows, run_remark_rows
 
         document = diagnosis_document(

@@ -20,7 +20,7 @@ __all__ = ["MOST_KINDS", "Problem", "problems_of"]
 MOST_KINDS = 25  # of notes that have a line of their own
 _LANE_SLACK_S = 1.0  # [s] clocks of a lane and of a log
 _NO_VALUE = re.compile(r": no value for (\d+) % of the drive")  # as `missing_notes` has it
-_NUMBER = re.compile(r"\d+(?:[.,]\d+)*")
+_NUMBER = re.compile(r"(?<![\w.,])[-+−]?\d+(?:[.,]\d+)*|\d+(?:[.,]\d+)*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,29 @@ def _notes(data: CampaignData) -> list[Problem]:
     return [*out, Problem("note", "other notes", "", tuple(sorted(rest)))]
 
 
+def _with_ranges(notes: Sequence[str]) -> str:
+    """The sentence of notes that differ in numbers alone, with the range of each number: `0.8 to 1.2`.
+
+    Numbers that are part of a name have none: `log…`.
+    """
+    columns = zip(*(_NUMBER.findall(n) for n in notes), strict=True)
+    ranges = iter([" to ".join(dict.fromkeys((min(c, key=_value), max(c, key=_value)))) for c in columns])
+
+    def shown(found: re.Match[str]) -> str:
+        text = next(ranges)
+        is_name = found.start() > 0 and (notes[0][found.start() - 1].isalpha() or notes[0][found.start() - 1] == "_")
+        return "…" if is_name and " to " in text else text
+
+    return _NUMBER.sub(shown, notes[0])
+
+
+def _value(number: str) -> float:
+    """For the order alone: a number with several commas or points is taken without them."""
+    text = number.replace("−", "-").replace(",", ".")
+    return float(text if text.count(".") < 2 else text.replace(".", ""))
+
+
 def _note(hits: Sequence[tuple[int, str]]) -> Problem:
     same = len({note for _, note in hits}) == 1
-    title = hits[0][1] if same else _NUMBER.sub("…", hits[0][1])
+    title = hits[0][1] if same else _with_ranges([note for _, note in hits])
     return Problem("note", cut(title, 240), "", tuple((i, "" if same else cut(note, 200)) for i, note in hits))

@@ -21,8 +21,8 @@ from aqualog.report.values import fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
 __all__ = [
-    "SCHEMA_VERSION", "document", "drive_remark_rows", "remark_rows", "result_events", "result_groups", "run_remark_rows",
-    "signal_groups", "track_name",
+    "SCHEMA_VERSION", "document", "drive_remark_rows", "remark_rows", "result_events", "result_groups",
+    "run_remark_rows", "signal_groups", "track_name",
 ]  # fmt: skip
 
 SCHEMA_VERSION = 1

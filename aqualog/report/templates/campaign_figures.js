@@ -176,9 +176,36 @@ function legendLines(curves) {
   return Math.ceil(new Set(curves.map(function (c) { return colourName(c[0]); })).size / 4);
 }
 
+// What a panel's range leaves out, in words: values, ends of intervals, the model's curve.
+function leftOut(curves, [low, high]) {
+  const points = curves.flatMap(function (c) { return c[2].filter(function (p) { return p[3] !== null; }); });
+  const models = curves.flatMap(function (c) { return c[2]; });
+  const beyond = function (some, of) {
+    return some.map(of).filter(function (v) { return v !== null && (v > high || v < low); });
+  };
+  const told = function (found, one, many) {
+    if (!found.length) return "";
+    const farthest = found.reduce(function (a, b) { return Math.abs(b) > Math.abs(a) ? b : a; });
+    return `${found.length} ${found.length > 1 ? many : one} to ${digits(farthest)}`;
+  };
+  const parts = [
+    told(beyond(points, function (p) { return p[3]; }), "value", "values"),
+    told(beyond(points, function (p) { return p[4]; }).concat(beyond(points, function (p) { return p[5]; })),
+      "end of an interval", "ends of intervals"),
+    told(beyond(models, function (p) { return p[8]; }), "value of the model", "values of the model"),
+  ].filter(Boolean);
+  return parts.length ? `not shown: ${parts.join(", ")}` : "";
+}
+
 function drawPanel(id, curves, limits, unit, yTitle, level) {
   const lay = layout("", axis("speed [km/h]", limits.x), axis(yTitle, limits.y), 300);
   lay.margin.t = 8;
+  const beyond = leftOut(curves, limits.y);
+  if (beyond) {
+    lay.margin.t = 24;
+    lay.annotations = [...(lay.annotations || []), { text: beyond, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right",
+      yanchor: "bottom", showarrow: false, font: { size: 11, color: "@muted" } }];
+  }
   const names = new Set();
   lay.shapes = [];
   const levels = new Set();

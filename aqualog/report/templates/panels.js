@@ -42,6 +42,7 @@ function panelBars(plot, rows, act) {
       return button(sign, `zoom ${way}, ${row.title}`, function () { act.zoom(k, factor); });
     });
     node.className = "panel-bar";
+    node.dataset.axis = row.axis;
     values.className = "values";
     tools.className = "tools";
     tools.setAttribute("role", "toolbar");
@@ -69,11 +70,12 @@ function panelBars(plot, rows, act) {
     },
     // `beyond` are values that the panel does not show.
     tell: function (k, beyond, isFree) {
-      const { fit } = bars[k], told = beyond.filter(function (v) { return v !== null && v !== undefined; });
+      const { fit, node } = bars[k], told = beyond.filter(function (v) { return v !== null && v !== undefined; });
       const peaks = told.map(function (v) { return String(Number(v.toPrecision(3))).replace("-", "−"); }).join(" and ");
       fit.hidden = !isFree && !peaks;
-      fit.textContent = isFree ? "fit" : `${plot.clientWidth < NARROW ? "" : "full range, "}to ${peaks}`;
-      fit.setAttribute("aria-label", `${fit.textContent}, ${rows[k].title}`);
+      fit.textContent = isFree ? "fit" : `not shown: to ${peaks}`;
+      fit.setAttribute("aria-label", isFree ? `fit, ${rows[k].title}` : `full range of ${rows[k].title}, to ${peaks}`);
+      node.dataset.beyond = isFree || !peaks ? "" : fit.textContent; // for paper, which has no buttons
     },
     // Values of all panels at a time; none without one.
     show: function (x) {

@@ -27,6 +27,12 @@ function cutUp(plot, rows) {
     const end = k + 1 < rows.length ? top(rows[k + 1]) : height - b;
     const isKept = function (c) { return c.contains(name(row)) || (k === 0 && c.contains("x2y")); };
     sheet.append(cutOut(plot, k ? top(row) : 0, end, isKept), times.cloneNode(true));
+    const bar = plot.parentNode.querySelector(`.panel-bar[data-axis="${row.axis}"]`);
+    if (bar && bar.dataset.beyond) {
+      const beyond = document.createElement("div");
+      beyond.textContent = bar.dataset.beyond;
+      sheet.prepend(beyond);
+    }
     return sheet;
   });
 }

@@ -77,6 +77,22 @@ def test_filter_acts_on_figures_matrix_tables_and_count(page):
     assert len(texts(page, "#runs tbody tr")) == 15
 
 
+def test_what_a_panel_leaves_out_is_written_on_it(browser, folder, tmp_path):
+    """A value without an interval, far above all with one: the scale is theirs, and the panel says what is beyond."""
+    html = (folder / "index.html").read_text(encoding="utf-8")
+    head, rest = html.split('id="campaign-data">', 1)
+    text, tail = rest.split("</script>", 1)
+    data = json.loads(text)
+    points = next(c[2] for c in data["resistance"] if any(p[4] is not None for p in c[2]))
+    points.append([*points[-1][:3], 99.5, None, None, 1, 9, None, "one run"])
+    changed = json.dumps(data).replace("<", "\\u003c")
+    (tmp_path / "index.html").write_text(f'{head}id="campaign-data">{changed}</script>{tail}', encoding="utf-8")
+    (tmp_path / "plotly.min.js").write_bytes((folder / "plotly.min.js").read_bytes())
+    page = opened(browser, tmp_path / "index.html")
+    shown(page, "#resistance")
+    assert any("1 value to 99.5" in t for t in texts(page, "#resistance .annotation-text"))
+
+
 def test_wheels_and_pooled_groups_are_told(page):
     before = texts(page, "#runs tbody tr td:nth-child(6)")
     pick(page, "RL")

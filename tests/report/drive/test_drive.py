@@ -272,7 +272,8 @@ def test_a_peak_hides_no_limit_until_it_is_asked_for(show, short):
     assert y_range(browser, axis)[1] < 60.0  # ten times the limit of 5
     tools = browser.find_element(By.CSS_SELECTOR, ".tools[aria-label='range of Minor spin-down']")
     fit, closer, _ = tools.find_elements(By.TAG_NAME, "button")
-    assert fit.text == "full range, to 5000"
+    assert fit.text == "not shown: to 5000"
+    assert "full range of Minor spin-down" in fit.get_attribute("aria-label")
     click_on(browser, fit)
     wait_for(lambda: y_range(browser, axis)[1] > 5000.0)
     assert fit.text == "fit"
