@@ -17,7 +17,8 @@ from aqualog.io.fingerprint import Contents, Seen, hash_of, sources_stamp
 __all__ = ["Configured", "Job", "code_stamp", "name_of", "plan_jobs", "result_key"]
 
 _BEHIND = (
-    "core", "physics", "guard", "io", "align", "features", "calibrate", "detect", "checks", "campaign/measure.py",
+    "core", "physics", "guard", "io", "align", "features", "calibrate", "detect", "checks", "campaign/full_rate.py",
+    "campaign/measure.py",
 )  # fmt: skip
 """Sources behind a result."""
 

@@ -12,6 +12,7 @@ import polars as pl
 
 from aqualog import __version__
 from aqualog.align.windows import LongDrive
+from aqualog.campaign.full_rate import FullRate
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, DriveResult, Event, FileFaults, FloatArray, Remark, Signals, Track
 from aqualog.core.vehicle import Vehicle
@@ -46,10 +47,12 @@ class Measurement:
     (index into `REASONS`); `on_water` where the log has it; per wheel `slip_*` [-] (3.13, `about["slip_against"]` names
     the reference), `slip_min_*`, `slip_max_*` [-] extremes of rim against car with radii learnt, `mu_*` [-], `spin_*`,
     `minor_*` (detector active). Unknown values are null. `about` is JSON: findings and faults.
+    `full`: samples at the log's own rate around its episodes, see `FullRate`; None without any.
     """
 
     samples: pl.DataFrame
     about: Mapping[str, Any]
+    full: pl.DataFrame | None = None
 
 
 def measure(signals: Signals, vehicle: Vehicle, *, settings: Settings | None = None) -> Measurement:
@@ -62,9 +65,11 @@ def measure(signals: Signals, vehicle: Vehicle, *, settings: Settings | None = N
     """
     result = detect_drive(signals, vehicle, settings=settings)
     present = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
-    thinning = Thinning(vehicle, signals.dt)
-    thinning.push({s: signals.array(s) for s in present}, *_seen(result))
-    return _measured(result, vehicle, thinning)
+    thinning, full = Thinning(vehicle, signals.dt), FullRate(signals.dt)
+    seen = _seen(result)
+    thinning.push({s: signals.array(s) for s in present}, *seen)
+    full.push(*seen)
+    return _measured(result, vehicle, thinning, full)
 
 
 def measure_long(
@@ -80,13 +85,16 @@ def measure_long(
     `faults`: data that the readers lost in the first pass. Only the thinned samples are held whole: 3 MB of an hour.
     """
     present = present_in(drive, rows)
-    thinning = Thinning(vehicle, drive.plan.grid.dt_ns * 1e-9)
+    dt = drive.plan.grid.dt_ns * 1e-9
+    thinning, full = Thinning(vehicle, dt), FullRate(dt)
 
     def keep(window: DriveResult) -> None:
-        thinning.push({s: window.signals.array(s) for s in present}, *_seen(window))
+        seen = _seen(window)
+        thinning.push({s: window.signals.array(s) for s in present}, *seen)
+        full.push(*seen)
 
     result = detect_long(drive, vehicle, settings=settings, faults=faults, rows=rows, keep=keep, present=present)
-    return _measured(result, vehicle, thinning)
+    return _measured(result, vehicle, thinning, full)
 
 
 def _seen(result: DriveResult) -> tuple[dict[str, FloatArray], tuple[Track, ...]]:
@@ -94,7 +102,7 @@ def _seen(result: DriveResult) -> tuple[dict[str, FloatArray], tuple[Track, ...]
     return f, result.tracks
 
 
-def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning) -> Measurement:
+def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning, full: FullRate) -> Measurement:
     samples = thinning.finish()
     signals, quality = result.signals, result.signals.quality
     moving = samples["v_x"].drop_nulls()
@@ -127,7 +135,7 @@ def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning) -> Meas
         "notes": [*quality.notes, *result.notes],
         "checks": [_remark(r) for r in result.checks],
     }
-    return Measurement(samples, about)
+    return Measurement(samples, about, full.finish(result.judgement))
 
 
 def _remark(r: Remark) -> dict[str, Any]:

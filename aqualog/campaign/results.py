@@ -143,6 +143,10 @@ class CampaignData:
         t: FloatArray = frame["t"].to_numpy()
         return RunSamples(frame, t, _on_water(info, frame, t, self.labels_of(info)))
 
+    def full(self, info: RunInfo) -> pl.DataFrame | None:
+        """Samples of a run at its log's own rate around its episodes; None without any, or in an older store."""
+        return self.store.full(info.key)
+
     def labels_of(self, info: RunInfo) -> tuple[Label, ...] | None:
         """Labels of a run's labels file; None without one."""
         return None if info.run.labels is None else self.configured.labels[info.run.labels]

@@ -1,6 +1,7 @@
 """Storage of a campaign's results, a folder or a URL: a file per log, and tables for other programs.
 
 STORE/samples/KEY.parquet   samples of one log; findings as JSON under "aqualog" in the file's metadata
+STORE/full/KEY.parquet      samples of one log at its own rate around its episodes; not there without any
 STORE/failed/KEY.json       reason for no result; tried again when the log or its configuration changes
 STORE/runs.parquet          a row per run        (made again by every batch)
 STORE/events.parquet        a row per event      (as above)
@@ -34,7 +35,7 @@ MARK = "aqualog_store.json"
 _METADATA_KEY = "aqualog"
 _SCHEMA = 1
 _LOCK = "lock"
-_FOLDERS = ("samples", "failed", "parts")
+_FOLDERS = ("samples", "full", "failed", "parts")
 _CONTENTS = "contents.json"
 _FILES = ("runs.parquet", "events.parquet", "episodes.parquet", "manifest.json", "contents.json", MARK, _LOCK)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -99,7 +100,7 @@ class Store:
                     self._place.write(MARK, (json.dumps({"schema_version": _SCHEMA}) + "\n").encode())
                 self._place.make(_FOLDERS)
                 if not self.part:  # another shard's file may be in the making
-                    self._place.sweep(("", "samples", "failed"))
+                    self._place.sweep(("", "samples", "full", "failed"))
                 if self.part:
                     stack.enter_context(self._place.held(f"parts/{self.part}.lock"))
                 is_held = True
@@ -132,6 +133,10 @@ class Store:
         """Keep the result of a log, whole. This and all methods that write: AqualogError if that is not possible."""
         metadata = {_METADATA_KEY: json.dumps(measurement.about, ensure_ascii=True, separators=(",", ":"))}
         with self._told():
+            if measurement.full is None:
+                self._place.remove(_full(key))
+            else:  # before the samples, which say that the log is done
+                self._write_frame(_full(key), measurement.full, statistics=False)
             self._write_frame(_samples(key), measurement.samples, metadata=metadata, statistics=False)
             self._place.remove(_failure(key))
 
@@ -151,6 +156,7 @@ class Store:
         """Remove a log's file, a damaged one."""
         with self._told():
             self._place.remove(_samples(key))
+            self._place.remove(_full(key))
 
     def look_at(self, keys: Collection[str]) -> None:
         """Announce that the findings of these logs are needed next: behind a URL many are read together."""
@@ -200,6 +206,17 @@ class Store:
         if not set(frame.columns) >= _COLUMNS:
             raise self._damaged(name)
         return frame
+
+    def full(self, key: str) -> pl.DataFrame | None:
+        """Samples at the log's own rate; None without an episode, in a store of an older version, or damaged."""
+        name = _full(key)
+        try:
+            if not self._place.has(name):
+                return None
+            frame = pl.read_parquet(self._place.copy(name), hive_partitioning=False)
+        except (OSError, *_UNREADABLE):
+            return None
+        return frame if {"t", "v_x"} <= set(frame.columns) else None
 
     def contents(self) -> dict[str, Any]:
         """Hashes that batches and shards have kept."""
@@ -286,6 +303,10 @@ class Store:
 
 def _samples(key: str) -> str:
     return f"samples/{key}.parquet"
+
+
+def _full(key: str) -> str:
+    return f"full/{key}.parquet"
 
 
 def _failure(key: str) -> str:

@@ -8,14 +8,19 @@ import pytest
 from aqualog.align.load import LoadedLong, load_drive, load_signals
 from aqualog.campaign import measure as measuring
 from aqualog.campaign.batch import run_batch
+from aqualog.campaign.full_rate import MOST_S, FullRate
 from aqualog.campaign.measure import measure, measure_long
+from aqualog.campaign.results import load_results
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
+from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.notation import WHEELS
+from aqualog.core.records import Track
 from aqualog.detect.slip_slope.direct_inputs import smoothed
 from aqualog.detect.stream import detect_drive
 from aqualog.io.write_table import TableColumn, write_parquet
 from aqualog.model.programme import SEDAN
+from aqualog.report.campaign.run_page import run_page
 from tests.campaign.made import make_campaign
 
 
@@ -76,6 +81,8 @@ def test_samples_of_windows_are_those_of_the_whole(tmp_path, case):
         assert long.samples.equals(whole.samples)
         assert long.samples.schema == whole.samples.schema
         assert long.about == whole.about
+        assert (long.full is None) == (whole.full is None)
+        assert long.full is None or long.full.equals(whole.full)
     assert whole.samples.height == 400
     assert set(whole.samples["reason"].unique()) > {0}
 
@@ -87,6 +94,8 @@ def test_short_and_slow_drives(tmp_path, dt, seconds):
         whole, long = both(path, RWD, rows)
         assert long.samples.equals(whole.samples)
         assert long.about == whole.about
+        assert (long.full is None) == (whole.full is None)
+        assert long.full is None or long.full.equals(whole.full)
     assert whole.samples.height == round(seconds / dt) // max(1, round(measuring.STEP_S / dt))
 
 
@@ -128,3 +137,44 @@ def test_a_batch_of_long_drives_keeps_the_same(tmp_path, monkeypatch):
     assert whole.keys()[0] == {key}
     assert long.samples(key).equals(whole.samples(key))
     assert long.about(key) == whole.about(key)
+
+
+def test_the_log_s_own_rate_is_kept_around_episodes_alone(tmp_path):
+    """A whole file beside the samples; without it, as in an older store, all else is as before."""
+    made = make_campaign(tmp_path, speeds=(100,), repeats=1)
+    configured = configure(made)
+    store = Store(tmp_path / "store")
+    assert run_batch(configured, store).made == 1
+    (info,) = (data := load_results(configured, store)).done
+    episodes = info.judgement.episodes
+    assert episodes
+    full = data.full(info)
+    t = full["t"].to_numpy()
+    assert np.diff(t).min() == pytest.approx(0.01)
+    assert all(any(e.start_s - 2.0 - 1e-6 <= x <= e.end_s + 2.0 + 1e-6 for e in episodes) for x in t)
+    whole = detect_drive(load_signals(info.run.logs, vehicle=info.vehicle), info.vehicle)
+    rows = np.round(t / 0.01).astype(int)
+    assert full["v_x"].to_numpy() == pytest.approx(whole.features["v_x_hat"].to_numpy()[rows], rel=1e-6)
+    text = run_page(data, info, data.samples(info), None, back="", full=full)
+    assert "The log&#39;s own rate, one point every 0.01 s, from 2 s before to 2 s after the episodes" in text
+    (path,) = (tmp_path / "store" / "full").iterdir()
+    path.unlink()
+    older = load_results(configured, Store(tmp_path / "store"))
+    assert older.full(info) is None
+    assert "own rate, one point" not in run_page(older, info, older.samples(info), None, back="")
+    assert run_batch(configured, store).kept == 1
+
+
+def test_what_is_kept_at_full_rate_is_bounded():
+    n, dt = 90_000, 0.01
+    active = np.ones(n, dtype=bool)
+    track = Track("minor_spin_down", "fl", "left", "m/s", np.ones(n), 1.0, active)
+    episode = Episode("aquaplaning", 10.0, 890.0, ("fl",), "f", "left", "partial", 20.0, (), 0.1, -0.1, 1e4, ())
+    full = FullRate(dt)
+    for a in range(0, n, 7000):
+        part = slice(a, a + 7000)
+        full.push({"v_x_hat": np.full(active[part].size, 20.0)}, [replace(track, active=active[part])])
+    found = full.finish(Judgement("aquaplaning", episodes=(episode,)))
+    assert found.height == round(MOST_S / dt)
+    assert found["t"][0] == 8.0
+    assert FullRate(dt).finish(Judgement()) is None

@@ -85,7 +85,8 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
         for i, info in enumerate(data.runs):
             samples = data.samples(info) if info.is_done else None
             facts.append(facts_of(info, samples) if samples is not None else None)
-            text = _clean(run_page(data, info, samples, facts[i], back="../index.html"))
+            full = data.full(info) if info.is_done else None
+            text = _clean(run_page(data, info, samples, facts[i], back="../index.html", full=full))
             writing.append(writers.submit(write_text, folder / pages[i], text))
             while len(writing) > (_WAITING if i + 1 < len(pages) else 0):
                 writing.popleft().result()

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Event, FloatArray
+from aqualog.report.campaign.full_rate import dense_of
 from aqualog.report.campaign.labels import key_title, value_text
 from aqualog.report.drive.judged import (
     EPISODE_HEADS,
@@ -44,7 +46,13 @@ MOST_EVENTS = 80  # in the table and in the figure
 
 
 def run_page(
-    data: CampaignData, info: RunInfo, samples: RunSamples | None, facts: RunFacts | None, *, back: str
+    data: CampaignData,
+    info: RunInfo,
+    samples: RunSamples | None,
+    facts: RunFacts | None,
+    *,
+    back: str,
+    full: pl.DataFrame | None = None,
 ) -> str:
     """The page as HTML; the same text for the same results.
 
@@ -54,6 +62,8 @@ def run_page(
         None for a run without results.
     back : str
         Address of the campaign's page.
+    full : DataFrame, optional
+        Samples at the log's own rate around the episodes, as `CampaignData.full` gives them.
     """
     configuration = [(key_title(k), value_text(k, v, is_alone=False)) for k, v in info.run.values.items()]
     has_load = any(info.run.values.get(f"load_{a}_kg", 0.0) for a in ("front", "rear"))
@@ -63,7 +73,7 @@ def run_page(
     main = [e for e in judgement.episodes if e.kind not in FOLDED]
     fold = "; ".join([*(folded_line(k, judgement.of(k)) for k in FOLDED if judgement.of(k)),
                       f"{counted(len(info.events), 'detection')}, one by one"])  # fmt: skip
-    drawn, island = _over_time(info, samples) if samples is not None else ([], {})
+    drawn, island = _over_time(info, samples, full) if samples is not None else ([], {})
     sections = [
         Section("", [Headline(headline(judgement) if info.is_done else "No results", _answers(info))], "verdict",
                 look=f"verdict events {level(judgement)}"),
@@ -82,7 +92,8 @@ def run_page(
     ]  # fmt: skip
     report = Report(
         f"run {info.index + 1} – {cut(data.name)}", f"run {info.index + 1} of {len(data.runs)}", sections,
-        [*configuration, *_facts(info, facts)], footer="From the campaign's samples, ten a second.",
+        [*configuration, *_facts(info, facts)], footer="From the campaign's samples, ten a second"
+        f"{', and the rate of the log around episodes' if full is not None else ''}.",
         islands={"run-data": island}, scripts=("loader.js", "run.js"),
     )  # fmt: skip
     return report_page(
@@ -156,12 +167,15 @@ def _cells(event: Event) -> list[Cell]:
 # --- over time --------------------------------------------------------------------------------------------------------
 
 
-def _over_time(info: RunInfo, samples: RunSamples) -> tuple[list[Section], dict[str, Any]]:
+def _over_time(info: RunInfo, samples: RunSamples, full: pl.DataFrame | None) -> tuple[list[Section], dict[str, Any]]:
     """The section that the page's script draws, and its data."""
-    plan = _plan(info, samples)
+    plan, dense = _plan(info, samples), None if full is None else dense_of(full, info.judgement)
     hint = "blue: on the lane; drag to zoom, double click to reset"
-    parts: list[Part] = [Stack(), Para(_note(info, samples, plan))]
-    return [Section("Over time", parts, "plot-section", hint)] if info.is_done else [], _plots(info, samples, plan)
+    note, drawn = _note(info, samples, plan), _plots(info, samples, plan)
+    if dense is not None:
+        note, drawn = f"{dense.sentence}{note[0].lower()}{note[1:]}", dense.into(drawn)
+    parts: list[Part] = [Stack(), Para(note)]
+    return [Section("Over time", parts, "plot-section", hint)] if info.is_done else [], drawn
 
 
 def _plan(info: RunInfo, samples: RunSamples) -> Plan:
