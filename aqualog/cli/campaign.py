@@ -214,4 +214,5 @@ def report(run: Run, campaign: str, out: Path | None, by: str, width: float, rob
     with run.hearing() as hear:
         page = runs.report(folder, by=by, bin_width=width, robust=robust, force=True, progress=hear)
     files = sum(p.is_file() for p in page.parent.rglob("*"))
-    return run.of_runs(runs, notes=[f"{page}: {files} files, {time.monotonic() - began:.0f} s"])
+    # the first note says where the results are, the others what is missing
+    return run.of_runs(runs, notes=[*runs.notes[1:], f"{page}: {files} files, {time.monotonic() - began:.0f} s"])
