@@ -11,7 +11,8 @@ from aqualog.calibrate.balance import Balance, Sample, fit_balance
 from aqualog.calibrate.records import Parameter, TieRodFit
 from aqualog.calibrate.spread import Spread, half_width
 from aqualog.core.errors import ConfigError
-from aqualog.core.vehicle import KEYS, Vehicle
+from aqualog.core.provenance import provenance_of, uncertainty
+from aqualog.core.vehicle import KEYS, Provenance, Vehicle
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
@@ -190,6 +191,44 @@ def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict
     return {key: (float(f"{value:.{DIGITS}g}"), p) for key, (value, p) in found.items()}
 
 
+def _sd(key: str, value: float, p: Parameter, vehicle: Vehicle) -> float | None:
+    """Return the standard deviation of a calibrated value, in the key's unit, so that 1.96 of it is the interval.
+
+    A radius by the ratio alone is as sure as ratio and the file's mean radius, whose error both axles share.
+    """
+    sd = 0.5 * (p.ci95[1] - p.ci95[0]) / 1.96
+    if not math.isfinite(sd) or sd <= 0.0:
+        return None
+    if p.name == "r_e_ratio":
+        mean = 0.5 * sum(uncertainty(vehicle, f"wheels.r_e_{axle}") for axle in "fr")
+        share = 1.0 / (1.0 + p.value) / (p.value if key == "wheels.r_e_f" else 1.0)  # d ln r / d ratio
+        sd = math.hypot(share * value * sd, mean)
+    elif p.value:
+        sd *= abs(value / p.value)  # of the gain that the file has already, and of a mass that is kept
+    return float(f"{sd:.3g}")
+
+
+def _provenances(
+    vehicle: Vehicle, values: Mapping[str, tuple[float, Parameter]], given: frozenset[str]
+) -> dict[str, Provenance]:
+    """Return where the values of a calibrated vehicle come from.
+
+    What was fixed is measured, if the file does not say more of the same value. Without a given scale the mass rests on
+    the torques: their gain stays a guess, but one that this mass binds.
+    """
+    found = dict(vehicle.provenance)
+    for key, (value, p) in values.items():
+        if p.remark != "given":
+            found[key] = Provenance("calibrated", _sd(key, value, p, vehicle))
+        elif key not in found or not math.isclose(value, getattr(vehicle, KEYS[key].name), rel_tol=1e-6):
+            found[key] = Provenance("measured")
+    is_bound = "mass" in values and values["mass"][1].remark != "given" and "torque_gain" not in values
+    if is_bound and provenance_of(vehicle, "torque_gain") == Provenance("guess"):
+        found["torque_gain"] = Provenance("guess", float(f"{GAIN_SD * vehicle.torque_gain:.3g}"))
+    unsaid = given - vehicle.given - set(found)
+    return {**found, **dict.fromkeys(sorted(unsaid), Provenance("guess"))}
+
+
 def calibrated(
     vehicle: Vehicle,
     parameters: Sequence[Parameter],
@@ -199,7 +238,8 @@ def calibrated(
     """Return the vehicle with the identified values; the others stay.
 
     Identified keys count as given. So do the loaded radii, once the effective ones are: forces depend on those that the
-    calibration has used. A spread from drive to drive that the drives do not show stays that of the file.
+    calibration has used. A spread from drive to drive that the drives do not show stays that of the file, and so does
+    the provenance of what is not estimated.
     """
     values = identified_values(parameters, vehicle)
     radii = {"wheels.r_l_f", "wheels.r_l_r"} if "wheels.r_e_f" in values else set()
@@ -209,5 +249,5 @@ def calibrated(
     # the gain's is that of the torques as they were read, like the gain itself
     scale = {"torque_gain": vehicle.torque_gain}
     seen = {n: float(f"{sd * scale.get(n, 1.0):.{DIGITS}g}") for n, sd in (spread or {}).items()}
-    both = {**vehicle.spread, **seen}
-    return replace(vehicle, **changed, **polynomials, spread=both, given=frozenset(given))  # type: ignore[arg-type]
+    tables = {"spread": {**vehicle.spread, **seen}, "provenance": _provenances(vehicle, values, given)}
+    return replace(vehicle, **changed, **polynomials, **tables, given=given)  # type: ignore[arg-type]

@@ -238,19 +238,29 @@ class Table:
 
     def line_of(self, key: str) -> int | None:
         """Return the line (from 1) of a key or table in this table, else of the table itself; None if not found."""
+        begin, found = self._lines_of(key)
+        if begin is None:  # written in braces, or with points
+            if self._parent is None:
+                return None
+            own = self.name.removeprefix(f"{self._parent.name}.")
+            return self._parent._lines_of(f"{own}.{key}")[1] or self._parent.line_of(own)
+        return found or begin or None
+
+    def _lines_of(self, key: str) -> tuple[int | None, int | None]:
+        """Return the line (from 1) of this table's header, 0 of the file's, and that of a key or table in it."""
         headers = [(i, re.sub("[\"']", "", m[1])) for i, line in enumerate(self.lines) if (m := _HEADER.match(line))]
         own = [i for i, name in headers if name == self.name]
         index = self._index or 0
         begin = -1 if not self.name else own[index] if index < len(own) else None
-        if begin is None:  # written in braces, or with points
-            return self._parent.line_of(self.name.rpartition(".")[2]) if self._parent else None
+        if begin is None:
+            return None, None
         end = next((i for i, _ in headers if i > begin), len(self.lines))
         names = re.compile(rf"""^\s*["']?{re.escape(key)}["']?\s*[=.]""")
         body = (i for i in range(begin + 1, end) if names.match(self.lines[i]))
         child = f"{self.name}.{key}" if self.name else key
         tables = (i for i, name in headers if name == child)
-        found = next(body, next(tables, begin))
-        return found + 1 if found >= 0 else None
+        found = next(body, next(tables, None))
+        return begin + 1, None if found is None else found + 1
 
     def add(self, key: str, message: str) -> None:
         """Note a fault at a key."""

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from aqualog.config.reader import Table, is_real, read
-from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, spread_lines
+from aqualog.config.reader import Table, is_real, quoted, read
+from aqualog.core.vehicle import (
+    COEFFICIENTS,
+    KEYS,
+    POLYNOMIALS,
+    SOURCES,
+    SPLIT,
+    SPREAD,
+    Provenance,
+    Vehicle,
+    provenance_lines,
+    spread_lines,
+    usual,
+)
 
 if TYPE_CHECKING:
     from aqualog.calibrate.records import Calibration, Parameter
@@ -19,8 +32,9 @@ LARGEST_TERM = 1e4  # [N], [N*m] constant and spread: as much as the whole force
 LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a half of the tyre's force (K)
 TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
-_SPLIT = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
-_TABLES_AND_WORDS = ("name", "drivetrain", "spread", *POLYNOMIALS, *(k.section for k in KEYS.values() if k.section))
+_SECTIONS = tuple(dict.fromkeys(k.section for k in KEYS.values() if k.section))
+_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance")
+_TABLES_AND_WORDS = ("name", "drivetrain", *_TABLES)
 
 
 def load_vehicle(path: Path) -> Vehicle:
@@ -38,26 +52,23 @@ def load_vehicle(path: Path) -> Vehicle:
     if not values["name"].isprintable():
         file.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
     given = {"name", *(n for n in ("drivetrain",) if n in file)}
-    values["drivetrain"] = file.choice("drivetrain", _SPLIT, "rwd")
-    values["torque_split_rear"] = _SPLIT[values["drivetrain"]]
+    values["drivetrain"] = file.choice("drivetrain", SPLIT, "rwd")
     for section in POLYNOMIALS:
         values[section] = _polynomial(file.table(section), section)
-    sections = list(dict.fromkeys(k.section for k in KEYS.values() if k.section))
-    spread = file.table("spread").numbers({n: _Spread(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
+    values["spread"] = file.table("spread").numbers({n: _Deviation(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
     for name, value in file.values.items():
-        if isinstance(value, dict) and name not in (*sections, *POLYNOMIALS, "spread"):
-            file.unknown(name, [*sections, *POLYNOMIALS, "spread"])
+        if isinstance(value, dict) and name not in _TABLES:
+            file.unknown(name, _TABLES)
     top = {k: x for k, x in file.values.items() if not isinstance(x, dict) and k not in _TABLES_AND_WORDS}
     _numbers(file, "", top, values, given)
-    for section in sections:
+    for section in _SECTIONS:
         table = file.table(section)
         _numbers(table, section, table.values, values, given)
+    values["provenance"] = _provenance(file.table("provenance"), given)
     file.faults.raise_if_any()
-    # a loaded radius that is not given follows the effective one, so that a truck does not get a car's
-    for axle in ("f", "r"):
-        if f"wheels.r_e_{axle}" in given and f"wheels.r_l_{axle}" not in given:
-            values[f"r_l_{axle}"] = 0.975 * values[f"r_e_{axle}"]
-    return Vehicle(**values, spread=spread, given=frozenset(given))
+    car = Vehicle(**values, given=frozenset(given))
+    unset = {k.name: usual(car, k) for k in KEYS.values() if k.path not in given}
+    return replace(car, **unset)  # type: ignore[arg-type]
 
 
 def _numbers(table: Table, section: str, names: Iterable[str], values: dict[str, Any], given: set[str]) -> None:
@@ -76,8 +87,45 @@ def _numbers(table: Table, section: str, names: Iterable[str], values: dict[str,
             table.unknown(name, known)
 
 
-class _Spread(NamedTuple):
-    """Bounds of a standard deviation from drive to drive: at most as large as its key may be."""
+def _provenance(table: Table, given: set[str]) -> dict[str, Provenance]:
+    """Read where values come from: a word, or a table with `source` and `sd`."""
+    found: dict[str, Provenance] = {}
+    for name, value in table.values.items():
+        if name in _SECTIONS and isinstance(value, dict):  # `wheels.r_e_f = ...`, where the quotes were left out
+            table_of = table.child(name, value)
+            rows = [(table_of, n, f"{name}.{n}", v) for n, v in value.items()]
+        else:
+            rows = [(table, name, name, value)]
+        for own, key, path, said in rows:
+            if path not in KEYS:
+                within = key != path
+                own.unknown(key, [k.name for k in KEYS.values() if k.section == name] if within else KEYS)
+                continue
+            entry = _source_and_sd(own, key, path, said)
+            if entry is None:
+                continue
+            if path not in given and entry.source != "guess":
+                own.add(key, f'provenance.{path} = "{entry.source}", but the file sets no {path}; expected its value')
+            found[path] = entry
+    return found
+
+
+def _source_and_sd(table: Table, name: str, path: str, said: Any) -> Provenance | None:
+    """Read one entry; None with the fault noted."""
+    own = table.child(name, said) if isinstance(said, dict) else None
+    source = said if own is None else own.get("source")
+    if own is not None:
+        own.check_names("source", "sd")
+    if not isinstance(source, str) or source not in SOURCES:
+        shown = "has no source" if source is None else f"= {repr(source)[:40]} is no source"
+        table.add(name, f"provenance.{path} {shown}; expected one of {quoted(SOURCES)}")
+        return None
+    sd = None if own is None else own.number("sd", _Deviation(KEYS[path].high, KEYS[path].unit))
+    return Provenance(source, sd)  # type: ignore[arg-type]
+
+
+class _Deviation(NamedTuple):
+    """Bounds of a standard deviation: at most as large as its key may be."""
 
     high: float
     unit: str
@@ -146,6 +194,8 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         lines.append(line)
     if new.spread:
         lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
+    if new.provenance:
+        lines += ["", "[provenance]", "# where a value comes from; sd: its standard deviation", *provenance_lines(new)]
     for part in POLYNOMIALS:
         table = getattr(new, part)
         if not table:

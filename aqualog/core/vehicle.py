@@ -17,15 +17,22 @@ __all__ = [
     "COEFFICIENTS",
     "KEYS",
     "POLYNOMIALS",
+    "SOURCES",
+    "SPLIT",
     "SPREAD",
     "Drivetrain",
     "Key",
+    "Provenance",
+    "Source",
     "Vehicle",
+    "provenance_lines",
     "spread_lines",
+    "usual",
     "vehicle_toml",
 ]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
+Source = Literal["measured", "calibrated", "data_sheet", "guess"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +92,17 @@ SPREAD = ("mass", "drag_area", "rolling_resistance", "torque_gain")
 """Keys of the table `spread`: the standard deviation by which one more drive differs from the file's value, in the
 key's unit. Wind, surface, temperature, fuel and all else that a balance of forces does not know."""
 
+SOURCES: Mapping[Source, str] = {
+    "measured": "weighed or measured on this car",
+    "calibrated": "estimated from drives of this car",
+    "data_sheet": "read in papers of its type",
+    "guess": "taken from another car, or as good as that",
+}
+"""Where a value of the table `provenance` may come from, the surest first."""
+
+SPLIT: Mapping[str, float] = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
+"""Rear share of the drive torque where a file does not set it."""
+
 COEFFICIENTS = ("c0", "c_y", "c_x", "sigma")
 
 KEYS: dict[str, Key] = {k.path: k for k in _ALL}
@@ -95,11 +113,19 @@ def _default(path: str) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a value comes from, and its standard deviation in the key's unit; None: what is usual for the source."""
+
+    source: Source
+    sd: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """One vehicle, SI.
 
     `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
-    trusting a default.
+    trusting a default. `provenance` is what the file says of its values; `core.provenance` knows the rest.
     """
 
     name: str = "default car"
@@ -127,6 +153,7 @@ class Vehicle:
     tie_rod: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     steering_torque: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     spread: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, Provenance] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     @classmethod
@@ -189,18 +216,51 @@ def spread_lines(vehicle: Vehicle) -> list[str]:
     return [f"{n} = {vehicle.spread[n]!r}  # [{KEYS[n].unit}]" for n in SPREAD if n in vehicle.spread]
 
 
+def provenance_lines(vehicle: Vehicle) -> list[str]:
+    """The lines of the table `provenance` in a vehicle file."""
+    said = ((k, vehicle.provenance[k.path]) for k in KEYS.values() if k.path in vehicle.provenance)
+    return [
+        f'{k.path} = "{p.source}"' if p.sd is None
+        else f'{k.path} = {{ source = "{p.source}", sd = {p.sd!r} }}  # [{k.unit}]'
+        for k, p in said
+    ]  # fmt: skip
+
+
+def usual(vehicle: Vehicle, key: Key) -> float:
+    """The value that a key has where a file does not set it.
+
+    A loaded radius follows the effective one, so that a truck does not get a car's; the torque's split follows the
+    drivetrain.
+    """
+    if key.name == "torque_split_rear":
+        return SPLIT[vehicle.drivetrain]
+    name = key.name.replace("r_l_", "r_e_")
+    is_led = name != key.name and f"{key.section}.{name}" in vehicle.given
+    return 0.975 * float(getattr(vehicle, name)) if is_led else key.default
+
+
 def vehicle_toml(vehicle: Vehicle) -> str:
-    """The vehicle as the text of a vehicle file, every key with unit and meaning."""
+    """The vehicle as the text of a vehicle file, every key with unit and meaning.
+
+    Of a vehicle that comes from a file, what that file does not set stays behind #: reading the text gives the same
+    record.
+    """
     name = vehicle.name.replace("\\", "").replace('"', "")
-    lines = [f'name = "{name}"', f'drivetrain = "{vehicle.drivetrain}"']
+    is_from_file = "name" in vehicle.given
+    hidden = "# " if is_from_file and not vehicle.knows_drivetrain and vehicle.drivetrain == "rwd" else ""
+    lines = [f'name = "{name}"', f'{hidden}drivetrain = "{vehicle.drivetrain}"']
     section = ""
     for key in KEYS.values():
         if key.section != section:
             section = key.section
             lines += ["", f"[{section}]"]
-        lines.append(f"{key.name} = {getattr(vehicle, key.name)!r}  # [{key.unit}] {key.meaning}")
+        value = getattr(vehicle, key.name)
+        hidden = "# " if is_from_file and key.path not in vehicle.given and value == usual(vehicle, key) else ""
+        lines.append(f"{hidden}{key.name} = {value!r}  # [{key.unit}] {key.meaning}{'; not set' if hidden else ''}")
     if vehicle.spread:
         lines += ["", "[spread]", *spread_lines(vehicle)]
+    if vehicle.provenance:
+        lines += ["", "[provenance]", *provenance_lines(vehicle)]
     for section in POLYNOMIALS:
         table = getattr(vehicle, section)
         if table:

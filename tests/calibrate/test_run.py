@@ -15,7 +15,7 @@ from aqualog.calibrate.words import notes
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Quality, Signals
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.vehicle import Provenance, Vehicle
 from aqualog.features.smoothing import earlier
 from aqualog.model.sensors import ESC, IDEAL
 from tests.calibrate.dry_drives import believed, campaign, car, one_drive, truth
@@ -338,3 +338,40 @@ def test_without_torques_and_drivetrain_nothing_is_left(series):
     none = replace(signals[0], frame=signals[0].frame.drop([n for n in signals[0].symbols if n.startswith("torque")]))
     with pytest.raises(SignalError, match="without torque of the driven wheels, drivetrain in the vehicle file"):
         calibrate([none], ["a"], bare)
+
+
+def test_where_the_values_of_a_calibrated_file_come_from(series, tmp_path):
+    signals, true, _, result = series
+    before = replace(believed(true), given=frozenset({"name", "drivetrain", "mass", "l_f", "wheels.r_e_f"}))
+    before = replace(before, provenance={"l_f": Provenance("measured", 0.02), "mass": Provenance("data_sheet")})
+    path = tmp_path / "car.toml"
+    path.write_text(calibrated_toml(before, result), encoding="utf-8")
+    car = load_vehicle(path)
+    assert car.provenance == calibrated(before, result.parameters).provenance
+    for name, key in (("mass", "mass"), ("drag_area", "drag_area"), ("r_e_f", "wheels.r_e_f")):
+        low, high = result.get(name).ci95
+        assert car.provenance[key] == Provenance("calibrated", pytest.approx((high - low) / 3.92, rel=5e-3))
+    assert car.provenance["l_f"] == Provenance("measured", 0.02)  # as before
+    assert car.provenance["torque_gain"] == Provenance("guess", 0.02)  # the mass rests on it
+    assert car.provenance["wheels.r_l_f"] == Provenance("guess")  # written for the forces, measured by nobody
+    weighed = calibrate(signals, ["a", "b"], before, {"mass": true.mass})
+    gain = weighed.get("torque_gain")
+    twice = replace(before, torque_gain=2.0, mass=true.mass, provenance={})
+    car = calibrated(twice, weighed.parameters)
+    assert car.provenance["mass"] == Provenance("measured")
+    assert car.provenance["torque_gain"].sd == pytest.approx((gain.ci95[1] - gain.ci95[0]) / 1.96, rel=5e-3)
+    known = replace(twice, provenance={"mass": Provenance("measured", 3.0)})
+    assert calibrated(known, weighed.parameters).provenance["mass"].sd == 3.0
+    known = replace(known, mass=true.mass + 5.0)  # of another value
+    assert calibrated(known, weighed.parameters).provenance["mass"] == Provenance("measured")
+
+
+def test_what_is_kept_keeps_its_provenance_and_a_ratio_of_radii_knows_no_size(series):
+    _, true, _, result = series
+    light = replace(believed(true), given=frozenset({"mass"}), provenance={"mass": Provenance("measured")})
+    kept = [replace(p, kept=True) if p.name == "mass" else p for p in result.parameters]
+    assert calibrated(light, kept).provenance["mass"] == Provenance("measured")
+    ratio = [p for p in result.parameters if p.name == "r_e_ratio"]
+    for given, share in ((frozenset(), 0.015), (frozenset({"wheels.r_e_f", "wheels.r_e_r"}), 0.01)):
+        car = calibrated(replace(light, given=given), ratio)
+        assert car.provenance["wheels.r_e_f"].sd == pytest.approx(share * light.r_e_f, rel=0.05)

@@ -57,7 +57,7 @@ def test_what_is_no_file(tmp_path):
     ("text", "said"),
     [
         ('[signals]\n\na_x = { channel = "x", scale = "minus 1" }', "line 3: signals.a_x.scale = 'minus 1' is not"),
-        ('[signals]\na_x.channel = "x"\na_x.scale = [1]', "line 2: signals.a_x.scale = [1] is not a number"),
+        ('[signals]\na_x.channel = "x"\na_x.scale = [1]', "line 3: signals.a_x.scale = [1] is not a number"),
         ('[signals.a_x]\nchannel = "x"\nscale = 1e13', "line 3: signals.a_x.scale = 1e+13 is outside"),
         (
             '[signals]\na_x = { channel = "x", scale = minus 1 }',

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import pytest
 
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
-from aqualog.core.vehicle import KEYS, vehicle_toml
+from aqualog.core.provenance import TYPICAL, provenance_of, uncertainty
+from aqualog.core.vehicle import KEYS, SOURCES, Provenance, Vehicle, vehicle_toml
 
 CONTRACT = """
 name = "sedan RWD"
@@ -143,3 +146,100 @@ def test_a_number_beyond_all_bounds_is_told_with_the_bounds(tmp_path, value):
     assert "is outside 200 ... 60000 kg" in told
     assert "not a number" not in told
     assert "mass = nan is not a number" in vehicle_faults(tmp_path, "mass = nan\n")
+
+
+FILE = """
+mass = 1500.0
+l_f = 1.2
+drag_area = 0.7
+[wheels]
+r_e_f = 0.31
+r_e_r = 0.32
+[provenance]
+mass = "measured"
+"drag_area" = { source = "measured", sd = 0.01 }
+wheels.r_e_f = { source = "calibrated", sd = 0.0004 }
+"wheels.r_e_r" = "calibrated"
+torque_gain = { source = "guess", sd = 0.1 }
+"""
+
+
+def test_where_values_come_from_and_how_sure_they_are(tmp_path):
+    car = load_vehicle(write(tmp_path, FILE))
+    assert car.provenance == {
+        "mass": Provenance("measured"),
+        "drag_area": Provenance("measured", 0.01),
+        "wheels.r_e_f": Provenance("calibrated", 0.0004),
+        "wheels.r_e_r": Provenance("calibrated"),
+        "torque_gain": Provenance("guess", 0.1),
+    }
+    sds = {
+        "mass": 10.0,  # not a share of it
+        "drag_area": 0.01,
+        "wheels.r_e_f": 0.0004,
+        "wheels.r_e_r": 0.0003 * 0.32,
+        "torque_gain": 0.1,
+        "l_f": 0.03 * 1.2,  # set, and nothing said: a data sheet
+        "h_cg": 0.1 * 0.54,  # not set: a guess
+        "torque_split_rear": 0.15,
+    }
+    assert {path: uncertainty(replace(car, drivetrain="awd"), path) for path in sds} == pytest.approx(sds)
+    assert uncertainty(car, "torque_split_rear") == 0.0  # rwd
+    without = replace(car, given=car.given - {"wheels.r_e_f", "mass"})  # what is not set is no calibrated value
+    assert uncertainty(without, "wheels.r_e_f") == pytest.approx(0.015 * 0.31)
+    assert provenance_of(without, "mass") == Provenance("guess")
+    with pytest.raises(KeyError):
+        uncertainty(car, "r_e_f")
+
+
+@pytest.mark.parametrize(
+    "text", [FILE, CONTRACT, "mass = 1500.0", '[wheels]\nr_e_f = 0.4\n[provenance]\nmass = "guess"']
+)
+def test_a_written_file_gives_the_same_record(tmp_path, text):
+    car = load_vehicle(write(tmp_path, text))
+    assert load_vehicle(write(tmp_path, vehicle_toml(car))) == car
+    assert set(KEYS) <= load_vehicle(write(tmp_path, vehicle_toml(Vehicle()))).given  # made in code: all of it counts
+
+
+def test_every_key_has_its_deviations_by_source():
+    assert list(TYPICAL) == list(KEYS)
+    for path, typical in TYPICAL.items():
+        car = replace(Vehicle(), drivetrain="awd", given=frozenset(KEYS))
+        sd = [uncertainty(replace(car, provenance={path: Provenance(source)}), path) for source in SOURCES]
+        assert 0.0 < sd[0] < KEYS[path].high
+        assert max(sd[:2]) <= sd[2] <= sd[3], path
+        assert typical.why.endswith((" (K)", " (V)", " (D)"))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('mas = "measured"', 'line 6: unknown key "mas" (did you mean "mass"?)'),
+        ('wheels.inerta_f = "guess"', 'line 6: unknown key "inerta_f" (did you mean "inertia_f"?)'),
+        ('"tyre.mu_may" = "guess"', 'line 6: unknown key "tyre.mu_may" (did you mean "tyre.mu_max"?)'),
+        ('name = "guess"', 'line 6: unknown key "name"'),
+        (
+            'mass = "weighed"',
+            "line 6: provenance.mass = 'weighed' is no source; "
+            'expected one of "measured", "calibrated", "data_sheet", "guess"',
+        ),
+        ("mass = 3", 'line 6: provenance.mass = 3 is no source; expected one of "measured"'),
+        ("mass = { sd = 3 }", "line 6: provenance.mass has no source; expected one of"),
+        ('mass = { source = "guess", sd = -3 }', "line 6: provenance.mass.sd = -3 is outside 0 ... 60000 kg"),
+        (
+            'wheels.r_e_f = { source = "guess", sd = -3 }',
+            "line 6: provenance.wheels.r_e_f.sd = -3 is outside 0 ... 1 m",
+        ),
+        ('mass = { source = "guess", std = 3 }', 'line 6: unknown key "std"'),
+        (
+            'wheels.r_e_r = "calibrated"',
+            'line 6: provenance.wheels.r_e_r = "calibrated", but the file sets no wheels.r_e_r; expected its value',
+        ),
+    ],
+)
+def test_faults_of_the_provenance(tmp_path, line, said):
+    text = f'mass = 1500.0\n[wheels]\nr_e_f = 0.3\n[provenance]\nwheels.r_e_f = "measured"\n{line}\n'
+    if line.startswith("wheels.r_e_f"):
+        text = text.replace('wheels.r_e_f = "measured"\n', "\n")
+    assert said in vehicle_faults(tmp_path, text)
+    assert "provenance is not a table" in vehicle_faults(tmp_path, "provenance = 3")
