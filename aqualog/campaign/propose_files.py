@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from aqualog.campaign.propose_drives import Drive, tokens
 from aqualog.campaign.propose_names import NameTable
-from aqualog.core.vehicle import KEYS, POLYNOMIALS
+from aqualog.core.vehicle import KEYS, POLYNOMIALS, SOURCES, Source
 
 __all__ = ["NEEDED", "Fact", "blanks", "campaign_text", "labels_of", "relative", "runs_text", "vehicle_text"]
 
@@ -89,11 +89,15 @@ def _words(name: str) -> tuple[str, ...]:
 
 
 class Fact(NamedTuple):
-    """What is known of a key: its value as TOML writes it, where it is from, and whether it needs no check."""
+    """What is known of a key: its value as TOML writes it, where it is from, and whether it needs no check.
+
+    `source` is its word in the table `provenance`.
+    """
 
     value: str
     origin: str
     is_sure: bool = False
+    source: Source = "guess"
 
 
 def vehicle_text(name: str, facts: Mapping[str, Fact] | None = None) -> str:
@@ -107,9 +111,11 @@ def vehicle_text(name: str, facts: Mapping[str, Fact] | None = None) -> str:
         "# Remove the # before each key that you know and write its value. What stands behind a # is not used.",
         "# SET marks keys that slip, forces and loads need in order to be right. Missing keys get the value of a",
         "# mid-size car, and detectors that need them report that.",
+        '# [provenance] at the end says where SET values come from. A key without a line there is "data_sheet".',
         f"name = {_quoted(name)}",
         _key_line("drivetrain", known.get("drivetrain"), '""', 'SET  "rwd", "fwd" or "awd"'),
     ]
+    words = ", ".join(f'"{s}"' for s in SOURCES)
     section = ""
     for key in KEYS.values():
         if key.section != section:
@@ -120,6 +126,11 @@ def vehicle_text(name: str, facts: Mapping[str, Fact] | None = None) -> str:
         lines.append(_key_line(key.name, known.get(key.path), "", about))
     for section, meaning in POLYNOMIALS.items():
         lines += ["", f"# [{section}]  # {meaning}; `aqualog calibrate` writes it"]
+    lines += ["", "[provenance]"]
+    for path in (p for p in KEYS if p in NEEDED or p in known):
+        # of a value that waits for a check, too: nobody has to think of it when the # goes
+        lines.append(f'{path} = "{known[path].source}"' if path in known else f'# {path} = ""')
+        lines[-1] = f"{lines[-1]:<30}# {words}"
     return "\n".join(lines) + "\n"
 
 

@@ -38,8 +38,8 @@ class DayToDay:
     """How a parameter looks like a difference between drives of the same car.
 
     `value` turns the standard deviation of its kind into one of the parameter, at a place and a speed [m/s]: a share of
-    the mass (inertia), a drag area [m²] (drag), a coefficient (rolling). `key`: key of the vehicle file whose spread is
-    the parameter's own, at the whole car.
+    the mass (inertia), a drag area [m²] (drag), a coefficient (rolling). `key`: key of the vehicle file whose value and
+    spread are the parameter's own, at the whole car.
     """
 
     kind: Kind
@@ -68,8 +68,8 @@ class DriveSearch:
     are sought; `variants` are values of the others, by the length of the longest drive [s].
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
-    effect or not; `tolerance_at` some places. `unset`: start of a key of the vehicle file, and the share by which cars
-    differ where an axle's key is not set. `equals`: effects that together look like this one on every log. `check`: how
+    effect or not; `tolerance_at` some places. `unset`: start of the key of an axle in the vehicle file that
+    the first parameter changes, and the share by which cars differ where it is not set. `equals`: effects that together look like this one on every log. `check`: how
     it is read without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places

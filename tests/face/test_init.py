@@ -10,6 +10,8 @@ import aqualog as aq
 from aqualog.cli.console import Console
 from aqualog.config.signal_map import load_signal_map
 from aqualog.core.errors import AqualogError, ConfigError, SignalError
+from aqualog.core.provenance import uncertainty
+from aqualog.core.vehicle import Provenance
 from tests.both_ways import check_saved, check_shown, command
 from tests.commands import run
 from tests.conftest import ROOT
@@ -47,6 +49,17 @@ def test_face_and_command_agree_and_the_files_work(tmp_path):
     vehicle = (out / "vehicle.toml").read_text()
     assert "# r_e_f = 0.3172" in vehicle  # the wheels turn, and v_x is there
     assert "guessed: v_x over the wheel speeds of this log" in vehicle
+    radii = {f"wheels.r_e_{axle}": Provenance("guess") for axle in "fr"}
+    assert aq.Vehicle.read(out / "vehicle.toml").provenance == radii
+    assert '# mass = ""                   # "measured", "calibrated", "data_sheet", "guess"' in vehicle
+    filled = (
+        vehicle.replace("# r_e_f", "r_e_f")
+        .replace("# mass =  ", "mass = 1500.0")
+        .replace('# mass = ""', 'mass = "measured"')
+    )
+    (tmp_path / "car.toml").write_text(filled)
+    car = aq.Vehicle.read(tmp_path / "car.toml")
+    assert (uncertainty(car, "mass"), uncertainty(car, "wheels.r_e_f")) == pytest.approx((10.0, 0.015 * car.r_e_f))
 
 
 def test_canonical_names_need_no_map_and_a_vehicle_file_none_to_fill(tmp_path):
