@@ -68,9 +68,9 @@ class DriveSearch:
     are sought; `variants` are values of the others, by the length of the longest drive [s].
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
-    effect or not; `tolerance_at` some places. `unset`: start of the key of an axle in the vehicle file that
-    the first parameter changes, and the share by which cars differ where it is not set. `equals`: effects that together look like this one on every log. `check`: how
-    it is read without driving.
+    effect or not; `tolerance_at` some places. `unset`: start of an axle's key in the vehicle file, which the first
+    parameter changes, and the share by which cars differ where it is not set. `equals`: effects that together look like
+    this one on every log. `check`: how it is read without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
     together it changes nothing; `is_single`: it counts once per car, wherever it acts.

@@ -25,7 +25,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ExitCode
 from aqualog.core.notation import ACCEPTED, SYMBOLS
 from aqualog.core.units import spellings
-from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD
+from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SOURCES, SPREAD
 from aqualog.detect.registry import DETECTORS, RIVALS
 from aqualog.detect.slip_slope.tuning import MEANINGS, TUNING
 from aqualog.model.effects import EFFECTS, EMPIRICAL
@@ -79,7 +79,7 @@ NAMES = {
     "map": [k.name for k in MAP_KEYS],
     "vehicle": [
         "name", "drivetrain", *KEYS, *(f"{p}.{c}" for p in POLYNOMIALS for c in COEFFICIENTS),
-        *(f"spread.{s}" for s in SPREAD),
+        *(f"spread.{s}" for s in SPREAD), *SOURCES,
     ],
     "campaign": [*(k.name for k in CAMPAIGN_KEYS), *RUN_KEYS, *GROUP_NAMES, *(k.name for k in LABEL_KEYS)],
     "scenario": [*SCENARIO_KEYS, *TYRE_KEYS, *TYRES],
@@ -119,6 +119,7 @@ def test_the_vehicle_example_loads_with_every_key(tmp_path):
     car = load_vehicle(tmp_path / "car.toml")
     assert set(KEYS) <= car.given
     assert set(car.spread) == set(SPREAD)
+    assert {p.source for p in car.provenance.values()} == set(SOURCES)
     assert all(set(getattr(car, p)) == set(COEFFICIENTS) for p in POLYNOMIALS)
 
 

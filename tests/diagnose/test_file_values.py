@@ -69,6 +69,12 @@ def test_each_key_of_a_row_exists_and_counts_at_one_place():
     assert set(found) <= set(KEYS)
 
 
+def test_a_second_parameter_has_no_key():
+    radius = EFFECTS["tyre_radius"]
+    more = replace(radius, parameters=(*radius.parameters, replace(radius.parameters[0], name="other")))
+    assert [key_of(Hypothesis(more, "f", (n,)), n) for n in ("delta", "other")] == ["wheels.r_e_f", ""]
+
+
 def test_a_value_that_is_said_to_be_surer_deviates_less():
     for source in ("data_sheet", "calibrated"):
         car = replace(CAR, provenance={"wheels.r_e_f": Provenance(source)})

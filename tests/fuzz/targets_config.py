@@ -75,7 +75,7 @@ def _check_signals(signals: Signals) -> None:
 @cache
 def vehicles() -> dict[str, bytes]:
     """The sample's, one with every key, and a bare one."""
-    polynomials = "\n[tie_rod]\nc0 = 10.0\nc_y = [0.1, 1e-5]\nc_x = 0.02\nsigma = 40.0\n[spread]\nmass = 30.0\ntorque_gain = 0.02\n"
+    polynomials = '\n[tie_rod]\nc0 = 10.0\nc_y = [0.1, 1e-5]\nc_x = 0.02\nsigma = 40.0\n[provenance]\nmass = "measured"\nwheels.r_e_f = { source = "calibrated", sd = 0.001 }\n[spread]\nmass = 30.0\ntorque_gain = 0.02\n'
     full = vehicle_toml(Vehicle())
     with_more = full if "[spread]" in full else full + polynomials
     bare = b'drivetrain = "awd"\nmass = 1900\n[tyre]\nslip_slope_f = 28\n'

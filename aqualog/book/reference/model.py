@@ -6,7 +6,17 @@ from dataclasses import replace
 
 from aqualog.book.markdown import code, fence, number, page, table
 from aqualog.core.notation import AXLES, SIDES, WHEELS
-from aqualog.core.vehicle import COEFFICIENTS, KEYS, POLYNOMIALS, SPREAD, Vehicle, vehicle_toml
+from aqualog.core.provenance import TYPICAL, Share
+from aqualog.core.vehicle import (
+    COEFFICIENTS,
+    KEYS,
+    POLYNOMIALS,
+    SOURCES,
+    SPREAD,
+    Provenance,
+    Vehicle,
+    vehicle_toml,
+)
 from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.term import Effect
 
@@ -44,6 +54,15 @@ _SPREAD = """
 surface, temperature and fuel are in it. `aqualog diagnose` allows for it; `aqualog calibrate` with four drives or more
 writes it.
 """
+_PROVENANCE = """
+`[provenance]` says where the value of a key comes from: `mass = "measured"`. With a standard deviation of its own it is
+`wheels.r_e_f = { source = "calibrated", sd = 0.0004 }`, in the key's unit. A key that is set without a line here counts
+as `data_sheet`. A key that is not set is a `guess`, and no other source may be given for it. `aqualog calibrate` writes
+what it estimated, and measured for what `--fix` gave.
+"""
+_PROVENANCE_SD = """
+The standard deviation of a value whose line gives none. [`[spread]`](#spread-between-drives) comes on top.
+"""
 
 
 def vehicle_page() -> str:
@@ -64,6 +83,11 @@ def vehicle_page() -> str:
         "## Tie rods and steering torque",
         _POLYNOMIALS,
         table(("key", "unit", "default", "meaning"), _coefficients()),
+        "## Where values come from",
+        _PROVENANCE,
+        table(("source", "meaning"), [(code(source), meaning) for source, meaning in SOURCES.items()]),
+        _PROVENANCE_SD,
+        table(("key", *(s.replace("_", " ") for s in SOURCES), "why"), _deviations()),
         "## Spread between drives",
         _SPREAD,
         table(("key", "unit", "default", "meaning"), _spread()),
@@ -88,11 +112,29 @@ def _spread() -> list[tuple[str, str, str, str]]:
     return [(code(f"spread.{n}"), KEYS[n].unit, "none", f"scatter of `{n}` between drives") for n in SPREAD]
 
 
+def _deviations() -> list[tuple[str, ...]]:
+    return [
+        (code(path), *(_size(getattr(typical, source), KEYS[path].unit) for source in SOURCES), typical.why)
+        for path, typical in TYPICAL.items()
+    ]
+
+
+def _size(sd: float, unit: str) -> str:
+    return f"{sd:.3g} {unit}".removesuffix(" -") if not isinstance(sd, Share) else f"{100.0 * sd:.3g} %"
+
+
 def vehicle_example() -> str:
     """The text of a vehicle file with every key."""
     car = replace(
         Vehicle(),
         name="sedan RWD",
+        given=frozenset(KEYS),
+        provenance={
+            "mass": Provenance("measured"),
+            "drag_area": Provenance("data_sheet", 0.03),
+            "wheels.r_e_f": Provenance("calibrated", 0.0004),
+            "tyre.mu_max": Provenance("guess"),
+        },
         spread={"mass": 15.0, "drag_area": 0.02, "rolling_resistance": 0.0008, "torque_gain": 0.01},
         tie_rod={"c0": (0.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,), "sigma": (60.0,)},
         steering_torque={"c0": (0.0,), "c_y": (0.002,), "c_x": (0.001,), "sigma": (0.5,)},
