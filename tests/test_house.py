@@ -11,12 +11,9 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 83_400  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
-MOST_FILES = 442
-MOST_TEST_LINES = 56_200
-MOST_LINES = 83_100  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
-MOST_FILES = 440
-MOST_TEST_LINES = 56_100
+MOST_LINES = 85_000  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
+MOST_FILES = 450
+MOST_TEST_LINES = 58_500
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100
