@@ -8,20 +8,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
-from aqualog.core.errors import SignalError, listed
+from aqualog.core.errors import ConfigError, SignalError, listed
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import ChannelInfo
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.reader import CsvFormat
 
 __all__ = [
-    "MAP_HINT", "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line", "map_text",
-    "matching", "quoted", "resolve", "separate_drives", "values_read",
+    "EACH_ITS_OWN", "MAP_HINT", "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line",
+    "map_text", "matching", "quoted", "read_alike", "resolve", "separate_drives", "values_read",
 ]  # fmt: skip
 
 
 MAP_HINT = "`aqualog init LOG -o FOLDER` writes a signal map; then the log with --signals FOLDER/map.toml"
 """What to try where signals are missing."""
+
+EACH_ITS_OWN = "name one channel each in a signal map; `aqualog inspect LOG` lists them"
+"""What to try where signals and channels do not go together one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +123,20 @@ def values_read(vehicle: Vehicle) -> tuple[float, ...]:
     return (*(vehicle.r_e(w) for w in WHEELS), vehicle.steering_ratio, vehicle.torque_gain)
 
 
+_SHARED = ("torque_", "pressure_", "water_depth")
+"""Signals of which one measured value may stand for both wheels, or both sides."""
+
+
+def read_alike(one: Entry, other: Entry) -> bool:
+    """Return whether two entries would give one channel twice: at the same scale, and not as one value for both wheels.
+
+    Such a line is a slip: wheels that never differ.
+    """
+    if any(one.symbol.startswith(s) and other.symbol.startswith(s) for s in _SHARED):
+        return False
+    return (one.unit, one.scale) == (other.unit, other.scale)
+
+
 def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:
     """Find the channel of every mapped symbol, and of every canonical name that needs no map.
 
@@ -130,6 +147,8 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     ------
     SignalError
         If a mapped channel is missing or ambiguous; all faults in one message.
+    ConfigError
+        If two signals read one channel.
     """
     found: dict[str, tuple[Entry, ChannelInfo]] = {}
     faults: list[str] = []
@@ -158,9 +177,23 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         raise SignalError(
             "; ".join(faults),
             where=signal_map.path or (channels[0].file if channels else ""),
-            hint="name one channel each in a signal map; `aqualog inspect LOG` lists them",
+            hint=EACH_ITS_OWN,
         )
+    _refuse_twice(found, signal_map)
     return found
+
+
+def _refuse_twice(found: Mapping[str, tuple[Entry, ChannelInfo]], signal_map: SignalMap) -> None:
+    """Raise ConfigError if two signals read the same channel, under whatever names."""
+    by_channel: dict[str, list[Entry]] = {}
+    for symbol, (entry, info) in found.items():
+        same = by_channel.setdefault(channel_id(info), [])
+        if (other := next((e for e in same if read_alike(e, entry)), None)) is not None:
+            raise ConfigError(
+                f"{other.symbol} and {symbol} read the same channel, {channel_id(info)}",
+                where=signal_map.path or info.file, hint=EACH_ITS_OWN,
+            )  # fmt: skip
+        same.append(entry)
 
 
 OF_SEPARATE_DRIVES = 3

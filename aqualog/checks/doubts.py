@@ -10,20 +10,29 @@ from typing import Any, NamedTuple
 from aqualog.align.mapping import Entry, entry_line
 from aqualog.core.records import Origin, Remark
 
-__all__ = ["Change", "Doubt", "remarks_of"]
+__all__ = ["Change", "Doubt", "exchanged", "remarks_of"]
 
 _OTHER_NAMES = {"steer_angle": "steering_wheel_angle", "torque_f": "torque_fl", "torque_r": "torque_rl"}
 
 
 class Change(NamedTuple):
-    """What turns a signal as it was read into the right one: factor * (signal - offset). Offset in SI."""
+    """What turns a signal as it was read into the right one: factor * (signal - offset). Offset in SI.
+
+    `of`: the signal whose channel it must be read from, empty for its own.
+    """
 
     factor: float = 1.0
     offset: float = 0.0
+    of: str = ""
 
     def beside(self, other: Change) -> Change:
         """Return both changes, each found on the signal as it was read."""
-        return Change(self.factor * other.factor, self.offset + other.offset)
+        return Change(self.factor * other.factor, self.offset + other.offset, self.of or other.of)
+
+
+def exchanged(one: str, other: str) -> dict[str, Change]:
+    """Return what puts two signals right whose channels are exchanged."""
+    return {one: Change(of=other), other: Change(of=one)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +86,12 @@ def line_of(origins: Mapping[str, Origin], symbol: str, change: Change) -> str:
 
     SI value = scale * to_SI(raw) + offset; the change applies to that value.
     """
-    name = symbol if symbol in origins else _OTHER_NAMES.get(symbol, symbol)
+    source = change.of or symbol
+    name = source if source in origins else _OTHER_NAMES.get(source, source)
     origin = origins.get(name)
-    entry = Entry(symbol, (symbol,)) if origin is None else Entry(**_given(origin))
+    entry = Entry(symbol, (source,)) if origin is None else Entry(**_given(origin))
+    if change.of:
+        entry = replace(entry, symbol=symbol)
     scale = _short(change.factor * entry.scale)
     offset = _short(change.factor * (entry.offset - change.offset))
     return entry_line(replace(entry, scale=scale, offset=offset))

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
-from aqualog.checks.driven import LEAST_SAMPLES, STILL, drives, shown
-from aqualog.checks.relations import changes, relate
+from aqualog.checks.driven import LEAST_DRIVE, STILL, drives, shown
+from aqualog.checks.slip import AXLE, slip_doubts
 from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
 from aqualog.core.notation import AXLES
@@ -24,20 +24,15 @@ PUSHED = 0.2  # [m/s^2] by the torque: driving, and surely no braking that the t
 BLOCK = 20  # windows, 10 s: grade and wind last as long
 LEAST_BLOCKS = 10
 SPREAD = 0.2  # [m/s^2] standard deviation of what the torque gives: less shows no gain
-SLIPPING = 0.5  # correlation from which the slip of an axle shows that it is driven
-COASTING = -0.3  # [m/s^2] slower, brakes may be on, which slow the front wheels more
-ROLLING = 0.03  # [-] more is water or ice
-DRIVEN = 0.1  # [m/s^2] changes of less show no drive
-SLIP = 2e-4  # [-] changes of less are the resolution of wheel speeds
-_AXLE = {"f": "front", "r": "rear"}
-_DRIVETRAIN = {"f": "fwd", "r": "rwd"}
 
 
 def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield what is wrong with the torques or with the vehicle file."""
     gains = list(_gain(windows))
     yield from gains or _resistance(windows)
-    yield from list(_drivetrain(windows)) or _slipping(windows)
+    wrong = list(_drivetrain(windows))
+    yield from wrong
+    yield from slip_doubts(windows, _driven_by_torque(windows), is_doubted=bool(wrong))
 
 
 def _resistance(windows: Windows) -> Iterator[Doubt]:
@@ -114,9 +109,20 @@ def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> t
     return slope, half_width(sd, n - 1.0)
 
 
+def _torques(windows: Windows) -> dict[str, FloatArray]:
+    """Return the torques of the axles that the log has. [N·m]"""
+    return {a: windows[name] for a in AXLES if (name := f"torque_{a}") in windows}
+
+
+def _driven_by_torque(windows: Windows) -> str:
+    """Return the one axle that the torques drive; empty if they show none, or both."""
+    driven = [a for a, torque in drives(_torques(windows)).items() if torque > LEAST_DRIVE]
+    return driven[0] if len(driven) == 1 else ""
+
+
 def _drivetrain(windows: Windows) -> Iterator[Doubt]:
     """Compare the axles that the torques drive with those in the vehicle file; propose them where it says none."""
-    torques = {a: windows[name] for a in AXLES if (name := f"torque_{a}") in windows}
+    torques = _torques(windows)
     drive = drives(torques)
     most = max(drive.values(), default=0.0)
     vehicle = windows.vehicle
@@ -134,38 +140,6 @@ def _drivetrain(windows: Windows) -> Iterator[Doubt]:
             told, better = "are never driven", "rwd" if axle == "f" else "fwd"
         else:
             continue
-        what = f"the vehicle file says {vehicle.drivetrain}, but the {_AXLE[axle]} wheels {told}"
+        what = f"the vehicle file says {vehicle.drivetrain}, but the {AXLE[axle]} wheels {told}"
         yield Doubt("drivetrain", ("drivetrain",), what, f'drivetrain = "{better}"?')
         return
-
-
-def _slipping(windows: Windows) -> Iterator[Doubt]:
-    """Compare the axle that slips when the car accelerates with the one that the vehicle file drives."""
-    car, wheels = windows.vehicle, windows.wheels
-    if car.drivetrain == "awd" or not car.knows_drivetrain or len(wheels) < 4 or windows.speed.size < 3:
-        return
-    step = windows.step_s
-    gained = np.gradient(windows.speed, step)
-    front, rear = (0.5 * (wheels[f"{a}l"] + wheels[f"{a}r"]) for a in AXLES)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        calm = (windows.speed > MOVING) & (gained > COASTING)
-        slip = (rear - front) / front
-        slip = np.where(calm & (np.abs(slip) < ROLLING), slip, np.nan)
-    if "yaw_rate" in windows:
-        with np.errstate(invalid="ignore"):
-            slip = np.where(np.abs(windows["yaw_rate"]) < 0.05, slip, np.nan)
-    x, y = changes(slip, step), changes(np.where(np.isfinite(slip), gained, np.nan), step)
-    found = relate(x / SLIP, y / DRIVEN, step, least=1.0)
-    driven = car.driven[0][0]
-    other = "r" if driven == "f" else "f"
-    against = found.r if driven == "r" else -found.r
-    if found.is_sure and against < -SLIPPING:
-        what = (
-            f"the vehicle file says {car.drivetrain}, but the {_AXLE[other]} wheels slip when the car accelerates "
-            f"(correlation {abs(found.r):.2f})"
-        )
-        advice = (
-            f'drivetrain = "{_DRIVETRAIN[other]}" or "awd" in the vehicle file with the torques of that axle in the '
-            "signal map, or front and rear wheels are swapped"
-        )
-        yield Doubt("drivetrain", ("drivetrain",), what, advice, value=found.r)

@@ -9,6 +9,7 @@ import numpy as np
 from aqualog.checks.doubts import Doubt, remarks_of
 from aqualog.checks.drive import drive_doubts
 from aqualog.checks.signs import sign_doubts
+from aqualog.checks.slip import in_turn, is_of_wheels
 from aqualog.checks.speeds import scale_doubts
 from aqualog.checks.standstill import offset_doubts
 from aqualog.checks.windows import EXTRA, Gather, Windows
@@ -61,5 +62,8 @@ def look(signals: Signals, vehicle: Vehicle) -> tuple[Remark, ...]:
 
 
 def _doubts(windows: Windows) -> list[Doubt]:
-    found = (sign_doubts(windows), offset_doubts(windows), scale_doubts(windows), drive_doubts(windows))
-    return [d for part in found for d in part]
+    parts = (sign_doubts(windows), offset_doubts(windows), scale_doubts(windows), drive_doubts(windows))
+    found = [d for part in parts for d in part]
+    # one exchange of wheels at a time: lines for two of them would not fit each other
+    wheels = sorted((d for d in found if is_of_wheels(d)), key=in_turn)
+    return [d for d in found if d not in wheels[1:]]

@@ -7,12 +7,13 @@ Forward and left are positive [iso8855_2011].
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
-from aqualog.checks.doubts import Change, Doubt
+from aqualog.checks.course import turning_by_course
+from aqualog.checks.doubts import Change, Doubt, exchanged
 from aqualog.checks.relations import Relation, changes, relate
 from aqualog.checks.windows import Windows
 from aqualog.core.notation import AXLES, WHEELS
@@ -29,13 +30,23 @@ BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what i
 OVAL_SHARE = 0.05  # of the drive
 SLIDING = 0.015  # half of the slip between the axles from which a driver may steer against the turning
 UNDERSTEER = 0.003  # [rad s^2/m] of a car; it only weighs fast driving against slow
+CROSSED = 0.6  # correlation of the differences along both sides: in slow bends the front wheels' longer paths make less
 TURN = Change(-1.0)
 
-_NAMES = {"front": "the front wheels (right minus left)", "rear": "the rear wheels (right minus left)"}
+_SIGNALS = {"a_y", "yaw_rate", "steer_angle"}
+_PAIRS = {
+    "front": ("omega_fl", "omega_fr"), "rear": ("omega_rl", "omega_rr"), "course": ("latitude", "longitude"),
+}  # fmt: skip
+"""Witnesses that are made of two signals: they point the other way where these are exchanged."""
+_NAMES = {
+    "front": "the front wheels (right minus left)", "rear": "the rear wheels (right minus left)",
+    "course": "the course (latitude, longitude)",
+}  # fmt: skip
 _ONE_FAULT = (
     ({"a_y", "yaw_rate"}, 1),  # an IMU with y to the right and z down
     ({"a_y"}, 1), ({"yaw_rate"}, 1), ({"steer_angle"}, 1),
     ({"front"}, 2), ({"rear"}, 2), ({"front", "rear"}, 3),  # names of wheels are rarely wrong
+    ({"course"}, 4),
 )  # fmt: skip
 """Sets of signals that one mistake turns, and how much it takes to believe it."""
 
@@ -65,16 +76,48 @@ def _turning(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
     step = windows.step_s
     seen = {n: changes(x, step) for n, x in _witnesses(windows, speed).items()}
     relations = {(a, b): relate(seen[a], seen[b], step, least=LATERAL) for a, b in combinations(seen, 2)}
+    yield from _crossed(windows, speed, seen, relations)
     for one, other in _camps(relations):
         turned = _turned(one, other)
         if turned is None:
             yield _undecided(one, other, relations)
             continue
         right = other if turned is one else one
-        if not turned <= {"a_y", "yaw_rate", "steer_angle"}:
-            yield _swapped(turned, right, relations)
-        for name in sorted(turned & {"a_y", "yaw_rate", "steer_angle"}):
+        pairs = sorted(turned - _SIGNALS)
+        if pairs:
+            yield _exchanged(pairs, right, relations)
+        for name in sorted(turned & _SIGNALS):
             yield _opposite(name, right, relations)
+
+
+def _crossed(
+    windows: Windows, speed: FloatArray, seen: Mapping[str, FloatArray], relations: Mapping[tuple[str, str], Relation]
+) -> Iterator[Doubt]:
+    """Yield a front wheel and a rear one of the other side that look exchanged.
+
+    Then the wheels of an axle are of one side and show no turning; the differences along either side show it.
+    """
+    wheels, step = windows.wheels, windows.step_s
+    by = next((n for n in ("yaw_rate", "course", "a_y", "steer_angle") if n in seen), None)
+    if by is None or len(wheels) < len(WHEELS):
+        return
+    across = [relations.get((by, axle)) or relations[axle, by] for axle in ("front", "rear")]
+    v = np.where(speed > MOVING, speed, np.nan) / windows.vehicle.track
+    along = [
+        relate(changes(v * (wheels[f"f{side}"] - wheels[f"r{side}"]), step), seen[by], step, least=LATERAL)
+        for side in "lr"
+    ]
+    weakest = min(along, key=lambda found: abs(found.r))
+    if not all(f.is_sure and abs(f.r) > CROSSED for f in along) or along[0].r * along[1].r < 0.0:
+        return
+    if any(abs(f.r) > abs(weakest.r) for f in across):
+        return
+    one, other = ("omega_fl", "omega_rr") if weakest.r > 0.0 else ("omega_fr", "omega_rl")
+    what = (
+        f"{one} and {other} look exchanged: the differences of front and rear wheels follow {_named(by)} (correlation "
+        f"{weakest.r:.2f}), those of left and right wheels do not"
+    )
+    yield Doubt("exchange", (one, other), what, ways=(exchanged(one, other),), value=weakest.r)
 
 
 def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
@@ -97,6 +140,8 @@ def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
         left, right = f"{axle[0]}l", f"{axle[0]}r"
         if left in wheels and right in wheels:
             found[axle] = v * (wheels[right] - wheels[left]) / car.track
+    if "latitude" in windows and "longitude" in windows:
+        found["course"] = turning_by_course(windows["latitude"], windows["longitude"], v, windows.step_s)
     if any(_is_oval(x) for n, x in found.items() if n != "a_y"):
         found.pop("a_y", None)
     return found
@@ -151,32 +196,39 @@ def _mistakes(names: set[str]) -> int:
 
 def _opposite(name: str, right: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
     told, r = _against(name, right, relations)
-    return Doubt("sign", (name,), f"{name} has the opposite sign of {told}", ways=({name: TURN},), value=r)
+    # nothing else than its names speaks against wheels that are the only witnesses
+    advice = f"or left and right are exchanged at both axles: {_DECIDES}" if set(right) == {"front", "rear"} else ""
+    return Doubt("sign", (name,), f"{name} has the opposite sign of {told}", advice, ways=({name: TURN},), value=r)
 
 
 def _undecided(one: set[str], other: set[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
     told = " and ".join(_named(n) for n in sorted(one))
     first = min(one, key=lambda n: _against(n, other, relations)[1])
     against, r = _against(first, other, relations)
-    ways = tuple(dict.fromkeys(sorted(camp), TURN) for camp in (one, other) if camp.isdisjoint(_NAMES))
-    verb = "has" if len(one) == 1 else "have"
+    verb = "have" if len(one) > 1 or one <= {"front", "rear"} else "has"
     what = f"{told} {verb} the opposite sign of {against}; this log does not show which of them is turned"
-    axles = sorted((one | other) & _NAMES.keys())
-    advice = "in a left turn each must be positive" + (f"; or {_swap(axles)}" if axles else "")
-    return Doubt("sign", tuple(sorted(one | other)), what, advice, ways, r)
+    advice = "in a left turn each must be positive" + ("" if "course" in one | other else f"; {_DECIDES}")
+    return Doubt("sign", tuple(sorted(one | other)), what, advice, (_way(one), _way(other)), r)
 
 
-def _swapped(wheels: set[str], right: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
-    axles = sorted(wheels & _NAMES.keys())
-    told, r = _against(axles[0], right, relations)
-    names = [f"omega_{a[0]}{side}" for a in axles for side in "lr"]
-    what = f"{' and '.join(_named(a) for a in axles)} have the opposite sign of {told}"
-    return Doubt("sign", tuple(names), what, _swap(axles), value=r)
+_DECIDES = "latitude and longitude in the map would decide"
 
 
-def _swap(axles: Collection[str]) -> str:
-    pairs = ", ".join(f"omega_{a[0]}l and omega_{a[0]}r" for a in axles)
-    return f"in the signal map, swap the channels of {pairs}"
+def _way(camp: Collection[str]) -> dict[str, Change]:
+    """Return the changes that put right all of a camp."""
+    way: dict[str, Change] = {}
+    for name in sorted(camp):
+        way |= exchanged(*_PAIRS[name]) if name in _PAIRS else {name: TURN}
+    return way
+
+
+def _exchanged(turned: Sequence[str], right: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
+    told, r = _against(turned[0], right, relations)
+    names = ", ".join(" and ".join(_PAIRS[n]) for n in turned)
+    verb = "has" if turned == ["course"] else "have"
+    what = f"{names} look exchanged: {' and '.join(_named(n) for n in turned)} {verb} the opposite sign of {told}"
+    symbols = tuple(s for n in turned for s in _PAIRS[n])
+    return Doubt("exchange", symbols, what, ways=(_way(turned),), value=r)
 
 
 def _against(name: str, others: Collection[str], relations: Mapping[tuple[str, str], Relation]) -> tuple[str, float]:

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 
-from aqualog.align.mapping import Entry, SignalMap, SourceClock, entry_line, quoted
+from aqualog.align.mapping import EACH_ITS_OWN, Entry, SignalMap, SourceClock, entry_line, quoted, read_alike
 from aqualog.config.reader import Faults, Key, Table, is_number, read
 from aqualog.core.errors import listed
 from aqualog.core.notation import ACCEPTED, SYMBOLS
@@ -61,14 +61,22 @@ def load_signal_map(path: Path) -> SignalMap:
     file = read(path, "signal map")
     file.check_names(*_TABLES)
     signals, sources, time = (file.table(name) for name in ("signals", "sources", "time"))
-    entries = {}
+    entries: dict[str, Entry] = {}
     for symbol in signals.values:
         if symbol not in SYMBOLS and symbol not in ACCEPTED:
             signals.unknown(symbol, [*SYMBOLS, *ACCEPTED])
             continue
         entry = _entry(signals, symbol)
-        if entry is not None:
-            entries[symbol] = entry
+        if entry is None:
+            continue
+        if twice := next((e for e in entries.values() if e.channel == entry.channel and read_alike(e, entry)), None):
+            at = signals.line_of(twice.symbol)
+            signals.add(
+                symbol,
+                f'{symbol} names channel "{entry.channel[0]}", as {twice.symbol} does{f" in line {at}" if at else ""}; '
+                f"{EACH_ITS_OWN}",
+            )
+        entries[symbol] = entry
     clocks = {}
     for name in sources.values:
         values = sources.table(name).numbers(_CLOCK_KEYS)

@@ -294,9 +294,9 @@ class SlopeSummary:
 class Remark:
     """What does not fit among the signals of a drive, and what to change.
 
-    `kind`: `sign`, `offset`, `scale`, `torque`, `drivetrain` or `resistance`; `signals`: the symbols in question, or
-    the keys of the vehicle file; `lines`: what to put under [signals] of the map. `value` with `ci95`: what was
-    measured, SI (NaN without).
+    `kind`: `sign`, `exchange`, `offset`, `scale`, `torque`, `drivetrain` or `resistance`; `signals`: the symbols in
+    question, or the keys of the vehicle file; `lines`: what to put under [signals] of the map. `value` with `ci95`:
+    what was measured, SI (NaN without).
     """
 
     kind: str

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from aqualog.align.load import idle_files, load_signals
-from aqualog.align.mapping import SignalMap
+from aqualog.align.mapping import Entry, SignalMap
+from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 
 
@@ -23,6 +24,23 @@ def test_files_that_give_no_signal_are_named(tmp_path):
     assert [n for n in one if "more0.csv gives none of the signals" in n]
     many = load_signals([used, *idle], vehicle=Vehicle(), signal_map=SignalMap()).quality.notes
     assert [n for n in many if "more0.csv, more1.csv, more2.csv and 2 more give none" in n]
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"omega_fl": "wheel", "omega_fr": "a.csv:wheel"},  # by name and by file
+        {"omega_fr": "omega_fl"},  # which is omega_fl by its name already
+    ],
+)  # fmt: skip
+def test_one_channel_for_two_signals_under_different_names(tmp_path, entries):
+    path = table(tmp_path / "a.csv", "wheel [rad/s]", "omega_fl [rad/s]")
+    signal_map = SignalMap({s: Entry(s, (c,)) for s, c in entries.items()}, path="map.toml")
+    with pytest.raises(
+        ConfigError, match=r"map\.toml: omega_fr and omega_fl|map\.toml: omega_fl and omega_fr"
+    ) as error:
+        load_signals([path], vehicle=Vehicle(), signal_map=signal_map)
+    assert "read the same channel" in error.value.what
 
 
 @pytest.mark.parametrize("paths", [[], ["a.csv"]])

@@ -43,6 +43,11 @@ def made(seconds=240.0, seed=0, v=20.0, turning=0.06, accelerating=1.0, stops=0,
         "yaw_rate": yaw + 0.003 * rng.standard_normal(n),
         "steer_angle": yaw * (CAR.wheelbase + 0.003 * speed**2) / np.maximum(speed, 1.0) + 0.001 * rng.standard_normal(n),
     }  # fmt: skip
+    course = DT * np.cumsum(yaw)
+    columns["latitude"] = 48.0 + np.degrees(DT * np.cumsum(speed * np.sin(course)) / 6.371e6)
+    columns["longitude"] = 11.0 + np.degrees(
+        DT * np.cumsum(speed * np.cos(course)) / 6.371e6 / np.cos(np.radians(48.0))
+    )
     for w, side in (("fl", -1), ("fr", 1), ("rl", -1), ("rr", 1)):
         columns[f"omega_{w}"] = (speed + side * 0.5 * CAR.track * yaw) / CAR.r_e(w) * (speed > 0.1)
         columns[f"omega_{w}"] += 0.05 * rng.standard_normal(n) * (speed > 0.1)

@@ -46,12 +46,29 @@ def test_turned_torques():
     assert remark is None or "sign" in remark.advice
 
 
+KNOWN = replace(CAR, given=CAR.given | {"drivetrain"})
+SIDES = tuple((f"omega_f{side}", f"omega_r{side}") for side in "lr")
+
+
+def exchange(*pairs):
+    return {**DRIVE, **{a: DRIVE[b] for pair in pairs for a, b in (pair, pair[::-1])}}
+
+
+def exchanged(columns, car=KNOWN, drop=()):
+    return [r for r in look(signals(columns, drop=drop), car) if r.kind in ("exchange", "drivetrain")]
+
+
+def lines_for(*pairs):
+    return {f'{a} = {{ channel = "{b}" }}' for pair in pairs for a, b in (pair, pair[::-1])}
+
+
 def test_the_axle_that_slips_is_the_driven_one():
-    assert said(drop=TORQUES) == []
-    (remark,) = said(replace(CAR, drivetrain="fwd"), drop=TORQUES)
+    assert said(KNOWN, drop=TORQUES) == []
+    (remark,) = said(replace(KNOWN, drivetrain="fwd"), drop=TORQUES)
     assert "the rear wheels slip when the car accelerates" in remark.what
     assert 'drivetrain = "rwd"' in remark.advice
-    assert said(replace(CAR, drivetrain="awd"), drop=TORQUES) == []
+    assert set(remark.lines) == lines_for(*SIDES)
+    assert said(replace(KNOWN, drivetrain="awd"), drop=TORQUES) == []
 
 
 def test_a_driven_axle_that_no_vehicle_file_says_is_proposed_not_assumed():
@@ -69,3 +86,41 @@ def test_a_driven_axle_that_no_vehicle_file_says_is_proposed_not_assumed():
     (remark,) = (r for r in look(signals(columns), bare) if r.kind == "drivetrain")
     assert remark.advice.endswith('drivetrain = "awd"?')
     assert said(bare, drop=TORQUES) == []  # wheels that slip say less than a torque
+
+
+def test_without_a_drivetrain_in_the_file_nothing_is_said_of_it():
+    assert exchanged(DRIVE, replace(CAR, drivetrain="fwd"), TORQUES) == []
+
+
+def test_front_and_rear_exchanged_where_torques_and_file_agree():
+    (remark,) = exchanged(exchange(*SIDES))
+    assert "the wheels of front and rear look exchanged" in remark.what
+    assert set(remark.lines) == lines_for(*SIDES)
+
+
+@pytest.mark.parametrize("pair", SIDES)
+@pytest.mark.parametrize("drop", [(), TORQUES])
+def test_front_and_rear_of_one_side_exchanged(pair, drop):
+    (remark,) = exchanged(exchange(pair), drop=drop)
+    assert remark.signals == pair
+    assert remark.what.startswith(f"{pair[0]} and {pair[1]} look exchanged")
+    assert set(remark.lines) == lines_for(pair)
+
+
+@pytest.mark.parametrize("pair", SIDES)
+def test_with_all_wheels_driven_either_side_may_be_exchanged(pair):
+    (remark,) = exchanged(exchange(pair), replace(KNOWN, drivetrain="awd"), TORQUES)
+    assert set(remark.lines) == lines_for(SIDES[0]) | lines_for(SIDES[1])
+
+
+@pytest.mark.parametrize("pair", [("omega_fl", "omega_rr"), ("omega_fr", "omega_rl")])
+def test_a_front_wheel_and_a_rear_one_of_the_other_side(pair):
+    (remark,) = exchanged(exchange(pair))
+    assert remark.signals == pair
+    assert set(remark.lines) == lines_for(pair)
+
+
+def test_of_two_exchanges_the_first_comes_first():
+    both = {f"omega_{a}": f"omega_{b}" for a, b in (("fl", "rr"), ("fr", "rl"), ("rl", "fr"), ("rr", "fl"))}
+    (remark,) = exchanged({**DRIVE, **{a: DRIVE[b] for a, b in both.items()}})
+    assert set(remark.lines) == lines_for(("omega_fl", "omega_fr"), ("omega_rl", "omega_rr"))

@@ -1,16 +1,20 @@
 """A turned signal is named; where the log cannot tell which one is turned, that is said."""
 
+import numpy as np
 import pytest
 
 from aqualog.checks.look import look
-from tests.checks.made import CAR, made, signals
+from aqualog.core.records import Origin
+from tests.checks.made import CAR, DT, made, signals
 
 TURNING = ("a_y", "yaw_rate", "steer_angle")
 WHEELS = tuple(f"omega_{w}" for w in ("fl", "fr", "rl", "rr"))
+PLACE = ("latitude", "longitude")
 DRIVE = made()
 
 
-def said(columns=DRIVE, **how):
+def said(columns=DRIVE, *, drop=PLACE, **how):
+    how["drop"] = drop
     return [(r.signals, r.lines) for r in look(signals(columns, **how), CAR) if r.kind == "sign"]
 
 
@@ -32,10 +36,10 @@ def test_without_wheels_the_odd_one_of_three_is_turned(turned):
 
 
 def test_a_turned_imu_and_turned_steering_look_alike():
-    ((names, lines),) = said(drop=WHEELS, turned=("steer_angle",))
+    ((names, lines),) = said(drop=(*WHEELS, *PLACE), turned=("steer_angle",))
     assert names == tuple(sorted(TURNING))
     assert set(lines) == {line(s) for s in TURNING}
-    (remark,) = look(signals(DRIVE, drop=WHEELS, turned=("steer_angle",)), CAR)
+    (remark,) = look(signals(DRIVE, drop=(*WHEELS, *PLACE), turned=("steer_angle",)), CAR)
     assert "does not show which" in remark.what
     assert " or " in remark.advice
 
@@ -43,23 +47,81 @@ def test_a_turned_imu_and_turned_steering_look_alike():
 @pytest.mark.parametrize(("one", "other"), [("a_y", "yaw_rate"), ("steer_angle", "yaw_rate")])
 def test_of_two_signals_none_is_named(one, other):
     (third,) = set(TURNING) - {one, other}
-    ((names, _),) = said(drop=(*WHEELS, third), turned=(one,))
+    ((names, _),) = said(drop=(*WHEELS, *PLACE, third), turned=(one,))
     assert names == tuple(sorted((one, other)))
 
 
-def test_swapped_wheels():
-    swapped = {**DRIVE, "omega_fl": DRIVE["omega_fr"], "omega_fr": DRIVE["omega_fl"]}
-    (remark,) = look(signals(swapped), CAR)
-    assert remark.signals == ("omega_fl", "omega_fr")
-    assert "swap the channels of omega_fl and omega_fr" in remark.advice
+def exchange(*pairs, columns=DRIVE):
+    out = dict(columns)
+    for one, other in pairs:
+        out[one], out[other] = columns[other], columns[one]
+    return out
+
+
+def lines_for(*pairs):
+    return {f'{a} = {{ channel = "{b}" }}' for pair in pairs for a, b in (pair, pair[::-1])}
+
+
+FRONT, REAR = ("omega_fl", "omega_fr"), ("omega_rl", "omega_rr")
+
+
+@pytest.mark.parametrize("drop", [(), PLACE, ("yaw_rate", "a_y"), TURNING])
+def test_exchanged_wheels_of_one_axle(drop):
+    (remark,) = look(signals(exchange(FRONT), drop=drop), CAR)
+    assert remark.signals == FRONT
+    assert remark.what.startswith("omega_fl and omega_fr look exchanged")
+    assert set(remark.lines) == lines_for(FRONT)
+
+
+def test_the_course_names_exchanged_wheels_of_both_axles():
+    """Three signals and the course agree: to turn the three would be wrong."""
+    (remark,) = look(signals(exchange(FRONT, REAR)), CAR)
+    assert remark.signals == (*FRONT, *REAR)
+    assert remark.what.startswith("omega_fl and omega_fr, omega_rl and omega_rr look exchanged")
+    assert set(remark.lines) == lines_for(FRONT, REAR)
+
+
+def test_without_a_course_turned_signals_are_asked_for_with_the_other_cause():
+    remarks = look(signals(exchange(FRONT, REAR), drop=PLACE), CAR)
+    assert {r.signals for r in remarks} == {(s,) for s in TURNING}
+    assert all("or left and right are exchanged at both axles" in r.advice for r in remarks)
+    assert all("latitude and longitude in the map would decide" in r.advice for r in remarks)
 
 
 def test_front_wheels_alone_do_not_outvote_three_signals_that_agree():
-    swapped = {**DRIVE, "omega_fl": DRIVE["omega_fr"], "omega_fr": DRIVE["omega_fl"]}
-    (remark,) = look(signals(swapped, drop=("omega_rl", "omega_rr")), CAR)
+    (remark,) = look(signals(exchange(FRONT), drop=(*REAR, *PLACE)), CAR)
     assert "does not show which" in remark.what
-    assert "swap the channels of omega_fl and omega_fr" in remark.advice
-    assert set(remark.lines) == {line(s) for s in TURNING}
+    assert set(remark.lines) == {line(s) for s in TURNING} | lines_for(FRONT)
+
+
+def test_front_wheels_alone_are_named_by_the_course():
+    (remark,) = look(signals(exchange(FRONT), drop=REAR), CAR)
+    assert set(remark.lines) == lines_for(FRONT)
+
+
+def test_exchanged_latitude_and_longitude_turn_nothing_else():
+    (remark,) = look(signals(exchange(PLACE)), CAR)
+    assert remark.what.startswith("latitude and longitude look exchanged")
+    assert set(remark.lines) == lines_for(PLACE)
+
+
+def test_a_line_for_exchanged_channels_keeps_the_unit_of_each():
+    origins = {s: Origin(s, f"Rad_{s[-2:]}", "a.mf4", "km/h", 10.0, 1, mapped={"channel": [f"Rad_{s[-2:]}"], "unit": "km/h"})
+               for s in FRONT}  # fmt: skip
+    (remark,) = look(signals(exchange(FRONT), origins=origins), CAR)
+    assert set(remark.lines) == {
+        'omega_fl = { channel = "Rad_fr", unit = "km/h" }', 'omega_fr = { channel = "Rad_fl", unit = "km/h" }'
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("slow", [0.1, 1.0])
+@pytest.mark.parametrize("turned", [("yaw_rate",), ("a_y", "yaw_rate"), TURNING])
+def test_the_course_of_a_slow_gnss_names_what_is_turned_without_wheels(slow, turned):
+    """Positions of 1 Hz or 10 Hz, to 0.1 m, joined by straight lines."""
+    t = np.arange(DRIVE["v_x"].size) * DT
+    own = np.arange(0.0, t[-1], slow)
+    joined = {s: np.interp(t, own, np.round(np.interp(own, t, DRIVE[s]), 6)) for s in PLACE}
+    assert said({**DRIVE, **joined}, drop=WHEELS, turned=turned) == [((s,), (line(s),)) for s in sorted(turned)]
 
 
 @pytest.mark.parametrize(

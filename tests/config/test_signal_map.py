@@ -41,6 +41,23 @@ def test_faults_of_a_map_come_together(tmp_path):
         assert part in str(error.value)
 
 
+@pytest.mark.parametrize("first", ['"A"', '{ channel = "A", unit = "km/h" }', '{ channel = ["A", "B"], offset = 1.0 }'])
+def test_one_channel_for_two_signals_is_refused_with_both_lines(tmp_path, first):
+    path = write(tmp_path, f'[signals]\nomega_fl = {first}\na_x = "C"\nomega_fr = {first}\n')
+    with pytest.raises(
+        ConfigError, match=r"x\.toml: line 4: omega_fr names channel \"A\", as omega_fl does in line 2"
+    ) as error:
+        load_signal_map(path)
+    assert error.value.exit_code == 2
+
+
+def test_one_torque_for_both_wheels_and_one_channel_in_two_scales_are_no_slip(tmp_path):
+    lines = ['torque_rl = { channel = "M", scale = 4.5 }', 'torque_rr = { channel = "M", scale = 4.5 }',
+             'pressure_fl = "P"', 'pressure_fr = "P"', 'omega_rl = { channel = "N" }',
+             'v_x = { channel = "N", scale = 0.3 }']  # fmt: skip
+    assert len(load_signal_map(write(tmp_path, "[signals]\n" + "\n".join(lines))).entries) == 6
+
+
 def test_how_csv_files_are_written(tmp_path):
     text = '[csv]\nseparator = "tab"\nencoding = "latin-1"\n[csv."gps*.csv"]\ndecimal = ","\n[signals]\n'
     found = load_signal_map(write(tmp_path, text))

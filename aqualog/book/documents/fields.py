@@ -258,7 +258,7 @@ _EVIDENCE = (
 )
 
 _CHECK = (
-    text("kind", "what is in doubt", ("sign", "offset", "scale", "torque", "drivetrain", "resistance")),
+    text("kind", "what is in doubt", ("sign", "exchange", "offset", "scale", "torque", "drivetrain", "resistance")),
     several("signals", "signals, or keys of the vehicle file"),
     text("what", "what does not fit"),
     text("advice", "what to do"),
