@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import Freeze, freeze_note, in_freezes, stand_watch_of, watch_of
+from aqualog.align.freezes import Freeze, Stretch, freeze_note, in_freezes, stand_watch_of, watch_of
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
+from aqualog.align.lines import in_lines, joined_note, line_watch_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
@@ -20,7 +21,7 @@ from aqualog.core.records import BoolArray, ChannelInfo, FloatArray, Origin, Tim
 from aqualog.core.units import convert, parse_unit
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["Clean", "Cleaner", "Samples", "Span", "SpanWatch", "Taken", "corrected", "span_of"]
+__all__ = ["Clean", "Cleaner", "Samples", "Span", "SpanWatch", "Taken", "Unmeasured", "corrected", "span_of"]
 
 _ROUNDING = 1e-7  # of a number in 32 bits, at most
 _BURST = 5  # median sample times; longer steps are gaps and no sample time
@@ -130,16 +131,23 @@ class Taken(NamedTuple):
     absolute: bool
 
 
+class Unmeasured(NamedTuple):
+    """Where no sensor made the samples of a signal: it repeats itself, or a logger joined a gap by a line."""
+
+    frozen: tuple[Freeze, ...] = ()
+    joined: tuple[Stretch, ...] = ()
+
+
 class Cleaner:
     """Clean one signal, under the name that the map has.
 
-    `freezes`, from `frozen` of an earlier pass: where it is frozen; without them no sample is left out as frozen. If
-    the unit does not fit the signal: SignalError, or ConfigError where the map gives the unit.
+    `unmeasured`, from an earlier pass: what is left out; without it nothing is as frozen or joined. If the unit does
+    not fit the signal: SignalError, or ConfigError where the map gives the unit.
     """
 
     def __init__(
         self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle,
-        freezes: tuple[Freeze, ...] | None = None,
+        unmeasured: Unmeasured | None = None,
     ) -> None:  # fmt: skip
         self.info, self.where = info, f"{info.file}:{info.path}"
         self._name, self._symbol = name, SYMBOLS.get(name) or ACCEPTED[name]
@@ -154,12 +162,14 @@ class Cleaner:
             raise
         r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
         self._rule = glitches_of(name, r_e)
-        self._freezes = freezes or ()
-        self._watch = watch_of(name, r_e) if freezes is None else None
+        self._unmeasured = unmeasured or Unmeasured()
+        self._watch = watch_of(name, r_e) if unmeasured is None else None
+        self._lines = line_watch_of(name) if unmeasured is None else None
         # when the car stands by this signal, if it is a speed; complete once all samples of the first pass are through
-        self.stands = stand_watch_of(name, r_e) if freezes is None else None
+        self.stands = stand_watch_of(name, r_e) if unmeasured is None else None
         # counts, and where something was first found
-        self._in_order = self._bad = self._code = self._out = self._glitches = self._frozen = self._through = 0
+        self._in_order = self._bad = self._code = self._out = self._glitches = self._through = 0
+        self._frozen = self._joined = 0
         self._first_glitch_ns: int | None = None
         self._first_out: tuple[int, float] | None = None
         # the time in which a jump may turn back
@@ -189,12 +199,16 @@ class Cleaner:
         self._through += t.size
         if self._watch is not None:
             self._watch.push(t, x)
+        if self._lines is not None:
+            self._lines.push(t, x)
         if self.stands is not None:
             self.stands.push(t, x)
-        if self._freezes:
-            repeats = in_freezes(t, self._freezes)
+        if any(self._unmeasured):
+            repeats = in_freezes(t, self._unmeasured.frozen)
+            joined = in_lines(t, self._unmeasured.joined) & ~repeats
             self._frozen += int(repeats.sum())
-            t, x = t[~repeats], x[~repeats]
+            self._joined += int(joined.sum())
+            t, x = _where(~(repeats | joined), t, x)
         return t, x
 
     def _without_glitches(self, rule: Glitches, t: TimeArray, x: FloatArray, *, is_last: bool) -> Samples:
@@ -241,9 +255,10 @@ class Cleaner:
         if self._first_glitch_ns is None and t.size:
             self._first_glitch_ns = int(t[0])
 
-    def frozen(self) -> tuple[Freeze, ...]:
-        """Return where the signal is frozen; complete once all samples are through."""
-        return self._freezes if self._watch is None else self._watch.finish()
+    def unmeasured(self) -> Unmeasured:
+        """Return where no sensor made the signal; complete once all samples are through."""
+        frozen = self._unmeasured.frozen if self._watch is None else self._watch.finish()
+        return Unmeasured(frozen, self._unmeasured.joined if self._lines is None else self._lines.finish())
 
     def cleaned(self, taken: Taken) -> tuple[Clean, list[str]]:
         """Return the signal, and the notes on it, once all samples are through."""
@@ -261,8 +276,10 @@ class Cleaner:
                 f"{self._symbol.high:g} {self._symbol.unit} (first: {value:.6g} at {float(at - begin) * 1e-9:.2f} s) "
                 "are left out"
             )
-        if self._freezes:
-            notes.append(freeze_note(self.where, self._frozen, begin, self._freezes))
+        if self._unmeasured.frozen:
+            notes.append(freeze_note(self.where, self._frozen, begin, self._unmeasured.frozen))
+        if self._unmeasured.joined:
+            notes.append(joined_note(self.where, self._joined, begin, self._unmeasured.joined))
         origin = Origin(
             symbol=self._name,
             channel=self.info.path,
@@ -274,6 +291,7 @@ class Cleaner:
             out_of_range=self._out + self._glitches,
             invalid_code=self._code,
             frozen=self._frozen,
+            joined=self._joined,
             faults=taken.faults,
             mapped=mapped_as(self._entry),
         )

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 
-from aqualog.align.clean import Clean, Cleaner, Samples, Taken, corrected, span_of
-from aqualog.align.freezes import SPEEDS, Freeze, standing_by, while_moving
+from aqualog.align.clean import Clean, Cleaner, Samples, Taken, Unmeasured, corrected, span_of
+from aqualog.align.freezes import SPEEDS, standing_by, while_moving
 from aqualog.align.grid import (
     MAX_ROWS,
     Grid,
@@ -28,7 +28,7 @@ from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Quality, Signals, TimeFaults
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["Found", "Freezes", "Plan", "build_signals", "cleaners_of", "missing_notes", "plan_drive", "quality_of"]
+__all__ = ["Found", "Plan", "build_signals", "cleaners_of", "missing_notes", "plan_drive", "quality_of"]
 
 MUCH = 0.2  # share of a drive; dropouts and sources that begin a little later stay below
 NAMED = 6  # signals in one line
@@ -64,7 +64,7 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
     faults = sum(by_file.values(), TimeFaults(drifts=sum(len(f.drifts) for f in file_faults)))
     own = sum(
         c.origin.not_finite + c.origin.out_of_range + c.origin.invalid_code + c.origin.frozen
-        + c.origin.faults.duplicates + c.origin.faults.strays
+        + c.origin.joined + c.origin.faults.duplicates + c.origin.faults.strays
         for c in cleaned
     )  # fmt: skip
     left_out = [(c.origin.faults.duplicates + c.origin.faults.strays, c.origin.samples) for c in cleaned]
@@ -103,22 +103,21 @@ def _reset_notes(by_file: Mapping[str, TimeFaults]) -> list[str]:
 
 
 Found = Mapping[str, tuple[Entry, ChannelInfo]]
-Freezes = Mapping[str, tuple[Freeze, ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
     """A drive whose signals have gone through their cleaners once.
 
-    `cleaned`: its signals; `notes` on them; `absolute`: whether the grid counts from 1970; `freezes`: where signals are
-    frozen.
+    `cleaned`: its signals; `notes` on them; `absolute`: whether the grid counts from 1970; `unmeasured`: where no
+    sensor made its signals.
     """
 
     grid: Grid
     absolute: bool
     cleaned: tuple[Clean, ...]
     notes: tuple[str, ...]
-    freezes: Freezes
+    unmeasured: Mapping[str, Unmeasured]
     vehicle: Vehicle
 
     @property
@@ -243,8 +242,8 @@ def plan_drive(
 ) -> Plan:
     """Clean the signals of a drive and plan its grid.
 
-    `take` passes all samples of some signals through their cleaners; signals without a sample may be left out. A frozen
-    signal, which is rare, goes through twice.
+    `take` passes all samples of some signals through their cleaners; signals without a sample may be left out. A signal
+    that is frozen or joined somewhere, which is rare, goes through twice.
 
     Raises
     ------
@@ -255,13 +254,13 @@ def plan_drive(
     cleaners = cleaners_of(found, signal_map, vehicle, faults=faults)
     taken = dict(take(cleaners))
     standing = standing_by(w for name in SPEEDS if name in cleaners and (w := cleaners[name].stands) is not None)
-    freezes = {
-        name: while_moving(cleaner.frozen(), standing) if name.startswith("torque_") else cleaner.frozen()
-        for name, cleaner in cleaners.items()
-    }
-    frozen = {name: found[name] for name, own in freezes.items() if own}
-    if frozen:  # sample times and counts are those without what is frozen
-        again = cleaners_of(frozen, signal_map, vehicle, freezes)
+    unmeasured = {name: cleaner.unmeasured() for name, cleaner in cleaners.items()}
+    for name in (n for n in unmeasured if n.startswith("torque_")):
+        own = unmeasured[name]
+        unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing))
+    in_part = {name: found[name] for name, own in unmeasured.items() if any(own)}
+    if in_part:  # sample times and counts are those without what nobody measured
+        again = cleaners_of(in_part, signal_map, vehicle, unmeasured)
         cleaners |= again
         taken |= take(again)
     cleaned: list[Clean] = []
@@ -277,21 +276,21 @@ def plan_drive(
         raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
     absolute = common_clock([(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned], signal_map)
     grid = grid_of(cleaned, rate_hz, most_rows=most_rows)
-    return Plan(grid, absolute, tuple(cleaned), tuple(notes), freezes, vehicle)
+    return Plan(grid, absolute, tuple(cleaned), tuple(notes), unmeasured, vehicle)
 
 
 def cleaners_of(
     found: Found,
     signal_map: SignalMap,
     vehicle: Vehicle,
-    freezes: Freezes | None = None,
+    unmeasured: Mapping[str, Unmeasured] | None = None,
     faults: dict[str, str] | None = None,
 ) -> dict[str, Cleaner]:
     """Return a cleaner for each signal whose unit fits, and in `faults` a note on each other."""
     cleaners = {}
     for name, (entry, info) in found.items():
         try:
-            known = None if freezes is None else freezes.get(name, ())
+            known = None if unmeasured is None else unmeasured.get(name, Unmeasured())
             cleaners[name] = Cleaner(name, entry, info, signal_map, vehicle, known)
         except SignalError as error:
             if faults is not None:

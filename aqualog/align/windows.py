@@ -1,8 +1,9 @@
 """Build a drive that is longer than memory window by window, on the same grid as in one go.
 
 The files are read twice. The first pass finds what depends on the whole of a signal: first and last stamp, sample
-times, counts. (A frozen signal needs one pass more.) The second pass reads the samples. A window's values equal those
-of `build_signals` bit for bit: both use the same cleaner, and every point of the grid has the same samples around it.
+times, counts. (A frozen or joined one needs one pass more.) The second pass reads the samples. A window's values
+equal those of `build_signals` bit for bit: both use the same cleaner, and every point of the grid has the same samples
+around it.
 Stamps out of order, resets and wraps need the whole channel: such a log raises `NotInPiecesError` before the first
 window.
 """
@@ -54,7 +55,7 @@ class LongDrive:
             Whether a sample of it was missing somewhere in the window.
         """
         grid = self.plan.grid
-        cleaners = cleaners_of(self._found, self._map, self.plan.vehicle, self.plan.freezes)
+        cleaners = cleaners_of(self._found, self._map, self.plan.vehicle, self.plan.unmeasured)
         buffers = {c.origin.symbol: _Buffer(c.origin.symbol, c.span.last_ns) for c in self.plan.cleaned}
         source = _Source(self._parts(), self._found, {n: _InOrder(c, self._map) for n, c in cleaners.items()})
         for first in range(0, grid.rows, rows):

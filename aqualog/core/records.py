@@ -123,7 +123,8 @@ class TimeFaults:
 class Origin:
     """Where a signal on the grid comes from and what was wrong with it.
 
-    `mapped`: its line in the signal map, by key: channel, unit, scale, offset, invalid.
+    `frozen`: samples with which the sensor repeated itself; `joined`: with which a logger filled a gap by a straight
+    line. `mapped`: its line in the signal map, by key: channel, unit, scale, offset, invalid.
     """
 
     symbol: str
@@ -138,6 +139,7 @@ class Origin:
     missing_fraction: float = 0.0
     faults: TimeFaults = field(default_factory=TimeFaults)
     frozen: int = 0
+    joined: int = 0
     mapped: Mapping[str, Any] = field(default_factory=dict)
 
 

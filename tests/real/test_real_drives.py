@@ -167,6 +167,14 @@ def test_bmw_resistance_runs_on_every_trip(real_logs, trip):
     assert "resistance" in result.judgement.ran
 
 
+@pytest.mark.parametrize("trip", ["A10", "B02", "B24"])
+def test_bmw_lines_of_the_logger_are_missing(real_logs, trip):
+    _, signals = drive("bmw_i3", [real_logs / "bmw_i3" / f"Trip{trip}.csv"])
+    joined = {n: o.joined for n, o in signals.origins.items() if o.joined}
+    assert joined == (dict.fromkeys(("v_x", "a_x", "torque_rl", "torque_rr"), 1589) if trip == "B02" else {})
+    assert np.isnan(signals.array("a_x")[401:1990]).all() == (trip == "B02")
+
+
 @pytest.mark.parametrize("name", ["00000001-60FE3F04.MF4", "00000002-60FE415D.MF4"])
 def test_canedge_is_explained_and_refused(real_logs, name):
     folder = real_logs / "canedge"

@@ -44,6 +44,7 @@ _SIGNAL = (
         count("out_of_range", "samples outside the signal's range; left out"),
         count("invalid_code", "samples with a code for \"no value\"; left out"),
         count("frozen", "samples in which the sensor repeats itself; left out"),
+        count("joined", "samples with which a logger filled a gap by a straight line; left out"),
     ),
 )  # fmt: skip
 

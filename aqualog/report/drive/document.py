@@ -31,7 +31,7 @@ _SLOPE = (
     "place", "wheel", "slope", "slope_sd", "reference", "reference_from", "beta", "offset", "judged_s", "dropped_s",
     "seconds", "inactive",
 )  # fmt: skip
-_BAD = ("not_finite", "out_of_range", "invalid_code", "frozen")
+_BAD = ("not_finite", "out_of_range", "invalid_code", "frozen", "joined")
 _UNITS = {"(m/s^2)^2": "m^2/s^4", "0 or 1": "bool"}
 
 

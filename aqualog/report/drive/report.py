@@ -66,6 +66,7 @@ _BAD = {
     "out_of_range": "out of range",
     "invalid_code": "marked invalid",
     "frozen": "frozen",
+    "joined": "a filled gap",
 }
 
 

@@ -1,0 +1,170 @@
+"""Find stretches that a logger filled with a straight line where it had no samples.
+
+A measured speed, acceleration or torque never runs straight for long. In measured drives the longest stretch is 3 s,
+of a torque that a control unit calculates. A line is one up to the resolution of the signal. The check judges only
+signals whose noise elsewhere is larger than their resolution. It therefore never reports a coarse signal, a constant
+speed, or a signal that was calculated. Blocks of a second begin at the first sample of the signal, so that the result
+does not depend on how the signal is cut into pieces.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.align.freezes import Stretch
+from aqualog.core.records import BoolArray, FloatArray, TimeArray
+
+__all__ = ["LineWatch", "in_lines", "joined_note", "line_watch_of"]
+
+_BLOCK_NS = 1_000_000_000
+_LEAST_SAMPLES = 5  # of a block that is judged
+_LEAST_S = {"torque": 10.0, "": 5.0}  # control units let torques rise evenly
+_JUDGED = ("v_x", "a_x", "a_y", "yaw_rate", "steer", "omega_", "torque_")
+_WITHIN = 1.05  # resolutions off the line between two rounded samples
+_ROUNDING = 2e-7  # of a number in 32 bits
+_RISE = 20.0  # resolutions from its beginning to its end: less is a constant value
+_NOISE = 3.0  # times as far off a line as a line may be is the signal elsewhere, in the middle
+_TURNS = 0.05  # least share of steps against the step before, elsewhere: measured speeds have 0.11 and more
+_OFTEN = 0.1  # of the blocks elsewhere that are straight: then the signal runs straight by itself
+_LEAST_BLOCKS = 30  # elsewhere, to know a signal by
+
+
+class _Block(NamedTuple):
+    """What is kept of blocks (b,): first sample, first sample behind, largest distance from the line between, counts.
+
+    `after_ns`, `after`: of the block's own last sample where no other follows at once.
+    """
+
+    t_ns: TimeArray
+    x: FloatArray
+    after_ns: TimeArray
+    after: FloatArray
+    off: FloatArray
+    samples: TimeArray
+    changes: TimeArray
+    turns: TimeArray
+
+
+def line_watch_of(name: str) -> LineWatch | None:
+    """Return the check for a signal; None for those that may run straight, as heights and temperatures do."""
+    if not name.startswith(_JUDGED):
+        return None
+    return LineWatch(_LEAST_S["torque" if name.startswith("torque_") else ""])
+
+
+class LineWatch:
+    """Check the samples of one signal, which may arrive in pieces. `least_s` is the shortest stretch. [s]"""
+
+    def __init__(self, least_s: float) -> None:
+        self._least_ns = round(least_s * 1e9)
+        self._first_ns: int | None = None
+        self._t: TimeArray = np.zeros(0, dtype=np.int64)  # of the block that is open
+        self._x: FloatArray = np.zeros(0)
+        self._finest = np.inf
+        self._kept: list[_Block] = []
+
+    def push(self, t_ns: TimeArray, x: FloatArray) -> None:
+        """Take samples (n,) at strictly increasing stamps, finite."""
+        if not t_ns.size:
+            return
+        if self._first_ns is None:
+            self._first_ns = int(t_ns[0])
+        t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
+        number = (t - self._first_ns) // _BLOCK_NS
+        whole = int(np.searchsorted(number, number[-1], side="left"))
+        self._t, self._x = t[whole:].copy(), x[whole:].copy()
+        if whole:
+            self._add(t[: whole + 1], x[: whole + 1], number[:whole])
+
+    def _add(self, t: TimeArray, x: FloatArray, number: TimeArray) -> None:
+        """Take whole blocks of samples (n,), with the one sample behind them if there is one."""
+        start = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
+        end = np.append(start[1:], number.size)
+        after = np.minimum(end, t.size - 1)
+        after = np.where(t[after] - t[end - 1] > _BLOCK_NS, end - 1, after)
+        of = np.repeat(np.arange(start.size), end - start)
+        own_t, own_x = t[: number.size], x[: number.size]
+        span = np.maximum(t[after] - t[start], 1)
+        line = x[start][of] + (x[after] - x[start])[of] * ((own_t - t[start][of]) / span[of])
+        steps = np.diff(x)
+        self._finest = min(self._finest, float(np.abs(steps[steps != 0.0]).min(initial=np.inf)))
+        steps = np.concatenate([[0.0], steps])[: number.size]
+        is_first = np.zeros(number.size, dtype=np.bool_)
+        is_first[start] = True
+        turns = (np.concatenate([[0.0], steps[:-1]]) * steps < 0.0) & ~is_first & ~np.roll(is_first, 1)
+        self._kept.append(_Block(
+            t[start], x[start], t[after], x[after], np.maximum.reduceat(np.abs(own_x - line), start), end - start,
+            np.add.reduceat(((steps != 0.0) & ~is_first).astype(np.int64), start),
+            np.add.reduceat(turns.astype(np.int64), start),
+        ))  # fmt: skip
+
+    def finish(self) -> tuple[Stretch, ...]:
+        """List the stretches that are lines, in order: the last sample before, and the first behind."""
+        if self._t.size:
+            self._add(self._t, self._x, np.zeros(self._t.size, dtype=np.int64))
+            self._t, self._x = self._t[:0], self._x[:0]
+        if not self._kept or not np.isfinite(self._finest):
+            return ()
+        b = _Block(*(np.concatenate(parts) for parts in zip(*self._kept, strict=True)))
+        self._kept = [b]
+        may_be_off = _WITHIN * self._finest + _ROUNDING * np.maximum(np.abs(b.x), np.abs(b.after))
+        is_judged = b.samples >= _LEAST_SAMPLES
+        is_line: BoolArray = is_judged & (b.off <= may_be_off)
+        found = [
+            (i, k)
+            for i, k in _runs(b, is_line, may_be_off)
+            if b.after_ns[k] - b.t_ns[i] >= self._least_ns and abs(b.after[k] - b.x[i]) >= _RISE * may_be_off[i]
+        ]
+        if not found:
+            return ()
+        outside = is_judged & ((b.off > may_be_off) | (np.abs(b.after - b.x) > may_be_off))
+        for i, k in found:
+            outside[i : k + 1] = False
+        noisy = outside & ~is_line
+        if int(noisy.sum()) < max(_LEAST_BLOCKS, (1.0 - _OFTEN) * int(outside.sum())):
+            return ()
+        if float(np.median(b.off[noisy] / may_be_off[noisy])) < _NOISE:
+            return ()
+        if int(b.turns[noisy].sum()) < _TURNS * int(b.changes[noisy].sum()):
+            return ()
+        return tuple((int(b.t_ns[i]), int(b.after_ns[k])) for i, k in found)
+
+
+def _runs(b: _Block, is_line: BoolArray, off: FloatArray) -> list[tuple[int, int]]:
+    """Return first and last block of runs on one line, each as long as it gets from its beginning on."""
+    found: list[tuple[int, int]] = []
+    low, high = -np.inf, np.inf
+    for k in np.flatnonzero(is_line).tolist():
+        first = found[-1][0] if found and found[-1][1] == k - 1 and b.t_ns[k] == b.after_ns[k - 1] else k
+        slopes = _slopes(b, first, k, off[k])
+        if first != k:
+            low, high = max(low, slopes[0]), min(high, slopes[1])
+            if low <= high:
+                found[-1] = first, k
+                continue
+        found.append((k, k))
+        low, high = _slopes(b, k, k, off[k])
+    return found
+
+
+def _slopes(b: _Block, first: int, k: int, off: float) -> tuple[float, float]:
+    """Return the slopes between which a line from the first sample of a block ends within `off` of block k's end."""
+    way_ns, rise = max(float(b.after_ns[k] - b.t_ns[first]), 1.0), float(b.after[k] - b.x[first])
+    return (rise - off) / way_ns, (rise + off) / way_ns
+
+
+def in_lines(t_ns: TimeArray, lines: tuple[Stretch, ...]) -> BoolArray:
+    """Return which samples (n,) lie within a line; its ends were measured."""
+    out = np.zeros(t_ns.size, dtype=np.bool_)
+    for start, end in lines:
+        out[np.searchsorted(t_ns, start, side="right") : np.searchsorted(t_ns, end, side="left")] = True
+    return out
+
+
+def joined_note(where: str, count: int, first_ns: int, lines: tuple[Stretch, ...]) -> str:
+    """Describe what was left out because no sensor made it; `first_ns` is the signal's first stamp."""
+    spans = ", ".join(f"{(a - first_ns) * 1e-9:.1f} to {(b - first_ns) * 1e-9:.1f} s" for a, b in lines[:3])
+    more = f" and {len(lines) - 3} more times" if len(lines) > 3 else ""
+    return f"{where}: {count} samples ({spans}{more}) lie on a straight line: a gap that was filled, left out"
