@@ -10,6 +10,7 @@ from aqualog.checks.doubts import Change, Doubt
 from aqualog.checks.relations import changes
 from aqualog.checks.windows import Windows, middle
 from aqualog.core.records import FloatArray
+from aqualog.physics.load import G
 
 __all__ = ["scale_doubts"]
 
@@ -23,12 +24,14 @@ MOVING = 3.0  # [m/s] from which a ratio of speeds means something
 STEADY = 0.04  # between the quartiles of such a ratio: the resolution of slow wheels, and a bend
 _UNITS = {3.6: ("km/h", "m/s"), 2.23694: ("mph", "m/s"), 1.60934: ("km/h", "mph")}  # true unit, unit taken: too large
 _NEAR = 0.04  # about such a factor
+_ROUGH = 1.3  # about that of g, as noise and grades change it
 
 
 def scale_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield wheels that always turn at another speed than the others, and scales that do not fit each other."""
-    yield from _speeds(windows)
-    yield from _acceleration(windows)
+    found = list(_speeds(windows))
+    yield from found
+    yield from _acceleration(windows, are_speeds_right=not found)
 
 
 def _speeds(windows: Windows) -> Iterator[Doubt]:
@@ -36,17 +39,21 @@ def _speeds(windows: Windows) -> Iterator[Doubt]:
     if not wheels:
         return
     common = middle(list(wheels.values()))
+    radius = {w: windows.vehicle.r_e(w) for w in wheels}
     odd = {w: r for w, x in wheels.items() if _is_off(r := _ratio(x, common))} if len(wheels) > 2 else {}
     if odd:
         told = ", ".join(f"omega_{w} is {_factor(r)} times" for w, r in odd.items())
-        own = {f"omega_{w}": Change(1.0 / r) for w, r in odd.items()}
+        own = {f"omega_{w}": Change(1.0 / r, radius=radius[w]) for w, r in odd.items()}
         names = tuple(f"omega_{w}" for w in odd)
         yield Doubt("scale", names, f"{told} the speed of the other wheels", "check its unit and tyre size", (own,))
         return
     ratio = _ratio(common, windows["v_x"]) if "v_x" in windows else 1.0
     if _is_off(ratio):
         what = f"wheel speeds times radius are {_factor(ratio)} times v_x"
-        ways = ({"v_x": Change(ratio)}, {f"omega_{w}": Change(1.0 / ratio) for w in wheels})
+        ways = (
+            {"v_x": Change(ratio, radius=1.0)},
+            {f"omega_{w}": Change(1.0 / ratio, radius=radius[w]) for w in wheels},
+        )
         advice = "check the units (km/h, mph, m/s, rad/s) and r_e in the vehicle file"
         yield Doubt("scale", ("v_x", *(f"omega_{w}" for w in wheels)), what, advice, ways, ratio)
 
@@ -78,7 +85,7 @@ def _ratio(x: FloatArray, y: FloatArray) -> float:
     return float(ratio) if high - low < STEADY * ratio else 1.0
 
 
-def _acceleration(windows: Windows) -> Iterator[Doubt]:
+def _acceleration(windows: Windows, *, are_speeds_right: bool) -> Iterator[Doubt]:
     if "a_x" not in windows or not windows.wheels or windows["a_x"].size < 3:
         return
     step = windows.step_s
@@ -91,4 +98,6 @@ def _acceleration(windows: Windows) -> Iterator[Doubt]:
     # the scale lies between both regressions: noise, or grades in a_x, make one of the signals the larger one
     if r > LEAST_CORRELATION and (r * ratio > RATIO or ratio / r < 1.0 / RATIO):
         what = f"wheel speeds change {ratio:.1f} times as fast as a_x says"
-        yield Doubt("scale", ("a_x",), what, "check the units of both (km/h, g)", value=ratio)
+        g = next((x for x in (G, 1.0 / G) if 1.0 / _ROUGH < ratio / x < _ROUGH), None)
+        ways = ({"a_x": Change(g, radius=1.0)},) if g and are_speeds_right else ()
+        yield Doubt("scale", ("a_x",), what, "check the units of both (km/h, g)", ways, ratio)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from aqualog.checks.look import look
+from aqualog.core.records import Origin
 from tests.checks.made import CAR, made, signals
 
 DRIVE = made(stops=1)
@@ -47,3 +48,60 @@ def test_wheels_that_slip_for_most_of_the_time_have_no_other_scale():
     slip = 1.0 + np.repeat(rng.uniform(0.0, 0.3, DRIVE["v_x"].size // 200), 200)
     columns = {n: x * slip if n in ("omega_rl", "omega_rr") else x for n, x in DRIVE.items()}
     assert not [r for r in look(signals(columns), CAR) if r.kind == "scale"]
+
+
+def origins(**units):
+    """Signals from channels with these units; `mapped` ones have the unit in the map."""
+    wheels = {f"omega_{w}": units.get("wheels", "rad/s") for w in ("fl", "fr", "rl", "rr")}
+    return {
+        s: Origin(s, s.upper(), "a.mf4", u, 20.0, 1, mapped={"channel": [s.upper()], "unit": u})
+        for s, u in {"v_x": "m/s", "a_x": "m/s^2", **wheels, **units}.items() if s in DRIVE
+    }  # fmt: skip
+
+
+def lines(factors, **units):
+    own = {n: x * factors.get(n[:5], factors.get(n, 1.0)) for n, x in DRIVE.items()}
+    remarks = [r for r in look(signals(own, origins=origins(**units)), CAR) if r.kind == "scale"]
+    return tuple(line for r in remarks for line in r.lines)
+
+
+@pytest.mark.parametrize(
+    ("true", "taken", "size"),
+    [("m/s", "km/h", 3.6), ("km/h", "m/s", 1 / 3.6), ("mph", "m/s", 0.44704), ("mph", "km/h", 1.609), ("km/h", "mph", 1 / 1.609)],
+)  # fmt: skip
+def test_the_right_unit_of_the_velocity_is_proposed(true, taken, size):
+    """A factor alone would keep the wrong unit; wheels in rad/s cannot be wrong by it."""
+    assert lines({"v_x": 1.0 / size}, v_x=taken) == (f'v_x = {{ channel = "V_X", unit = "{true}" }}',)
+
+
+@pytest.mark.parametrize(
+    ("true", "taken", "size"),
+    [("km/h", "m/s", 3.6), ("rad/s", "m/s", 1.0 / CAR.r_e("fl")), ("rpm", "rad/s", 60.0 / (2.0 * np.pi)),
+     ("rad/s", "deg/s", np.pi / 180.0)],
+)  # fmt: skip
+def test_the_right_unit_of_the_wheels_is_proposed(true, taken, size):
+    found = lines({"omega": size}, wheels=taken)
+    assert [line for line in found if "omega" in line] == [
+        f'omega_{w} = {{ channel = "OMEGA_{w.upper()}", unit = "{true}" }}' for w in ("fl", "fr", "rl", "rr")
+    ]  # fmt: skip
+
+
+def test_both_may_be_in_the_wrong_unit():
+    found = lines({"v_x": 1.0 / 3.6}, v_x="km/h", wheels="m/s")
+    assert found[0] == 'v_x = { channel = "V_X", unit = "m/s" }'
+    assert found[1] == 'omega_fl = { channel = "OMEGA_FL", unit = "km/h" }'
+    assert len(found) == 5
+
+
+def test_one_wheel_in_another_unit():
+    assert lines({"omega_rr": 3.6}, wheels="m/s") == ('omega_rr = { channel = "OMEGA_RR", unit = "km/h" }',)
+
+
+def test_a_factor_that_no_unit_explains_stays_one():
+    (line,) = lines({"omega_rr": 1.08}, wheels="m/s")
+    assert 'unit = "m/s", scale = 0.92' in line
+
+
+@pytest.mark.parametrize(("true", "taken", "size"), [("g", "m/s^2", 1 / 9.80665), ("m/s^2", "g", 9.80665)])
+def test_the_right_unit_of_the_acceleration_is_proposed(true, taken, size):
+    assert lines({"a_x": size}, a_x=taken) == (f'a_x = {{ channel = "A_X", unit = "{true}" }}',)
