@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean, Span
-from aqualog.align.mapping import SignalMap
+from aqualog.align.mapping import SignalMap, align_command
 from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import WHEELS, Symbol
@@ -186,7 +186,7 @@ def common_clock(clocks: Sequence[tuple[str, bool]], signal_map: SignalMap) -> b
             "the files do not share a clock",
             where=", ".join(by_kind[False]),
             expected=f"absolute time as in {', '.join(by_kind[True])}",
-            hint="`aqualog align FILE FILE --write-map map.toml`",
+            hint=align_command([*by_kind[True], *by_kind[False]], signal_map.path),
         )
     return kinds.pop()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -15,8 +16,9 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.io.reader import CsvFormat
 
 __all__ = [
-    "EACH_ITS_OWN", "MAP_HINT", "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "channel_id", "entry_line",
-    "map_text", "matching", "quoted", "read_alike", "resolve", "separate_drives", "values_read",
+    "EACH_ITS_OWN", "MAP_HINT", "OF_SEPARATE_DRIVES", "Entry", "SignalMap", "SourceClock", "align_command",
+    "channel_id", "entry_line", "map_text", "matching", "quoted", "read_alike", "resolve", "separate_drives",
+    "values_read",
 ]  # fmt: skip
 
 
@@ -32,7 +34,7 @@ class Entry:
     """One line of a signal map: SI value = scale * to_SI(raw) + offset.
 
     `channel` may be a list in order of preference. `unit` overrides what the file says. `invalid` are raw values that
-    mean "no value" (error codes).
+    mean "no value" (error codes). `line`: where it stands in its file; 0 if it stands in none.
     """
 
     symbol: str
@@ -41,6 +43,7 @@ class Entry:
     scale: float = 1.0
     offset: float = 0.0
     invalid: tuple[float, ...] = ()
+    line: int = field(default=0, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,16 @@ class SignalMap:
 
 def _names(pattern: str, file: str) -> bool:
     return fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern
+
+
+def align_command(logs: Sequence[str], map_path: str = "") -> str:
+    """Return what to type where the clocks of files of one drive disagree."""
+    signals = f" --signals {shlex.quote(map_path)}" if map_path else ""
+    out = "clocks.toml" if map_path.endswith("map.toml") else "map.toml"
+    return (
+        f"`aqualog align {' '.join(shlex.quote(log) for log in logs)}{signals} --write-map {out}`, "
+        f"then the command again with --signals {out}"
+    )
 
 
 def entry_line(entry: Entry) -> str:
@@ -158,9 +171,9 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         if len(matches) == 1:
             found[symbol] = (entry, matches[0])
         elif not matches:
-            faults.append(f"{symbol}: no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
+            faults.append(f"{_place(entry)}no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
         else:
-            faults.append(f"{symbol}: channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
+            faults.append(f"{_place(entry)}channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
             doubled += len({m.file for m in matches}) > 1
     for symbol in (*SYMBOLS, *ACCEPTED):
         if symbol in signal_map.entries:
@@ -229,6 +242,10 @@ def _ends_with_path(path: str, wanted: str) -> bool:
     return path.endswith(wanted) and len(path) > len(wanted) and path[-len(wanted) - 1] in "./:"
 
 
+def _place(entry: Entry) -> str:
+    return f"{f'line {entry.line}: ' if entry.line else ''}{entry.symbol}: "
+
+
 def _quoted(names: Sequence[str]) -> str:
     return " or ".join(f'"{n}"' for n in names)
 
@@ -240,4 +257,7 @@ def _listed(matches: Sequence[ChannelInfo]) -> str:
 def _nearest(wanted: Sequence[str], channels: Sequence[ChannelInfo]) -> str:
     names = sorted({c.path for c in channels} | {c.name for c in channels})
     near = difflib.get_close_matches(wanted[0], names, n=1, cutoff=0.5)
-    return f' (nearest: "{near[0]}")' if near else ""
+    if near:
+        return f' (nearest: "{near[0]}")'
+    files = listed(list(dict.fromkeys(c.file for c in channels)), 3)
+    return f" in {files}, which {'has' if len(channels) else 'has no'} {listed(names, 6) if names else 'channel'}"

@@ -264,6 +264,7 @@ def plan_drive(
         cleaners |= again
         taken |= take(again)
     cleaned: list[Clean] = []
+    empty: list[Clean] = []
     notes: list[str] = []
     for name in found:
         if name in faults:
@@ -271,12 +272,35 @@ def plan_drive(
         if name in taken:
             clean, own_notes = cleaners[name].cleaned(taken[name])
             notes += own_notes
-            cleaned += [clean] if clean.span.samples else []
+            (cleaned if clean.span.samples else empty).append(clean)
     if not cleaned:
-        raise SignalError("no usable signal", expected="at least wheel speeds", hint="`aqualog inspect LOG`")
+        raise _nothing_usable([*faults.values(), *(_why_empty(c.origin) for c in empty)], found)
     absolute = common_clock([(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned], signal_map)
     grid = grid_of(cleaned, rate_hz, most_rows=most_rows)
     return Plan(grid, absolute, tuple(cleaned), tuple(notes), unmeasured, vehicle)
+
+
+_WHY = {
+    "not_finite": "no numbers", "invalid_code": 'codes for "no value"', "out_of_range": "out of range",
+    "frozen": "frozen", "joined": "a filled gap",
+}  # fmt: skip
+
+
+def _why_empty(origin: Origin) -> str:
+    """Return why no sample of a signal is used."""
+    counts = [f"{n} {word}" for kind, word in _WHY.items() if (n := getattr(origin, kind))]
+    of = f"of {origin.samples} samples {', '.join(counts)}" if counts else "no sample"
+    return f"{origin.symbol} ({origin.file}:{origin.channel} [{origin.unit}]): {of}"
+
+
+def _nothing_usable(whys: Sequence[str], found: Found) -> SignalError:
+    return SignalError(
+        f"no usable signal{': ' if whys else ''}{'; '.join(whys[:NAMED])}",
+        where=", ".join(dict.fromkeys(info.file for _, info in found.values())),
+        expected="at least wheel speeds",
+        hint="`aqualog inspect LOG` shows what each channel holds; a unit or a channel that is wrong is put right in "
+        "the signal map",
+    )
 
 
 def cleaners_of(

@@ -102,8 +102,9 @@ def doctor(run: Run, out: Path | None) -> Output:
 
     Every file is read to its end: damage, time stamps that jump, samples that are no numbers, codes, signals that stand
     still. Then the drive is judged as `detect` would see it: units, ranges, sensors that contradict each other, and
-    which detectors lack what. Only -o writes a file. Exit codes: 0 nothing lost, 3 something lost or a file of several
-    cannot be read, 4 nothing lost but no signal that aqualog knows, or no samples at all, 1 nothing can be read.
+    which detectors lack what. Without a map signals are guessed as `detect` guesses them. Only -o writes a file. Exit
+    codes: 0 nothing lost, whatever values are left out; 3 something lost or a file of several cannot be read; 4 nothing
+    lost but no signal that aqualog knows, or no samples at all; 1 nothing can be read.
 
     \b
     Examples:

@@ -161,7 +161,9 @@ def _entry(signals: Table, symbol: str) -> Entry | None:
     if numbers.get("scale") == 0.0:
         signals.add(symbol, f"{symbol}: scale = 0 would erase the signal")
     unit = None if unit is None else str(unit)
-    return Entry(symbol, names, unit, **numbers, invalid=tuple(float(i) for i in invalid))
+    return Entry(
+        symbol, names, unit, **numbers, invalid=tuple(float(i) for i in invalid), line=signals.line_of(symbol) or 0
+    )
 
 
 def map_text(

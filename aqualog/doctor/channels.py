@@ -12,6 +12,7 @@ from aqualog.doctor.findings import Finding, Level
 __all__ = ["channel_findings"]
 
 _HABIT = 0.01  # of the stamps doubled here and there are a logger's habit; more are samples lost to a wrong clock
+_HABITUAL: dict[str, Level] = {"duplicates": "mended", "strays": "left_out"}
 _TIMES: dict[str, tuple[Level, str, str]] = {
     "duplicates": (
         "lost", "time stamps doubled; the last sample of each is kept",
@@ -50,8 +51,8 @@ def channel_findings(
             if count and (own.file, kind, count) not in told:
                 told.add((own.file, kind, count))
                 level, what, advice = _TIMES[kind]
-                if kind == "duplicates" and count <= _HABIT * own.samples:
-                    level = "mended"
+                if count <= _HABIT * own.samples:
+                    level = _HABITUAL.get(kind, level)
                 fault, _, rule = what.partition("; ")
                 told_as = f"{count} {fault}{own.faults.place(kind)}; {rule}"
                 first_s = own.faults.first_s.get(kind)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from aqualog.align.clean import corrected
 from aqualog.align.clock import estimate_clock
-from aqualog.align.mapping import SignalMap
+from aqualog.align.mapping import SignalMap, align_command
 from aqualog.align.quantity import Quantity, find_quantity
 from aqualog.core.errors import FitError, SignalError
 from aqualog.core.records import Channel
@@ -35,8 +35,15 @@ def on_clock(speed: Quantity, signal_map: SignalMap) -> Quantity:
     return replace(speed, t_ns=corrected(speed.t_ns, signal_map, speed.file))
 
 
-def clock_findings(speeds: Sequence[Quantity]) -> Iterator[Finding]:
+def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_path: str) -> Iterator[Finding]:
     """Yield findings for each file whose clock runs at another rate than the first one's, or differs by an offset.
+
+    Parameters
+    ----------
+    speeds : sequence of Quantity
+    paths : mapping file name -> path
+    map_path : str
+        Signal map of the drive; empty without one.
 
     Clocks are not compared where the match of the speeds is weak or their common time short.
     """
@@ -58,7 +65,9 @@ def clock_findings(speeds: Sequence[Quantity]) -> Iterator[Finding]:
                 f"its clock drifts by {fit.drift_ppm:+.0f} ppm (95 % {low:+.0f} to {high:+.0f}) against "
                 f"{reference.file}, {shift:+.3f} s over {fit.overlap_s:.0f} s, by the speed in both"
             )
-            yield Finding("doubt", "drifts", source.file, source.label, what, _advice(reference, source), 1)
+            yield Finding(
+                "doubt", "drifts", source.file, source.label, what, _advice(paths, map_path, reference, source), 1
+            )
         low, high = fit.offset_ci95
         if not apart and low * high > 0.0 and min(abs(low), abs(high)) > _SENSOR_S:
             side = "after" if fit.offset_s > 0.0 else "before"
@@ -66,8 +75,11 @@ def clock_findings(speeds: Sequence[Quantity]) -> Iterator[Finding]:
                 f"its speed comes {abs(fit.offset_s):.2f} s {side} the same in {reference.file} "
                 f"(95 % {low:+.2f} to {high:+.2f} s), by the speed in both"
             )
-            yield Finding("doubt", "offset", source.file, source.label, what, _advice(reference, source), 1)
+            yield Finding(
+                "doubt", "offset", source.file, source.label, what, _advice(paths, map_path, reference, source), 1
+            )
 
 
-def _advice(reference: Quantity, source: Quantity) -> str:
-    return f"aqualog align {reference.file} {source.file} --write-map"
+def _advice(paths: Mapping[str, str], map_path: str, *speeds: Quantity) -> str:
+    logs = [paths.get(s.file, s.file) for s in speeds]
+    return align_command(logs, map_path)

@@ -77,12 +77,13 @@ def _examined(
     if any(f.level == "unreadable" for f in findings):
         return Examination(tuple(files), tuple(findings))
     report("looking at the drive")
-    findings += clock_findings(speeds)
+    findings += clock_findings(speeds, {p.name: str(p) for p in paths}, signal_map.path)
     try:
         signals = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
         result = detect_drive(signals, vehicle)
     except AqualogError as error:
-        whole = Finding("doubt", "no_signals", "", "", error.what, error.hint)
+        what = error.what + (f"; expected {error.expected}" if error.expected else "")
+        whole = Finding("doubt", "no_signals", error.where, "", what, error.hint)
         none: tuple[tuple[str, tuple[str, ...]], ...] = tuple((d, ()) for d in DETECTORS)
         return Examination(tuple(files), (*findings, whole), (), none, tuple(pictures))
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
@@ -170,6 +171,6 @@ def _of_signals(
     for note in dict.fromkeys(notes):
         own = next(((f, c) for f, c in frozen if note.startswith(f"{f}:{c}: ") and "is frozen" in note), None)
         if own is not None:
-            yield Finding("lost", "frozen", *own, note.removeprefix(f"{own[0]}:{own[1]}: "))
+            yield Finding("left_out", "frozen", *own, note.removeprefix(f"{own[0]}:{own[1]}: "))
         elif not any(what in note for what in told) and "time stamps:" not in note:
-            yield Finding("lost" if "left out" in note else "doubt", "signal", "", "", note)
+            yield Finding("left_out" if "left out" in note else "doubt", "signal", "", "", note)

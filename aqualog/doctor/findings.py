@@ -9,9 +9,9 @@ from aqualog.core.records import FloatArray
 
 __all__ = ["Examination", "FileState", "Finding", "Level", "Picture"]
 
-Level = Literal["unreadable", "lost", "mended", "doubt"]
-"""`unreadable`: nothing could be read; `lost`: samples are gone or not used; `mended`: a fault of the time stamps was
-repaired; `doubt`: nothing is lost, but the user should check."""
+Level = Literal["unreadable", "lost", "left_out", "mended", "doubt"]
+"""`unreadable`: nothing could be read; `lost`: samples are gone; `left_out`: they are there, but not used; `mended`: a
+fault of the time stamps was repaired; `doubt`: nothing is lost, but the user should check."""
 
 
 @dataclass(frozen=True, slots=True)

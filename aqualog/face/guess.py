@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from aqualog.core.vehicle import Vehicle
     from aqualog.face.drive import Drive
 
-__all__ = ["load_or_guess"]
+__all__ = ["guessed", "load_or_guess"]
 
 _NAMED = 3  # signals in the note
 
@@ -57,8 +57,7 @@ def load_or_guess(
         found = _guesses(drive)
         if not any(s.startswith("omega_") for s in found):
             return drive, loaded, ()
-    entries = {s: p.entry for s, p in found.items()}
-    own = replace(drive, signal_map=replace(drive.signal_map, entries=entries), _loaded={})
+    own = _with(drive, found)
     try:
         return own, load(own), (_note(found),)
     except AqualogError:
@@ -67,8 +66,35 @@ def load_or_guess(
         return drive, loaded, ()  # what is guessed does not go together: what is known does
 
 
+def guessed(drive: Drive) -> tuple[Drive, str]:
+    """Return the drive with the map that `load_or_guess` would take, and the note on it, without loading it.
+
+    As it is, with an empty note, where nothing is guessed.
+    """
+    if drive.given is not None or drive.signal_map.entries:
+        return drive, ""
+    try:
+        known, found = _proposals(drive)
+    except AqualogError:
+        return drive, ""
+    is_wheel = [s.startswith("omega_") for s in found]
+    return (_with(drive, found), _note(found)) if any(is_wheel) or (found and not known) else (drive, "")
+
+
+def _with(drive: Drive, found: Mapping[str, Proposal]) -> Drive:
+    entries = {s: p.entry for s, p in found.items()}
+    return replace(drive, signal_map=replace(drive.signal_map, entries=entries), _loaded={})
+
+
 def _guesses(drive: Drive) -> Mapping[str, Proposal]:
-    """Return the proposals that need a map; none if the log cannot be read or is too long for memory.
+    """Return the proposals that need a map, as `_proposals`."""
+    return _proposals(drive)[1]
+
+
+def _proposals(drive: Drive) -> tuple[frozenset[str], Mapping[str, Proposal]]:
+    """Return the signals that need no map, and the proposals that do.
+
+    None if the log cannot be read, is too long for memory, or has all wheel speeds by name.
 
     Raises
     ------
@@ -82,14 +108,16 @@ def _guesses(drive: Drive) -> Mapping[str, Proposal]:
 
     try:
         with drive.reading(), DriveLog(drive.paths, read_options(drive.signal_map, drive.dbc)) as log:
-            if sum(c.count for c in log.channels()) >= LONG:
-                return {}
+            names = {c.name for c in log.channels()}
+            if sum(c.count for c in log.channels()) >= LONG or all(f"omega_{w}" in names for w in WHEELS):
+                return frozenset(), {}
             channels, _ = log.read_readable()
     except AqualogError:
-        return {}
-    found = {s: p for s, p in look_at(channels).proposals.items() if p.reason != CANONICAL}
+        return frozenset(), {}
+    proposals = look_at(channels).proposals
+    found = {s: p for s, p in proposals.items() if p.reason != CANONICAL}
     check_one_drive([(c.info.file, c.info.path) for c in channels], found.values())
-    return found
+    return frozenset(proposals.keys() - found.keys()), found
 
 
 def _note(found: Mapping[str, Proposal]) -> str:

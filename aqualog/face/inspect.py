@@ -279,7 +279,7 @@ class Health(Result):
 
         made = go.Figure()
         files = [f.file for f in self.examination.files]
-        for level in ("unreadable", "lost", "mended", "doubt"):
+        for level in ("unreadable", "lost", "left_out", "mended", "doubt"):
             own = [f.file for f in self.examination.findings if f.level == level]
             made.add_bar(x=files, y=[own.count(f) for f in files], name=level)
         made.update_layout(title=self.drive.title, barmode="stack", template="plotly_white")
@@ -312,7 +312,8 @@ def exit_code(found: Examination) -> ExitCode:
 def doctor(drive: DriveLike, vehicle: PathLike | Vehicle | None = None, *, progress: Progress = None) -> Health:
     """Report what is wrong with the files of one drive, what was lost, and what to do.
 
-    Every file is read to its end. A file that cannot be read is a finding, not an error.
+    Every file is read to its end. A file that cannot be read is a finding, not an error. Without a map and wheel speeds
+    signals are guessed as `aq.detect` guesses them, and a finding says so.
 
     Parameters
     ----------
@@ -328,13 +329,18 @@ def doctor(drive: DriveLike, vehicle: PathLike | Vehicle | None = None, *, progr
     >>> aq.doctor("drive.mf4").tables["findings"]
     """
     from aqualog.doctor.examine import examine
+    from aqualog.doctor.findings import Finding
+    from aqualog.face.guess import guessed
 
-    one = drive_of(drive)
+    one, note = guessed(drive_of(drive))
     with one.reading():
         found = examine(
             list(one.paths), vehicle=vehicle_of(vehicle, one), signal_map=one.signal_map, dbc=one.dbc,
             report=listener(progress),
         )  # fmt: skip
+    if note:
+        own = Finding("doubt", "guessed", "", "", *note.partition(". ")[::2])
+        found = replace(found, findings=(own, *found.findings))
     return Health(one, found, has_loss=found.has_loss, sources=one.sources)
 
 

@@ -19,13 +19,15 @@ __all__ = ["examination_document", "examination_report"]
 
 _HEADS = {
     "unreadable": "Cannot be read:",
-    "lost": "Lost or not used:",
+    "lost": "Lost:",
+    "left_out": "Left out:",
     "mended": "Mended:",
     "doubt": "Worth checking:",
 }
 _LEVELS = {
     "unreadable": ("unreadable", "full", "cannot be read"),
-    "lost": ("lost", "full", "lost or not used"),
+    "lost": ("lost", "full", "lost"),
+    "left_out": ("left out", "partial", "left out"),
     "doubt": ("check", "partial", "worth checking"),
     "mended": ("mended", "ran", "mended"),
 }
@@ -80,7 +82,9 @@ def _page(found: Examination, lacks: list[tuple[str, tuple[str, ...]]], figures:
     told = [f"{n} {_LEVELS[level][2]}" for level, n in counts.items() if n]
     head = f"{counted(len(ordered), 'finding')}: {', '.join(told)}" if ordered else "No problem found"
     able = f"{counted(len(found.ready), 'detector')} can run" if found.ready else "No detector can run"
-    look = "full" if found.has_loss else "partial" if counts["doubt"] or not found.ready else "none"
+    look = (
+        "full" if found.has_loss else "partial" if counts["doubt"] or counts["left_out"] or not found.ready else "none"
+    )
     rows: list[list[str | Cell]] = [
         [Cell(_LEVELS[f.level][0], tag=_LEVELS[f.level][1]), cut(f.file, CELL) or "–", cut(f.channel, CELL) or "–",
          upper_first(cut(f.what, NOTE)), cut(f.advice, NOTE) or "–"]
@@ -140,11 +144,11 @@ def _picture(p: Picture, *, is_alone: bool) -> dict[str, Any]:
 
 
 def examination_document(found: Examination) -> dict[str, Any]:
-    """For JSON; `healthy` if nothing was lost."""
+    """For JSON; `healthy` if nothing was lost or left out."""
     return {
         "schema_version": 1,
         "tool_version": __version__,
-        "healthy": not found.has_loss,
+        "healthy": not found.has_loss and all(f.level != "left_out" for f in found.findings),
         "files": [asdict(f) for f in found.files],
         "findings": [asdict(f) for f in found.findings],
         "detectors": {"ready": list(found.ready), "missing": {name: list(s) for name, s in found.missing if s}},

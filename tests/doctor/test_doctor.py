@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -10,12 +11,14 @@ from aqualog.align.freezes import longest_stop
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap, SourceClock
 from aqualog.cli.main import app
+from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.doctor import examine as examination
 from aqualog.doctor.examine import examine
 from aqualog.doctor.findings import Examination, FileState, Finding
 from aqualog.face.inspect import exit_code
 from aqualog.io.write_mdf import MdfGroup, write_mf4
+from tests.commands import run
 from tests.conftest import ROOT
 
 SAMPLES = ROOT / "sample_logs"
@@ -148,7 +151,7 @@ def test_values(tmp_path):
     x[500:1900, 1] = x[500, 1]
     x[10:20, 3] = np.nan
     found, _ = kinds(tmp_path, table(x))
-    frozen = found["lost", "frozen"]  # once, and not as worth a look, too
+    frozen = found["left_out", "frozen"]  # once, and not as worth a look, too
     assert ("doubt", "frozen") not in found
     assert (frozen.channel, frozen.file) == ("omega_fl", "x.csv")
     assert "1399 samples (first at 5.00 s) only repeat the one before, for up to 14.0 s" in frozen.what
@@ -358,3 +361,96 @@ def test_a_log_that_changes_while_it_is_looked_at_is_a_loss(tmp_path, monkeypatc
     found = examine([path], vehicle=CAR, signal_map=SignalMap())
     assert [(f.kind, f.file) for f in found.findings if f.kind == "changed"] == [("changed", "a.csv")]
     assert found.has_loss
+
+
+@pytest.mark.parametrize("change", ["none", "frozen", "spike", "doubled", "cut"])
+def test_doctor_and_detect_end_with_the_same_code(change, tmp_path):
+    """3 where a log lost data; what is left out of a whole log is no loss."""
+    x = drive()
+    if change == "frozen":
+        x[500:1900, 1] = x[500, 1]
+    if change == "spike":
+        x[700:720, 1] = 5000.0
+    if change == "doubled":
+        x = doubled(x)
+    path = tmp_path / "x.csv"
+    path.write_text(table(x))
+    if change == "cut":
+        path = tmp_path / "x.mcap"
+        whole = (SAMPLES / "lane_drive.mcap").read_bytes()
+        path.write_bytes(whole[: len(whole) * 3 // 4])
+    log = [path, "--signals", SAMPLES / "map_mcap.toml"] if change == "cut" else [path]
+    codes = {name: run(name, *log).exit_code for name in ("doctor", "detect")}
+    assert codes == dict.fromkeys(codes, 3 if change in ("doubled", "cut") else 0)
+    document = json.loads(run("doctor", *log, "--json").stdout)
+    assert document["healthy"] == (change == "none")
+
+
+def test_without_a_map_doctor_guesses_as_detect_does(tmp_path):
+    rows = drive(4000)
+    rows = np.column_stack([rows, rows[:, 1:3]])
+    names = ["t [s]", "Wheel Speed FL [rad/s]", "Wheel Speed FR [rad/s]", "Speed [m/s]", "Wheel Speed RL [rad/s]",
+             "Wheel Speed RR [rad/s]"]  # fmt: skip
+    path = tmp_path / "x.csv"
+    path.write_text(table(rows, header=",".join(names)))
+    done = run("doctor", path, "--json")
+    found = json.loads(done.stdout)
+    assert done.exit_code == 0
+    (guess,) = [f for f in found["findings"] if f["kind"] == "guessed"]
+    assert guess["what"].startswith("no signal map: ")
+    assert "omega_fl = Wheel Speed FL" in guess["what"]
+    assert "aqualog init" in guess["advice"]
+    assert "spin_down" in found["detectors"]["ready"]
+    detected = json.loads(run("detect", path, "--json").stdout)
+    assert any(n.startswith(guess["what"]) for n in detected["quality"]["notes"])
+
+
+def test_a_drive_with_names_that_are_known_has_no_guess(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(table(drive()))
+    assert not [f for f in json.loads(run("doctor", path, "--json").stdout)["findings"] if f["kind"] == "guessed"]
+
+
+def test_clocks_that_disagree_are_answered_with_what_to_type(tmp_path):
+    rng = np.random.default_rng(4)
+    t = np.arange(4000) * 0.05
+    v = 20.0 + np.convolve(rng.normal(0.0, 1.0, t.size + 200), np.hanning(201) / 12.0, mode="valid")
+    wheels, gps = tmp_path / "wheels.csv", tmp_path / "my gps.csv"
+    wheels.write_text(table(np.column_stack([t + 5.0, *[v / 0.317] * 2]), header=WHEELS))
+    gps.write_text(table(np.column_stack([t + 5.7, v + rng.normal(0.0, 0.01, t.size)]), header="t [s],v_x [m/s]"))
+    found = examine([wheels, gps], vehicle=CAR, signal_map=SignalMap())
+    (told,) = [f for f in found.findings if f.kind == "offset"]
+    typed = told.advice.split("`")[1]
+    assert typed == f"aqualog align {wheels} '{gps}' --write-map map.toml"
+    assert told.advice.endswith("then the command again with --signals map.toml")
+    mapped = examine([wheels, gps], vehicle=CAR, signal_map=SignalMap(path="map.toml"))
+    (told,) = [f for f in mapped.findings if f.kind == "offset"]
+    assert "--signals map.toml --write-map clocks.toml" in told.advice
+    assert run(*shlex.split(typed)[1:-1], tmp_path / "map.toml").exit_code == 0
+    again = examine([wheels, gps], vehicle=CAR, signal_map=load_signal_map(tmp_path / "map.toml"))
+    assert not [f for f in again.findings if f.kind == "offset"]
+
+
+def test_a_log_without_any_number_says_of_which_channel(tmp_path):
+    x = drive(500)
+    x[:, 1:] = np.nan
+    path = tmp_path / "x.csv"
+    path.write_text(table(x))
+    done = run("detect", path)
+    assert done.exit_code == 4
+    err = done.stderr
+    assert "x.csv: no usable signal: " in err
+    assert "omega_fl (x.csv:omega_fl [rad/s]): of 500 samples 500 no numbers" in err
+    assert "aqualog inspect" in err
+
+
+def test_a_wrong_name_in_a_map_has_its_line_and_what_the_log_has(tmp_path):
+    path, signal_map = tmp_path / "x.csv", tmp_path / "map.toml"
+    path.write_text(table(drive(500)))
+    signal_map.write_text('[signals]\n# wheels\nomega_rl = "omega_f"\na_x = "Beschleunigung"\n')
+    for name in ("detect", "doctor"):
+        done = run(name, path, "--signals", signal_map)
+        assert done.exit_code == 4
+        assert 'line 3: omega_rl: no channel "omega_f" (nearest: "omega_f' in done.output
+        assert 'line 4: a_x: no channel "Beschleunigung" in x.csv, which has omega_fl, omega_fr, v_x' in done.output
+        assert "map.toml: line 3" in done.output

@@ -51,7 +51,7 @@ def test_pictures_have_few_samples_and_the_times_of_the_faults(found):
 def test_page_begins_with_the_gravest_finding_and_marks_it(found):
     page = report_page(examination_report(found), title="drive")
     words = re.sub(r"<[^>]+>|\s+", " ", page[page.index("<h1>") : page.index("<footer>")])
-    assert "4 findings: 1 lost or not used, 2 worth checking, 1 mended" in words
+    assert "4 findings: 1 lost, 2 worth checking, 1 mended" in words
     assert words.index("100 of 10000 samples") < words.index("Stands at 50") < words.index("2 overflows")
     assert words.index("2 overflows") < words.index("Detectors")
     figures = json.loads(re.search(r'id="figure-data">(.*?)</script>', page, re.DOTALL)[1])
@@ -63,5 +63,5 @@ def test_page_begins_with_the_gravest_finding_and_marks_it(found):
 
 def test_text_is_without_the_page_s_tables(found):
     text = report_text(examination_report(found))
-    assert text.startswith("drive.mf4: MDF, 1,000 bytes, 2 channels, 20,000 samples, 100.0 s\n\nlost or not used:\n")
+    assert text.startswith("drive.mf4: MDF, 1,000 bytes, 2 channels, 20,000 samples, 100.0 s\n\nlost:\n")
     assert text.count("stands at 50") == 1

@@ -249,8 +249,9 @@ DOCTOR = Document(
             *or_null(number("start_s", "s", "first sample"), number("end_s", "s", "last sample")),
         )),
         rows("findings", "what was found, the worst first", (
-            text("level", "unreadable: no data could be read; lost: samples are gone or not used; mended: a fault of "
-                 "the time stamps was undone; doubt: worth checking", ("unreadable", "lost", "mended", "doubt")),
+            text("level", "unreadable: no data could be read; lost: samples are gone; left_out: they are there, "
+                 "but not used; mended: a fault of the time stamps was undone; doubt: worth checking",
+                 ("unreadable", "lost", "left_out", "mended", "doubt")),
             text("kind", "short name of the fault"),
             text("file", "file; empty for the whole drive"),
             text("channel", "channel; empty for the whole file"),

@@ -18,7 +18,10 @@ MEANINGS = {
     ExitCode.USAGE: ("usage or configuration", "an option, a name or a settings file is wrong, or a file would be "
                      "overwritten; nothing was done"),
     ExitCode.PARTIAL: ("done, but not with all data", "the result is there; data of a log was lost, or some logs could "
-                       "not be read"),
+                       "not be read. Lost is what a file that is cut off, damaged or changed no longer has, and "
+                       "samples whose time stamps are doubled or stray, from 1 % on. Values that aqualog leaves out "
+                       "(dropouts, spikes, frozen, filled or impossible ones) are reported, and are no loss. `doctor` "
+                       "reads all channels, other commands those that they need"),
     ExitCode.NOTHING_USABLE: ("nothing usable", "signals are missing, or the data do not carry the estimate"),
     ExitCode.GATE_TRIPPED: ("a gate has tripped", "`--fail-on-event` found an episode of aquaplaning, or a `--gate` "
                             "was not kept; it wins over 3"),
