@@ -104,7 +104,7 @@ def doctor(run: Run, out: Path | None) -> Output:
     still. Then the drive is judged as `detect` would see it: units, ranges, sensors that contradict each other, and
     which detectors lack what. Without a map signals are guessed as `detect` guesses them. Only -o writes a file. Exit
     codes: 0 nothing lost, whatever values are left out; 3 something lost or a file of several cannot be read; 4 nothing
-    lost but no signal that aqualog knows, or no samples at all; 1 nothing can be read.
+    lost but no detector can run, or no samples at all; 1 nothing can be read.
 
     \b
     Examples:

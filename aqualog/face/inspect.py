@@ -304,7 +304,7 @@ def exit_code(found: Examination) -> ExitCode:
         return ExitCode.FAILED
     if found.has_loss and any(f.samples for f in found.files):
         return ExitCode.PARTIAL
-    if any(f.kind == "no_signals" for f in found.findings):
+    if not found.ready:  # as `detect` ends
         return ExitCode.NOTHING_USABLE
     return ExitCode.PARTIAL if found.has_loss else ExitCode.DONE
 

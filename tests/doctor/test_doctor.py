@@ -363,7 +363,7 @@ def test_a_log_that_changes_while_it_is_looked_at_is_a_loss(tmp_path, monkeypatc
     assert found.has_loss
 
 
-@pytest.mark.parametrize("change", ["none", "frozen", "spike", "doubled", "cut"])
+@pytest.mark.parametrize("change", ["none", "frozen", "spike", "doubled", "cut", "no wheels", "no name"])
 def test_doctor_and_detect_end_with_the_same_code(change, tmp_path):
     """3 where a log lost data; what is left out of a whole log is no loss."""
     x = drive()
@@ -373,17 +373,19 @@ def test_doctor_and_detect_end_with_the_same_code(change, tmp_path):
         x[700:720, 1] = 5000.0
     if change == "doubled":
         x = doubled(x)
+    header = {"no wheels": "t [s],v_x [m/s],brake_pressure [bar],a_x [m/s^2]", "no name": "t [s],a,b,c"}
     path = tmp_path / "x.csv"
-    path.write_text(table(x))
+    path.write_text(table(x, **{"header": header[change]} if change in header else {}))
     if change == "cut":
         path = tmp_path / "x.mcap"
         whole = (SAMPLES / "lane_drive.mcap").read_bytes()
         path.write_bytes(whole[: len(whole) * 3 // 4])
     log = [path, "--signals", SAMPLES / "map_mcap.toml"] if change == "cut" else [path]
     codes = {name: run(name, *log).exit_code for name in ("doctor", "detect")}
-    assert codes == dict.fromkeys(codes, 3 if change in ("doubled", "cut") else 0)
+    expected = {"doubled": 3, "cut": 3, "no wheels": 4, "no name": 4}.get(change, 0)
+    assert codes == dict.fromkeys(codes, expected)
     document = json.loads(run("doctor", *log, "--json").stdout)
-    assert document["healthy"] == (change == "none")
+    assert document["healthy"] == (change in ("none", "no name"))
 
 
 def test_without_a_map_doctor_guesses_as_detect_does(tmp_path):
