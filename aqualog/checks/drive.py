@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
-from aqualog.checks.driven import LEAST_DRIVE, STILL, drives, shown
+from aqualog.checks.driven import LEAST_DRIVE, LEAST_SAMPLES, STILL, drives, shown
 from aqualog.checks.slip import AXLE, slip_doubts
 from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
