@@ -42,7 +42,7 @@ def detect(
       aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
       aqualog detect drive.mf4 --vehicle car.toml --model model.toml
     """
-    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.detect import DETECT_FILES, detect
     from aqualog.io.write_log import check_suffix
@@ -86,8 +86,25 @@ def detect(
         *result.notes,
         *([f"results are in {out}: {', '.join(DETECT_FILES)}"] if out is not None else []),
     ]
-    has_tripped = fail_on_event and result.verdict == "aquaplaning"
-    return Output(result, notes, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)
+    return Output(result, notes, code=_gate(run, result) if fail_on_event else None)
+
+
+def _gate(run: Run, result: Detection) -> int | None:
+    """The exit code of `--fail-on-event`: a drive that could not be judged has not passed."""
+    from aqualog.core.errors import ExitCode, SignalError
+    from aqualog.report.drive.judged import headline
+
+    if result.verdict == "aquaplaning":
+        return int(ExitCode.GATE_TRIPPED)
+    if result.verdict == "none":
+        return None
+    judgement = result.drive_result.judgement
+    open_gate = SignalError(
+        f"--fail-on-event has no answer. {headline(judgement)}", where=result.drive.title,
+        expected="a drive that can be judged", hint="aqualog doctor, which says what to mend",
+    )  # fmt: skip
+    run.console.error(open_gate.line())
+    return int(open_gate.exit_code)
 
 
 def _history_notes(result: Detection, path: Path | None, configuration: str) -> list[str]:

@@ -147,7 +147,10 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         str, "robust", "--reference", metavar="RULE",
         help="Dry slope of the history: robust (upper quartile of the periods' means) or max (as the thesis).",
     ),
-    "fail_on_event": _flag("Exit with 5 if there was an episode of aquaplaning.", "--fail-on-event"),
+    "fail_on_event": _flag(
+        "Exit with 5 if there was an episode of aquaplaning, and with 4 if aquaplaning could not be judged.",
+        "--fail-on-event",
+    ),
     "out:slopes": _file("Folder for slip_slope.json, .csv and .html.", metavar="DIR"),
     "method": _option(
         str, "auto", "--method", metavar="NAME",

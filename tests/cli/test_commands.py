@@ -130,15 +130,28 @@ def test_the_verdict_is_the_first_line_and_in_the_document():
     assert sorted(episode["events"]) == list(range(len(document["events"])))
 
 
-def test_gate(tmp_path):
-    """Only an episode of aquaplaning trips it: no lock-up, no single detector, nothing that cannot be judged."""
+def test_gate_on_an_event():
+    """An episode of aquaplaning trips it; a drive that could not be judged does not pass, and is written whole."""
     assert run("detect", MF4, "--vehicle", CAR, "--fail-on-event").exit_code == 5
+    assert run("detect", MF4, "--json").exit_code == 0
     told = run("detect", MF4, "--fail-on-event", "--json")
-    assert told.exit_code == 0, told.stderr
+    assert told.exit_code == 4, told.stderr
+    (line,) = [x for x in told.stderr.splitlines() if x.startswith("error: ")]
+    assert "--fail-on-event" in line
+    assert "no drivetrain in a vehicle file, no mass" in line
+    assert "Try: " in line
     document = json.loads(told.stdout)
     assert document["verdict"] == "cannot_be_judged"
     assert document["missing"] == ["vehicle.drivetrain", "vehicle.mass"]
     assert {e["detector"] for e in document["events"]} == {"spin_down"}
+
+
+def test_a_gate_on_an_event_passes_a_dry_drive(tmp_path):
+    scenario = tmp_path / "dry.toml"
+    scenario.write_text(f'vehicle = "{CAR}"\nduration_s = 20.0\nspeed_kmh = 90.0\nseed = 1\n')
+    assert run("simulate", scenario, "-o", tmp_path / "dry.parquet").exit_code == 0
+    passed = run("detect", tmp_path / "dry.parquet", "--vehicle", CAR, "--fail-on-event")
+    assert passed.exit_code == 0, passed.stderr
 
 
 def test_missing_signals_end_with_4_and_one_line(tmp_path):

@@ -22,7 +22,8 @@ MEANINGS = {
                        "samples whose time stamps are doubled or stray, from 1 % on. Values that aqualog leaves out "
                        "(dropouts, spikes, frozen, filled or impossible ones) are reported, and are no loss. `doctor` "
                        "reads all channels, other commands those that they need"),
-    ExitCode.NOTHING_USABLE: ("nothing usable", "signals are missing, or the data do not carry the estimate"),
+    ExitCode.NOTHING_USABLE: ("nothing usable", "signals are missing, the data do not carry the estimate, or with "
+                              "`--fail-on-event` aquaplaning could not be judged; it wins over 3"),
     ExitCode.GATE_TRIPPED: ("a gate has tripped", "`--fail-on-event` found an episode of aquaplaning, or a `--gate` "
                             "was not kept; it wins over 3"),
     ExitCode.INTERRUPTED: ("interrupted", "Ctrl-C or a request to end; files that were finished are whole"),
