@@ -108,7 +108,7 @@ def _ages(dt, peak, since, after, g, active):  # type: ignore[no-untyped-def]
     for i in range(g.size):
         after += dt
         since += dt
-        if g[i] <= 0.0:
+        if g[i] <= 0.0 or (math.isnan(g[i]) and peak == 0.0):
             peak, since = 0.0, 0.0
         elif g[i] >= peak:
             peak = g[i]
@@ -128,7 +128,7 @@ def ages(dt: float, state: Ages, g: FloatArray, active: BoolArray) -> tuple[Floa
     state : Ages
         From `new_ages` or the piece before.
     g, active : array (n,)
-        Statistic and alarm of `scan`. NaN: time goes on.
+        Statistic and alarm of `scan`. NaN: time goes on, and a sum of zero stays zero.
 
     Returns
     -------

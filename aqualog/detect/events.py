@@ -18,6 +18,8 @@ Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 SINCE, AFTER = "since_s", "after_s"
 """Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`)."""
 
+REACH_S = 10.0  # [s] no cause began so long before its detection
+
 Severity = Callable[[Mapping[str, Any]], str]
 Explain = Callable[[dict[str, Any]], dict[str, Any]]
 
@@ -74,10 +76,12 @@ class _Builder:
         self._explain = explain
         self._offset = 0
         self._open: _Open | None = None
+        self._gaps: list[tuple[int, int]] = []  # samples without a statistic, [first, end)
 
     def push(self, bits: BoolArray, statistic: FloatArray, evidence: Evidence) -> list[Event]:
         """Return events that end within this piece."""
         closed: list[Event] = []
+        self._note_gaps(np.isnan(statistic))
         edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             if begin > 0:
@@ -96,6 +100,20 @@ class _Builder:
         """Return the event that is open at the end of the drive."""
         return self._close(self._offset)
 
+    def _note_gaps(self, lacks: BoolArray) -> None:
+        oldest = (self._offset if self._open is None else self._open.start) - REACH_S * 1e9 / self._dt_ns
+        self._gaps = [g for g in self._gaps if g[1] >= oldest]
+        edges = self._offset + np.flatnonzero(np.diff(np.concatenate([[False], lacks, [False]]).astype(np.int8)))
+        for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            is_one = self._gaps and self._gaps[-1][1] == begin
+            first = self._gaps.pop()[0] if is_one else begin
+            self._gaps.append((first, end))
+
+    def _gap_s(self, at_s: float) -> tuple[float, float]:
+        """The gap that a moment lies within, or that moment twice. [s]"""
+        spans = ((first * self._dt_ns / 1e9, end * self._dt_ns / 1e9) for first, end in reversed(self._gaps))
+        return next((g for g in spans if g[0] < at_s < g[1]), (at_s, at_s))
+
     def _close(self, end: int) -> list[Event]:
         if self._open is None:
             return []
@@ -103,12 +121,13 @@ class _Builder:
         start_s, end_s = opened.start * self._dt_ns / 1e9, end * self._dt_ns / 1e9
         since, after = (opened.evidence.pop(name, 0.0) for name in (SINCE, AFTER))
         # a wheel may report a puddle when the car has left it: then the cause is over before the event begins
-        cause_end = max(end_s - after, 0.0)
+        cause_end = self._gap_s(max(end_s - after, 0.0))[0]
+        cause_start = self._gap_s(max(start_s - since, 0.0))[1]  # a cause is known only where there are data
         return [
             Event(
                 **self._place, start_s=start_s, end_s=end_s, severity=self._severity(opened.evidence),
                 peak=opened.peak, threshold=self._threshold, evidence=self._explain(opened.evidence),
-                cause_s=(min(max(start_s - since, 0.0), cause_end), cause_end),
+                cause_s=(min(cause_start, cause_end), cause_end),
             )
         ]  # fmt: skip
 

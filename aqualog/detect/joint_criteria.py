@@ -135,7 +135,7 @@ class JointCriteriaWatch:
         )
         bits = found.behind(gate, slope)
         count = np.sum([bits[k] for k in GATED], axis=0, dtype=np.float64)
-        warned: BoolArray = np.asarray(count > 0)
+        warned: BoolArray = np.asarray((count > 0) & ~np.isnan(x))
         active, self._hold = hold_on(warned, self._hold, seconds=HOLD, dt=self._dt)
         name = self._setup.detector.name
         track = Track(name, None, None, "-", np.where(np.isnan(x), np.nan, count), 1.0, active)

@@ -5,7 +5,7 @@ import pytest
 
 from aqualog.core.records import Track
 from aqualog.detect import cusum
-from aqualog.detect.events import AFTER, EventBook
+from aqualog.detect.events import AFTER, SINCE, EventBook
 from aqualog.detect.resistance import alarm_params
 
 DT = 0.01
@@ -64,3 +64,36 @@ def test_a_cause_may_be_over_before_its_event_begins():
     assert (event.start_s, event.end_s) == (0.5, 0.7)
     assert event.cause_s == (pytest.approx(0.41), pytest.approx(0.41))
     assert AFTER not in event.evidence
+
+
+def booked(bits, statistic, since, cuts=()):
+    book, events = EventBook(10_000_000), []
+    for part in np.split(np.arange(bits.size), cuts):
+        track = Track("resistance", None, None, "-", statistic[part], 1.0, bits[part])
+        events += book.take(track, {SINCE: ("first", since[part])}, lambda _: "partial")
+    return [e.cause_s for e in (*events, *book.finish())]
+
+
+@pytest.mark.parametrize("cuts", [(), (35,), (20, 40, 41, 55)])
+@pytest.mark.parametrize(("since", "begin"), [(0.05, 0.45), (0.15, 0.40), (0.38, 0.40), (0.45, 0.05)])
+def test_no_cause_begins_where_there_are_no_data(since, begin, cuts):
+    statistic, bits = np.ones(100), np.zeros(100, dtype=bool)
+    statistic[10:40] = np.nan
+    bits[50:70] = True
+    assert booked(bits, statistic, np.full(100, since), cuts) == [(pytest.approx(begin), 0.7)]
+
+
+def test_no_cause_ends_where_there_are_no_data():
+    """A warning that is held for half a second runs on into a gap."""
+    statistic, bits = np.ones(100), np.zeros(100, dtype=bool)
+    statistic[60:90] = np.nan
+    bits[50:70] = True
+    assert booked(bits, statistic, np.zeros(100)) == [(0.5, 0.6)]
+
+
+def test_a_sum_of_zero_does_not_age_in_a_gap():
+    x = np.concatenate([np.zeros(100), np.full(100, np.nan), np.full(100, 0.6)])
+    g, bits, _ = cusum.scan(alarm_params(DT), cusum.initial_state(), x)
+    since, _, _ = cusum.ages(DT, cusum.new_ages(), g, bits)
+    first = int(np.argmax(bits))
+    assert since[first] == pytest.approx((first - 199) * DT)

@@ -82,6 +82,15 @@ def test_the_warning_names_what_decided():
     assert features["joint_gate"][30] == 0.0
 
 
+def test_a_warning_begins_only_where_the_resistance_is_known():
+    """The gate stays open for a second, also where the balance of forces has no value."""
+    x = np.where(np.arange(N) < 30, 0.3, np.nan)
+    seen = scene([track("spin_down", np.arange(N) > 50)], x=x)
+    shown, _, features = watched(JOINT_CRITERIA, seen)
+    assert features["joint_gate"][55] == 1.0
+    assert not shown.active.any()
+
+
 def test_a_criterion_that_began_under_braking_does_not_count():
     seen = scene([track("spin_down", np.arange(N) > 10)])
     assert watched(JOINT_CRITERIA, seen)[0].active.any()

@@ -1,8 +1,10 @@
 """A drive fed in pieces gives the same features, statistics and events as in one go, bit for bit."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.detect import stream
@@ -107,3 +109,22 @@ def test_a_drive_in_pieces_is_the_drive_in_one(monkeypatch):
         assert [(t.detector, t.wheel) for t in result.tracks] == [(t.detector, t.wheel) for t in whole.tracks]
     assert bare.features.is_empty()
     assert not any(t.statistic.size or t.active.size for t in bare.tracks)
+
+
+@pytest.mark.parametrize("lost", ["", "torque_", "a_x"])
+@pytest.mark.parametrize(("first", "end"), [(2.0, 6.6), (5.5, 7.0), (8.0, 9.5)])
+def test_no_episode_of_water_begins_or_ends_within_a_gap(lost, first, end):
+    """The lane is from 6 to 14 s; the resistance reaches back by up to two seconds."""
+    signals, _ = drive(CAR, duration_s=18.0, lanes=(lane(),), speed_kmh=((0.0, 104.0),))
+    t = pl.col("t")
+    gone = [pl.when((t >= first) & (t < end)).then(None).otherwise(pl.col(s)).alias(s)
+            for s in signals.symbols if s.startswith(lost)]  # fmt: skip
+    found = detect_drive(replace(signals, frame=signals.frame.with_columns(gone)), CAR, samples=False)
+    (*_, last) = found.judgement.of("aquaplaning")
+    assert last.end_s > 13.0
+    known = [e for e in found.events if e.detector == "resistance"]
+    for begin, until in [e.cause_s for e in known] + [
+        (e.start_s, e.end_s) for e in found.judgement.episodes if not lost
+    ]:
+        assert not first < begin < end
+        assert not first < until < end
