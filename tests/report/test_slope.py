@@ -82,6 +82,30 @@ def test_browser_draws_it_without_requests(browser, found, tmp_path):
     assert severe(browser) == []
 
 
+FITS = """
+return [...document.querySelectorAll('.js-plotly-plot')].every(p => {
+  const box = e => e.getBoundingClientRect(), legend = p.querySelector('.legend'), title = p.querySelector('.xtitle');
+  const isApart = !legend || !title || (box(legend).top >= box(title).bottom && box(legend).bottom <= box(p).bottom + 1);
+  return Math.abs(box(p.querySelector('.svg-container')).width - p.clientWidth) <= 1 && isApart;
+}) && document.documentElement.scrollWidth <= window.innerWidth
+"""
+
+
+@pytest.mark.browser
+def test_figures_follow_the_width_of_the_window(browser, found, tmp_path):
+    path = tmp_path / "page.html"
+    write_page(path, render_slope_page(found, title="run"))
+    try:
+        browser.get(path.as_uri())
+        wait_for(lambda: browser.execute_script("return document.body.dataset.ready === 'true'"))
+        for width in (390, 1400):
+            size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            wait_for(lambda: browser.execute_script(FITS), 15.0)
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_a_notebook_shows_the_sections_without_figures(found):
     html = report_fragment(slope_report(replace(found, vehicle_name=HOSTILE), (HOSTILE,)))
     assert "<h2>Over the session</h2>" in html

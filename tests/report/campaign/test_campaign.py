@@ -6,6 +6,7 @@ import re
 import pytest
 
 from tests.headless import click, requests, severe, wait_for
+from tests.report.test_contrast import ENOUGH, contrast
 
 pytestmark = pytest.mark.browser
 
@@ -104,6 +105,28 @@ def test_wheels_and_pooled_groups_are_told(page):
     pick(page, "n0")  # an own column, by which nothing is split
     assert not page.execute_script("return document.getElementById('pooled').hidden")
     assert "also use runs that the filters leave out" in texts(page, "#pooled")[0]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_speeds_in_a_cell_of_the_matrix_can_be_read(browser, folder, scheme):
+    """The ground of a cell is a colour of its own, which muted text is too near to [WCAG 2.2, 1.4.3]."""
+    try:
+        media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        page = opened(browser, folder / "index.html")
+        found = page.execute_script("""
+          const numbers = c => c.match(/[\\d.]+/g).map(Number), style = e => getComputedStyle(e);
+          const paper = numbers(style(document.querySelector('#matrix-section')).backgroundColor);
+          return [...document.querySelectorAll('#matrix td.cell small')].map(e => {
+            const [r, g, b, share] = numbers(style(e.parentElement).backgroundColor);
+            const ground = [r, g, b].map((x, i) => (share ?? 1) * x + (1 - (share ?? 1)) * paper[i]);
+            return [numbers(style(e).color).slice(0, 3), ground];
+          });""")
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert found
+    code = ["#" + "".join(f"{round(x):02x}" for x in colour) for pair in found for colour in pair]
+    assert min(map(contrast, code[::2], code[1::2])) >= ENOUGH
 
 
 def test_matrix_cell_filters_and_lets_go(page):
