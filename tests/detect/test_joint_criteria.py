@@ -156,6 +156,20 @@ def test_the_sum_warns_above_its_threshold_and_names_the_terms():
     assert event.severity == "partial"  # no wheel has lost the road
 
 
+@pytest.mark.parametrize(
+    ("mu", "is_alarm", "counts"), [(0.98, False, False), (0.05, False, True), (0.98, True, True), (None, False, True)]
+)
+def test_a_wheel_that_spins_up_with_its_traction_does_not_count(mu, is_alarm, counts):
+    """A front wheel under full throttle on a dry road, of which the resistance takes 0.25 m/s² (C27)."""
+    tracks = [track("resistance", True, statistic=0.1), track("spin_up", is_alarm, "fl", 3.0)]
+    seen = scene(tracks)
+    if mu is not None:
+        seen = replace(seen, f={**seen.f, "mu_fl": np.full(N, mu)})
+    found, _, features = watched(JOINT_CUSUM, seen)
+    assert found.active.all() == counts
+    assert features["joint_term_spin_up"] == pytest.approx(1.0 if counts else 0.0)
+
+
 @pytest.mark.parametrize("gated", [True, False])
 def test_without_resistance_the_sum_does_not_warn_unless_asked_to(gated):
     tracks = [track("spin_up", True, statistic=1.5), track("spin_down", True, statistic=1.5)]
