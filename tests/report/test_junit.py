@@ -1,6 +1,9 @@
 """JUnit XML as build servers read it."""
 
 import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
 
 from aqualog.report.junit import Case, Suite, junit_xml
 
@@ -22,3 +25,10 @@ def test_counts_and_kinds():
         [], [("failure", 'was 3 & "more" '), ("system-out", None)], [("error", "cannot be read")],
     ]  # fmt: skip
     assert {k for case in root.iter("testcase") for k in case.attrib} == {"classname", "name", "time"}
+
+
+def test_it_is_valid_by_the_schema_of_the_build_server():
+    """The schema of Jenkins' plug-in for test results, under the MIT licence that stands in it."""
+    etree = pytest.importorskip("lxml.etree")
+    schema = etree.XMLSchema(etree.parse(Path(__file__).with_name("junit-10.xsd")))
+    schema.assertValid(etree.fromstring(TEXT.encode()))
